@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a recording's folder (and files named on the command line in place of those in it).
+// Gives   Recording: everything declared and logged, read and checked; the video is only found, not decoded.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "calib/bundle/measurements.h"
+#include "calib/camera/camera_model.h"
+#include "calib/camera/marker_set.h"
+#include "calib/camera/tag_observations.h"
+#include "kinematics/log/joint_log.h"
+#include "kinematics/model/kinematic_tree.h"
+#include "kinematics/structure/pose_tracks.h"
+
+namespace kinescope {
+
+/// Files named on the command line; each takes the place of the one in the folder.
+struct RecordingPaths {
+  std::filesystem::path folder;
+  std::optional<std::filesystem::path> video, joints, camera, tags, corners, poses, points, nominal;
+};
+
+/// recording.yaml as a value.
+struct RecordingSettings {
+  std::string name;                            ///< of the robot; default: the folder's name
+  std::vector<std::string> torque_channels;
+  std::optional<Eigen::Vector3d> gravity;      ///< in the camera's frame, any length
+  std::vector<TagId> fixed_tags;               ///< declared at rest in the camera's frame
+  double video_start_s = 0.0;                  ///< added to the video's times: time of its first stamp on the log's clock
+  std::vector<TargetDistance> target_distances;
+  std::map<std::string, std::string> units;    ///< channel: rad, deg, m, mm, ticks
+};
+
+/// How far into the path the recording enters.
+enum class RecordingEntry { kVideo, kCorners, kPoses, kPoints };
+
+struct Recording {
+  std::filesystem::path folder;
+  RecordingSettings settings;
+  RecordingEntry entry = RecordingEntry::kVideo;
+  std::filesystem::path video;                 ///< file or image folder; empty unless entry is kVideo
+  std::optional<TagObservations> corners;      ///< corners.csv
+  std::optional<PoseTracks> poses;             ///< poses.csv
+  std::optional<PointObservations> points;     ///< points.csv
+  JointLog log;                                ///< empty when there is no joints.csv
+  std::optional<CameraModel> camera;           ///< none: to be estimated
+  MarkerSet markers;
+  std::optional<KinematicTree> nominal;
+  std::vector<std::filesystem::path> files;    ///< everything that was read, sorted
+  std::vector<std::string> warnings;
+};
+
+/// Reads and checks everything but the video's frames. Throws Error (file, place, remedy).
+[[nodiscard]] Recording read_recording(const RecordingPaths& paths);
+
+/// The single readers, for the same files anywhere.
+[[nodiscard]] MarkerSet read_marker_set(const std::filesystem::path& path);
+[[nodiscard]] RecordingSettings read_recording_settings(const std::filesystem::path& path);
+/// corners.csv: t,tag,corner,u,v[,sigma] (px; corner from 0), one row a corner.
+[[nodiscard]] TagObservations read_corners(const std::filesystem::path& path, const MarkerSet& markers);
+/// poses.csv: t,body,x,y,z,qx,qy,qz,qw[,sigma_m,sigma_rad] (m; body in the camera's or tracker's frame).
+[[nodiscard]] PoseTracks read_poses(const std::filesystem::path& path);
+/// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place is unknown.
+[[nodiscard]] PointObservations read_points(const std::filesystem::path& path);
+
+}  // namespace kinescope

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace kinescope {
+
+/// SHA-256 of a file in hexadecimal, as sha256sum prints it. Throws bad_input.
+[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+
+}  // namespace kinescope

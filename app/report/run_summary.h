@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// All products of one run, gathered for its report.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calib/bundle/calibration.h"
+#include "calib/camera/marker_set.h"
+#include "calib/quality/error_summary.h"
+#include "kinematics/log/joint_log.h"
+#include "kinematics/structure/pose_tracks.h"
+#include "kinematics/structure/structure.h"
+
+namespace kinescope {
+
+struct InputFile {
+  std::string name;    ///< relative to the recording
+  std::string sha256;
+};
+
+struct StageTime {
+  std::string stage;
+  double seconds = 0.0;
+};
+
+/// What was seen of one marker.
+struct MarkerSummary {
+  TagId id;
+  double size_m = 0.0;
+  int frames_seen = 0;
+  double median_edge_px = 0.0;
+  double median_sigma_px = 0.0;
+};
+
+struct RunSummary {
+  std::string robot;            ///< name
+  std::string recording;        ///< folder name
+  std::string entry;            ///< "video", "corners", "poses", "points"
+  std::string version;          ///< of the program
+  std::string command;          ///< how to reproduce
+  std::vector<InputFile> inputs;
+  std::vector<std::pair<std::string, std::string>> options;  ///< name, value
+  std::vector<StageTime> times;
+
+  int frames = 0;               ///< of the recording
+  double duration_s = 0.0;
+  std::vector<MarkerSummary> markers;
+  std::vector<std::pair<std::string, int>> rejected;  ///< reason, count
+  std::vector<std::string> warnings;                  ///< of reading and detection
+  bool camera_declared = true;
+
+  JointLog log;
+  PoseTracks tracks;            ///< empty for points
+  std::optional<Structure> structure;   ///< none when a nominal robot was given
+  std::optional<KinematicTree> nominal;
+  Calibration calibration;
+  ErrorSummary errors;
+};
+
+}  // namespace kinescope

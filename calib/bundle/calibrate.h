@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   Measurements, a JointLog and a start (from the structure, or a nominal robot).
+// Gives   Calibration: all parameters with covariance, residuals, held-out errors.
+// Frames  gauge: the base frame is held to the first marker of the base link (or, where there is none, to
+//         the camera); joint frames keep z on the axis and do not turn about or slide along it.
+// Method  bundle adjustment over the corners (or poses, or points) with Ceres; product of exponentials;
+//         robust loss, then rejection and a plain refit; block-wise (sandwich) covariance.
+// Not here: finding the structure, tracing what is left (calib/trace).
+#pragma once
+
+#include "calib/bundle/calibration.h"
+#include "calib/bundle/measurements.h"
+#include "calib/camera/marker_set.h"
+#include "kinematics/core/progress.h"
+#include "kinematics/log/joint_log.h"
+
+namespace kinescope {
+
+/// What is estimated of the joints; each level includes the ones before it.
+enum class FreeGeometry {
+  kPlacement,  ///< only where the base and the markers are
+  kOffsets,    ///< + the zero of every joint
+  kGeometry    ///< + axes: direction and place
+};
+
+/// Where the search starts, and what is held.
+struct CalibrationStart {
+  KinematicTree tree;
+  Pose T_camera_base;
+  CameraModel camera;
+  double time_offset_s = 0.0;
+  Eigen::MatrixXd joint_values;   ///< frames x joints for joints no channel drives; else empty
+  bool nominal = false;           ///< the tree is a nominal robot: names, zeros and link frames are kept
+  bool markers_placed = true;     ///< false: marker mounts and T_camera_base are to be found first
+};
+
+struct CalibrateOptions {
+  FreeGeometry free = FreeGeometry::kGeometry;
+  bool estimate_intrinsics = false;
+  bool estimate_time_offset = true;
+  bool estimate_scales = false;      ///< of channels that are declared in rad or m
+  double nominal_sigma_m = 5e-3;     ///< prior on the geometry of a nominal robot
+  double nominal_sigma_rad = 0.01;
+  double reject_sigma = 4.5;         ///< sightings beyond this many standard deviations are left out
+  int folds = 5;                     ///< of the cross-validation; 0: none
+  int max_iterations = 100;
+};
+
+/// Throws undetermined when there is nothing to fit (no sighting with a joint value).
+[[nodiscard]] Calibration calibrate(const Measurements& measurements, const MarkerSet& markers,
+                                    const JointLog& log, const CalibrationStart& start,
+                                    const CalibrateOptions& options = {},
+                                    const Progress& progress = {});
+
+}  // namespace kinescope

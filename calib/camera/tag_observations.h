@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What was seen: the corners of markers, frame by frame. observations.csv / corners.csv as a value.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "kinematics/core/ids.h"
+
+namespace kinescope {
+
+/// One marker in one frame.
+struct TagObservation {
+  int frame = 0;                          ///< index into TagObservations::times_s
+  TagId id;
+  std::vector<Eigen::Vector2d> corners_px;  ///< in the order of MarkerSet::corners_m; centre of pixel at 0
+  double sigma_px = 0.1;                  ///< standard deviation of one coordinate of one corner
+  int hamming = 0;                        ///< bits corrected
+  double decision_margin = 0.0;           ///< contrast of the decoding; 0 where unknown
+};
+
+/// A detection that was seen and not believed.
+struct RejectedTag {
+  int frame = 0;
+  TagId id;
+  std::string reason;
+};
+
+struct TagObservations {
+  std::vector<double> times_s;  ///< of every frame of the recording, also of those without a marker
+  int width = 0;                ///< px
+  int height = 0;               ///< px
+  std::vector<TagObservation> observations;  ///< by frame, then id
+  std::vector<RejectedTag> rejected;
+};
+
+}  // namespace kinescope

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   one grey image.
+// Gives   the markers in it: id, four corners (px, centre of pixel at 0, AprilTag order), decoding margin.
+// Method  AprilTag 3 (Krogius et al. 2019) through the packaged library; ArUco dictionaries through OpenCV.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "calib/camera/tag_observations.h"
+#include "calib/vision/image_view.h"
+
+namespace kinescope {
+
+struct DetectorOptions {
+  double decimate = 1.0;   ///< search at 1/decimate of the resolution; more is faster and misses small tags
+  double blur_sigma = 0.0; ///< px, smoothing before the search
+  bool refine_edges = true;
+  int max_hamming = 1;     ///< bits corrected at most; more finds more and invents more
+  double min_margin = 20.0;///< least decision margin (AprilTag families)
+};
+
+class TagDetector {
+ public:
+  virtual ~TagDetector() = default;
+  /// `frame` of the result is 0. Not thread-safe: one detector a thread.
+  [[nodiscard]] virtual std::vector<TagObservation> detect(const ImageView& image) = 0;
+};
+
+/// Names of all families this build knows.
+[[nodiscard]] std::vector<std::string> known_families();
+
+/// Throws bad_request for a family we do not know (and names those we do).
+[[nodiscard]] std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
+                                                             const DetectorOptions& options = {});
+
+}  // namespace kinescope

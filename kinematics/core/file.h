@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Whole files, in and out. A product is written to a temporary name beside its place and renamed, so
+// that a run that is cut off leaves nothing half-written.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace kinescope {
+
+/// The file's bytes. Throws bad_input when it is missing, a folder, unreadable or over `max_bytes`.
+[[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
+                                         std::uintmax_t max_bytes = std::uintmax_t{1} << 30U);
+
+/// Writes all of it or nothing. Throws bad_request when the folder cannot be written.
+void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+/// Makes the folder (and its parents) and proves that a file can be made there. Throws bad_request.
+void require_writable_folder(const std::filesystem::path& folder);
+
+}  // namespace kinescope

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/log/joint_log.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/csv.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+JointLog from_table(const CsvTable& table, const std::vector<std::string>& torque_channels) {
+  JointLog log;
+  log.source = table.source;
+  const std::size_t time_column = table.require_column("t");
+  std::vector<std::size_t> columns;
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    const std::string& name = table.header[c];
+    const bool torque =
+        name.starts_with("tau") || std::ranges::find(torque_channels, name) != torque_channels.end();
+    if (c == time_column || torque) continue;
+    columns.push_back(c);
+    log.channels.push_back(name);
+  }
+  if (columns.empty()) {
+    throw bad_input(table.source + ":1", "no joint channel beside 't'",
+                    "add one column a joint with its value in rad, m or ticks");
+  }
+  const auto rows = static_cast<Eigen::Index>(table.rows.size());
+  log.values.resize(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    const double time_s = table.number(r, time_column);
+    if (!log.times_s.empty() && time_s <= log.times_s.back()) {
+      throw bad_input(table.place(r),
+                      fmt::format("time {:.6f} s does not come after {:.6f} s", time_s,
+                                  log.times_s.back()),
+                      "sort the rows by time and remove repeated stamps");
+    }
+    log.times_s.push_back(time_s);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      log.values(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
+          table.number(r, columns[c]);
+    }
+  }
+  return log;
+}
+
+// Slope at sample i from its neighbours (parabola through three points; one-sided at the ends).
+double slope(const JointLog& log, int channel, std::size_t i) {
+  const std::size_t n = log.size();
+  const auto value = [&](std::size_t k) { return log.values(static_cast<Eigen::Index>(k), channel); };
+  const auto secant = [&](std::size_t k) {
+    return (value(k + 1) - value(k)) / (log.times_s[k + 1] - log.times_s[k]);
+  };
+  if (i == 0) return secant(0);
+  if (i == n - 1) return secant(n - 2);
+  const double left = log.times_s[i] - log.times_s[i - 1];
+  const double right = log.times_s[i + 1] - log.times_s[i];
+  return (secant(i - 1) * right + secant(i) * left) / (left + right);
+}
+
+ChannelValue hermite(const JointLog& log, int channel, std::size_t i, double time_s) {
+  const double h = log.times_s[i + 1] - log.times_s[i];
+  const double u = (time_s - log.times_s[i]) / h;
+  const double y0 = log.values(static_cast<Eigen::Index>(i), channel);
+  const double y1 = log.values(static_cast<Eigen::Index>(i + 1), channel);
+  const double m0 = h * slope(log, channel, i);
+  const double m1 = h * slope(log, channel, i + 1);
+  const double u2 = u * u;
+  const double u3 = u2 * u;
+  const double value = (2 * u3 - 3 * u2 + 1) * y0 + (u3 - 2 * u2 + u) * m0 +
+                       (-2 * u3 + 3 * u2) * y1 + (u3 - u2) * m1;
+  const double rate = ((6 * u2 - 6 * u) * y0 + (3 * u2 - 4 * u + 1) * m0 + (-6 * u2 + 6 * u) * y1 +
+                       (3 * u2 - 2 * u) * m1) /
+                      h;
+  return {value, rate};
+}
+
+enum class Quantity { kValue, kRate };
+
+Eigen::MatrixXd resample_quantity(const JointLog& log, const std::vector<double>& times_s,
+                                  double time_offset_s, double max_gap_s, Quantity quantity) {
+  const auto channels = static_cast<Eigen::Index>(log.channels.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(times_s.size()), channels,
+                                                  std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t f = 0; f < times_s.size(); ++f) {
+    for (Eigen::Index c = 0; c < channels; ++c) {
+      const auto sample =
+          interpolate(log, static_cast<int>(c), times_s[f] + time_offset_s, max_gap_s);
+      if (!sample) continue;
+      out(static_cast<Eigen::Index>(f), c) =
+          quantity == Quantity::kValue ? sample->value : sample->rate;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<int> JointLog::channel(std::string_view name) const {
+  const auto found = std::ranges::find(channels, name);
+  if (found == channels.end()) return std::nullopt;
+  return static_cast<int>(found - channels.begin());
+}
+
+JointLog read_joint_log(const std::filesystem::path& path,
+                        const std::vector<std::string>& torque_channels) {
+  return from_table(read_csv(path), torque_channels);
+}
+
+JointLog parse_joint_log(std::string_view text, const std::string& source,
+                         const std::vector<std::string>& torque_channels) {
+  return from_table(parse_csv(text, source), torque_channels);
+}
+
+std::optional<ChannelValue> interpolate(const JointLog& log, int channel, double time_s,
+                                        double max_gap_s) {
+  if (log.empty() || time_s < log.times_s.front() || time_s > log.times_s.back()) {
+    return std::nullopt;
+  }
+  const auto after = std::ranges::upper_bound(log.times_s, time_s);
+  const auto before = static_cast<std::size_t>(after - log.times_s.begin()) - 1;
+  if (log.times_s[before] == time_s) {
+    const auto row = static_cast<Eigen::Index>(before);
+    return ChannelValue{log.values(row, channel), log.size() > 1 ? slope(log, channel, before) : 0.0};
+  }
+  if (log.times_s[before + 1] - log.times_s[before] > max_gap_s) return std::nullopt;
+  return hermite(log, channel, before, time_s);
+}
+
+Eigen::MatrixXd resample(const JointLog& log, const std::vector<double>& times_s,
+                         double time_offset_s, double max_gap_s) {
+  return resample_quantity(log, times_s, time_offset_s, max_gap_s, Quantity::kValue);
+}
+
+Eigen::MatrixXd resample_rates(const JointLog& log, const std::vector<double>& times_s,
+                               double time_offset_s, double max_gap_s) {
+  return resample_quantity(log, times_s, time_offset_s, max_gap_s, Quantity::kRate);
+}
+
+bool is_posture_log(const JointLog& log, const std::vector<double>& times_s) {
+  return std::ranges::all_of(
+      times_s, [&](double t) { return std::ranges::binary_search(log.times_s, t); });
+}
+
+}  // namespace kinescope

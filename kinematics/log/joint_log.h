@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   joints.csv: `t` in s, then one column a channel (rad, m or raw ticks), any order and name.
+// Gives   JointLog: named channels over their own clock, and their values between the samples.
+// Method  cubic Hermite interpolation with three-point slopes (Catmull-Rom for uneven steps).
+// Not here: which channel drives what (kinematics/structure), torques (dynamics).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace kinescope {
+
+/// Joint values over time. All channels share the stamps.
+struct JointLog {
+  std::string source;                 ///< file name, for messages; empty when made by hand
+  std::vector<double> times_s;        ///< strictly increasing
+  std::vector<std::string> channels;  ///< names, in the file's order
+  Eigen::MatrixXd values;             ///< samples x channels, in the channel's own unit
+
+  [[nodiscard]] std::size_t size() const { return times_s.size(); }
+  [[nodiscard]] bool empty() const { return times_s.empty(); }
+  [[nodiscard]] std::optional<int> channel(std::string_view name) const;
+};
+
+/// A channel's value and rate at a time.
+struct ChannelValue {
+  double value = 0.0;
+  double rate = 0.0;  ///< per s
+};
+
+/// Reads joints.csv. `torque_channels` and columns that begin with "tau" are left out.
+/// Throws bad_input: missing or empty file, no column `t`, a cell that is no finite number, stamps that
+/// do not increase, no channel. Each names file, line and remedy.
+[[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
+                                      const std::vector<std::string>& torque_channels = {});
+[[nodiscard]] JointLog parse_joint_log(std::string_view text, const std::string& source,
+                                       const std::vector<std::string>& torque_channels = {});
+
+/// The channel at `time_s`, or nothing before the first, after the last sample, or inside a gap longer
+/// than `max_gap_s`. O(log samples).
+[[nodiscard]] std::optional<ChannelValue> interpolate(const JointLog& log, int channel,
+                                                      double time_s, double max_gap_s = 0.5);
+
+/// All channels at the given times: times x channels; rows that cannot be interpolated are NaN.
+[[nodiscard]] Eigen::MatrixXd resample(const JointLog& log, const std::vector<double>& times_s,
+                                       double time_offset_s = 0.0, double max_gap_s = 0.5);
+
+/// Resampled rates (per s), as resample().
+[[nodiscard]] Eigen::MatrixXd resample_rates(const JointLog& log,
+                                             const std::vector<double>& times_s,
+                                             double time_offset_s = 0.0, double max_gap_s = 0.5);
+
+/// True when every one of the times is exactly a stamp of the log: postures measured at rest, with
+/// nothing to interpolate and no clock to align.
+[[nodiscard]] bool is_posture_log(const JointLog& log, const std::vector<double>& times_s);
+
+}  // namespace kinescope
