@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/tracks/planar_pose.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Dense>
+
+namespace kinescope {
+namespace {
+
+constexpr int kMaxIterations = 20;
+// Two refined branches closer than this (rad) are one pose.
+constexpr double kSameBranch = 1e-3;
+
+// Homography from plane to normalised image coordinates by the direct linear transform; coordinates are
+// of order one already. Nothing when the corners do not span the plane.
+std::optional<Eigen::Matrix3d> homography(std::span<const Eigen::Vector2d> plane,
+                                          std::span<const Eigen::Vector2d> image) {
+  const auto n = static_cast<Eigen::Index>(plane.size());
+  Eigen::MatrixXd A(2 * n, 9);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector2d& p = plane[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d& x = image[static_cast<std::size_t>(i)];
+    A.row(2 * i) << p.x(), p.y(), 1, 0, 0, 0, -x.x() * p.x(), -x.x() * p.y(), -x.x();
+    A.row(2 * i + 1) << 0, 0, 0, p.x(), p.y(), 1, -x.y() * p.x(), -x.y() * p.y(), -x.y();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(A.transpose() * A);
+  if (eigen.eigenvalues()[1] < 1e-12 * eigen.eigenvalues()[8]) return std::nullopt;
+  const Eigen::Matrix<double, 9, 1> h = eigen.eigenvectors().col(0);
+  Eigen::Matrix3d H;
+  H << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8];
+  if (std::abs(H(2, 2)) < 1e-12 * H.norm()) return std::nullopt;
+  return H / H(2, 2);
+}
+
+// Both rotations that share the homography's first derivative at the origin of the plane.
+// Collins and Bartoli 2014, section 3 and appendix A.
+std::optional<std::array<Eigen::Matrix3d, 2>> ippe_rotations(const Eigen::Matrix3d& H) {
+  const Eigen::Vector2d v = H.topRightCorner<2, 1>();
+  const Eigen::Matrix2d J = H.topLeftCorner<2, 2>() - v * H.bottomLeftCorner<1, 2>();
+  const Eigen::Matrix3d Rv =
+      rotation_to_axis(Eigen::Vector3d(v.x(), v.y(), 1.0).normalized()).toRotationMatrix();
+  Eigen::Matrix<double, 2, 3> P;
+  P << 1, 0, -v.x(), 0, 1, -v.y();
+  const Eigen::Matrix2d B = P * Rv.leftCols<2>();
+  if (std::abs(B.determinant()) < 1e-12) return std::nullopt;
+  const Eigen::Matrix2d A = B.inverse() * J;
+  const double gamma = A.jacobiSvd().singularValues()[0];
+  if (!(gamma > 0.0)) return std::nullopt;
+  const Eigen::Matrix2d R22 = A / gamma;
+  const Eigen::Matrix2d rest = Eigen::Matrix2d::Identity() - R22.transpose() * R22;
+  Eigen::Vector2d b(std::sqrt(std::max(0.0, rest(0, 0))), std::sqrt(std::max(0.0, rest(1, 1))));
+  if (rest(0, 1) < 0.0) b.y() = -b.y();
+  std::array<Eigen::Matrix3d, 2> rotations;
+  for (int k = 0; k < 2; ++k) {
+    Eigen::Matrix3d R;
+    R.topLeftCorner<2, 2>() = R22;
+    R.bottomLeftCorner<1, 2>() = (k == 0 ? 1.0 : -1.0) * b.transpose();
+    R.col(2) = R.col(0).cross(R.col(1));
+    rotations[static_cast<std::size_t>(k)] = Rv * R;
+  }
+  return rotations;
+}
+
+Eigen::Vector3d translation_for(const Eigen::Matrix3d& R, std::span<const Eigen::Vector3d> points,
+                                std::span<const Eigen::Vector2d> image) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p = R * points[i];
+    Eigen::Matrix<double, 2, 3> A;
+    A << 1, 0, -image[i].x(), 0, 1, -image[i].y();
+    normal += A.transpose() * A;
+    right -= A.transpose() * A * p;
+  }
+  return normal.ldlt().solve(right);
+}
+
+struct Linearised {
+  Matrix6d normal = Matrix6d::Zero();  // J'J / sigma^2
+  Vector6d gradient = Vector6d::Zero();
+  double chi_square = 0.0;
+};
+
+std::optional<Linearised> linearise(const CameraModel& camera, const Pose& T_camera_marker,
+                                    std::span<const Eigen::Vector3d> points,
+                                    std::span<const Eigen::Vector2d> pixels, double sigma_px) {
+  Linearised out;
+  const Eigen::Matrix3d R = T_camera_marker.matrix3();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto projection = project_with_derivatives(camera, T_camera_marker * points[i]);
+    if (!projection) return std::nullopt;
+    Eigen::Matrix<double, 3, 6> d_point;  // of T exp(d) p: R [-[p]x, I]
+    d_point << -R * skew(points[i]), R;
+    const Eigen::Matrix<double, 2, 6> J = projection->d_point * d_point / sigma_px;
+    const Eigen::Vector2d r = (pixels[i] - projection->pixel) / sigma_px;
+    out.normal += J.transpose() * J;
+    out.gradient += J.transpose() * r;
+    out.chi_square += r.squaredNorm();
+  }
+  return out;
+}
+
+// Levenberg-Marquardt on the corners.
+std::optional<PlanarBranch> refine(const CameraModel& camera, Pose pose,
+                                   std::span<const Eigen::Vector3d> points,
+                                   std::span<const Eigen::Vector2d> pixels, double sigma_px) {
+  auto state = linearise(camera, pose, points, pixels, sigma_px);
+  if (!state) return std::nullopt;
+  double damping = 1e-6;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    Matrix6d damped = state->normal;
+    damped.diagonal() *= 1.0 + damping;
+    const Vector6d step = damped.ldlt().solve(state->gradient);
+    const Pose candidate = pose * exp_pose(step);
+    const auto next = linearise(camera, candidate, points, pixels, sigma_px);
+    if (!next || next->chi_square > state->chi_square) {
+      damping *= 10.0;
+      if (damping > 1e6) break;
+      continue;
+    }
+    const double gain = state->chi_square - next->chi_square;
+    pose = candidate;
+    state = next;
+    damping = std::max(1e-12, damping * 0.1);
+    if (gain < 1e-9 * (1.0 + state->chi_square)) break;
+  }
+  const Eigen::LDLT<Matrix6d> factor(state->normal);
+  if (!factor.isPositive()) return std::nullopt;
+  PlanarBranch branch{pose, state->chi_square, factor.solve(Matrix6d::Identity())};
+  if (!branch.covariance.allFinite()) return std::nullopt;
+  return branch;
+}
+
+}  // namespace
+
+std::optional<PlanarPose> estimate_planar_pose(const CameraModel& camera,
+                                               std::span<const Eigen::Vector3d> corners_m,
+                                               std::span<const Eigen::Vector2d> corners_px,
+                                               double sigma_px) {
+  if (corners_m.size() < 4 || corners_m.size() != corners_px.size()) return std::nullopt;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : corners_m) centre += p / static_cast<double>(corners_m.size());
+  double scale = 0.0;
+  for (const Eigen::Vector3d& p : corners_m) scale = std::max(scale, (p - centre).norm());
+  std::vector<Eigen::Vector2d> plane;
+  std::vector<Eigen::Vector2d> image;
+  for (std::size_t i = 0; i < corners_m.size(); ++i) {
+    const auto ray = unproject(camera, corners_px[i]);
+    if (!ray) return std::nullopt;
+    plane.emplace_back((corners_m[i] - centre).head<2>() / scale);
+    image.push_back(*ray);
+  }
+  const auto H = homography(plane, image);
+  if (!H) return std::nullopt;
+  const auto rotations = ippe_rotations(*H);
+  if (!rotations) return std::nullopt;
+
+  std::vector<PlanarBranch> branches;
+  for (const Eigen::Matrix3d& R : *rotations) {
+    const Pose start{Eigen::Quaterniond(R).normalized(), translation_for(R, corners_m, image)};
+    if (auto branch = refine(camera, start, corners_m, corners_px, sigma_px)) {
+      branches.push_back(*branch);
+    }
+  }
+  if (branches.empty()) return std::nullopt;
+  if (branches.size() == 1) return PlanarPose{branches[0], std::nullopt};
+  if (branches[1].chi_square < branches[0].chi_square) std::swap(branches[0], branches[1]);
+  if (angle_between(branches[0].T_camera_marker.rotation, branches[1].T_camera_marker.rotation) <
+      kSameBranch) {
+    return PlanarPose{branches[0], std::nullopt};
+  }
+  return PlanarPose{branches[0], branches[1]};
+}
+
+}  // namespace kinescope

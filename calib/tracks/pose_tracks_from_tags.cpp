@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/tracks/pose_tracks_from_tags.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "calib/tracks/planar_pose.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+// How fast a marker may plausibly turn (rad/s, one standard deviation) and how much it may turn between
+// frames on top of that: the branch that would need more is the wrong one.
+constexpr double kTurnRate = 2.0;
+constexpr double kTurnFloor = 0.05;
+// No single step may count for more than this (chi-square): a real jump must stay possible.
+constexpr double kMaxStepCost = 30.0;
+// The sightings with the largest images used to find a focal length.
+constexpr std::size_t kFocalViews = 120;
+
+struct Candidate {
+  int frame = 0;
+  PlanarPose pose;
+  [[nodiscard]] int count() const { return pose.other ? 2 : 1; }
+  [[nodiscard]] const PlanarBranch& branch(int k) const { return k == 0 ? pose.best : *pose.other; }
+};
+
+double step_cost(const PlanarBranch& a, const PlanarBranch& b, double dt_s) {
+  const double angle = angle_between(a.T_camera_marker.rotation, b.T_camera_marker.rotation);
+  const double noise = a.covariance.topLeftCorner<3, 3>().trace() +
+                       b.covariance.topLeftCorner<3, 3>().trace();
+  const double spread = kTurnFloor + kTurnRate * dt_s;
+  return std::min(kMaxStepCost, angle * angle / (spread * spread + noise));
+}
+
+// The most probable sequence of branches (Viterbi).
+std::vector<int> choose_branches(const std::vector<Candidate>& candidates,
+                                 const std::vector<double>& times_s) {
+  std::vector<std::array<double, 2>> cost(candidates.size());
+  std::vector<std::array<int, 2>> from(candidates.size());
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    for (int k = 0; k < candidates[i].count(); ++k) {
+      const auto slot = static_cast<std::size_t>(k);
+      cost[i][slot] = candidates[i].branch(k).chi_square;
+      if (i == 0) continue;
+      const double dt = times_s[static_cast<std::size_t>(candidates[i].frame)] -
+                        times_s[static_cast<std::size_t>(candidates[i - 1].frame)];
+      double best = std::numeric_limits<double>::infinity();
+      for (int m = 0; m < candidates[i - 1].count(); ++m) {
+        const double total = cost[i - 1][static_cast<std::size_t>(m)] +
+                             step_cost(candidates[i - 1].branch(m), candidates[i].branch(k), dt);
+        if (total < best) {
+          best = total;
+          from[i][slot] = m;
+        }
+      }
+      cost[i][slot] += best;
+    }
+  }
+  std::vector<int> chosen(candidates.size(), 0);
+  if (candidates.empty()) return chosen;
+  const std::size_t last = candidates.size() - 1;
+  chosen[last] = candidates[last].count() == 2 && cost[last][1] < cost[last][0] ? 1 : 0;
+  for (std::size_t i = last; i > 0; --i) {
+    chosen[i - 1] = from[i][static_cast<std::size_t>(chosen[i])];
+  }
+  return chosen;
+}
+
+PoseTrack make_track(TagId id, const std::vector<Candidate>& candidates,
+                     const std::vector<double>& times_s) {
+  PoseTrack track{id, {}};
+  const std::vector<int> chosen = choose_branches(candidates, times_s);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const PlanarBranch& branch = candidates[i].branch(chosen[i]);
+    PoseSample sample;
+    sample.frame = candidates[i].frame;
+    sample.T_camera_marker = branch.T_camera_marker;
+    sample.covariance = branch.covariance;
+    if (candidates[i].count() == 2) {
+      const PlanarBranch& other = candidates[i].branch(1 - chosen[i]);
+      sample.T_camera_marker_alternative = other.T_camera_marker;
+      sample.alternative_cost = other.chi_square - branch.chi_square;
+    }
+    track.samples.push_back(std::move(sample));
+  }
+  return track;
+}
+
+double perimeter(const TagObservation& observation) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < observation.corners_px.size(); ++i) {
+    sum += (observation.corners_px[i] -
+            observation.corners_px[(i + 1) % observation.corners_px.size()])
+               .norm();
+  }
+  return sum;
+}
+
+// Robust misfit of all views, each with its own pose, for one focal length.
+double focal_cost(const CameraModel& camera, const std::vector<const TagObservation*>& views,
+                  const MarkerSet& markers) {
+  constexpr double kCap = 1e4;  // a view that does not fit at any focal length must not decide
+  double sum = 0.0;
+  for (const TagObservation* view : views) {
+    const auto pose = estimate_planar_pose(camera, markers.corners_m(view->id), view->corners_px,
+                                           view->sigma_px);
+    sum += pose ? std::min(kCap, pose->best.chi_square) : kCap;
+  }
+  return sum;
+}
+
+}  // namespace
+
+PoseTracks pose_tracks_from_tags(const TagObservations& observations, const CameraModel& camera,
+                                 const MarkerSet& markers) {
+  std::map<TagId, std::vector<Candidate>> candidates;
+  for (const TagObservation& observation : observations.observations) {
+    const auto pose = estimate_planar_pose(camera, markers.corners_m(observation.id),
+                                           observation.corners_px, observation.sigma_px);
+    if (pose) candidates[observation.id].push_back({observation.frame, *pose});
+  }
+  PoseTracks tracks{observations.times_s, {}};
+  for (auto& [id, list] : candidates) {
+    std::ranges::sort(list, {}, &Candidate::frame);
+    tracks.tracks.push_back(make_track(id, list, observations.times_s));
+  }
+  return tracks;
+}
+
+double focal_from_tags(const TagObservations& observations, const MarkerSet& markers) {
+  std::vector<const TagObservation*> views;
+  for (const TagObservation& observation : observations.observations) {
+    views.push_back(&observation);
+  }
+  std::ranges::stable_sort(views, [](const TagObservation* a, const TagObservation* b) {
+    return perimeter(*a) > perimeter(*b);
+  });
+  if (views.size() > kFocalViews) views.resize(kFocalViews);
+
+  const auto cost = [&](double log_focal) {
+    return focal_cost(pinhole_guess(observations.width, observations.height, std::exp(log_focal)),
+                      views, markers);
+  };
+  constexpr int kGrid = 24;
+  const double low = std::log(0.4 * observations.width);
+  const double step = std::log(10.0) / kGrid;
+  int best = 0;
+  std::vector<double> costs;
+  for (int i = 0; i <= kGrid; ++i) {
+    costs.push_back(cost(low + i * step));
+    if (costs.back() < costs[static_cast<std::size_t>(best)]) best = i;
+  }
+  if (best == 0 || best == kGrid) {
+    throw undetermined("camera",
+                       "the focal length cannot be seen in the markers' shapes",
+                       "give a camera.yaml (kinescope camera makes one), or film the markers "
+                       "larger and more tilted");
+  }
+  // Golden section between the neighbours.
+  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
+  double a = low + (best - 1) * step;
+  double b = low + (best + 1) * step;
+  for (int i = 0; i < 24; ++i) {
+    const double c = b - ratio * (b - a);
+    const double d = a + ratio * (b - a);
+    if (cost(c) < cost(d)) {
+      b = d;
+    } else {
+      a = c;
+    }
+  }
+  return std::exp(0.5 * (a + b));
+}
+
+}  // namespace kinescope

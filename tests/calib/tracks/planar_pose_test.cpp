@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/tracks/planar_pose.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "calib/camera/marker_set.h"
+#include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/core/rng.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kExact = 1e-8;  // rad, m: noise-free corners, Gauss-Newton to convergence
+
+CameraModel camera_720p() {
+  CameraModel camera = pinhole_guess(1280, 720, 900.0);
+  camera.distortion = {-0.1, 0.05, 0.0007, -0.0003, 0.0};
+  return camera;
+}
+
+// A marker that faces the camera, tilted at random by up to 60 degrees.
+Pose random_view(Rng& rng, double distance_m) {
+  Vector6d tilt = Vector6d::Zero();
+  const double direction = rng.uniform(0.0, 6.28);
+  const double angle = rng.uniform(0.2, 1.0);
+  tilt.head<3>() << angle * std::cos(direction), angle * std::sin(direction), 0.0;
+  Pose view = exp_pose(tilt);
+  view.rotation = view.rotation * exp_rotation({0.0, 0.0, rng.uniform(-3.0, 3.0)});
+  view.translation << rng.uniform(-0.3, 0.3) * distance_m, rng.uniform(-0.15, 0.15) * distance_m,
+      distance_m;
+  return view;
+}
+
+std::vector<Eigen::Vector2d> images(const CameraModel& camera, const Pose& T_camera_marker,
+                                    const std::vector<Eigen::Vector3d>& corners) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const auto& corner : corners) pixels.push_back(*project(camera, T_camera_marker * corner));
+  return pixels;
+}
+
+TEST(PlanarPose, RecoversThePoseOfCleanCorners) {
+  Rng rng = Rng::from_name("planar pose clean");
+  const auto corners = square_corners(0.05);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Pose truth = random_view(rng, rng.uniform(0.3, 1.5));
+    const auto pixels = images(camera_720p(), truth, corners);
+    const auto found = estimate_planar_pose(camera_720p(), corners, pixels, 0.1);
+    ASSERT_TRUE(found);
+    EXPECT_LT(log_pose(truth.inverse() * found->best.T_camera_marker).norm(), kExact) << trial;
+    EXPECT_LT(found->best.chi_square, kExact);
+  }
+}
+
+TEST(PlanarPose, TheOtherBranchMirrorsTheNormal) {
+  // A small tag far away: both branches explain it nearly as well, tilted to opposite sides.
+  Rng rng = Rng::from_name("planar pose branches");
+  const auto corners = square_corners(0.03);
+  int with_other = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const Pose truth = random_view(rng, 2.0);
+    const auto found =
+        estimate_planar_pose(camera_720p(), corners, images(camera_720p(), truth, corners), 0.1);
+    ASSERT_TRUE(found);
+    if (!found->other) continue;
+    ++with_other;
+    EXPECT_GT(found->other->chi_square, found->best.chi_square);
+    EXPECT_GT(angle_between(found->other->T_camera_marker.rotation, truth.rotation), 0.1);
+    EXPECT_LT((found->other->T_camera_marker.translation - truth.translation).norm(), 0.05);
+  }
+  EXPECT_GT(with_other, 40);
+}
+
+TEST(PlanarPose, CovarianceCoversTheScatter) {
+  // chi-square of the pose error against the claimed covariance has mean 6 and variance 12.
+  constexpr int kTrials = 600;
+  constexpr double kSigma = 0.05;
+  Rng rng = Rng::from_name("planar pose coverage");
+  const auto corners = square_corners(0.08);
+  double sum = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Pose truth = random_view(rng, 0.6);
+    auto pixels = images(camera_720p(), truth, corners);
+    for (auto& p : pixels) p += Eigen::Vector2d(rng.normal(kSigma), rng.normal(kSigma));
+    const auto found = estimate_planar_pose(camera_720p(), corners, pixels, kSigma);
+    ASSERT_TRUE(found);
+    const Vector6d d = log_pose(found->best.T_camera_marker.inverse() * truth);
+    sum += d.dot(found->best.covariance.ldlt().solve(d));
+  }
+  EXPECT_NEAR(sum / kTrials, 6.0, 4.0 * std::sqrt(12.0 / kTrials));
+}
+
+TEST(PlanarPose, RefusesCornersThatAreNoSquare) {
+  const auto corners = square_corners(0.05);
+  const std::vector<Eigen::Vector2d> line{{100, 100}, {110, 100}, {120, 100}, {130, 100}};
+  EXPECT_FALSE(estimate_planar_pose(camera_720p(), corners, line, 0.1));
+  const std::vector<Eigen::Vector2d> dot(4, {100, 100});
+  EXPECT_FALSE(estimate_planar_pose(camera_720p(), corners, dot, 0.1));
+  EXPECT_FALSE(estimate_planar_pose(camera_720p(), corners, {}, 0.1));
+}
+
+TEST(PoseTracks, TimeChoosesTheBranchThatMovesSmoothly) {
+  // Noise as strong as the difference between the branches: single views pick wrong often, the track must
+  // not.
+  constexpr double kSigma = 0.15;
+  Rng rng = Rng::from_name("planar pose time");
+  MarkerSet markers;
+  markers.default_size_m = 0.05;
+  TagObservations observations;
+  observations.width = 1280;
+  observations.height = 720;
+  std::vector<Pose> truth;
+  int wrong_alone = 0;
+  for (int frame = 0; frame < 200; ++frame) {
+    const double t = frame / 30.0;
+    Pose pose;
+    pose.rotation = exp_rotation({0.6 + 0.1 * std::sin(t), 0.3 * std::cos(t), 0.2 * t});
+    pose.translation << 0.1, 0.05, 1.6;
+    truth.push_back(pose);
+    observations.times_s.push_back(t);
+    TagObservation seen;
+    seen.frame = frame;
+    seen.id = TagId{7};
+    seen.sigma_px = kSigma;
+    seen.corners_px = images(camera_720p(), pose, markers.corners_m(seen.id));
+    for (auto& p : seen.corners_px) p += Eigen::Vector2d(rng.normal(kSigma), rng.normal(kSigma));
+    const auto alone = estimate_planar_pose(camera_720p(), markers.corners_m(seen.id),
+                                            seen.corners_px, kSigma);
+    ASSERT_TRUE(alone);
+    if (angle_between(alone->best.T_camera_marker.rotation, pose.rotation) > 0.5) ++wrong_alone;
+    observations.observations.push_back(seen);
+  }
+  const PoseTracks tracks = pose_tracks_from_tags(observations, camera_720p(), markers);
+  ASSERT_EQ(tracks.tracks.size(), 1U);
+  ASSERT_EQ(tracks.tracks[0].samples.size(), 200U);
+  int wrong = 0;
+  for (const PoseSample& sample : tracks.tracks[0].samples) {
+    const auto& expected = truth[static_cast<std::size_t>(sample.frame)];
+    if (angle_between(sample.T_camera_marker.rotation, expected.rotation) > 0.5) ++wrong;
+  }
+  EXPECT_GT(wrong_alone, 3);
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(PoseTracks, FocalLengthFromShapes) {
+  constexpr double kFocalTolerance = 20.0;  // px: about 4 sigma of 120 views at 0.05 px
+  Rng rng = Rng::from_name("focal from tags");
+  MarkerSet markers;
+  markers.default_size_m = 0.1;
+  CameraModel camera = pinhole_guess(1280, 720, 905.0);
+  TagObservations observations;
+  observations.width = 1280;
+  observations.height = 720;
+  for (int frame = 0; frame < 150; ++frame) {
+    observations.times_s.push_back(frame);
+    TagObservation seen;
+    seen.frame = frame;
+    seen.id = TagId{1};
+    seen.sigma_px = 0.05;
+    seen.corners_px = images(camera, random_view(rng, 0.6), markers.corners_m(seen.id));
+    for (auto& p : seen.corners_px) p += Eigen::Vector2d(rng.normal(0.05), rng.normal(0.05));
+    observations.observations.push_back(seen);
+  }
+  EXPECT_NEAR(focal_from_tags(observations, markers), 905.0, kFocalTolerance);
+}
+
+}  // namespace
+}  // namespace kinescope
