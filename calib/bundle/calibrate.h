@@ -2,9 +2,11 @@
 //
 // Takes   Measurements, a JointLog and a start (from the structure, or a nominal robot).
 // Gives   Calibration: all parameters with covariance, residuals, held-out errors.
-// Frames  gauge: the base frame is held to the first marker of the base link (or, where there is none, to
+// Frames  gauge: the base frame is held to the first marker of the base link (or, where there is
+// none, to
 //         the camera); joint frames keep z on the axis and do not turn about or slide along it.
-// Method  bundle adjustment over the corners (or poses, or points) with Ceres; product of exponentials;
+// Method  bundle adjustment over the corners (or poses, or points) with Ceres; product of
+// exponentials;
 //         robust loss, then rejection and a plain refit; block-wise (sandwich) covariance.
 // Not here: finding the structure, tracing what is left (calib/trace).
 #pragma once
@@ -30,20 +32,20 @@ struct CalibrationStart {
   Pose T_camera_base;
   CameraModel camera;
   double time_offset_s = 0.0;
-  Eigen::MatrixXd joint_values;   ///< frames x joints for joints no channel drives; else empty
-  bool nominal = false;           ///< the tree is a nominal robot: names, zeros and link frames are kept
-  bool markers_placed = true;     ///< false: marker mounts and T_camera_base are to be found first
+  Eigen::MatrixXd joint_values;  ///< frames x joints for joints no channel drives; else empty
+  bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
+  bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
 };
 
 struct CalibrateOptions {
   FreeGeometry free = FreeGeometry::kGeometry;
   bool estimate_intrinsics = false;
   bool estimate_time_offset = true;
-  bool estimate_scales = false;      ///< of channels that are declared in rad or m
-  double nominal_sigma_m = 5e-3;     ///< prior on the geometry of a nominal robot
+  bool estimate_scales = false;   ///< of channels that are declared in rad or m
+  double nominal_sigma_m = 5e-3;  ///< prior on the geometry of a nominal robot
   double nominal_sigma_rad = 0.01;
-  double reject_sigma = 4.5;         ///< sightings beyond this many standard deviations are left out
-  int folds = 5;                     ///< of the cross-validation; 0: none
+  double reject_sigma = 4.5;  ///< sightings beyond this many standard deviations are left out
+  int folds = 5;              ///< of the cross-validation; 0: none
   int max_iterations = 100;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calibrated robot as a value: every parameter with its doubt, every residual, what was left out.
+// The calibrated robot as a value: every parameter with its doubt, every residual, what was left
+// out.
 #pragma once
 
 #include <array>
@@ -19,8 +20,9 @@ namespace kinescope {
 using Sigma = std::optional<double>;
 
 struct JointEstimate {
-  Eigen::Vector3d axis_base = Eigen::Vector3d::UnitZ();   ///< unit, base frame, all joints at their mean value
-  Eigen::Vector3d point_base = Eigen::Vector3d::Zero();   ///< m, a point of the axis, same posture
+  Eigen::Vector3d axis_base =
+      Eigen::Vector3d::UnitZ();  ///< unit, base frame, all joints at their mean value
+  Eigen::Vector3d point_base = Eigen::Vector3d::Zero();  ///< m, a point of the axis, same posture
   Sigma direction_sigma_rad;  ///< largest over the two directions the axis can tilt to
   Sigma position_sigma_m;     ///< largest over the two directions across the axis; revolute only
   Sigma offset_sigma;         ///< rad or m; where the offset was estimated
@@ -29,10 +31,10 @@ struct JointEstimate {
 };
 
 struct MarkerEstimate {
-  Sigma rotation_sigma_rad;     ///< largest over the three directions
-  Sigma translation_sigma_m;    ///< the same
-  int used = 0;                 ///< sightings used
-  int rejected = 0;             ///< sightings left out as outliers
+  Sigma rotation_sigma_rad;   ///< largest over the three directions
+  Sigma translation_sigma_m;  ///< the same
+  int used = 0;               ///< sightings used
+  int rejected = 0;           ///< sightings left out as outliers
 };
 
 /// One line of the parameter table; the order is that of `Calibration::covariance`.
@@ -40,21 +42,22 @@ struct Parameter {
   std::string name;   ///< "joint2 axis tilt x"
   std::string block;  ///< "joint2", "tag_12", "camera", "clock", "intrinsics"
   std::string unit;   ///< "rad", "m", "s", "px", "", "rad/unit", ..
-  double value = 0.0; ///< change against the start for tilts and shifts; the value itself otherwise
+  double value =
+      0.0;            ///< change against the start for tilts and shifts; the value itself otherwise
   Sigma sigma;        ///< standard uncertainty, noise correlated in time allowed for
   Sigma sigma_white;  ///< what independent noise alone would give
 };
 
 /// A combination of parameters that the data do not (or hardly) determine.
 struct WeakDirection {
-  double relative_singular_value = 0.0;   ///< against the largest, columns scaled to unit length
+  double relative_singular_value = 0.0;  ///< against the largest, columns scaled to unit length
   std::vector<std::pair<int, double>> parameters;  ///< index, weight (largest first)
-  std::string words;                      ///< "the zero of joint3 and the yaw of tag_4 cannot be told apart"
+  std::string words;  ///< "the zero of joint3 and the yaw of tag_4 cannot be told apart"
 };
 
 struct Observability {
-  double condition_number = 0.0;          ///< of the scaled Jacobian
-  std::vector<double> singular_values;    ///< of the scaled Jacobian, largest first
+  double condition_number = 0.0;        ///< of the scaled Jacobian
+  std::vector<double> singular_values;  ///< of the scaled Jacobian, largest first
   std::vector<WeakDirection> weak;
 };
 
@@ -64,13 +67,15 @@ enum class MeasurementKind { kCorners, kPose, kPoint };
 struct SightingResidual {
   int frame = 0;
   TagId id;
-  bool used = true;          ///< false: rejected as an outlier
-  int fold = -1;             ///< the fold in which this frame was held out
+  bool used = true;                          ///< false: rejected as an outlier
+  int fold = -1;                             ///< the fold in which this frame was held out
   std::vector<Eigen::Vector2d> corners_px;   ///< final model; corners only
   std::vector<Eigen::Vector2d> held_out_px;  ///< model that has not seen this frame's fold
-  std::vector<Eigen::Vector2d> before_px;    ///< the start (nominal model, or structure found from poses)
-  /// The same as a displacement of the marker (rad, m), in the marker's frame for poses; for corners in the
-  /// camera's axes (x right, y down, z along the line of sight), least squares over the corners.
+  std::vector<Eigen::Vector2d>
+      before_px;  ///< the start (nominal model, or structure found from poses)
+  /// The same as a displacement of the marker (rad, m), in the marker's frame for poses; for
+  /// corners in the camera's axes (x right, y down, z along the line of sight), least squares over
+  /// the corners.
   Vector6d displacement = Vector6d::Zero();
   Vector6d held_out_displacement = Vector6d::Zero();
   Vector6d before_displacement = Vector6d::Zero();
@@ -83,34 +88,35 @@ struct Calibration {
   std::string status_reason;
   MeasurementKind kind = MeasurementKind::kCorners;
 
-  KinematicTree tree;              ///< base to links to markers
-  Pose T_camera_base;              ///< the camera (or tracker) sees the base there
+  KinematicTree tree;  ///< base to links to markers
+  Pose T_camera_base;  ///< the camera (or tracker) sees the base there
   CameraModel camera;
   bool intrinsics_estimated = false;
   std::array<Sigma, kMaxIntrinsics> intrinsics_sigma{};
-  double time_offset_s = 0.0;      ///< joint-log time = frame time + offset
+  double time_offset_s = 0.0;  ///< joint-log time = frame time + offset
   Sigma time_offset_sigma_s;
-  Eigen::MatrixXd joint_values;    ///< frames x joints, rad or m; NaN where the log has a gap
-  std::vector<double> times_s;     ///< of the frames
+  Eigen::MatrixXd joint_values;  ///< frames x joints, rad or m; NaN where the log has a gap
+  std::vector<double> times_s;   ///< of the frames
 
   std::vector<JointEstimate> joints;    ///< beside tree.joints
   std::vector<MarkerEstimate> markers;  ///< beside tree.markers
   std::vector<Parameter> parameters;
-  Eigen::MatrixXd covariance;      ///< of `parameters`, in their order and units
-  std::string gauge;               ///< in words: what was held, and why nothing is lost by it
+  Eigen::MatrixXd covariance;  ///< of `parameters`, in their order and units
+  std::string gauge;           ///< in words: what was held, and why nothing is lost by it
   Observability observability;
 
   std::vector<SightingResidual> residuals;
-  double sigma_scale = 1.0;        ///< the noise found over the noise declared
-  double training_rms = 0.0;       ///< px (corners) or m (poses, points), per coordinate, of the folds' training parts
-  double held_out_rms = 0.0;       ///< the same on the frames each fold left out
-  double before_rms = 0.0;         ///< the same with the start
-  double final_rms = 0.0;          ///< the same with all frames used
+  double sigma_scale = 1.0;  ///< the noise found over the noise declared
+  double training_rms =
+      0.0;  ///< px (corners) or m (poses, points), per coordinate, of the folds' training parts
+  double held_out_rms = 0.0;               ///< the same on the frames each fold left out
+  double before_rms = 0.0;                 ///< the same with the start
+  double final_rms = 0.0;                  ///< the same with all frames used
   double training_rotation_rms_rad = 0.0;  ///< poses only
   double held_out_rotation_rms_rad = 0.0;
   double before_rotation_rms_rad = 0.0;
   int folds = 0;
-  double correlation_time_s = 0.0; ///< over which residuals are alike; widens the uncertainties
+  double correlation_time_s = 0.0;  ///< over which residuals are alike; widens the uncertainties
   int iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;

@@ -16,10 +16,11 @@ namespace kinescope {
 /// One row of points.csv: a point on the robot seen by a tracker, or held in a socket.
 struct PointObservation {
   int frame = 0;
-  TagId id;                                    ///< the point on the robot
-  std::optional<Eigen::Vector3d> position_m;   ///< in the tracker's frame; none: unknown but fixed target
-  std::string target;                          ///< name of the socket when the position is unknown
-  double sigma_m = 1e-4;                       ///< of one coordinate
+  TagId id;  ///< the point on the robot
+  std::optional<Eigen::Vector3d>
+      position_m;         ///< in the tracker's frame; none: unknown but fixed target
+  std::string target;     ///< name of the socket when the position is unknown
+  double sigma_m = 1e-4;  ///< of one coordinate
 };
 
 /// A measured distance between two sockets.

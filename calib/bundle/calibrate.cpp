@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "calib/bundle/folds.h"
+#include "calib/bundle/make_spec.h"
+#include "calib/bundle/read_back.h"
+#include "calib/bundle/solve.h"
+#include "calib/bundle/uncertainty.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+using bundle::BuildOptions;
+using bundle::Readings;
+using bundle::RobustSolution;
+using bundle::Sighting;
+using bundle::Spec;
+using bundle::State;
+
+// What a model says about one sighting, in the sighting's own units.
+struct Prediction {
+  std::vector<Eigen::Vector2d> corners_px;
+  Vector6d displacement = Vector6d::Zero();
+};
+
+// Displacement of the marker (right perturbation) that would explain the residual, least squares;
+// turned to the camera's axes for corners.
+std::optional<Prediction> predict_residual(const Spec& spec, const State& state,
+                                           const Readings& readings, const Sighting& sighting) {
+  const auto error = bundle::error_of(spec, state, readings, sighting);
+  if (!error) return std::nullopt;
+  Prediction out;
+  if (sighting.kind == MeasurementKind::kPoint) {
+    out.displacement.tail<3>() = error->residual * sighting.sigma;
+    return out;
+  }
+  out.displacement = -(error->d_marker.transpose() * error->d_marker)
+                          .ldlt()
+                          .solve(error->d_marker.transpose() * error->residual);
+  if (sighting.kind == MeasurementKind::kCorners) {
+    const Eigen::Matrix3d R = bundle::predict(spec, state, readings, sighting).matrix3();
+    out.displacement.head<3>() = R * out.displacement.head<3>();
+    out.displacement.tail<3>() = R * out.displacement.tail<3>();
+    for (Eigen::Index i = 0; i < error->residual.size(); i += 2) {
+      out.corners_px.emplace_back(error->residual.segment<2>(i) * sighting.sigma);
+    }
+  }
+  return out;
+}
+
+// Root mean square of one coordinate over sightings, and of one angle (poses).
+struct Rms {
+  double sum = 0.0;
+  double sum_rotation = 0.0;
+  int count = 0;
+  int count_rotation = 0;
+  void add(MeasurementKind kind, const Prediction& prediction) {
+    if (kind == MeasurementKind::kCorners) {
+      for (const auto& r : prediction.corners_px) sum += r.squaredNorm();
+      count += 2 * static_cast<int>(prediction.corners_px.size());
+      return;
+    }
+    sum += prediction.displacement.tail<3>().squaredNorm();
+    count += 3;
+    if (kind == MeasurementKind::kPose) {
+      sum_rotation += prediction.displacement.head<3>().squaredNorm();
+      count_rotation += 3;
+    }
+  }
+  [[nodiscard]] double value() const { return count > 0 ? std::sqrt(sum / count) : 0.0; }
+  [[nodiscard]] double rotation() const {
+    return count_rotation > 0 ? std::sqrt(sum_rotation / count_rotation) : 0.0;
+  }
+};
+
+std::vector<std::optional<Prediction>> predict_all(const Spec& spec, const State& state,
+                                                   const std::vector<int>& indices) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::vector<std::optional<Prediction>> out;
+  for (const int index : indices) {
+    out.push_back(
+        predict_residual(spec, state, readings, spec.sightings[static_cast<std::size_t>(index)]));
+  }
+  return out;
+}
+
+// Cross-validation: each fold's frames are predicted by a model that has not seen them.
+void validate(const Spec& spec, const State& solution, const RobustSolution& robust, int folds,
+              const std::map<int, std::size_t>& slot, Calibration& out, int max_iterations,
+              const Progress& progress) {
+  Rms training;
+  Rms held_out;
+  for (int fold = 0; fold < folds; ++fold) {
+    report(progress, "validate", fold, folds);
+    std::vector<int> seen;
+    std::vector<int> unseen;
+    for (const int index : robust.used) {
+      const bool left_out = out.residuals[slot.at(index)].fold == fold;
+      (left_out ? unseen : seen).push_back(index);
+    }
+    if (seen.empty() || unseen.empty()) continue;
+    State state = solution;
+    static_cast<void>(bundle::solve(spec, state, seen, {}, max_iterations));
+    const bool values_unknown = std::ranges::any_of(spec.free_value, [](bool f) { return f; });
+    if (values_unknown) {
+      static_cast<void>(bundle::solve(spec, state, unseen, {std::nullopt, true}, max_iterations));
+    }
+    for (const auto& prediction : predict_all(spec, state, seen)) {
+      if (prediction) training.add(spec.kind, *prediction);
+    }
+    const auto predictions = predict_all(spec, state, unseen);
+    for (std::size_t i = 0; i < unseen.size(); ++i) {
+      if (!predictions[i]) continue;
+      SightingResidual& residual = out.residuals[slot.at(unseen[i])];
+      residual.held_out_px = predictions[i]->corners_px;
+      residual.held_out_displacement = predictions[i]->displacement;
+      held_out.add(spec.kind, *predictions[i]);
+    }
+  }
+  report(progress, "validate", folds, folds);
+  out.folds = folds;
+  out.training_rms = training.value();
+  out.held_out_rms = held_out.value();
+  out.training_rotation_rms_rad = training.rotation();
+  out.held_out_rotation_rms_rad = held_out.rotation();
+}
+
+// A fold for every sighting: by posture, or by time where joint values are unknown. Targets are
+// compared within a fold only where every target is seen in several.
+std::vector<int> folds_of(const Spec& spec, const State& state, const std::vector<int>& usable,
+                          int folds) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::vector<int> frames;
+  for (const int index : usable) {
+    const int frame = spec.sightings[static_cast<std::size_t>(index)].frame;
+    if (frames.empty() || frames.back() != frame) frames.push_back(frame);
+  }
+  std::vector<int> driven;
+  for (std::size_t j = 0; j < spec.channel.size(); ++j) {
+    if (spec.channel[j] >= 0) driven.push_back(static_cast<int>(j));
+  }
+  Eigen::MatrixXd features(static_cast<Eigen::Index>(frames.size()),
+                           static_cast<Eigen::Index>(driven.size()));
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    for (std::size_t d = 0; d < driven.size(); ++d) {
+      features(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(d)) =
+          readings.value(frames[f], driven[d]);
+    }
+  }
+  const std::vector<int> fold = bundle::assign_folds(features, folds);
+  std::vector<int> by_frame(spec.times_s.size(), -1);
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    by_frame[static_cast<std::size_t>(frames[f])] = fold[f];
+  }
+  return by_frame;
+}
+
+// Parameters and state that the start stands for: the nominal robot is compared once it is placed.
+State start_state(Spec& spec, const CalibrationStart& start, const CalibrateOptions& options) {
+  State state = bundle::initial_state(spec, start);
+  bundle::guess_targets(spec, state);
+  if (!start.nominal) return state;
+  Spec placement = spec;
+  for (auto& mask : placement.free_joint) mask.fill(false);
+  placement.free_offset.assign(placement.free_offset.size(), false);
+  placement.free_scale.assign(placement.free_scale.size(), false);
+  placement.has_prior = false;
+  State placed = state;
+  static_cast<void>(bundle::solve_robustly(placement, placed,
+                                           bundle::usable_sightings(placement, placed),
+                                           options.reject_sigma, options.max_iterations));
+  return placed;
+}
+
+void set_status(Calibration& out, const RobustSolution& robust) {
+  out.status =
+      robust.summary.converged ? CalibrationStatus::kConverged : CalibrationStatus::kNotConverged;
+  out.status_reason = robust.summary.message;
+  // An axis that may point anywhere, or lie anywhere, has not been determined.
+  constexpr double kMaxTilt = 0.2;    // rad
+  constexpr double kMaxShift = 0.25;  // m
+  std::string undetermined_joints;
+  for (std::size_t j = 0; j < out.joints.size(); ++j) {
+    const JointEstimate& joint = out.joints[j];
+    const bool tilt_unknown = joint.direction_sigma_rad && *joint.direction_sigma_rad > kMaxTilt;
+    const bool place_unknown = joint.position_sigma_m && *joint.position_sigma_m > kMaxShift;
+    if (!tilt_unknown && !place_unknown) continue;
+    undetermined_joints += (undetermined_joints.empty() ? "" : ", ") + out.tree.joints[j].name;
+  }
+  if (undetermined_joints.empty()) return;
+  out.status = CalibrationStatus::kUndetermined;
+  out.status_reason = fmt::format("the axis of {} is not determined", undetermined_joints);
+}
+
+}  // namespace
+
+Calibration calibrate(const Measurements& measurements, const MarkerSet& markers,
+                      const JointLog& log, const CalibrationStart& start,
+                      const CalibrateOptions& options, const Progress& progress) {
+  Spec spec = bundle::make_spec(measurements, markers, log, start, options);
+  State state = start_state(spec, start, options);
+  const State before = state;
+  const std::vector<int> usable = bundle::usable_sightings(spec, state);
+  if (usable.empty()) {
+    throw undetermined("calibration", "no marker was seen while the joint log ran",
+                       "check that joints.csv and the video cover the same time");
+  }
+  report(progress, "calibrate", 0, 1);
+  const double initial_cost = 0.0;
+  const RobustSolution robust =
+      bundle::solve_robustly(spec, state, usable, options.reject_sigma, options.max_iterations);
+  report(progress, "calibrate", 1, 1);
+
+  Calibration out;
+  out.kind = spec.kind;
+  out.iterations = robust.summary.iterations;
+  out.initial_cost = initial_cost;
+  out.final_cost = robust.summary.final_cost;
+  out.sigma_scale = robust.sigma_scale;
+
+  const int frames_used = bundle::count_frames(spec, robust.used);
+  const int folds = options.folds < 2 || frames_used < 4 ? 0 : std::min(options.folds, frames_used);
+  const std::vector<int> fold_of_frame = folds_of(spec, state, usable, std::max(1, folds));
+  std::map<int, std::size_t> slot;
+  const auto now = predict_all(spec, state, usable);
+  const auto then = predict_all(spec, before, usable);
+  Rms rms_now;
+  Rms rms_before;
+  for (std::size_t i = 0; i < usable.size(); ++i) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(usable[i])];
+    SightingResidual residual;
+    residual.frame = sighting.frame;
+    residual.id = spec.tree.markers[static_cast<std::size_t>(sighting.marker)].id;
+    residual.used = std::ranges::binary_search(robust.used, usable[i]);
+    residual.fold = fold_of_frame[static_cast<std::size_t>(sighting.frame)];
+    if (now[i]) {
+      residual.corners_px = now[i]->corners_px;
+      residual.displacement = now[i]->displacement;
+      if (residual.used) rms_now.add(spec.kind, *now[i]);
+    }
+    if (then[i]) {
+      residual.before_px = then[i]->corners_px;
+      residual.before_displacement = then[i]->displacement;
+      if (residual.used) rms_before.add(spec.kind, *then[i]);
+    }
+    slot[usable[i]] = out.residuals.size();
+    out.residuals.push_back(std::move(residual));
+  }
+  out.final_rms = rms_now.value();
+  out.training_rms = out.final_rms;
+  out.before_rms = rms_before.value();
+  out.training_rotation_rms_rad = rms_now.rotation();
+  out.before_rotation_rms_rad = rms_before.rotation();
+  if (folds > 0) {
+    validate(spec, state, robust, folds, slot, out, options.max_iterations, progress);
+  }
+  bundle::read_back(spec, state, robust, bundle::estimate_uncertainty(spec, state, robust.used),
+                    out);
+  set_status(out, robust);
+  return out;
+}
+
+}  // namespace kinescope

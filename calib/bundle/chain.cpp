@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/chain.h"
+
+namespace kinescope::bundle {
+
+ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const ChainJoint> joints,
+                                     const Pose& T_link_marker) {
+  ChainDerivatives out;
+  out.d_joint.resize(joints.size());
+  out.d_value.resize(joints.size());
+  // From the marker inwards; `rest` is everything behind the place that is perturbed.
+  Pose rest = T_link_marker;
+  for (std::size_t k = joints.size(); k-- > 0;) {
+    const ChainJoint& joint = joints[k];
+    Vector6d twist = Vector6d::Zero();
+    if (joint.type == JointType::kRevolute) twist.head<3>() = joint.axis;
+    if (joint.type == JointType::kPrismatic) twist.tail<3>() = joint.axis;
+    out.d_value[k] = adjoint(rest.inverse()) * twist;
+    rest = joint_motion(joint.type, joint.axis, joint.value) * rest;
+    out.d_joint[k] = adjoint(rest.inverse());
+    rest = joint.T_parent_joint * rest;
+  }
+  out.d_camera_base = adjoint(rest.inverse());
+  out.T_camera_marker = T_camera_base * rest;
+  return out;
+}
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The chain from the camera to a marker and its derivatives:
+//   T_camera_marker = T_camera_base * prod_k (T_parent_joint_k * exp(axis_k q_k)) * T_link_marker.
+// Every derivative is the 6-vector d of a right perturbation of T_camera_marker.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kinematics/model/kinematic_tree.h"
+
+namespace kinescope::bundle {
+
+/// One joint on the way, at one instant.
+struct ChainJoint {
+  JointType type = JointType::kFixed;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+  Pose T_parent_joint;
+  double value = 0.0;  ///< rad or m
+};
+
+struct ChainDerivatives {
+  Pose T_camera_marker;
+  Matrix6d d_camera_base;         ///< of a right perturbation of T_camera_base
+  std::vector<Matrix6d> d_joint;  ///< of T_parent_joint, from the base outwards
+  std::vector<Vector6d> d_value;  ///< of the joint value, per rad or m
+  // The mount's derivative is the identity.
+};
+
+/// Murray, Li, Sastry 1994, section 3.2.4, in body coordinates.
+[[nodiscard]] ChainDerivatives differentiate_chain(const Pose& T_camera_base,
+                                                   std::span<const ChainJoint> joints,
+                                                   const Pose& T_link_marker);
+
+}  // namespace kinescope::bundle

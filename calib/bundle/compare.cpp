@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Observed against predicted, for corners, poses and points.
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+namespace {
+
+// ad(d) of SE(3), tangent order rotation, translation. Barfoot 2017, eq. 7.16, reordered.
+Matrix6d small_adjoint(const Vector6d& d) {
+  Matrix6d ad = Matrix6d::Zero();
+  ad.topLeftCorner<3, 3>() = skew(d.head<3>());
+  ad.bottomRightCorner<3, 3>() = skew(d.head<3>());
+  ad.bottomLeftCorner<3, 3>() = skew(d.tail<3>());
+  return ad;
+}
+
+std::optional<SightingError> compare_corners(const Sighting& sighting, const Pose& T_camera_marker,
+                                             const CameraModel& camera) {
+  const auto n = static_cast<Eigen::Index>(sighting.corners_px.size());
+  SightingError error{Eigen::VectorXd(2 * n), Eigen::Matrix<double, Eigen::Dynamic, 6>(2 * n, 6),
+                      Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>(2 * n, kMaxIntrinsics)};
+  const Eigen::Matrix3d R = T_camera_marker.matrix3();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector3d& p = sighting.geometry_m[static_cast<std::size_t>(i)];
+    const auto projection = project_with_derivatives(camera, T_camera_marker * p);
+    if (!projection) return std::nullopt;
+    Eigen::Matrix<double, 3, 6> d_point;
+    d_point << -R * skew(p), R;
+    error.residual.segment<2>(2 * i) =
+        (sighting.corners_px[static_cast<std::size_t>(i)] - projection->pixel) / sighting.sigma;
+    error.d_marker.middleRows<2>(2 * i) = -(projection->d_point * d_point) / sighting.sigma;
+    error.d_intrinsics.middleRows<2>(2 * i) = -projection->d_intrinsics / sighting.sigma;
+  }
+  return error;
+}
+
+SightingError compare_pose(const Sighting& sighting, const Pose& T_camera_marker) {
+  const Vector6d d = log_pose(T_camera_marker.inverse() * sighting.T_camera_marker);
+  // log(exp(-e) exp(d)) = d - Jl^-1(d) e with Jl^-1 = I - ad/2 + ad^2/12 to third order.
+  const Matrix6d ad = small_adjoint(d);
+  const Matrix6d inverse_jacobian = Matrix6d::Identity() - 0.5 * ad + ad * ad / 12.0;
+  return {sighting.whitening * d, -sighting.whitening * inverse_jacobian,
+          Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>::Zero(6, kMaxIntrinsics)};
+}
+
+SightingError compare_point(const Sighting& sighting, const Pose& T_camera_marker,
+                            const Eigen::Vector3d& observed) {
+  SightingError error{
+      (observed - T_camera_marker.translation) / sighting.sigma,
+      Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(3, 6),
+      Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>::Zero(3, kMaxIntrinsics)};
+  error.d_marker.rightCols<3>() = -T_camera_marker.matrix3() / sighting.sigma;
+  return error;
+}
+
+}  // namespace
+
+int Sighting::dimension() const {
+  switch (kind) {
+    case MeasurementKind::kCorners:
+      return 2 * static_cast<int>(corners_px.size());
+    case MeasurementKind::kPose:
+      return 6;
+    case MeasurementKind::kPoint:
+      return 3;
+  }
+  return 0;
+}
+
+std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_camera_marker,
+                                     const CameraModel& camera, const Eigen::Vector3d* target_m) {
+  switch (sighting.kind) {
+    case MeasurementKind::kCorners:
+      return compare_corners(sighting, T_camera_marker, camera);
+    case MeasurementKind::kPose:
+      return compare_pose(sighting, T_camera_marker);
+    case MeasurementKind::kPoint:
+      return compare_point(sighting, T_camera_marker,
+                           target_m != nullptr ? *target_m : sighting.position_m);
+  }
+  return std::nullopt;
+}
+
+std::optional<SightingError> error_of(const Spec& spec, const State& state,
+                                      const Readings& readings, const Sighting& sighting) {
+  const Pose T_camera_marker = predict(spec, state, readings, sighting);
+  if (sighting.target < 0) {
+    return compare(sighting, T_camera_marker, camera_of(spec, state), nullptr);
+  }
+  const Eigen::Vector3d target(state.targets[static_cast<std::size_t>(sighting.target)].data());
+  return compare(sighting, T_camera_marker, camera_of(spec, state), &target);
+}
+
+}  // namespace kinescope::bundle

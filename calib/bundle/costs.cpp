@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/costs.h"
+
+#include <ceres/sized_cost_function.h>
+
+namespace kinescope::bundle {
+namespace {
+
+CameraModel camera_from(const CameraModel& base, const double* intrinsics) {
+  CameraModel camera = base;
+  camera.fx = intrinsics[0];
+  camera.fy = intrinsics[1];
+  camera.cx = intrinsics[2];
+  camera.cy = intrinsics[3];
+  std::copy(intrinsics + 4, intrinsics + kMaxIntrinsics, camera.distortion.begin());
+  return camera;
+}
+
+// One sighting. Blocks: camera_base, then for every joint on the way its frame and its map (or its
+// value in this frame), the mount, the time offset, the intrinsics, the target.
+class SightingCost final : public ceres::CostFunction {
+ public:
+  SightingCost(const Spec& spec, const Sighting& sighting, const Readings& readings)
+      : spec_(&spec), sighting_(&sighting), readings_(&readings) {
+    const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+    path_ = &spec.path[marker.link.index()];
+    set_num_residuals(sighting.dimension());
+    auto& sizes = *mutable_parameter_block_sizes();
+    sizes.push_back(7);
+    for (const int joint : *path_) {
+      sizes.push_back(7);
+      sizes.push_back(spec.free_value[static_cast<std::size_t>(joint)] ? 1 : 2);
+    }
+    sizes.push_back(7);
+    sizes.push_back(1);
+    if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
+    if (sighting.target >= 0) sizes.push_back(3);
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    std::vector<ChainJoint> joints(path_->size());
+    for (std::size_t k = 0; k < path_->size(); ++k) joints[k] = joint_at(k, parameters);
+    const std::size_t mount = 1 + 2 * path_->size();
+    const Pose T_camera_base = from_block(parameters[0]);
+    const Pose T_link_marker = from_block(parameters[mount]);
+    const ChainDerivatives chain = differentiate_chain(T_camera_base, joints, T_link_marker);
+
+    const bool corners = sighting_->kind == MeasurementKind::kCorners;
+    const CameraModel camera =
+        corners ? camera_from(spec_->camera, parameters[mount + 2]) : spec_->camera;
+    Eigen::Vector3d target = Eigen::Vector3d::Zero();
+    if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[mount + 2]);
+    const auto error = compare(*sighting_, chain.T_camera_marker, camera,
+                               sighting_->target >= 0 ? &target : nullptr);
+    if (!error || !error->residual.allFinite()) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = error->residual;
+    if (jacobians != nullptr) {
+      fill_jacobians(parameters, joints, chain, *error, jacobians);
+    }
+    return true;
+  }
+
+ private:
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  ChainJoint joint_at(std::size_t k, double const* const* parameters) const {
+    const int id = (*path_)[k];
+    const Joint& joint = spec_->tree.joints[static_cast<std::size_t>(id)];
+    const double* map = parameters[2 + 2 * k];
+    const double value = spec_->free_value[static_cast<std::size_t>(id)]
+                             ? map[0]
+                             : map[0] * readings_->value(sighting_->frame, id) + map[1];
+    return {joint.type, joint.axis, from_block(parameters[1 + 2 * k]), value};
+  }
+
+  void fill_pose(double* out, const SightingError& error, const Matrix6d& d,
+                 const double* pose) const {
+    if (out == nullptr) return;
+    Eigen::Map<RowMajor>(out, num_residuals(), 7) =
+        error.d_marker * (d * minus_jacobian(from_block(pose)));
+  }
+
+  void fill_jacobians(double const* const* parameters, const std::vector<ChainJoint>& joints,
+                      const ChainDerivatives& chain, const SightingError& error,
+                      double** jacobians) const {
+    const int rows = num_residuals();
+    fill_pose(jacobians[0], error, chain.d_camera_base, parameters[0]);
+    Eigen::VectorXd d_time = Eigen::VectorXd::Zero(rows);
+    for (std::size_t k = 0; k < joints.size(); ++k) {
+      const int id = (*path_)[k];
+      fill_pose(jacobians[1 + 2 * k], error, chain.d_joint[k], parameters[1 + 2 * k]);
+      const Eigen::VectorXd d_value = error.d_marker * chain.d_value[k];
+      double* out = jacobians[2 + 2 * k];
+      if (spec_->free_value[static_cast<std::size_t>(id)]) {
+        if (out != nullptr) Eigen::Map<Eigen::VectorXd>(out, rows) = d_value;
+        continue;
+      }
+      if (out != nullptr) {
+        Eigen::Map<RowMajor> d_map(out, rows, 2);
+        d_map.col(0) = d_value * readings_->value(sighting_->frame, id);
+        d_map.col(1) = d_value;
+      }
+      d_time += d_value * (parameters[2 + 2 * k][0] * readings_->rate(sighting_->frame, id));
+    }
+    const std::size_t mount = 1 + 2 * joints.size();
+    fill_pose(jacobians[mount], error, Matrix6d::Identity(), parameters[mount]);
+    if (jacobians[mount + 1] != nullptr) {
+      Eigen::Map<Eigen::VectorXd>(jacobians[mount + 1], rows) = d_time;
+    }
+    if (sighting_->kind == MeasurementKind::kCorners && jacobians[mount + 2] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[mount + 2], rows, kMaxIntrinsics) = error.d_intrinsics;
+    }
+    if (sighting_->target >= 0 && jacobians[mount + 2] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[mount + 2], rows, 3) =
+          Eigen::Matrix3d::Identity() / sighting_->sigma;
+    }
+  }
+
+  const Spec* spec_;
+  const Sighting* sighting_;
+  const Readings* readings_;
+  const std::vector<int>* path_;
+};
+
+// A joint frame that should stay near the nominal one.
+class FramePrior final : public ceres::SizedCostFunction<6, 7> {
+ public:
+  FramePrior(Pose nominal, double sigma_rad, double sigma_m) : nominal_(std::move(nominal)) {
+    weights_ << Eigen::Vector3d::Constant(1.0 / sigma_rad),
+        Eigen::Vector3d::Constant(1.0 / sigma_m);
+  }
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const Pose pose = from_block(parameters[0]);
+    const Vector6d d = log_pose(nominal_.inverse() * pose);
+    Eigen::Map<Vector6d> out(residuals);
+    out = weights_.cwiseProduct(d);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      // The right Jacobian's inverse is the identity to first order in d, and d stays small.
+      Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> slope(jacobians[0]);
+      slope = weights_.asDiagonal() * minus_jacobian(pose);
+    }
+    return true;
+  }
+
+ private:
+  Pose nominal_;
+  Vector6d weights_;
+};
+
+// A measured distance between two targets.
+class DistanceCost final : public ceres::SizedCostFunction<1, 3, 3> {
+ public:
+  DistanceCost(double distance_m, double sigma_m) : distance_(distance_m), sigma_(sigma_m) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const Eigen::Vector3d between = Eigen::Map<const Eigen::Vector3d>(parameters[0]) -
+                                    Eigen::Map<const Eigen::Vector3d>(parameters[1]);
+    const double length = between.norm();
+    if (length < 1e-9) return false;
+    residuals[0] = (length - distance_) / sigma_;
+    if (jacobians == nullptr) return true;
+    const Eigen::Vector3d slope = between / (length * sigma_);
+    for (int i = 0; i < 3; ++i) {
+      if (jacobians[0] != nullptr) jacobians[0][i] = slope[i];
+      if (jacobians[1] != nullptr) jacobians[1][i] = -slope[i];
+    }
+    return true;
+  }
+
+ private:
+  double distance_;
+  double sigma_;
+};
+
+}  // namespace
+
+ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
+                                        const Readings& readings) {
+  return new SightingCost(spec, sighting, readings);
+}
+
+ceres::CostFunction* make_frame_prior(const Spec& spec, const Pose& nominal) {
+  return new FramePrior(nominal, spec.prior_sigma_rad, spec.prior_sigma_m);
+}
+
+ceres::CostFunction* make_distance_cost(const TargetPair& pair) {
+  return new DistanceCost(pair.distance_m, pair.sigma_m);
+}
+
+CameraModel camera_of(const Spec& spec, const State& state) {
+  return camera_from(spec.camera, state.intrinsics.data());
+}
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The residuals of the bundle, one function each; Ceres takes ownership of what they return.
+#pragma once
+
+#include <ceres/cost_function.h>
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+/// One sighting, whitened. Blocks: T_camera_base (7), then for every joint on the way its frame (7)
+/// and its map (scale, offset) or its value in this frame (1), the mount (7), the time offset (1),
+/// for corners the intrinsics (12), for points in a target its place (3). `readings` must follow
+/// the time offset.
+[[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
+                                                      const Readings& readings);
+/// A joint frame that should stay near the nominal one. Block: the frame (7).
+[[nodiscard]] ceres::CostFunction* make_frame_prior(const Spec& spec, const Pose& nominal);
+/// A measured distance. Blocks: both targets' places (3, 3).
+[[nodiscard]] ceres::CostFunction* make_distance_cost(const TargetPair& pair);
+
+}  // namespace kinescope::bundle

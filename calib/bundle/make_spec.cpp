@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/make_spec.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope::bundle {
+namespace {
+
+constexpr TangentMask kAllFree{true, true, true, true, true, true};
+constexpr TangentMask kHeld{};
+// A turn about the axis and a shift along it do not change a revolute joint; no shift changes a
+// prismatic one.
+constexpr TangentMask kRevoluteAxis{true, true, false, true, true, false};
+constexpr TangentMask kPrismaticAxis{true, true, false, false, false, false};
+constexpr TangentMask kPointMount{false, false, false, true, true, true};
+
+std::map<TagId, int> marker_index(const KinematicTree& tree) {
+  std::map<TagId, int> index;
+  for (std::size_t m = 0; m < tree.markers.size(); ++m) {
+    index[tree.markers[m].id] = static_cast<int>(m);
+  }
+  return index;
+}
+
+void add_corners(const Measurements& measurements, const MarkerSet& markers, Spec& spec) {
+  const auto index = marker_index(spec.tree);
+  for (const TagObservation& observation : measurements.corners) {
+    const auto found = index.find(observation.id);
+    if (found == index.end()) continue;
+    Sighting sighting;
+    sighting.kind = MeasurementKind::kCorners;
+    sighting.frame = observation.frame;
+    sighting.marker = found->second;
+    sighting.corners_px = observation.corners_px;
+    sighting.geometry_m = markers.corners_m(observation.id);
+    sighting.sigma = observation.sigma_px;
+    KINESCOPE_CHECK(sighting.corners_px.size() == sighting.geometry_m.size(),
+                    "as many corners as the marker has");
+    spec.sightings.push_back(std::move(sighting));
+  }
+}
+
+void add_poses(const Measurements& measurements, Spec& spec) {
+  const auto index = marker_index(spec.tree);
+  for (const PoseTrack& track : measurements.poses.tracks) {
+    const auto found = index.find(track.id);
+    if (found == index.end()) continue;
+    for (const PoseSample& sample : track.samples) {
+      Sighting sighting;
+      sighting.kind = MeasurementKind::kPose;
+      sighting.frame = sample.frame;
+      sighting.marker = found->second;
+      sighting.T_camera_marker = sample.T_camera_marker;
+      const Eigen::LLT<Matrix6d> factor(sample.covariance.inverse());
+      KINESCOPE_CHECK(factor.info() == Eigen::Success, "a pose's covariance is positive definite");
+      sighting.whitening = factor.matrixU();
+      spec.sightings.push_back(std::move(sighting));
+    }
+  }
+}
+
+void add_points(const Measurements& measurements, Spec& spec) {
+  const auto index = marker_index(spec.tree);
+  std::map<std::string, int> targets;
+  for (const PointObservation& observation : measurements.points.observations) {
+    if (!observation.position_m) targets.try_emplace(observation.target, 0);
+  }
+  for (auto& [name, number] : targets) {
+    number = static_cast<int>(spec.targets.size());
+    spec.targets.push_back(name);
+  }
+  for (const PointObservation& observation : measurements.points.observations) {
+    const auto found = index.find(observation.id);
+    if (found == index.end()) continue;
+    Sighting sighting;
+    sighting.kind = MeasurementKind::kPoint;
+    sighting.frame = observation.frame;
+    sighting.marker = found->second;
+    sighting.sigma = observation.sigma_m;
+    if (observation.position_m) {
+      sighting.position_m = *observation.position_m;
+    } else {
+      sighting.target = targets.at(observation.target);
+    }
+    spec.sightings.push_back(std::move(sighting));
+  }
+  for (const TargetDistance& distance : measurements.points.distances) {
+    const auto from = targets.find(distance.from);
+    const auto to = targets.find(distance.to);
+    if (from == targets.end() || to == targets.end()) continue;
+    spec.distances.push_back({from->second, to->second, distance.distance_m, distance.sigma_m});
+  }
+}
+
+// True when nothing measured has a place in the camera's (tracker's) frame.
+bool only_targets(const Spec& spec) {
+  return spec.kind == MeasurementKind::kPoint &&
+         std::ranges::all_of(spec.sightings, [](const Sighting& s) { return s.target >= 0; });
+}
+
+std::optional<std::size_t> first_seen_base_marker(const Spec& spec) {
+  std::set<int> seen;
+  for (const Sighting& sighting : spec.sightings) seen.insert(sighting.marker);
+  for (std::size_t m = 0; m < spec.tree.markers.size(); ++m) {
+    if (spec.tree.markers[m].link == LinkId{0} && seen.contains(static_cast<int>(m))) return m;
+  }
+  return std::nullopt;
+}
+
+void free_joints(const CalibrationStart& start, const CalibrateOptions& options, Spec& spec) {
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    const Joint& joint = spec.tree.joints[j];
+    TangentMask mask = kHeld;
+    if (options.free == FreeGeometry::kGeometry && joint.type != JointType::kFixed) {
+      if (start.nominal) {
+        // Zeros belong to a nominal robot's frames; a prior holds what the data leave open.
+        mask = kAllFree;
+      } else {
+        mask = joint.type == JointType::kRevolute ? kRevoluteAxis : kPrismaticAxis;
+      }
+    }
+    spec.free_joint.push_back(mask);
+    const bool movable = joint.type != JointType::kFixed;
+    const bool driven = spec.channel[j] >= 0;
+    spec.free_value.push_back(movable && !driven);
+    spec.free_offset.push_back(start.nominal && movable && driven &&
+                               options.free == FreeGeometry::kOffsets);
+    spec.free_scale.push_back(driven && (options.estimate_scales || joint.scale != 1.0));
+  }
+}
+
+void free_frames(const CalibrationStart& start, Spec& spec) {
+  const auto anchor = first_seen_base_marker(spec);
+  const bool point = spec.kind == MeasurementKind::kPoint;
+  for (std::size_t m = 0; m < spec.tree.markers.size(); ++m) {
+    const bool held = !start.nominal && anchor && *anchor == m;
+    spec.free_mount.push_back(held ? kHeld : point ? kPointMount : kAllFree);
+  }
+  const bool base_is_seen = start.nominal ? !only_targets(spec) : anchor.has_value();
+  spec.free_camera = base_is_seen ? kAllFree : kHeld;
+}
+
+void check_something_seen(const Spec& spec) {
+  if (!spec.sightings.empty()) return;
+  throw undetermined("calibration", "none of the markers seen belongs to the robot's structure",
+                     "check that the markers of tags.yaml are on the robot");
+}
+
+}  // namespace
+
+Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const JointLog& log,
+               const CalibrationStart& start, const CalibrateOptions& options) {
+  Spec spec;
+  spec.tree = start.tree;
+  spec.times_s = measurements.times_s;
+  spec.log = log;
+  spec.postures = !log.empty() && is_posture_log(log, spec.times_s);
+  spec.camera = start.camera;
+  for (const Joint& joint : spec.tree.joints) {
+    const auto channel =
+        joint.type == JointType::kFixed ? std::nullopt : log.channel(joint.channel);
+    spec.channel.push_back(channel.value_or(-1));
+  }
+  for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
+    std::vector<int> path;
+    for (const JointId id : spec.tree.path_to(LinkId{static_cast<int>(l)}))
+      path.push_back(id.value);
+    spec.path.push_back(std::move(path));
+  }
+  if (!measurements.corners.empty()) {
+    spec.kind = MeasurementKind::kCorners;
+    add_corners(measurements, markers, spec);
+  } else if (!measurements.poses.tracks.empty()) {
+    spec.kind = MeasurementKind::kPose;
+    add_poses(measurements, spec);
+  } else {
+    spec.kind = MeasurementKind::kPoint;
+    add_points(measurements, spec);
+  }
+  // The order of the input must not reach the bits of the answer.
+  std::ranges::stable_sort(spec.sightings, [](const Sighting& a, const Sighting& b) {
+    return std::pair(a.frame, a.marker) < std::pair(b.frame, b.marker);
+  });
+  check_something_seen(spec);
+  free_joints(start, options, spec);
+  free_frames(start, spec);
+  spec.free_time_offset = options.estimate_time_offset && !spec.postures && !log.empty();
+  spec.has_prior = start.nominal && options.free == FreeGeometry::kGeometry;
+  spec.prior_sigma_m = options.nominal_sigma_m;
+  spec.prior_sigma_rad = options.nominal_sigma_rad;
+  if (options.estimate_intrinsics && spec.kind == MeasurementKind::kCorners) {
+    // k3 bends only the far corners of the image, where markers seldom are: held unless the model
+    // needs it.
+    const int count = 4 + distortion_count(spec.camera.model);
+    for (int i = 0; i < count; ++i) spec.free_intrinsics[static_cast<std::size_t>(i)] = true;
+    if (spec.camera.model == DistortionModel::kPlumbBob) spec.free_intrinsics[8] = false;
+  }
+  return spec;
+}
+
+void guess_targets(const Spec& spec, State& state) {
+  if (spec.targets.empty()) return;
+  const Readings readings(spec, state.time_offset[0]);
+  std::vector<Eigen::Vector3d> sum(spec.targets.size(), Eigen::Vector3d::Zero());
+  std::vector<int> count(spec.targets.size(), 0);
+  for (const Sighting& sighting : spec.sightings) {
+    if (sighting.target < 0) continue;
+    const auto t = static_cast<std::size_t>(sighting.target);
+    sum[t] += predict(spec, state, readings, sighting).translation;
+    ++count[t];
+  }
+  for (std::size_t t = 0; t < sum.size(); ++t) {
+    const Eigen::Vector3d mean = sum[t] / std::max(1, count[t]);
+    state.targets[t] = {mean.x(), mean.y(), mean.z()};
+  }
+}
+
+int count_frames(const Spec& spec, const std::vector<int>& sightings) {
+  std::set<int> frames;
+  for (const int index : sightings) {
+    frames.insert(spec.sightings[static_cast<std::size_t>(index)].frame);
+  }
+  return static_cast<int>(frames.size());
+}
+
+std::string gauge_in_words(const Spec& spec) {
+  std::string words;
+  if (const auto anchor = first_seen_base_marker(spec);
+      anchor && spec.free_mount[*anchor] == kHeld) {
+    words = fmt::format("The base frame is held to tag_{}; ", spec.tree.markers[*anchor].id.value);
+  } else if (spec.free_camera == kHeld) {
+    words = "The base frame is held where it starts; ";
+  }
+  words +=
+      spec.has_prior
+          ? "joint frames stay near the nominal ones by a weak prior where the data are silent."
+          : "joint frames keep their z axis on the joint's axis and neither turn about nor slide "
+            "along it: the markers' and next joints' places take that up, so nothing is lost.";
+  return words;
+}
+
+}  // namespace kinescope::bundle

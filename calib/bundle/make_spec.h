@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+/// Gathers what is measured, held and free. Markers of the tree that were never seen stay, held.
+/// Throws undetermined when nothing measured belongs to the tree.
+[[nodiscard]] Spec make_spec(const Measurements& measurements, const MarkerSet& markers,
+                             const JointLog& log, const CalibrationStart& start,
+                             const CalibrateOptions& options);
+
+/// Puts every target where its points are on average. Needs marker mounts.
+void guess_targets(const Spec& spec, State& state);
+
+[[nodiscard]] int count_frames(const Spec& spec, const std::vector<int>& sightings);
+
+/// In words: what is held so that the answer is unique.
+[[nodiscard]] std::string gauge_in_words(const Spec& spec);
+
+}  // namespace kinescope::bundle

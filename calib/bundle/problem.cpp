@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <ceres/loss_function.h>
+#include <fmt/format.h>
+
+#include "calib/bundle/costs.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::bundle {
+namespace {
+
+const std::array<const char*, kMaxIntrinsics> kIntrinsicNames{"fx", "fy", "cx", "cy", "d1", "d2",
+                                                              "d3", "d4", "d5", "d6", "d7", "d8"};
+
+// Keeps the readings at the time offset that the solver is looking at.
+class ReadingsCallback final : public ceres::EvaluationCallback {
+ public:
+  ReadingsCallback(Readings* readings, const double* time_offset)
+      : readings_(readings), time_offset_(time_offset) {}
+  void PrepareForEvaluation(bool /*jacobians*/, bool new_point) override {
+    if (new_point) readings_->update(*time_offset_);
+  }
+
+ private:
+  Readings* readings_;
+  const double* time_offset_;
+};
+
+}  // namespace
+
+State initial_state(const Spec& spec, const CalibrationStart& start) {
+  State state;
+  state.camera_base = to_block(start.T_camera_base);
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    const Joint& joint = spec.tree.joints[j];
+    state.joint_frames.push_back(to_block(joint.T_parent_joint));
+    state.joint_maps.push_back({joint.scale, joint.offset});
+    std::vector<double> values;
+    if (spec.free_value[j]) {
+      KINESCOPE_CHECK(start.joint_values.rows() == static_cast<Eigen::Index>(spec.times_s.size()),
+                      "joints without a channel need a value in every frame");
+      for (Eigen::Index f = 0; f < start.joint_values.rows(); ++f) {
+        const double value = start.joint_values(f, static_cast<Eigen::Index>(j));
+        values.push_back(std::isfinite(value) ? value : 0.0);
+      }
+    }
+    state.values.push_back(std::move(values));
+  }
+  for (const Marker& marker : spec.tree.markers) {
+    state.mounts.push_back(to_block(marker.T_link_marker));
+  }
+  state.time_offset[0] = start.time_offset_s;
+  const CameraModel& c = spec.camera;
+  state.intrinsics = {c.fx, c.fy, c.cx, c.cy};
+  std::copy(c.distortion.begin(), c.distortion.end(), state.intrinsics.begin() + 4);
+  state.targets.resize(spec.targets.size());
+  return state;
+}
+
+Readings::Readings(const Spec& spec, double time_offset_s) : spec_(&spec), time_offset_s_(0.0) {
+  const auto frames = static_cast<Eigen::Index>(spec.times_s.size());
+  const auto joints = static_cast<Eigen::Index>(spec.tree.joints.size());
+  value_ = Eigen::MatrixXd::Zero(frames, joints);
+  rate_ = Eigen::MatrixXd::Zero(frames, joints);
+  known_.setConstant(frames, joints, true);
+  time_offset_s_ = time_offset_s + 1.0;
+  update(time_offset_s);
+}
+
+void Readings::update(double time_offset_s) {
+  if (time_offset_s == time_offset_s_) return;
+  time_offset_s_ = time_offset_s;
+  for (std::size_t j = 0; j < spec_->tree.joints.size(); ++j) {
+    if (spec_->channel[j] < 0) continue;
+    for (std::size_t f = 0; f < spec_->times_s.size(); ++f) {
+      const auto row = static_cast<Eigen::Index>(f);
+      const auto column = static_cast<Eigen::Index>(j);
+      const auto sample = interpolate(spec_->log, spec_->channel[j],
+                                      spec_->times_s[f] + time_offset_s, spec_->max_gap_s);
+      known_(row, column) = sample.has_value();
+      // Where the log ends while the offset moves, the last values stay: such frames are not used.
+      if (!sample) continue;
+      value_(row, column) = sample->value;
+      rate_(row, column) = spec_->postures ? 0.0 : sample->rate;
+    }
+  }
+}
+
+std::vector<ChainJoint> chain_of(const Spec& spec, const State& state, const Readings& readings,
+                                 const Sighting& sighting) {
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  std::vector<ChainJoint> joints;
+  for (const int id : spec.path[marker.link.index()]) {
+    const auto j = static_cast<std::size_t>(id);
+    const double value =
+        spec.free_value[j]
+            ? state.values[j][static_cast<std::size_t>(sighting.frame)]
+            : state.joint_maps[j][0] * readings.value(sighting.frame, id) + state.joint_maps[j][1];
+    joints.push_back({spec.tree.joints[j].type, spec.tree.joints[j].axis,
+                      from_block(state.joint_frames[j].data()), value});
+  }
+  return joints;
+}
+
+Pose predict(const Spec& spec, const State& state, const Readings& readings,
+             const Sighting& sighting) {
+  Pose pose = from_block(state.camera_base.data());
+  for (const ChainJoint& joint : chain_of(spec, state, readings, sighting)) {
+    pose = pose * joint.T_parent_joint * joint_motion(joint.type, joint.axis, joint.value);
+  }
+  return pose * from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data());
+}
+
+BuiltProblem::BuiltProblem(const Spec& spec, State& state, const std::vector<int>& sightings,
+                           const BuildOptions& options) {
+  readings_ = std::make_unique<Readings>(spec, state.time_offset[0]);
+  callback_ = std::make_unique<ReadingsCallback>(readings_.get(), state.time_offset.data());
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = callback_.get();
+  problem_options.enable_fast_removal = false;
+  problem_ = std::make_unique<ceres::Problem>(problem_options);
+  for (const int index : sightings) add_sighting(spec, state, index, options);
+  add_priors(spec, state);
+  set_manifolds(spec, state, options);
+}
+
+void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
+                                const BuildOptions& options) {
+  const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  std::vector<double*> blocks{state.camera_base.data()};
+  for (const int id : spec.path[marker.link.index()]) {
+    const auto j = static_cast<std::size_t>(id);
+    blocks.push_back(state.joint_frames[j].data());
+    blocks.push_back(spec.free_value[j] ? &state.values[j][static_cast<std::size_t>(sighting.frame)]
+                                        : state.joint_maps[j].data());
+  }
+  blocks.push_back(state.mounts[static_cast<std::size_t>(sighting.marker)].data());
+  blocks.push_back(state.time_offset.data());
+  if (sighting.kind == MeasurementKind::kCorners) blocks.push_back(state.intrinsics.data());
+  if (sighting.target >= 0) {
+    blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
+  }
+  ceres::LossFunction* loss =
+      options.robust_width ? new ceres::CauchyLoss(*options.robust_width) : nullptr;
+  ids_.push_back(
+      problem_->AddResidualBlock(make_sighting_cost(spec, sighting, *readings_), loss, blocks));
+}
+
+void BuiltProblem::add_priors(const Spec& spec, State& state) {
+  for (const TargetPair& pair : spec.distances) {
+    double* from = state.targets[static_cast<std::size_t>(pair.from)].data();
+    double* to = state.targets[static_cast<std::size_t>(pair.to)].data();
+    if (!problem_->HasParameterBlock(from) || !problem_->HasParameterBlock(to)) continue;
+    // A measurement, not a prior: it counts among the data.
+    ids_.push_back(problem_->AddResidualBlock(make_distance_cost(pair), nullptr, from, to));
+  }
+  if (!spec.has_prior) return;
+  for (std::size_t j = 0; j < state.joint_frames.size(); ++j) {
+    double* frame = state.joint_frames[j].data();
+    const bool free = std::ranges::any_of(spec.free_joint[j], [](bool f) { return f; });
+    if (!free || !problem_->HasParameterBlock(frame)) continue;
+    prior_ids_.push_back(problem_->AddResidualBlock(
+        make_frame_prior(spec, spec.tree.joints[j].T_parent_joint), nullptr, frame));
+  }
+}
+
+void BuiltProblem::free_pose(double* data, const TangentMask& mask, const std::string& block,
+                             bool frozen) {
+  static const std::array<const char*, 6> kNames{"turn x",  "turn y",  "turn z",
+                                                 "shift x", "shift y", "shift z"};
+  if (!problem_->HasParameterBlock(data)) return;
+  FreeBlock out{data, block, {}, {}, {}, -1};
+  for (int i = 0; i < 6; ++i) {
+    if (!mask[static_cast<std::size_t>(i)]) continue;
+    out.names.push_back(fmt::format("{} {}", block, kNames[static_cast<std::size_t>(i)]));
+    out.units.emplace_back(i < 3 ? "rad" : "m");
+    out.components.push_back(i);
+  }
+  if (frozen || out.names.empty()) {
+    problem_->SetParameterBlockConstant(data);
+    return;
+  }
+  problem_->SetManifold(data, new PoseManifold(mask));
+  blocks_.push_back(std::move(out));
+}
+
+void BuiltProblem::free_numbers(double* data, const std::vector<bool>& free, FreeBlock names,
+                                bool frozen) {
+  if (!problem_->HasParameterBlock(data)) return;
+  FreeBlock out{data, names.block, {}, {}, {}, -1};
+  std::vector<int> held;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    if (!free[i]) {
+      held.push_back(static_cast<int>(i));
+      continue;
+    }
+    out.names.push_back(names.names[i]);
+    out.units.push_back(names.units[i]);
+    out.components.push_back(static_cast<int>(i));
+  }
+  if (frozen || out.names.empty()) {
+    problem_->SetParameterBlockConstant(data);
+    return;
+  }
+  if (!held.empty()) {
+    problem_->SetManifold(data, new ceres::SubsetManifold(static_cast<int>(free.size()), held));
+  }
+  blocks_.push_back(std::move(out));
+}
+
+void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOptions& options) {
+  const bool frozen = options.freeze_globals;
+  free_pose(state.camera_base.data(), spec.free_camera, "camera", frozen);
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    const Joint& joint = spec.tree.joints[j];
+    free_pose(state.joint_frames[j].data(), spec.free_joint[j], joint.name, frozen);
+    const std::string unit = joint.type == JointType::kPrismatic ? "m" : "rad";
+    if (!spec.free_value[j]) {
+      free_numbers(state.joint_maps[j].data(), {spec.free_scale[j], spec.free_offset[j]},
+                   {nullptr,
+                    joint.name,
+                    {joint.name + " scale", joint.name + " offset"},
+                    {unit + "/unit", unit},
+                    {},
+                    -1},
+                   frozen);
+    }
+  }
+  for (std::size_t m = 0; m < spec.tree.markers.size(); ++m) {
+    free_pose(state.mounts[m].data(), spec.free_mount[m],
+              fmt::format("tag_{}", spec.tree.markers[m].id.value), frozen);
+  }
+  free_numbers(state.time_offset.data(), {spec.free_time_offset},
+               {nullptr, "clock", {"time offset"}, {"s"}, {}, -1}, frozen);
+  FreeBlock intrinsics{nullptr, "intrinsics", {}, {}, {}, -1};
+  for (std::size_t i = 0; i < kMaxIntrinsics; ++i) {
+    intrinsics.names.emplace_back(kIntrinsicNames[i]);
+    intrinsics.units.emplace_back(i < 4 ? "px" : "");
+  }
+  free_numbers(state.intrinsics.data(),
+               std::vector<bool>(spec.free_intrinsics.begin(), spec.free_intrinsics.end()),
+               intrinsics, frozen);
+  for (std::size_t t = 0; t < spec.targets.size(); ++t) {
+    const std::string name = "target " + spec.targets[t];
+    free_numbers(state.targets[t].data(), {true, true, true},
+                 {nullptr, name, {name + " x", name + " y", name + " z"}, {"m", "m", "m"}, {}, -1},
+                 frozen);
+  }
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    // The zero of a joint that no channel drives is free: its value in the first frame stays.
+    bool zero_held = frozen;
+    for (std::size_t f = 0; f < state.values[j].size(); ++f) {
+      double* value = &state.values[j][f];
+      if (!problem_->HasParameterBlock(value)) continue;
+      if (!zero_held) {
+        problem_->SetParameterBlockConstant(value);
+        zero_held = true;
+        continue;
+      }
+      has_local_ = true;
+      const std::string name = fmt::format("{} value in frame {}", spec.tree.joints[j].name, f);
+      blocks_.push_back({value, spec.tree.joints[j].name, {name}, {""}, {0}, static_cast<int>(f)});
+    }
+  }
+}
+
+}  // namespace kinescope::bundle

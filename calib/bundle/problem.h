@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The bundle as data (Spec: what is measured, what is free) and as numbers (State: what is
+// estimated), and the Ceres problem made of the two. Internal to the room: the only header beside
+// pose_block.h that shows Ceres.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <ceres/evaluation_callback.h>
+#include <ceres/problem.h>
+
+#include "calib/bundle/calibrate.h"
+#include "calib/bundle/chain.h"
+#include "calib/bundle/pose_block.h"
+
+namespace kinescope::bundle {
+
+/// One marker (body, point) in one frame, ready to be compared with a prediction.
+struct Sighting {
+  MeasurementKind kind = MeasurementKind::kCorners;
+  int frame = 0;
+  int marker = 0;                             ///< index into Spec::tree.markers
+  std::vector<Eigen::Vector2d> corners_px;    ///< corners
+  std::vector<Eigen::Vector3d> geometry_m;    ///< corners in the marker's frame
+  double sigma = 1.0;                         ///< px (corners) or m (points)
+  Pose T_camera_marker;                       ///< poses
+  Matrix6d whitening = Matrix6d::Identity();  ///< poses: L' with L L' = inverse covariance
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< points with a measured place
+  int target = -1;  ///< points held in an unknown place: index into Spec::targets
+  [[nodiscard]] int dimension() const;
+};
+
+struct TargetPair {
+  int from = 0;
+  int to = 0;
+  double distance_m = 0.0;
+  double sigma_m = 0.0;
+};
+
+/// What is measured, what is held, what is free. Never changes while solving.
+struct Spec {
+  MeasurementKind kind = MeasurementKind::kCorners;
+  KinematicTree tree;  ///< joints and markers in the order of the State; the poses of the start
+  std::vector<double> times_s;
+  JointLog log;
+  bool postures = false;  ///< stamps of log and measurements agree: nothing to interpolate
+  double max_gap_s = 0.5;
+  std::vector<int> channel;  ///< of every joint; -1: none (value unknown, or a fixed joint)
+  std::vector<std::vector<int>> path;  ///< joints from the base to each link
+  std::vector<Sighting> sightings;     ///< by frame, then marker
+  std::vector<std::string> targets;
+  std::vector<TargetPair> distances;
+  CameraModel camera;
+
+  TangentMask free_camera{};
+  std::vector<TangentMask> free_joint;
+  std::vector<TangentMask> free_mount;
+  std::vector<bool> free_scale;
+  std::vector<bool> free_offset;
+  std::vector<bool> free_value;  ///< joints whose value is unknown in every frame
+  bool free_time_offset = false;
+  std::array<bool, kMaxIntrinsics> free_intrinsics{};
+  /// Prior on the joint frames (nominal robots): standard deviations of rotation and translation.
+  bool has_prior = false;
+  double prior_sigma_rad = 0.0;
+  double prior_sigma_m = 0.0;
+};
+
+/// The estimated numbers. Addresses must not change while a problem built on them lives.
+struct State {
+  PoseBlock camera_base{};
+  std::vector<PoseBlock> joint_frames;
+  std::vector<std::array<double, 2>> joint_maps;  ///< scale, offset
+  std::vector<PoseBlock> mounts;
+  std::array<double, 1> time_offset{};
+  std::array<double, kMaxIntrinsics> intrinsics{};
+  std::vector<std::array<double, 3>> targets;
+  std::vector<std::vector<double>> values;  ///< joint, frame; only where Spec::free_value
+};
+
+[[nodiscard]] State initial_state(const Spec& spec, const CalibrationStart& start);
+[[nodiscard]] CameraModel camera_of(const Spec& spec, const State& state);
+
+/// Channel readings and rates at every frame for the present time offset: frames x joints.
+class Readings {
+ public:
+  Readings(const Spec& spec, double time_offset_s);
+  void update(double time_offset_s);
+  [[nodiscard]] double value(int frame, int joint) const { return value_(frame, joint); }
+  [[nodiscard]] double rate(int frame, int joint) const { return rate_(frame, joint); }
+  /// False where the log has nothing (outside, or in a gap).
+  [[nodiscard]] bool known(int frame, int joint) const { return known_(frame, joint); }
+
+ private:
+  const Spec* spec_;
+  double time_offset_s_;
+  Eigen::MatrixXd value_;
+  Eigen::MatrixXd rate_;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> known_;
+};
+
+/// The joints on the way to a sighting's marker, at its instant.
+[[nodiscard]] std::vector<ChainJoint> chain_of(const Spec& spec, const State& state,
+                                               const Readings& readings, const Sighting& sighting);
+[[nodiscard]] Pose predict(const Spec& spec, const State& state, const Readings& readings,
+                           const Sighting& sighting);
+
+/// Whitened observed minus predicted, and its derivatives.
+struct SightingError {
+  Eigen::VectorXd residual;                           ///< unitless
+  Eigen::Matrix<double, Eigen::Dynamic, 6> d_marker;  ///< by right perturbation of T_camera_marker
+  Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics> d_intrinsics;  ///< corners only
+};
+
+/// Nothing when a corner lies behind the camera. `target_m` takes the place of the measured
+/// position.
+[[nodiscard]] std::optional<SightingError> compare(const Sighting& sighting,
+                                                   const Pose& T_camera_marker,
+                                                   const CameraModel& camera,
+                                                   const Eigen::Vector3d* target_m);
+
+/// The error of one sighting at a state.
+[[nodiscard]] std::optional<SightingError> error_of(const Spec& spec, const State& state,
+                                                    const Readings& readings,
+                                                    const Sighting& sighting);
+
+/// A free block of parameters: one entry a free number in `names`, beside the tangent space's axes.
+struct FreeBlock {
+  double* data = nullptr;
+  std::string block;
+  std::vector<std::string> names;
+  std::vector<std::string> units;
+  std::vector<int> components;  ///< which of the block's numbers (poses: of the six) each name is
+  int local_frame = -1;         ///< frame, for a joint value that is unknown in each frame
+};
+
+struct BuildOptions {
+  std::optional<double>
+      robust_width;  ///< Cauchy loss on a sighting's chi-square beyond this; none: squared
+  bool freeze_globals = false;  ///< only joint values per frame move
+};
+
+/// A Ceres problem over some of the sightings.
+class BuiltProblem {
+ public:
+  BuiltProblem(const Spec& spec, State& state, const std::vector<int>& sightings,
+               const BuildOptions& options);
+  [[nodiscard]] ceres::Problem& problem() { return *problem_; }
+  [[nodiscard]] const std::vector<FreeBlock>& blocks() const { return blocks_; }
+  [[nodiscard]] const std::vector<ceres::ResidualBlockId>& sighting_ids() const { return ids_; }
+  [[nodiscard]] const std::vector<ceres::ResidualBlockId>& prior_ids() const { return prior_ids_; }
+  /// True when joint values per frame are among the unknowns.
+  [[nodiscard]] bool has_local_blocks() const { return has_local_; }
+
+ private:
+  void add_sighting(const Spec& spec, State& state, int index, const BuildOptions& options);
+  void add_priors(const Spec& spec, State& state);
+  void set_manifolds(const Spec& spec, State& state, const BuildOptions& options);
+  void free_pose(double* data, const TangentMask& mask, const std::string& block, bool frozen);
+  void free_numbers(double* data, const std::vector<bool>& free, FreeBlock names, bool frozen);
+
+  std::unique_ptr<Readings> readings_;
+  std::unique_ptr<ceres::EvaluationCallback> callback_;
+  std::unique_ptr<ceres::Problem> problem_;
+  std::vector<ceres::ResidualBlockId> ids_;
+  std::vector<ceres::ResidualBlockId> prior_ids_;
+  std::vector<FreeBlock> blocks_;
+  bool has_local_ = false;
+};
+
+}  // namespace kinescope::bundle

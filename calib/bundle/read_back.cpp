@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/read_back.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <Eigen/Eigenvalues>
+
+#include "calib/bundle/make_spec.h"
+
+namespace kinescope::bundle {
+namespace {
+
+// Where each component of a pose block stands among the parameters; -1: held.
+using Columns = std::array<int, 6>;
+
+std::map<const double*, Columns> pose_columns(const Uncertainty& uncertainty) {
+  std::map<const double*, Columns> out;
+  int next = 0;
+  for (const FreeBlock& block : uncertainty.blocks) {
+    Columns columns;
+    columns.fill(-1);
+    for (std::size_t i = 0; i < block.components.size(); ++i) {
+      const auto component = static_cast<std::size_t>(block.components[i]);
+      if (component < 6) columns[component] = next + static_cast<int>(i);
+    }
+    out[block.data] = columns;
+    next += static_cast<int>(block.names.size());
+  }
+  return out;
+}
+
+// Largest standard deviation over the directions of a covariance; nothing when a parameter is
+// unseen.
+Sigma largest_sigma(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+  const double most = eigen.eigenvalues()[covariance.rows() - 1];
+  if (!(most > 0.0) || !std::isfinite(most)) return std::nullopt;
+  return std::sqrt(most);
+}
+
+bool all_seen(const Uncertainty& uncertainty, const Columns& columns, int first, int count) {
+  for (int i = first; i < first + count; ++i) {
+    const int column = columns[static_cast<std::size_t>(i)];
+    if (column >= 0 && !uncertainty.parameters[static_cast<std::size_t>(column)].sigma)
+      return false;
+  }
+  return true;
+}
+
+Sigma block_sigma(const Uncertainty& uncertainty, const Columns& columns, int first) {
+  std::vector<int> present;
+  for (int i = first; i < first + 3; ++i) {
+    if (columns[static_cast<std::size_t>(i)] >= 0) {
+      present.push_back(columns[static_cast<std::size_t>(i)]);
+    }
+  }
+  if (present.empty() || !all_seen(uncertainty, columns, first, 3)) return std::nullopt;
+  return largest_sigma(uncertainty.covariance(present, present));
+}
+
+double value_of(const FreeBlock& block, std::size_t i, const State& start) {
+  // Poses are reported as changes, everything else as it is.
+  static_cast<void>(start);
+  return block.data[block.components[i]];
+}
+
+Eigen::VectorXd mean_values(const Calibration& out) {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(out.joint_values.cols());
+  for (Eigen::Index j = 0; j < mean.size(); ++j) {
+    int count = 0;
+    for (Eigen::Index f = 0; f < out.joint_values.rows(); ++f) {
+      if (!std::isfinite(out.joint_values(f, j))) continue;
+      mean[j] += out.joint_values(f, j);
+      ++count;
+    }
+    if (count > 0) mean[j] /= count;
+  }
+  return mean;
+}
+
+void fill_joint_values(const Spec& spec, const State& state, const Readings& readings,
+                       Calibration& out) {
+  const auto frames = static_cast<Eigen::Index>(spec.times_s.size());
+  const auto joints = static_cast<Eigen::Index>(spec.tree.joints.size());
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  out.joint_values = Eigen::MatrixXd::Constant(frames, joints, kUnknown);
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    for (std::size_t f = 0; f < spec.times_s.size(); ++f) {
+      double value = 0.0;
+      if (spec.free_value[j]) {
+        value = state.values[j][f];
+      } else if (spec.channel[j] >= 0) {
+        // The offset goes into the joint's frame, so that the value is the reading in SI units.
+        const int joint = static_cast<int>(j);
+        value = readings.known(static_cast<int>(f), joint)
+                    ? state.joint_maps[j][0] * readings.value(static_cast<int>(f), joint)
+                    : kUnknown;
+      }
+      out.joint_values(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(j)) = value;
+    }
+  }
+}
+
+void fill_tree(const Spec& spec, const State& state, Calibration& out) {
+  out.tree = spec.tree;
+  for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
+    Joint& joint = out.tree.joints[j];
+    joint.T_parent_joint = from_block(state.joint_frames[j].data()) *
+                           joint_motion(joint.type, joint.axis, state.joint_maps[j][1]);
+    joint.scale = state.joint_maps[j][0];
+    joint.offset = 0.0;
+    if (joint.type == JointType::kFixed) continue;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const Sighting& sighting : spec.sightings) {
+      const double value = out.joint_values(sighting.frame, static_cast<Eigen::Index>(j));
+      if (!std::isfinite(value)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    if (low <= high) joint.limits = JointLimits{low, high};
+  }
+  for (std::size_t m = 0; m < out.tree.markers.size(); ++m) {
+    out.tree.markers[m].T_link_marker = from_block(state.mounts[m].data());
+  }
+  out.T_camera_base = from_block(state.camera_base.data());
+}
+
+// Uncertainty of each axis in the base frame, all joints at their mean: the frames before it count.
+void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncertainty,
+                 Calibration& out) {
+  const auto columns = pose_columns(uncertainty);
+  const Eigen::VectorXd mean = mean_values(out);
+  const std::vector<Pose> T_base_link = forward_kinematics(out.tree, mean);
+  const auto parameters = uncertainty.covariance.rows();
+  for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
+    const Joint& joint = out.tree.joints[j];
+    JointEstimate estimate;
+    const Pose T_base_joint = T_base_link[joint.parent.index()] * joint.T_parent_joint;
+    estimate.axis_base = T_base_joint.rotation * joint.axis;
+    estimate.point_base = T_base_joint.translation;
+    if (joint.limits) estimate.range = *joint.limits;
+    if (joint.type != JointType::kFixed && parameters > 0) {
+      Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, parameters);
+      bool seen = true;
+      for (const int up : spec.path[joint.child.index()]) {
+        const auto found = columns.find(state.joint_frames[static_cast<std::size_t>(up)].data());
+        if (found == columns.end()) continue;
+        const Joint& above = out.tree.joints[static_cast<std::size_t>(up)];
+        const Pose T_base_above = T_base_link[above.parent.index()] * above.T_parent_joint;
+        const Matrix6d carry = adjoint(T_base_joint.inverse() * T_base_above);
+        seen = seen && all_seen(uncertainty, found->second, 0, 6);
+        for (int i = 0; i < 6; ++i) {
+          const int column = found->second[static_cast<std::size_t>(i)];
+          if (column >= 0) A.col(column) += carry.col(i);
+        }
+      }
+      // Only what tilts the axis, and what moves it sideways, matters.
+      const Eigen::Matrix3d R = rotation_to_axis(joint.axis).toRotationMatrix().transpose();
+      const Eigen::MatrixXd tilt = (R * A.topRows<3>()).topRows<2>();
+      const Eigen::MatrixXd shift = (R * A.bottomRows<3>()).topRows<2>();
+      if (seen) {
+        estimate.direction_sigma_rad =
+            largest_sigma(tilt * uncertainty.covariance * tilt.transpose());
+        if (joint.type == JointType::kRevolute) {
+          estimate.position_sigma_m =
+              largest_sigma(shift * uncertainty.covariance * shift.transpose());
+        }
+      }
+    }
+    out.joints.push_back(estimate);
+  }
+}
+
+void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncertainty,
+                  Calibration& out) {
+  out.parameters = uncertainty.parameters;
+  out.covariance = uncertainty.covariance;
+  std::size_t next = 0;
+  for (const FreeBlock& block : uncertainty.blocks) {
+    const bool pose = block.block != "clock" && block.block != "intrinsics" &&
+                      !block.names.front().ends_with("scale") &&
+                      !block.names.front().ends_with("offset") &&
+                      !block.block.starts_with("target ");
+    for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
+      Parameter& parameter = out.parameters[next];
+      if (!pose) parameter.value = value_of(block, i, state);
+      if (block.block == "clock") out.time_offset_sigma_s = parameter.sigma;
+      if (block.block == "intrinsics") {
+        out.intrinsics_sigma[static_cast<std::size_t>(block.components[i])] = parameter.sigma;
+      }
+      for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+        if (block.data != state.joint_maps[j].data()) continue;
+        (block.components[i] == 0 ? out.joints[j].scale_sigma : out.joints[j].offset_sigma) =
+            parameter.sigma;
+      }
+    }
+  }
+}
+
+void fill_markers(const Spec& spec, const State& state, const RobustSolution& robust,
+                  const Uncertainty& uncertainty, Calibration& out) {
+  const auto columns = pose_columns(uncertainty);
+  out.markers.resize(spec.tree.markers.size());
+  for (std::size_t m = 0; m < out.markers.size(); ++m) {
+    const auto found = columns.find(state.mounts[m].data());
+    if (found == columns.end()) continue;
+    out.markers[m].rotation_sigma_rad = block_sigma(uncertainty, found->second, 0);
+    out.markers[m].translation_sigma_m = block_sigma(uncertainty, found->second, 3);
+  }
+  const auto marker_of = [&](int index) {
+    return static_cast<std::size_t>(spec.sightings[static_cast<std::size_t>(index)].marker);
+  };
+  for (const int index : robust.used) ++out.markers[marker_of(index)].used;
+  for (const int index : robust.rejected) ++out.markers[marker_of(index)].rejected;
+}
+
+}  // namespace
+
+void read_back(const Spec& spec, const State& state, const RobustSolution& robust,
+               const Uncertainty& uncertainty, Calibration& out) {
+  const Readings readings(spec, state.time_offset[0]);
+  out.times_s = spec.times_s;
+  out.camera = camera_of(spec, state);
+  out.intrinsics_estimated = std::ranges::any_of(spec.free_intrinsics, [](bool f) { return f; });
+  out.time_offset_s = state.time_offset[0];
+  out.gauge = gauge_in_words(spec);
+  out.observability = uncertainty.observability;
+  out.correlation_time_s = uncertainty.correlation_time_s;
+  fill_joint_values(spec, state, readings, out);
+  fill_tree(spec, state, out);
+  fill_joints(spec, state, uncertainty, out);
+  fill_markers(spec, state, robust, uncertainty, out);
+  fill_numbers(spec, state, uncertainty, out);
+}
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/solve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <ceres/solver.h>
+
+namespace kinescope::bundle {
+namespace {
+
+// Above this many global unknowns the normal equations are kept sparse.
+constexpr int kDenseLimit = 400;
+// Groups smaller than this share the common noise level.
+constexpr std::size_t kMinGroup = 30;
+// Width of the Cauchy loss in units of the square root of a sighting's degrees of freedom.
+constexpr double kLossWidth = 3.0;
+
+// Quantile of chi-square with k degrees of freedom at z standard deviations. Wilson and Hilferty
+// 1931.
+double chi_square_at(double k, double z) {
+  const double a = 2.0 / (9.0 * k);
+  return k * std::pow(std::max(0.0, 1.0 - a + z * std::sqrt(a)), 3.0);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Misfit {
+  int sighting = 0;
+  double chi_square = 0.0;  // infinite where nothing can be predicted
+  double rotation = 0.0;    // poses: the parts of it
+  double translation = 0.0;
+};
+
+std::vector<Misfit> misfits(const Spec& spec, const State& state, const std::vector<int>& indices) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::vector<Misfit> out;
+  for (const int index : indices) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const auto error = error_of(spec, state, readings, sighting);
+    Misfit misfit{index, std::numeric_limits<double>::infinity(), 0.0, 0.0};
+    if (error) {
+      misfit.chi_square = error->residual.squaredNorm();
+      if (sighting.kind == MeasurementKind::kPose) {
+        misfit.rotation = error->residual.head<3>().squaredNorm();
+        misfit.translation = error->residual.tail<3>().squaredNorm();
+      }
+    }
+    out.push_back(misfit);
+  }
+  return out;
+}
+
+double robust_scale(const std::vector<double>& chi_squares, double freedom, double shrink) {
+  if (chi_squares.empty()) return 1.0;
+  const double ratio = median(chi_squares) / chi_square_at(freedom, 0.0) * shrink;
+  return std::sqrt(std::max(ratio, 1e-12));
+}
+
+// Multiplies the declared sigmas so that the misfits have the size their degrees of freedom ask
+// for.
+void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
+  std::vector<double> all;
+  std::vector<double> rotation;
+  std::vector<double> translation;
+  std::map<int, std::vector<double>> by_marker;
+  for (const Misfit& misfit : misfits) {
+    if (!std::isfinite(misfit.chi_square)) continue;
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    // Per degree of freedom, so that boards and tags can be mixed.
+    all.push_back(misfit.chi_square / sighting.dimension());
+    by_marker[sighting.marker].push_back(all.back());
+    rotation.push_back(misfit.rotation);
+    translation.push_back(misfit.translation);
+  }
+  if (all.empty()) return;
+  if (spec.kind == MeasurementKind::kPose) {
+    const double s_rotation = robust_scale(rotation, 3.0, shrink);
+    const double s_translation = robust_scale(translation, 3.0, shrink);
+    for (Sighting& sighting : spec.sightings) {
+      sighting.whitening.leftCols<3>() /= s_rotation;
+      sighting.whitening.rightCols<3>() /= s_translation;
+    }
+    return;
+  }
+  const auto scale_of = [&](const std::vector<double>& values, int marker) {
+    double freedom = 8.0;
+    for (const Sighting& s : spec.sightings) {
+      if (marker < 0 || s.marker == marker) {
+        freedom = s.dimension();
+        break;
+      }
+    }
+    std::vector<double> chi(values);
+    for (double& value : chi) value *= freedom;
+    return robust_scale(chi, freedom, shrink);
+  };
+  const double common = scale_of(all, -1);
+  std::map<int, double> scale;
+  for (const auto& [marker, values] : by_marker) {
+    scale[marker] = values.size() >= kMinGroup ? scale_of(values, marker) : common;
+  }
+  for (Sighting& sighting : spec.sightings) {
+    const auto found = scale.find(sighting.marker);
+    sighting.sigma *= found == scale.end() ? common : found->second;
+  }
+}
+
+double rms_sigma(const Spec& spec) {
+  double sum = 0.0;
+  for (const Sighting& s : spec.sightings) {
+    const double sigma = s.kind == MeasurementKind::kPose
+                             ? std::sqrt(3.0) / s.whitening.rightCols<3>().norm()
+                             : s.sigma;
+    sum += sigma * sigma;
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, spec.sightings.size())));
+}
+
+// Sightings beyond `reject_sigma`; the others are what is used.
+std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfits,
+                              double reject_sigma) {
+  std::vector<int> kept;
+  for (const Misfit& misfit : misfits) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    if (misfit.chi_square <= chi_square_at(sighting.dimension(), reject_sigma)) {
+      kept.push_back(misfit.sighting);
+    }
+  }
+  return kept;
+}
+
+// Factor N / (N - P): residuals of a fit are smaller than the noise.
+double freedom_factor(const Spec& spec, State& state, const std::vector<int>& used) {
+  BuiltProblem built(spec, state, used, {});
+  int unknowns = 0;
+  for (const FreeBlock& block : built.blocks()) unknowns += static_cast<int>(block.names.size());
+  int rows = 0;
+  for (const int index : used) rows += spec.sightings[static_cast<std::size_t>(index)].dimension();
+  return static_cast<double>(rows) / std::max(1.0, static_cast<double>(rows - unknowns));
+}
+
+}  // namespace
+
+SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
+                   const BuildOptions& build_options, int max_iterations) {
+  BuiltProblem built(spec, state, sightings, build_options);
+  if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
+  int unknowns = 0;
+  for (const FreeBlock& block : built.blocks()) unknowns += static_cast<int>(block.names.size());
+
+  ceres::Solver::Options options;
+  options.linear_solver_type = built.has_local_blocks() || unknowns > kDenseLimit
+                                   ? ceres::SPARSE_NORMAL_CHOLESKY
+                                   : ceres::DENSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = max_iterations;
+  options.function_tolerance = 1e-10;
+  options.parameter_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-14;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &built.problem(), &summary);
+  return {summary.termination_type == ceres::CONVERGENCE, summary.message,
+          static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};
+}
+
+std::vector<int> usable_sightings(const Spec& spec, const State& state) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::vector<int> usable;
+  for (std::size_t i = 0; i < spec.sightings.size(); ++i) {
+    const Sighting& sighting = spec.sightings[i];
+    const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+    const auto& path = spec.path[marker.link.index()];
+    const bool known = std::ranges::all_of(path, [&](int joint) {
+      return spec.channel[static_cast<std::size_t>(joint)] < 0 ||
+             readings.known(sighting.frame, joint);
+    });
+    if (known) usable.push_back(static_cast<int>(i));
+  }
+  return usable;
+}
+
+RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
+                              double reject_sigma, int max_iterations) {
+  constexpr int kPasses = 2;
+  const double declared = rms_sigma(spec);
+  RobustSolution out;
+  // A first solve with declared sigmas and a wide loss, then the noise level is known well enough
+  // for the loss to tell outliers from noise.
+  rescale(spec, misfits(spec, state, sightings), 1.0);
+  const double freedom =
+      sightings.empty() ? 6.0 : spec.sightings[static_cast<std::size_t>(sightings[0])].dimension();
+  BuildOptions robust{kLossWidth * std::sqrt(freedom), false};
+  out.summary = solve(spec, state, sightings, robust, max_iterations);
+  rescale(spec, misfits(spec, state, sightings), 1.0);
+  SolveSummary second = solve(spec, state, sightings, robust, max_iterations);
+  out.summary.iterations += second.iterations;
+  out.used = sightings;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<Misfit> all = misfits(spec, state, sightings);
+    rescale(spec, all, freedom_factor(spec, state, out.used));
+    all = misfits(spec, state, sightings);
+    out.used = keep_inliers(spec, all, reject_sigma);
+    second = solve(spec, state, out.used, {}, max_iterations);
+    out.summary.iterations += second.iterations;
+  }
+  out.summary.converged = second.converged;
+  out.summary.message = second.message;
+  out.summary.final_cost = second.final_cost;
+  rescale(spec, misfits(spec, state, out.used), freedom_factor(spec, state, out.used));
+  std::ranges::set_difference(sightings, out.used, std::back_inserter(out.rejected));
+  out.sigma_scale = rms_sigma(spec) / declared;
+  return out;
+}
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// From a Spec and a State to the best State: robust, then with outliers put aside and the noise
+// level found.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+struct SolveSummary {
+  bool converged = false;
+  std::string message;
+  int iterations = 0;
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+};
+
+/// Least squares over the given sightings; moves `state`. Single-threaded, so that the bits are the
+/// same.
+[[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
+                                 const BuildOptions& options, int max_iterations);
+
+struct RobustSolution {
+  SolveSummary summary;
+  std::vector<int> used;  ///< indices into Spec::sightings
+  std::vector<int> rejected;
+  double sigma_scale = 1.0;  ///< noise found over noise declared, rms over all
+};
+
+/// Robust solve, noise level per marker (per rotation and translation for poses), rejection, plain
+/// refit, twice. Rescales the sigmas in `spec`.
+[[nodiscard]] RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
+                                            double reject_sigma, int max_iterations);
+
+/// Sightings whose joints all have a reading at the state's time offset.
+[[nodiscard]] std::vector<int> usable_sightings(const Spec& spec, const State& state);
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/uncertainty.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <Eigen/Eigenvalues>
+#include <ceres/crs_matrix.h>
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope::bundle {
+namespace {
+
+// Scaled singular values below this, relative to the largest, are called weak: the combination is
+// known a thousand times worse than the best one.
+constexpr double kWeak = 1e-3;
+// Below this the data say nothing at all and the direction is left out of the covariance.
+constexpr double kUnseen = 1e-8;
+// Blocks of the sandwich: no fewer than this many, or its scatter says nothing.
+constexpr int kMinStretches = 12;
+
+// The rows of one frame: derivatives by the global parameters with the frame's own unknowns
+// eliminated.
+struct FrameRows {
+  Eigen::MatrixXd J;
+  Eigen::VectorXd r;
+};
+
+struct Linearisation {
+  std::vector<FreeBlock> blocks;    // global
+  std::map<int, FrameRows> frames;  // by frame; distances between targets under -1
+  Eigen::MatrixXd prior_information;
+};
+
+std::vector<double*> data_of(const std::vector<FreeBlock>& blocks) {
+  std::vector<double*> data;
+  for (const FreeBlock& block : blocks) data.push_back(block.data);
+  return data;
+}
+
+int width_of(const std::vector<FreeBlock>& blocks) {
+  int width = 0;
+  for (const FreeBlock& block : blocks) width += static_cast<int>(block.names.size());
+  return width;
+}
+
+Eigen::MatrixXd dense_rows(const ceres::CRSMatrix& m, int first, int count, int column,
+                           int columns) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count, columns);
+  for (int i = 0; i < count; ++i) {
+    const auto row = static_cast<std::size_t>(first + i);
+    for (int k = m.rows[row]; k < m.rows[row + 1]; ++k) {
+      const int c = m.cols[static_cast<std::size_t>(k)] - column;
+      if (c >= 0 && c < columns) out(i, c) = m.values[static_cast<std::size_t>(k)];
+    }
+  }
+  return out;
+}
+
+Eigen::MatrixXd information_of_priors(BuiltProblem& built, const std::vector<double*>& parameters,
+                                      int width) {
+  if (built.prior_ids().empty()) return Eigen::MatrixXd::Zero(width, width);
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = parameters;
+  options.residual_blocks = built.prior_ids();
+  ceres::CRSMatrix jacobian;
+  KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, nullptr, nullptr, &jacobian),
+                  "priors can be evaluated");
+  const Eigen::MatrixXd J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
+  return J.transpose() * J;
+}
+
+// Takes the frame's own unknowns out: J <- J - L (L'L)^-1 L' J.
+void eliminate(FrameRows& rows, const Eigen::MatrixXd& local) {
+  if (local.cols() == 0) return;
+  Eigen::MatrixXd normal = local.transpose() * local;
+  normal.diagonal().array() += 1e-12 * (normal.diagonal().maxCoeff() + 1e-300);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+  rows.J -= local * factor.solve(local.transpose() * rows.J);
+  rows.r -= local * factor.solve(local.transpose() * rows.r);
+}
+
+Linearisation linearise(const Spec& spec, State& state, const std::vector<int>& used) {
+  BuiltProblem built(spec, state, used, {});
+  Linearisation out;
+  std::map<int, std::vector<FreeBlock>> locals;
+  for (const FreeBlock& block : built.blocks()) {
+    if (block.local_frame < 0) {
+      out.blocks.push_back(block);
+    } else {
+      locals[block.local_frame].push_back(block);
+    }
+  }
+  const int width = width_of(out.blocks);
+  // Frame by frame, so that the memory needed does not depend on the length of the recording.
+  std::map<int, std::vector<ceres::ResidualBlockId>> ids;
+  for (std::size_t i = 0; i < built.sighting_ids().size(); ++i) {
+    const int frame =
+        i < used.size() ? spec.sightings[static_cast<std::size_t>(used[i])].frame : -1;
+    ids[frame].push_back(built.sighting_ids()[i]);
+  }
+  for (const auto& [frame, residual_blocks] : ids) {
+    ceres::Problem::EvaluateOptions options;
+    options.parameter_blocks = data_of(out.blocks);
+    const auto local = locals.find(frame);
+    int local_width = 0;
+    if (local != locals.end()) {
+      for (double* data : data_of(local->second)) options.parameter_blocks.push_back(data);
+      local_width = width_of(local->second);
+    }
+    options.residual_blocks = residual_blocks;
+    options.apply_loss_function = false;
+    std::vector<double> residuals;
+    ceres::CRSMatrix jacobian;
+    KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
+                    "a solution can be evaluated");
+    FrameRows rows;
+    rows.J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
+    rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data(), jacobian.num_rows);
+    eliminate(rows, dense_rows(jacobian, 0, jacobian.num_rows, width, local_width));
+    out.frames.emplace(frame, std::move(rows));
+  }
+  out.prior_information = information_of_priors(built, data_of(out.blocks), width);
+  return out;
+}
+
+// Pooled autocorrelation of the whitened residuals of each marker's coordinates, integrated.
+double correlation_time(const Spec& spec, const State& state, const std::vector<int>& used) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::map<int, std::map<int, Eigen::VectorXd>> by_marker;
+  for (const int index : used) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    if (const auto error = error_of(spec, state, readings, sighting)) {
+      by_marker[sighting.marker][sighting.frame] = error->residual;
+    }
+  }
+  const std::size_t frames = spec.times_s.size();
+  if (frames < 20) return 0.0;
+  const double step_s =
+      (spec.times_s.back() - spec.times_s.front()) / static_cast<double>(frames - 1);
+  double variance = 0.0;
+  for (const auto& [marker, series] : by_marker) {
+    for (const auto& [frame, r] : series)
+      variance += r.squaredNorm() / static_cast<double>(r.size());
+  }
+  std::size_t total = 0;
+  for (const auto& [marker, series] : by_marker) total += series.size();
+  if (total == 0 || variance <= 0.0) return 0.0;
+  variance /= static_cast<double>(total);
+  double sum = 0.5;
+  const int max_lag = static_cast<int>(std::min<std::size_t>(frames / 4, 200));
+  for (int lag = 1; lag <= max_lag; ++lag) {
+    double product = 0.0;
+    int pairs = 0;
+    for (const auto& [marker, series] : by_marker) {
+      for (const auto& [frame, r] : series) {
+        const auto later = series.find(frame + lag);
+        if (later == series.end()) continue;
+        product += r.dot(later->second) / static_cast<double>(r.size());
+        ++pairs;
+      }
+    }
+    const double rho = pairs > 0 ? product / (pairs * variance) : 0.0;
+    if (rho < 0.05) break;
+    sum += rho;
+  }
+  return sum * step_s;
+}
+
+// Which stretch of time each frame belongs to.
+std::map<int, int> stretches(const Spec& spec, const Linearisation& linear, double correlation_s) {
+  std::map<int, int> out;
+  const double begin = spec.times_s.front();
+  const double duration = std::max(1e-9, spec.times_s.back() - begin);
+  const double length = std::clamp(4.0 * correlation_s, duration / 200.0, duration / kMinStretches);
+  int next = 1 << 20;
+  for (const auto& [frame, rows] : linear.frames) {
+    if (spec.postures || frame < 0) {
+      out[frame] = next++;
+    } else {
+      out[frame] =
+          static_cast<int>((spec.times_s[static_cast<std::size_t>(frame)] - begin) / length);
+    }
+  }
+  return out;
+}
+
+// Factors by which the variances grow because the residuals are not independent.
+Eigen::VectorXd inflation(const Linearisation& linear, const std::map<int, int>& stretch,
+                          const Eigen::MatrixXd& covariance) {
+  std::map<int, Eigen::VectorXd> scores;
+  const Eigen::Index n = covariance.rows();
+  for (const auto& [frame, rows] : linear.frames) {
+    auto [entry, fresh] = scores.try_emplace(stretch.at(frame), Eigen::VectorXd::Zero(n));
+    entry->second += rows.J.transpose() * rows.r;
+  }
+  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
+  for (const auto& [key, g] : scores) meat += g * g.transpose();
+  const auto count = static_cast<double>(scores.size());
+  if (count < 3.0) return Eigen::VectorXd::Ones(n);
+  const Eigen::MatrixXd sandwich = covariance * meat * covariance * (count / (count - 1.0));
+  Eigen::VectorXd ratio(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    ratio[i] = covariance(i, i) > 0.0 ? sandwich(i, i) / covariance(i, i) : 1.0;
+  }
+  // The ratio of one parameter scatters by sqrt(2 / stretches); half of it is taken from the pool.
+  const double pooled = ratio.mean();
+  return (0.5 * (ratio.array() + pooled)).max(1.0);
+}
+
+std::string in_words(const std::vector<Parameter>& parameters, const WeakDirection& direction) {
+  std::string words;
+  const std::size_t count = std::min<std::size_t>(3, direction.parameters.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string& name =
+        parameters[static_cast<std::size_t>(direction.parameters[i].first)].name;
+    words += (i == 0 ? "" : i + 1 == count ? " and " : ", ") + name;
+  }
+  return words + (count > 1 ? " cannot be told apart" : " is not seen");
+}
+
+// Singular values of the Jacobian with its columns scaled to unit length, and the directions behind
+// the small ones. Returns the information matrix's pseudo-inverse in the scaled space, unseen
+// directions left out, and marks the parameters they touch.
+Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& total,
+                        std::vector<Parameter>& parameters, Observability& out,
+                        std::vector<bool>& unseen) {
+  const Eigen::Index n = data.rows();
+  const Eigen::VectorXd scale = data.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * data *
+                                                             scale.asDiagonal());
+  const double largest = std::sqrt(std::max(eigen.eigenvalues()[n - 1], 1e-300));
+  for (Eigen::Index k = n; k-- > 0;) {
+    out.singular_values.push_back(std::sqrt(std::max(eigen.eigenvalues()[k], 0.0)));
+  }
+  out.condition_number = largest / std::max(out.singular_values.back(), 1e-300);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double relative = std::sqrt(std::max(eigen.eigenvalues()[k], 0.0)) / largest;
+    if (relative > kWeak) break;
+    WeakDirection weak{relative, {}, {}};
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double weight = eigen.eigenvectors()(i, k);
+      if (std::abs(weight) > 0.2) weak.parameters.emplace_back(static_cast<int>(i), weight);
+      if (relative < kUnseen && std::abs(weight) > 1e-3) unseen[static_cast<std::size_t>(i)] = true;
+    }
+    std::ranges::stable_sort(weak.parameters, [](const auto& a, const auto& b) {
+      return std::abs(a.second) > std::abs(b.second);
+    });
+    weak.words = in_words(parameters, weak);
+    out.weak.push_back(std::move(weak));
+  }
+  const Eigen::VectorXd total_scale = total.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> full(total_scale.asDiagonal() * total *
+                                                            total_scale.asDiagonal());
+  Eigen::VectorXd inverse = Eigen::VectorXd::Zero(n);
+  const double floor = kUnseen * kUnseen * full.eigenvalues()[n - 1];
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (full.eigenvalues()[k] > floor) inverse[k] = 1.0 / full.eigenvalues()[k];
+  }
+  return total_scale.asDiagonal() * full.eigenvectors() * inverse.asDiagonal() *
+         full.eigenvectors().transpose() * total_scale.asDiagonal();
+}
+
+}  // namespace
+
+Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vector<int>& used) {
+  const Linearisation linear = linearise(spec, state, used);
+  Uncertainty out;
+  out.blocks = linear.blocks;
+  const int n = width_of(out.blocks);
+  for (const FreeBlock& block : out.blocks) {
+    for (std::size_t i = 0; i < block.names.size(); ++i) {
+      out.parameters.push_back({block.names[i], block.block, block.units[i], 0.0, {}, {}});
+    }
+  }
+  if (n == 0) return out;
+  Eigen::MatrixXd data = Eigen::MatrixXd::Zero(n, n);
+  for (const auto& [frame, rows] : linear.frames) {
+    data.selfadjointView<Eigen::Lower>().rankUpdate(rows.J.transpose());
+    out.chi_square += rows.r.squaredNorm();
+    out.rows += static_cast<int>(rows.r.size());
+  }
+  data = Eigen::MatrixXd(data.selfadjointView<Eigen::Lower>());
+
+  std::vector<bool> unseen(static_cast<std::size_t>(n), false);
+  const Eigen::MatrixXd white =
+      observe(data, data + linear.prior_information, out.parameters, out.observability, unseen);
+  out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
+  const Eigen::VectorXd factor =
+      inflation(linear, stretches(spec, linear, out.correlation_time_s), white).cwiseSqrt();
+  out.covariance = factor.asDiagonal() * white * factor.asDiagonal();
+  for (int i = 0; i < n; ++i) {
+    // With a prior the posterior is finite even where the data are silent, and says so by its size.
+    if (unseen[static_cast<std::size_t>(i)] && !spec.has_prior) continue;
+    Parameter& parameter = out.parameters[static_cast<std::size_t>(i)];
+    parameter.sigma_white = std::sqrt(white(i, i));
+    parameter.sigma = std::sqrt(out.covariance(i, i));
+  }
+  return out;
+}
+
+}  // namespace kinescope::bundle
