@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Elements stand in the order of urdfdom's own exporter (materials, links, joints), which itself is
+// of no use here: it prints six digits, 0.5 um at 1 m.
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+#include <tinyxml2.h>
+
+#include "kinematics/core/error.h"
+#include "kinematics/urdf/urdf.h"
+
+namespace kinescope {
+namespace {
+
+using tinyxml2::XMLElement;
+
+// Nobody measured how strong or fast the joints are, and URDF asks for both. Zero would stop every
+// planner; these are wide enough to bind nowhere.
+constexpr double kAnyEffort = 1000.0;
+constexpr double kAnyVelocity = 100.0;
+
+constexpr std::string_view kFirstComment =
+    " Learned by Kinescope. SI units. A marker is a fixed link tag_ID: x right, y down, z into the "
+    "tag. "
+    "Limits are the range that was seen; effort and velocity were not measured. Shapes are for the "
+    "eye "
+    "only. ";
+
+// The extension is MuJoCo's: without an inertia it refuses a moving body (also one with several
+// drawn shapes, whose mass is zero), and by default it merges fixed links (the markers) into their
+// parents and drops what is only drawn. No inertia is invented for others.
+constexpr double kMujocoMassKg = 0.1;
+constexpr double kMujocoInertiaKgM2 = 0.001;
+
+struct Material {
+  const char* name;
+  const char* rgba;
+};
+constexpr Material kLinkColour{"link_grey", "0.62 0.66 0.70 1"};
+constexpr Material kRevoluteColour{"revolute_orange", "0.90 0.45 0.10 1"};
+constexpr Material kPrismaticColour{"prismatic_blue", "0.15 0.45 0.80 1"};
+constexpr Material kTagBlack{"tag_black", "0.05 0.05 0.05 1"};
+constexpr Material kTagWhite{"tag_white", "0.97 0.97 0.97 1"};
+
+/// Shortest text that reads back as the same double.
+std::string number(double value) { return fmt::format("{}", value == 0.0 ? 0.0 : value); }
+
+std::string numbers(const Eigen::Vector3d& v) {
+  return fmt::format("{} {} {}", number(v.x()), number(v.y()), number(v.z()));
+}
+
+/// Fixed-axis angles about x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll). Roll is taken from the rotation
+/// that is left after the yaw, so that the product is exact also where pitch is 90 degrees.
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Quaterniond& rotation) {
+  const Eigen::Matrix3d R = rotation.normalized().toRotationMatrix();
+  const double yaw = std::atan2(R(1, 0), R(0, 0));
+  const double c = std::cos(yaw);
+  const double s = std::sin(yaw);
+  const double pitch = std::atan2(-R(2, 0), c * R(0, 0) + s * R(1, 0));
+  const double roll = std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1));
+  return {roll, pitch, yaw};
+}
+
+bool is_name_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == '-' || c == '.' || c == '/';
+}
+
+/// What ROS, KDL and MuJoCo take as a name: letters, digits, _ - . and / (not in front).
+std::string sanitised(std::string_view name, std::string_view fallback) {
+  std::string out;
+  for (const char c : name) {
+    const bool continues_a_character = (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+    if (is_name_character(c)) {
+      out += c;
+    } else if (!continues_a_character) {
+      out += '_';
+    }
+  }
+  out.erase(0, out.find_first_not_of('/'));
+  return out.empty() ? std::string(fallback) : out;
+}
+
+/// The name, or name_2, name_3, .. where it is taken.
+std::string claim(const std::string& name, std::set<std::string>& taken) {
+  std::string out = name;
+  for (int i = 2; !taken.insert(out).second; ++i) out = fmt::format("{}_{}", name, i);
+  return out;
+}
+
+std::string marker_name(const Marker& marker) { return fmt::format("tag_{}", marker.id.value); }
+
+struct Names {
+  std::string robot;
+  std::vector<std::string> links;
+  std::vector<std::string> joints;
+};
+
+/// Unique names for everything. Those of the markers are promised to others, so they come first.
+Names make_names(const KinematicTree& tree) {
+  Names names{.robot = sanitised(tree.name, "robot"), .links = {}, .joints = {}};
+  std::set<std::string> links;
+  std::set<std::string> joints;
+  for (const Marker& marker : tree.markers) {
+    KINESCOPE_CHECK(links.insert(marker_name(marker)).second, "a marker stands in the tree once");
+    joints.insert(marker_name(marker) + "_joint");
+  }
+  for (const Link& link : tree.links)
+    names.links.push_back(claim(sanitised(link.name, "link"), links));
+  for (const Joint& joint : tree.joints) {
+    names.joints.push_back(claim(sanitised(joint.name, "joint"), joints));
+  }
+  return names;
+}
+
+XMLElement& add(XMLElement& parent, const char* name) {
+  return *parent.InsertNewChildElement(name);
+}
+
+void add_origin(XMLElement& parent, const Pose& pose) {
+  XMLElement& origin = add(parent, "origin");
+  origin.SetAttribute("xyz", numbers(pose.translation).c_str());
+  origin.SetAttribute("rpy", numbers(roll_pitch_yaw(pose.rotation)).c_str());
+}
+
+/// A <visual> at `pose` whose geometry the caller fills in.
+XMLElement& add_visual(XMLElement& link, const Pose& pose, const Material& material) {
+  XMLElement& visual = add(link, "visual");
+  add_origin(visual, pose);
+  XMLElement& geometry = add(visual, "geometry");
+  add(visual, "material").SetAttribute("name", material.name);
+  return geometry;
+}
+
+void add_box(XMLElement& link, const Pose& pose, const Eigen::Vector3d& size,
+             const Material& material) {
+  add(add_visual(link, pose, material), "box").SetAttribute("size", numbers(size).c_str());
+}
+
+void add_cylinder(XMLElement& link, const Pose& pose, double radius, double length,
+                  const Material& material) {
+  XMLElement& cylinder = add(add_visual(link, pose, material), "cylinder");
+  cylinder.SetAttribute("radius", number(radius).c_str());
+  cylinder.SetAttribute("length", number(length).c_str());
+}
+
+/// A rod between two points; nothing where they are one.
+void add_rod(XMLElement& link, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+             double radius) {
+  const Eigen::Vector3d along = to - from;
+  if (along.norm() < 0.5 * radius) return;
+  add_cylinder(link, {rotation_to_axis(along), 0.5 * (from + to)}, radius, along.norm(),
+               kLinkColour);
+}
+
+/// Thickness (m) that suits the robot: a share of the typical distance from joint to joint or
+/// marker.
+double rod_radius(const KinematicTree& tree) {
+  constexpr double kSmallest = 0.002;
+  constexpr double kLargest = 0.05;
+  std::vector<double> lengths;
+  for (const Joint& joint : tree.joints) lengths.push_back(joint.T_parent_joint.translation.norm());
+  for (const Marker& marker : tree.markers)
+    lengths.push_back(marker.T_link_marker.translation.norm());
+  std::erase_if(lengths, [](double length) { return length < 1e-4; });
+  if (lengths.empty()) return 0.01;
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::ranges::nth_element(lengths, middle);
+  return std::clamp(0.06 * *middle, kSmallest, kLargest);
+}
+
+/// The body of the joint that moves the link, then rods from its origin to all that sits on the
+/// link.
+void add_link_visuals(XMLElement& link, const KinematicTree& tree, LinkId id, double radius) {
+  if (const auto parent = tree.parent_joint(id)) {
+    const Joint& joint = tree.joints[parent->index()];
+    const Pose along{rotation_to_axis(joint.axis), Eigen::Vector3d::Zero()};
+    if (joint.type == JointType::kRevolute) {
+      add_cylinder(link, along, 1.8 * radius, 5.0 * radius, kRevoluteColour);
+    } else if (joint.type == JointType::kPrismatic) {
+      add_box(link, along, {3.0 * radius, 3.0 * radius, 6.0 * radius}, kPrismaticColour);
+    }
+  }
+  for (const Joint& joint : tree.joints) {
+    if (joint.parent != id) continue;
+    add_rod(link, Eigen::Vector3d::Zero(), joint.T_parent_joint.translation, radius);
+  }
+  for (const Marker& marker : tree.markers) {
+    if (marker.link != id) continue;
+    add_rod(link, Eigen::Vector3d::Zero(), marker.T_link_marker.translation, 0.4 * radius);
+  }
+}
+
+/// A tag is a black plate (its size is the tag's) on a wider white one behind it; a body that is no
+/// tag, a ball.
+void add_marker_link(XMLElement& robot, const Marker& marker, double radius) {
+  XMLElement& link = add(robot, "link");
+  link.SetAttribute("name", marker_name(marker).c_str());
+  const double s = marker.size_m;
+  if (s <= 0.0) {
+    add(add_visual(link, {}, kTagBlack), "sphere")
+        .SetAttribute("radius", number(1.5 * radius).c_str());
+    return;
+  }
+  const double thickness = 0.02 * s;
+  const auto at_depth = [](double z) {
+    return Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0, 0.0, z)};
+  };
+  add_box(link, at_depth(0.5 * thickness), {s, s, thickness}, kTagBlack);
+  add_box(link, at_depth(1.5 * thickness), {1.25 * s, 1.25 * s, thickness}, kTagWhite);
+}
+
+const char* urdf_type(const Joint& joint) {
+  switch (joint.type) {
+    case JointType::kRevolute:
+      return joint.limits ? "revolute" : "continuous";
+    case JointType::kPrismatic:
+      return "prismatic";
+    case JointType::kFixed:
+      break;
+  }
+  return "fixed";
+}
+
+XMLElement& add_joint(XMLElement& robot, const std::string& name, const char* type,
+                      const Pose& origin, const std::string& parent, const std::string& child) {
+  XMLElement& joint = add(robot, "joint");
+  joint.SetAttribute("name", name.c_str());
+  joint.SetAttribute("type", type);
+  add_origin(joint, origin);
+  add(joint, "parent").SetAttribute("link", parent.c_str());
+  add(joint, "child").SetAttribute("link", child.c_str());
+  return joint;
+}
+
+/// A prismatic joint without limits gets none (lower and upper are optional and then 0, which
+/// MuJoCo and parse_urdf both take as none), a revolute one is continuous.
+void add_axis_and_limit(XMLElement& element, const Joint& joint) {
+  if (joint.type == JointType::kFixed) return;
+  add(element, "axis").SetAttribute("xyz", numbers(joint.axis).c_str());
+  XMLElement& limit = add(element, "limit");
+  limit.SetAttribute("effort", number(kAnyEffort).c_str());
+  limit.SetAttribute("velocity", number(kAnyVelocity).c_str());
+  if (!joint.limits) return;
+  limit.SetAttribute("lower", number(joint.limits->lower).c_str());
+  limit.SetAttribute("upper", number(joint.limits->upper).c_str());
+}
+
+void add_mujoco_extension(XMLElement& robot) {
+  XMLElement& compiler = add(add(robot, "mujoco"), "compiler");
+  compiler.SetAttribute("boundmass", number(kMujocoMassKg).c_str());
+  compiler.SetAttribute("boundinertia", number(kMujocoInertiaKgM2).c_str());
+  compiler.SetAttribute("inertiafromgeom", "false");
+  compiler.SetAttribute("discardvisual", "false");
+  compiler.SetAttribute("fusestatic", "false");
+}
+
+void check_numbers(const KinematicTree& tree) {
+  const auto finite = [](const Pose& pose) {
+    return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
+  };
+  for (const Joint& joint : tree.joints) {
+    KINESCOPE_CHECK(finite(joint.T_parent_joint), "a joint's place is finite");
+    KINESCOPE_CHECK(!joint.limits || joint.limits->lower <= joint.limits->upper,
+                    "limits are in order");
+  }
+  for (const Marker& marker : tree.markers) {
+    KINESCOPE_CHECK(finite(marker.T_link_marker), "a marker's place is finite");
+  }
+}
+
+}  // namespace
+
+std::string write_urdf(const KinematicTree& tree) {
+  check_tree(tree);
+  check_numbers(tree);
+  const Names names = make_names(tree);
+  const double radius = rod_radius(tree);
+  tinyxml2::XMLDocument document;
+  document.InsertEndChild(document.NewDeclaration(R"(xml version="1.0" encoding="UTF-8")"));
+  XMLElement& robot = *document.NewElement("robot");
+  document.InsertEndChild(&robot);
+  robot.SetAttribute("name", names.robot.c_str());
+  robot.InsertNewComment(std::string(kFirstComment).c_str());
+  add_mujoco_extension(robot);
+  for (const Material& material :
+       {kLinkColour, kRevoluteColour, kPrismaticColour, kTagBlack, kTagWhite}) {
+    XMLElement& element = add(robot, "material");
+    element.SetAttribute("name", material.name);
+    add(element, "color").SetAttribute("rgba", material.rgba);
+  }
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    XMLElement& link = add(robot, "link");
+    link.SetAttribute("name", names.links[i].c_str());
+    add_link_visuals(link, tree, LinkId{static_cast<int>(i)}, radius);
+  }
+  for (const Marker& marker : tree.markers) add_marker_link(robot, marker, radius);
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const Joint& joint = tree.joints[j];
+    add_axis_and_limit(
+        add_joint(robot, names.joints[j], urdf_type(joint), joint.T_parent_joint,
+                  names.links[joint.parent.index()], names.links[joint.child.index()]),
+        joint);
+  }
+  for (const Marker& marker : tree.markers) {
+    add_joint(robot, marker_name(marker) + "_joint", "fixed", marker.T_link_marker,
+              names.links[marker.link.index()], marker_name(marker));
+  }
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
+KinematicTree with_readings_as_values(const KinematicTree& tree) {
+  KinematicTree out = tree;
+  for (Joint& joint : out.joints) {
+    if (joint.type == JointType::kFixed) continue;
+    const double sign = joint.scale < 0.0 ? -1.0 : 1.0;
+    joint.T_parent_joint =
+        joint.T_parent_joint * joint_motion(joint.type, joint.axis, joint.offset);
+    joint.axis *= sign;
+    if (joint.limits) {
+      const double a = sign * (joint.limits->lower - joint.offset);
+      const double b = sign * (joint.limits->upper - joint.offset);
+      joint.limits = JointLimits{std::min(a, b), std::max(a, b)};
+    }
+    joint.scale = std::abs(joint.scale);
+    joint.offset = 0.0;
+  }
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <regex>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/urdf/urdf.h"
+#include "tests/kinematics/model/random_tree.h"
+
+namespace kinescope {
+namespace {
+
+// Exact algebra: about 10 products of numbers up to 10, a few epsilon (2e-16) each.
+constexpr double kExact = 1e-12;
+
+/// Largest difference of forward kinematics over links and markers, m or rad, by name.
+double worst_difference(const KinematicTree& a, const KinematicTree& b,
+                        const Eigen::VectorXd& values) {
+  const std::vector<Pose> fk_a = forward_kinematics(a, values);
+  const std::vector<Pose> fk_b = forward_kinematics(b, values);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < a.links.size(); ++i) {
+    worst = std::max(worst, pose_distance(fk_a[i], fk_b[b.link(a.links[i].name)->index()]));
+  }
+  for (const Marker& marker : a.markers) {
+    const Marker& other = *b.marker(marker.id);
+    worst = std::max(worst, pose_distance(fk_a[marker.link.index()] * marker.T_link_marker,
+                                          fk_b[other.link.index()] * other.T_link_marker));
+  }
+  return worst;
+}
+
+TEST(UrdfRoundTrip, ThousandPosturesOnRandomTrees) {
+  Rng rng = Rng::from_name("UrdfRoundTrip.ThousandPosturesOnRandomTrees");
+  for (int robot = 0; robot < 50; ++robot) {
+    const KinematicTree tree = random_tree(rng, 1 + rng.index(10), rng.index(6));
+    const KinematicTree back = parse_urdf(write_urdf(tree), "memory");
+    ASSERT_EQ(back.joints.size(), tree.joints.size());
+    ASSERT_EQ(back.markers.size(), tree.markers.size());
+    for (int posture = 0; posture < 20; ++posture) {
+      EXPECT_LT(worst_difference(tree, back, random_values(rng, tree)), kExact)
+          << "robot " << robot;
+    }
+  }
+}
+
+TEST(UrdfRoundTrip, KeepsEverythingElse) {
+  Rng rng = Rng::from_name("UrdfRoundTrip.KeepsEverythingElse");
+  for (int robot = 0; robot < 20; ++robot) {
+    const KinematicTree tree = random_tree(rng, 8, 5);
+    const KinematicTree back = parse_urdf(write_urdf(tree), "memory");
+    EXPECT_EQ(back.name, tree.name);
+    for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+      EXPECT_EQ(back.joints[j].name, tree.joints[j].name);
+      EXPECT_EQ(back.joints[j].type, tree.joints[j].type);
+      EXPECT_EQ(back.joints[j].parent, tree.joints[j].parent);
+      EXPECT_EQ(back.joints[j].child, tree.joints[j].child);
+      EXPECT_EQ(back.joints[j].limits, tree.joints[j].limits);
+    }
+    for (std::size_t m = 0; m < tree.markers.size(); ++m) {
+      EXPECT_EQ(back.markers[m].id, tree.markers[m].id);
+      EXPECT_EQ(back.markers[m].link, tree.markers[m].link);
+      EXPECT_EQ(back.markers[m].size_m, tree.markers[m].size_m);
+    }
+  }
+}
+
+TEST(UrdfRoundTrip, SecondWritingIsTheSameText) {
+  Rng rng = Rng::from_name("UrdfRoundTrip.SecondWriting");
+  const KinematicTree tree = random_tree(rng, 6, 3);
+  EXPECT_EQ(write_urdf(tree), write_urdf(tree));
+}
+
+TEST(UrdfWrite, NamesAreMadeFitForOthers) {
+  KinematicTree tree;
+  tree.name = "my \"robot\" <1>";
+  tree.links = {{"base"}, {"Arm 1"}, {"Arm_1"}, {""}, {"tag_3"}};
+  for (int j = 0; j < 4; ++j) {
+    Joint joint;
+    joint.name = std::vector<std::string>{"q&1", "q<1", "/arm/wrist",
+                                          "\xCE\xB8"}[static_cast<std::size_t>(j)];
+    joint.type = JointType::kRevolute;
+    joint.parent = LinkId{0};
+    joint.child = LinkId{j + 1};
+    tree.joints.push_back(joint);
+  }
+  tree.markers = {{.id = TagId{3}, .link = LinkId{1}, .T_link_marker = {}, .size_m = 0.05}};
+  const KinematicTree back = parse_urdf(write_urdf(tree), "memory");
+  EXPECT_EQ(back.name, "my__robot___1_");
+  EXPECT_EQ(back.links[1].name, "Arm_1");
+  EXPECT_EQ(back.links[2].name, "Arm_1_2");
+  EXPECT_EQ(back.links[3].name, "link");
+  EXPECT_EQ(back.links[4].name, "tag_3_2");
+  EXPECT_EQ(back.joints[0].name, "q_1");
+  EXPECT_EQ(back.joints[1].name, "q_1_2");
+  EXPECT_EQ(back.joints[2].name, "arm/wrist");
+  EXPECT_EQ(back.joints[3].name, "_");
+  EXPECT_EQ(back.markers[0].link, LinkId{1});
+}
+
+TEST(UrdfWrite, RefusesWhatIsNoTree) {
+  KinematicTree tree;
+  EXPECT_THROW(static_cast<void>(write_urdf(tree)), std::logic_error);
+  tree.links = {{"base"}};
+  tree.markers = {{.id = TagId{1}, .link = LinkId{0}, .T_link_marker = {}, .size_m = 0.1}};
+  tree.markers.push_back(tree.markers.front());
+  EXPECT_THROW(static_cast<void>(write_urdf(tree)), std::logic_error) << "one marker twice";
+  tree.markers.pop_back();
+  tree.markers[0].T_link_marker.translation.x() = std::nan("");
+  EXPECT_THROW(static_cast<void>(write_urdf(tree)), std::logic_error) << "NaN";
+}
+
+TEST(UrdfWrite, FixedAxisAnglesInTheOrderOfUrdf) {
+  // Rz(yaw) Ry(pitch) Rx(roll): with yaw and roll of 90 degrees x goes to y, y to z, z to x.
+  KinematicTree tree;
+  tree.links = {{"base"}, {"tip"}};
+  Joint joint;
+  joint.name = "j";
+  joint.parent = LinkId{0};
+  joint.child = LinkId{1};
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  joint.T_parent_joint.rotation = Eigen::Quaterniond(R);
+  tree.joints.push_back(joint);
+  std::smatch match;
+  const std::string text = write_urdf(tree);
+  ASSERT_TRUE(std::regex_search(
+      text, match, std::regex("<joint[^]*rpy=\"([-0-9.e]+) ([-0-9.e]+) ([-0-9.e]+)\"")));
+  EXPECT_NEAR(std::stod(match[1]), 0.5 * std::numbers::pi, 1e-15);
+  EXPECT_NEAR(std::stod(match[2]), 0.0, 1e-15);
+  EXPECT_NEAR(std::stod(match[3]), 0.5 * std::numbers::pi, 1e-15);
+}
+
+TEST(UrdfReadings, OffsetAndSignMoveIntoTheGeometry) {
+  Rng rng = Rng::from_name("UrdfReadings");
+  for (int robot = 0; robot < 20; ++robot) {
+    KinematicTree tree = random_tree(rng, 6, 4);
+    for (Joint& joint : tree.joints) {
+      joint.scale = rng.uniform(-2.0, 2.0);
+      joint.offset = rng.normal();
+    }
+    const KinematicTree by_reading = with_readings_as_values(tree);
+    for (int posture = 0; posture < 10; ++posture) {
+      const Eigen::VectorXd reading = random_values(rng, tree);
+      Eigen::VectorXd value = reading;
+      Eigen::VectorXd unsigned_value = reading;
+      for (Eigen::Index j = 0; j < value.size(); ++j) {
+        const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+        value[j] = joint.scale * reading[j] + joint.offset;
+        unsigned_value[j] = std::abs(joint.scale) * reading[j];
+      }
+      const std::vector<Pose> expected = forward_kinematics(tree, value);
+      const std::vector<Pose> found = forward_kinematics(by_reading, unsigned_value);
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_LT(pose_distance(expected[i], found[i]), kExact);
+      }
+    }
+  }
+}
+
+TEST(UrdfReadings, LimitsFollow) {
+  KinematicTree tree;
+  tree.links = {{"base"}, {"tip"}};
+  Joint joint;
+  joint.name = "j";
+  joint.type = JointType::kPrismatic;
+  joint.parent = LinkId{0};
+  joint.child = LinkId{1};
+  joint.scale = -1.0;
+  joint.offset = 0.25;
+  joint.limits = JointLimits{-0.5, 0.75};  // readings from -0.5 to 0.75
+  tree.joints.push_back(joint);
+  const KinematicTree out = with_readings_as_values(tree);
+  EXPECT_EQ(out.joints[0].limits, (JointLimits{-0.5, 0.75}));
+  tree.joints[0].scale = 1.0;
+  EXPECT_EQ(with_readings_as_values(tree).joints[0].limits, (JointLimits{-0.75, 0.5}));
+}
+
+}  // namespace
+}  // namespace kinescope
