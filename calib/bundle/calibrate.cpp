@@ -180,6 +180,34 @@ State start_state(Spec& spec, const CalibrationStart& start, const CalibrateOpti
   return placed;
 }
 
+// A joint with no sighting behind it while its channel has a reading cannot be calibrated.
+void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) {
+  std::vector<bool> seen(spec.tree.joints.size(), false);
+  for (const int index : usable) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+    for (const int joint : spec.path[marker.link.index()]) {
+      seen[static_cast<std::size_t>(joint)] = true;
+    }
+  }
+  std::string missing;
+  for (std::size_t j = 0; j < seen.size(); ++j) {
+    // The joints of a nominal robot that carry no marker stay as they are.
+    const bool fixed = spec.tree.joints[j].type == JointType::kFixed;
+    const bool free = std::ranges::any_of(spec.free_joint[j], [](bool f) { return f; });
+    if (seen[j] || fixed || (!free && !spec.free_offset[j])) continue;
+    if (spec.has_prior) continue;
+    missing += (missing.empty() ? "" : ", ") + spec.tree.joints[j].name;
+  }
+  if (missing.empty() && !usable.empty()) return;
+  throw undetermined(
+      "calibration",
+      missing.empty()
+          ? std::string("no marker was seen while the joint log ran")
+          : fmt::format("no marker behind {} was seen while the joint log ran", missing),
+      "check that joints.csv and the video cover the same time");
+}
+
 void set_status(Calibration& out, const RobustSolution& robust) {
   out.status =
       robust.summary.converged ? CalibrationStatus::kConverged : CalibrationStatus::kNotConverged;
@@ -209,12 +237,8 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   State state = start_state(spec, start, options);
   const State before = state;
   const std::vector<int> usable = bundle::usable_sightings(spec, state);
-  if (usable.empty()) {
-    throw undetermined("calibration", "no marker was seen while the joint log ran",
-                       "check that joints.csv and the video cover the same time");
-  }
+  require_every_joint_seen(spec, usable);
   report(progress, "calibrate", 0, 1);
-  const double initial_cost = 0.0;
   const RobustSolution robust =
       bundle::solve_robustly(spec, state, usable, options.reject_sigma, options.max_iterations);
   report(progress, "calibrate", 1, 1);
@@ -222,7 +246,7 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   Calibration out;
   out.kind = spec.kind;
   out.iterations = robust.summary.iterations;
-  out.initial_cost = initial_cost;
+  out.initial_cost = robust.summary.initial_cost;
   out.final_cost = robust.summary.final_cost;
   out.sigma_scale = robust.sigma_scale;
 

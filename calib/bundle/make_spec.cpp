@@ -114,6 +114,12 @@ std::optional<std::size_t> first_seen_base_marker(const Spec& spec) {
   return std::nullopt;
 }
 
+// Readings in rad or m, deg, mm: the unit is known, and a scale beside it would be an effect of the
+// robot.
+bool is_unit_scale(double scale) {
+  return scale == 1.0 || scale == kRadPerDegree || scale == kMetrePerMillimetre;
+}
+
 void free_joints(const CalibrationStart& start, const CalibrateOptions& options, Spec& spec) {
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
@@ -132,7 +138,7 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
     spec.free_value.push_back(movable && !driven);
     spec.free_offset.push_back(start.nominal && movable && driven &&
                                options.free == FreeGeometry::kOffsets);
-    spec.free_scale.push_back(driven && (options.estimate_scales || joint.scale != 1.0));
+    spec.free_scale.push_back(driven && (options.estimate_scales || !is_unit_scale(joint.scale)));
   }
 }
 

@@ -22,6 +22,10 @@ enum class JointType { kFixed, kRevolute, kPrismatic };
 
 [[nodiscard]] std::string_view to_string(JointType type);
 
+/// Scales of channels in units that people log.
+inline constexpr double kRadPerDegree = 0.017453292519943295;
+inline constexpr double kMetrePerMillimetre = 1e-3;
+
 /// Lowest and highest joint value, rad or m.
 struct JointLimits {
   double lower = 0.0;
