@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a recording's folder (and files named on the command line in place of those in it).
-// Gives   Recording: everything declared and logged, read and checked; the video is only found, not decoded.
+// Gives   Recording: everything declared and logged, read and checked; the video is only found, not
+// decoded.
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "calib/camera/camera_model.h"
 #include "calib/camera/marker_set.h"
 #include "calib/camera/tag_observations.h"
+#include "kinematics/core/error.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/model/kinematic_tree.h"
 #include "kinematics/structure/pose_tracks.h"
@@ -27,15 +30,19 @@ struct RecordingPaths {
   std::optional<std::filesystem::path> video, joints, camera, tags, corners, poses, points, nominal;
 };
 
-/// recording.yaml as a value.
+/// recording.yaml as a value. Its keys: name, torque_channels, gravity, fixed_tags, video_start,
+/// target_distances (list of from, to, distance, sigma) and units (channel: unit).
 struct RecordingSettings {
-  std::string name;                            ///< of the robot; default: the folder's name
-  std::vector<std::string> torque_channels;
-  std::optional<Eigen::Vector3d> gravity;      ///< in the camera's frame, any length
-  std::vector<TagId> fixed_tags;               ///< declared at rest in the camera's frame
-  double video_start_s = 0.0;                  ///< added to the video's times: time of its first stamp on the log's clock
+  std::string name;                          ///< of the robot; default: the folder's name
+  std::vector<std::string> torque_channels;  ///< columns of joints.csv beside those named tau*
+  std::optional<Eigen::Vector3d> gravity;    ///< in the camera's frame, any length
+  std::vector<TagId> fixed_tags;             ///< declared at rest in the camera's frame
+  double video_start_s =
+      0.0;  ///< added to the video's times: time of its first stamp on the log's clock
   std::vector<TargetDistance> target_distances;
-  std::map<std::string, std::string> units;    ///< channel: rad, deg, m, mm, ticks
+  /// channel: rad, deg, m, mm, ticks. read_recording() turns deg to rad and mm to m, in the log and
+  /// here.
+  std::map<std::string, std::string> units;
 };
 
 /// How far into the path the recording enters.
@@ -45,29 +52,51 @@ struct Recording {
   std::filesystem::path folder;
   RecordingSettings settings;
   RecordingEntry entry = RecordingEntry::kVideo;
-  std::filesystem::path video;                 ///< file or image folder; empty unless entry is kVideo
-  std::optional<TagObservations> corners;      ///< corners.csv
-  std::optional<PoseTracks> poses;             ///< poses.csv
-  std::optional<PointObservations> points;     ///< points.csv
-  JointLog log;                                ///< empty when there is no joints.csv
-  std::optional<CameraModel> camera;           ///< none: to be estimated
+  std::filesystem::path video;              ///< file or image folder; empty unless entry is kVideo
+  std::optional<TagObservations> corners;   ///< corners.csv
+  std::optional<PoseTracks> poses;          ///< poses.csv
+  std::optional<PointObservations> points;  ///< points.csv
+  JointLog log;                             ///< empty when there is no joints.csv
+  std::optional<CameraModel> camera;        ///< none: to be estimated
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
-  std::vector<std::filesystem::path> files;    ///< everything that was read, sorted
+  std::vector<std::filesystem::path> files;  ///< everything that was read, sorted
   std::vector<std::string> warnings;
 };
 
 /// Reads and checks everything but the video's frames. Throws Error (file, place, remedy).
 [[nodiscard]] Recording read_recording(const RecordingPaths& paths);
 
+/// What can be read although something is wrong, and all that is wrong.
+struct ReadAttempt {
+  Recording recording;
+  std::vector<Error> errors;  ///< in the order met; empty when read_recording() would not throw
+};
+
+/// As read_recording(), but goes on behind an error. Throws nothing for a bad recording.
+[[nodiscard]] ReadAttempt try_read_recording(const RecordingPaths& paths);
+
+/// The name of a recording's folder, also where its path ends in a slash or a dot.
+[[nodiscard]] std::string recording_name(const std::filesystem::path& folder);
+
+/// Throws bad_input when the log and the times (on the log's clock) of `source` have no moment in
+/// common. Nothing to check where there is no log.
+void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
+                          const std::string& source);
+
 /// The single readers, for the same files anywhere.
+/// tags.yaml: family, default_size, sizes (id: size), tags (list of id, size), boards (id: columns,
+/// rows, square: the inner corners of a chessboard row by row, x right, y down), only_listed.
 [[nodiscard]] MarkerSet read_marker_set(const std::filesystem::path& path);
 [[nodiscard]] RecordingSettings read_recording_settings(const std::filesystem::path& path);
 /// corners.csv: t,tag,corner,u,v[,sigma] (px; corner from 0), one row a corner.
-[[nodiscard]] TagObservations read_corners(const std::filesystem::path& path, const MarkerSet& markers);
-/// poses.csv: t,body,x,y,z,qx,qy,qz,qw[,sigma_m,sigma_rad] (m; body in the camera's or tracker's frame).
+[[nodiscard]] TagObservations read_corners(const std::filesystem::path& path,
+                                           const MarkerSet& markers);
+/// poses.csv: t,body,x,y,z,qx,qy,qz,qw[,sigma_m,sigma_rad] (m; body in the camera's or tracker's
+/// frame).
 [[nodiscard]] PoseTracks read_poses(const std::filesystem::path& path);
-/// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place is unknown.
+/// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place
+/// is unknown.
 [[nodiscard]] PointObservations read_points(const std::filesystem::path& path);
 
 }  // namespace kinescope

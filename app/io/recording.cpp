@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/io/recording.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/io/nearest_name.h"
+#include "app/io/recording_files.h"
+#include "calib/camera/camera_file.h"
+#include "kinematics/core/error.h"
+#include "kinematics/urdf/urdf.h"
+
+namespace kinescope {
+namespace fs = std::filesystem;
+namespace {
+
+/// Brings a channel to SI. Ticks stay: their scale is found from the motion.
+void convert_channel(JointLog& log, int channel, std::string& unit) {
+  if (unit == "deg") {
+    log.values.col(channel) *= std::numbers::pi / 180.0;
+    unit = "rad";
+  } else if (unit == "mm") {
+    log.values.col(channel) *= 1e-3;
+    unit = "m";
+  }
+}
+
+void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& settings_file) {
+  for (auto& [name, unit] : settings.units) {
+    const std::optional<int> channel = log.channel(name);
+    if (!channel) {
+      throw bad_input(settings_file.string(),
+                      fmt::format("units names a channel '{}' that is not logged", name),
+                      did_you_mean(name, log.channels));
+    }
+    convert_channel(log, *channel, unit);
+  }
+}
+
+/// Torque channels that are declared must be columns, or the declaration is a slip of the pen.
+void read_log(Recording& recording, const RecordingFiles& files) {
+  if (!files.joints) {
+    if (!recording.settings.units.empty()) {
+      throw bad_input(files.settings->string(), "units are declared, but there is no joints.csv",
+                      "add it, or remove the units");
+    }
+    return;
+  }
+  RecordingSettings& settings = recording.settings;
+  recording.log = read_joint_log(*files.joints, settings.torque_channels);
+  if (!settings.torque_channels.empty()) {
+    const JointLog all = read_joint_log(*files.joints);
+    for (const std::string& name : settings.torque_channels) {
+      if (name.starts_with("tau") || all.channel(name)) continue;
+      throw bad_input(files.settings->string(),
+                      fmt::format("torque_channels names '{}', which is not logged", name),
+                      did_you_mean(name, all.channels));
+    }
+  }
+  if (!settings.units.empty()) convert_units(recording.log, settings, *files.settings);
+}
+
+/// Distances join targets that hold a point.
+void add_distances(Recording& recording, const RecordingFiles& files) {
+  std::vector<std::string> targets;
+  for (const PointObservation& point : recording.points->observations) {
+    if (!point.target.empty()) targets.push_back(point.target);
+  }
+  std::ranges::sort(targets);
+  const auto repeated = std::ranges::unique(targets);
+  targets.erase(repeated.begin(), repeated.end());
+  for (const TargetDistance& distance : recording.settings.target_distances) {
+    for (const std::string& name : {distance.from, distance.to}) {
+      if (std::ranges::binary_search(targets, name)) continue;
+      throw bad_input(files.settings->string(),
+                      fmt::format("target_distances names '{}', which holds no point", name),
+                      did_you_mean(name, targets));
+    }
+  }
+  recording.points->distances = recording.settings.target_distances;
+}
+
+void read_sightings(Recording& recording, const RecordingFiles& files) {
+  switch (recording.entry) {
+    case RecordingEntry::kVideo:
+      recording.video = *files.video;
+      break;
+    case RecordingEntry::kCorners:
+      recording.corners = read_corners(*files.corners, recording.markers);
+      if (recording.camera) {
+        recording.corners->width = recording.camera->width;
+        recording.corners->height = recording.camera->height;
+      }
+      require_time_overlap(recording.log, recording.corners->times_s, files.corners->string());
+      break;
+    case RecordingEntry::kPoses:
+      recording.poses = read_poses(*files.poses);
+      require_time_overlap(recording.log, recording.poses->times_s, files.poses->string());
+      break;
+    case RecordingEntry::kPoints:
+      recording.points = read_points(*files.points);
+      add_distances(recording, files);
+      require_time_overlap(recording.log, recording.points->times_s, files.points->string());
+      break;
+  }
+}
+
+void read_markers(Recording& recording, const RecordingFiles& files) {
+  if (files.tags) {
+    recording.markers = read_marker_set(*files.tags);
+    return;
+  }
+  const bool needed =
+      recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners;
+  if (!needed) return;
+  throw bad_input(
+      (recording.folder / "tags.yaml").string(), "no such file",
+      "write one with family: tag36h11 and default_size: (edge in m), or name one with --tags");
+}
+
+void check_fixed_tags(const Recording& recording, const RecordingFiles& files) {
+  for (const TagId id : recording.settings.fixed_tags) {
+    const bool listed = !recording.markers.only_listed || recording.markers.sizes_m.contains(id) ||
+                        recording.markers.boards.contains(id);
+    if (listed) continue;
+    throw bad_input(files.settings->string(),
+                    fmt::format("fixed_tags names {}, which {} does not list", id.value,
+                                files.tags->filename().string()),
+                    "correct one of the two");
+  }
+}
+
+}  // namespace
+
+void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
+                          const std::string& source) {
+  if (log.empty() || times_s.empty()) return;
+  const auto [first, last] = std::ranges::minmax(times_s);
+  if (first <= log.times_s.back() && last >= log.times_s.front()) return;
+  throw bad_input(
+      log.source.empty() ? "joints.csv" : log.source,
+      fmt::format("runs from {:.3f} to {:.3f} s and {} from {:.3f} to {:.3f} s: no common time",
+                  log.times_s.front(), log.times_s.back(), source, first, last),
+      "use one clock for both, or set video_start in recording.yaml to the log's time at the "
+      "video's first frame");
+}
+
+std::string recording_name(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+  return name.empty() ? "robot" : name.string();
+}
+
+ReadAttempt try_read_recording(const RecordingPaths& paths) {
+  ReadAttempt attempt;
+  Recording& recording = attempt.recording;
+  recording.folder = paths.folder;
+  const auto step = [&](const auto& read) {
+    try {
+      read();
+    } catch (const Error& error) {
+      attempt.errors.push_back(error);
+    }
+  };
+  RecordingFiles files;
+  step([&] { files = find_recording_files(paths); });
+  if (!attempt.errors.empty()) return attempt;
+  recording.entry = files.entry;
+  recording.warnings = files.warnings;
+  recording.files = files.all();
+  step([&] {
+    if (files.settings) recording.settings = read_recording_settings(*files.settings);
+  });
+  if (recording.settings.name.empty()) recording.settings.name = recording_name(paths.folder);
+  step([&] { read_markers(recording, files); });
+  step([&] { check_fixed_tags(recording, files); });
+  step([&] {
+    if (files.camera) recording.camera = read_camera(*files.camera);
+  });
+  step([&] {
+    if (files.nominal) recording.nominal = read_urdf(*files.nominal);
+  });
+  step([&] { read_log(recording, files); });
+  step([&] { read_sightings(recording, files); });
+  return attempt;
+}
+
+Recording read_recording(const RecordingPaths& paths) {
+  ReadAttempt attempt = try_read_recording(paths);
+  if (!attempt.errors.empty()) throw attempt.errors.front();
+  return std::move(attempt.recording);
+}
+
+}  // namespace kinescope

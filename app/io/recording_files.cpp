@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/io/recording_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace fs = std::filesystem;
+namespace {
+
+using MaybePath = std::optional<fs::path>;
+
+constexpr std::array kVideoEndings = {".mp4", ".avi",  ".mkv", ".mov", ".webm", ".m4v",
+                                      ".mpg", ".mpeg", ".wmv", ".ts",  ".ogv",  ".flv"};
+
+bool is_video_file(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return std::ranges::find(kVideoEndings, ending) != kVideoEndings.end();
+}
+
+std::vector<fs::path> sorted_files(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_regular_file(error)) files.push_back(entry.path());
+  }
+  if (error) throw bad_input(folder.string(), "cannot be listed", "check its permissions");
+  std::ranges::sort(files);
+  return files;
+}
+
+void check_folder(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder, error))
+    throw bad_input(folder.string(), "no such folder", "check the path");
+  if (fs::is_directory(folder, error)) return;
+  throw bad_input(folder.string(), "is a file, not a recording's folder",
+                  "name the folder that holds the video, tags.yaml and joints.csv");
+}
+
+/// The video: the one named video.*, else the only one, else a folder of images.
+MaybePath find_video(const fs::path& folder) {
+  std::vector<fs::path> videos = sorted_files(folder);
+  std::erase_if(videos, [](const fs::path& path) { return !is_video_file(path); });
+  std::vector<fs::path> named = videos;
+  std::erase_if(named, [](const fs::path& path) { return path.stem() != "video"; });
+  const std::vector<fs::path>& candidates = named.empty() ? videos : named;
+  if (candidates.size() > 1) {
+    std::vector<std::string> names;
+    for (const fs::path& path : candidates) names.push_back(path.filename().string());
+    throw bad_input(folder.string(),
+                    fmt::format("holds several videos: {}", fmt::join(names, ", ")),
+                    "name one with --video");
+  }
+  if (candidates.size() == 1) return candidates.front();
+  for (const char* name : {"images", "video"}) {
+    std::error_code error;
+    if (fs::is_directory(folder / name, error)) return folder / name;
+  }
+  return std::nullopt;
+}
+
+/// The file named on the command line, else the one of that name in the folder.
+MaybePath find_file(const MaybePath& declared, const fs::path& folder, const char* name,
+                    const char* option) {
+  std::error_code error;
+  if (declared) {
+    if (fs::exists(*declared, error)) return declared;
+    throw bad_input(declared->string(), "no such file", fmt::format("correct {}", option));
+  }
+  if (fs::is_regular_file(folder / name, error)) return folder / name;
+  return std::nullopt;
+}
+
+/// The way in that the command line asks for.
+std::optional<RecordingEntry> declared_entry(const RecordingPaths& paths) {
+  std::vector<std::pair<RecordingEntry, std::string>> named;
+  if (paths.video) named.emplace_back(RecordingEntry::kVideo, "--video");
+  if (paths.corners) named.emplace_back(RecordingEntry::kCorners, "--corners");
+  if (paths.poses) named.emplace_back(RecordingEntry::kPoses, "--poses");
+  if (paths.points) named.emplace_back(RecordingEntry::kPoints, "--points");
+  if (named.size() > 1) {
+    throw bad_request(fmt::format("{} {}", named[0].second, named[1].second),
+                      "both say what was seen of the robot", "name only one of them");
+  }
+  if (named.empty()) return std::nullopt;
+  return named.front().first;
+}
+
+RecordingEntry choose_entry(const RecordingPaths& paths, RecordingFiles& files) {
+  const std::array<std::pair<RecordingEntry, const MaybePath*>, 4> ways = {
+      {{RecordingEntry::kVideo, &files.video},
+       {RecordingEntry::kCorners, &files.corners},
+       {RecordingEntry::kPoses, &files.poses},
+       {RecordingEntry::kPoints, &files.points}}};
+  std::optional<RecordingEntry> entry = declared_entry(paths);
+  for (const auto& [way, file] : ways) {
+    if (!*file || (entry && *entry == way)) continue;
+    if (entry) {
+      files.warnings.push_back(fmt::format(
+          "{} is not used: the recording is read from another file", (*file)->string()));
+    } else {
+      entry = way;
+    }
+  }
+  if (entry) return *entry;
+  throw bad_input(paths.folder.string(), "holds no video, corners.csv, poses.csv or points.csv",
+                  "add one of them, or name it with --video, --corners, --poses or --points");
+}
+
+}  // namespace
+
+std::vector<fs::path> RecordingFiles::all() const {
+  std::vector<fs::path> out;
+  const MaybePath* seen[] = {&video, &corners, &poses, &points};
+  const MaybePath& used = *seen[static_cast<std::size_t>(entry)];
+  for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
+    if (!*file) continue;
+    std::error_code error;
+    if (!fs::is_directory(**file, error)) {
+      out.push_back(**file);
+      continue;
+    }
+    for (const fs::path& image : sorted_files(**file)) out.push_back(image);
+  }
+  std::ranges::sort(out);
+  return out;
+}
+
+RecordingFiles find_recording_files(const RecordingPaths& paths) {
+  const fs::path& folder = paths.folder;
+  check_folder(folder);
+  RecordingFiles files;
+  const bool seen_otherwise = paths.corners || paths.poses || paths.points;
+  if (paths.video) {
+    files.video = find_file(paths.video, folder, "", "--video");
+  } else if (!seen_otherwise) {
+    files.video = find_video(folder);
+  }
+  files.joints = find_file(paths.joints, folder, "joints.csv", "--joints");
+  files.camera = find_file(paths.camera, folder, "camera.yaml", "--camera");
+  files.tags = find_file(paths.tags, folder, "tags.yaml", "--tags");
+  files.settings = find_file(std::nullopt, folder, "recording.yaml", "");
+  files.corners = find_file(paths.corners, folder, "corners.csv", "--corners");
+  files.poses = find_file(paths.poses, folder, "poses.csv", "--poses");
+  files.points = find_file(paths.points, folder, "points.csv", "--points");
+  files.nominal = find_file(paths.nominal, folder, "nominal.urdf", "--nominal");
+  files.entry = choose_entry(paths, files);
+  return files;
+}
+
+}  // namespace kinescope

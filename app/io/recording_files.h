@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which files a recording consists of. Nothing is opened here.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/io/recording.h"
+
+namespace kinescope {
+
+struct RecordingFiles {
+  RecordingEntry entry = RecordingEntry::kVideo;
+  std::optional<std::filesystem::path> video, joints, camera, tags, settings, corners, poses,
+      points, nominal;
+  std::vector<std::string> warnings;  ///< files that are there and not used
+
+  /// All of them, sorted; a folder of images as its files.
+  [[nodiscard]] std::vector<std::filesystem::path> all() const;
+};
+
+/// Throws bad_input: no such folder, a named file that is not there, nothing that shows the robot,
+/// two videos. Throws bad_request when the command line names two of --video, --corners, --poses,
+/// --points.
+[[nodiscard]] RecordingFiles find_recording_files(const RecordingPaths& paths);
+
+}  // namespace kinescope

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// recording.yaml: what cannot be seen in the other files.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "app/io/nearest_name.h"
+#include "app/io/recording.h"
+#include "app/io/yaml_value.h"
+
+namespace kinescope {
+namespace {
+
+Eigen::Vector3d read_direction(const YamlValue& value) {
+  const std::vector<YamlValue> items = value.items();
+  if (items.size() != 3) {
+    throw value.error(fmt::format("has {} numbers, not 3", items.size()),
+                      "write [x, y, z] in the camera's frame");
+  }
+  const Eigen::Vector3d v(items[0].number(), items[1].number(), items[2].number());
+  if (v.norm() < 1e-9) throw value.error("has no length", "write a direction such as [0, 1, 0]");
+  return v;
+}
+
+TargetDistance read_target_distance(const YamlValue& value) {
+  value.only_keys({"from", "to", "distance", "sigma"});
+  TargetDistance out{.from = value.require("from").text(), .to = value.require("to").text()};
+  out.distance_m = value.require("distance").positive("give the distance in m");
+  if (const auto sigma = value.find("sigma")) out.sigma_m = sigma->positive("give it in m");
+  if (out.from == out.to) throw value.error("joins a target to itself", "name two targets");
+  return out;
+}
+
+std::string read_unit(const YamlValue& value) {
+  static const std::vector<std::string> kUnits = {"rad", "deg", "m", "mm", "ticks"};
+  const std::string unit = value.text();
+  if (std::ranges::find(kUnits, unit) != kUnits.end()) return unit;
+  throw value.error(fmt::format("is '{}', a unit nobody knows", unit), did_you_mean(unit, kUnits));
+}
+
+}  // namespace
+
+RecordingSettings read_recording_settings(const std::filesystem::path& path) {
+  const YamlValue file = YamlValue::read(path);
+  file.only_keys({"name", "torque_channels", "gravity", "fixed_tags", "video_start",
+                  "target_distances", "units"});
+  RecordingSettings settings;
+  if (const auto name = file.find("name")) settings.name = name->text();
+  if (const auto list = file.find("torque_channels")) {
+    for (const YamlValue& item : list->items()) settings.torque_channels.push_back(item.text());
+  }
+  if (const auto gravity = file.find("gravity")) settings.gravity = read_direction(*gravity);
+  if (const auto list = file.find("fixed_tags")) {
+    for (const YamlValue& item : list->items()) settings.fixed_tags.push_back({item.whole(0)});
+  }
+  if (const auto start = file.find("video_start")) settings.video_start_s = start->number();
+  if (const auto list = file.find("target_distances")) {
+    for (const YamlValue& item : list->items()) {
+      settings.target_distances.push_back(read_target_distance(item));
+    }
+  }
+  if (const auto units = file.find("units")) {
+    for (const auto& [channel, unit] : units->entries()) settings.units[channel] = read_unit(unit);
+  }
+  return settings;
+}
+
+}  // namespace kinescope
