@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/attachment.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "kinematics/structure/coupling.h"
+#include "kinematics/structure/tangent.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// A channel is inexact (backlash, gear error) when the residual along the joint is this much larger.
+constexpr double kInexact = 1.5;
+// Candidates this much worse (-2 ln likelihood, linear) than the best refined one are not refined.
+constexpr double kHopeless = 60.0;
+
+double log_det_of(const Matrix6d& W) {
+  double sum = 0.0;
+  for (int c = 0; c < 6; ++c) sum += std::log(std::abs(W(c, c)));
+  return -2.0 * sum;
+}
+
+double coordinate_variance(const ChainModel& model) {
+  double mean = 0.0;
+  for (const double c : model.coordinates) mean += c / static_cast<double>(model.coordinates.size());
+  double variance = 0.0;
+  for (const double c : model.coordinates) {
+    variance += (c - mean) * (c - mean) / static_cast<double>(model.coordinates.size());
+  }
+  return variance;
+}
+
+// Distance of the child from the axis; 0 for slides.
+double axis_distance(const ChainModel& model) {
+  if (model.joints.size() != 1 || model.joints.front().type != JointType::kRevolute) return 0.0;
+  const Eigen::Vector3d p = model.joints.front().frame.inverse() * model.mount.translation;
+  return p.head<2>().norm();
+}
+
+double penalty_of(const ChainFit& fit, const Readings& readings) {
+  const double samples = std::max(2.0, fit.samples / fit.correlation);
+  double penalty = 0.0;
+  int free_parameters = fit.parameters;
+  std::size_t t = 0;
+  for (const ChainJoint& joint : fit.model.joints) {
+    for (std::size_t k = 0; k < joint.terms.size(); ++k, ++t) {
+      const ChainTerm& term = joint.terms[k];
+      const double rms = readings.rms[static_cast<std::size_t>(term.channel)];
+      --free_parameters;
+      penalty += scale_penalty(term.scale / rms, fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms);
+      // Which further channel couples is one choice of many.
+      if (k > 0) penalty += 2.0 * std::log(std::max(2, readings.channels())) + 4.0;
+    }
+  }
+  const double r = axis_distance(fit.model);
+  penalty += 3.0 * std::log1p(r * r);
+  return penalty + free_parameters * std::log(samples);
+}
+
+// What a coordinate free at every sample costs: it could have been anywhere in its range.
+double coordinate_cost(const ChainFit& fit, const Motion& motion) {
+  if (fit.model.joints.size() != 1 || !fit.model.joints.front().terms.empty()) return 0.0;
+  const double variance = coordinate_variance(fit.model);
+  double sum = 0.0;
+  const Vector6d axis = axis_in_child(fit.model, 0.0);
+  for (const MotionSample& s : motion) {
+    const double lever = (s.whitening.triangularView<Eigen::Upper>() * axis).norm();
+    sum += 1.0 + std::log1p(variance * lever * lever);
+  }
+  return sum;
+}
+
+Attachment complete(ChainFit fit, const RelativeMotion& relative, int seen, const Readings& readings) {
+  Attachment a;
+  const double share = relative.motion.empty() ? 1.0 : seen / static_cast<double>(relative.motion.size());
+  a.data_cost = share * (fit.cost + relative.log_det + coordinate_cost(fit, relative.motion));
+  a.penalty = penalty_of(fit, readings);
+  a.fit = std::move(fit);
+  return a;
+}
+
+int seen_with_log(const Body& body, const Readings& readings) {
+  int count = 0;
+  for (std::size_t i = 0; i < body.at.size(); ++i) count += body.at[i].seen && readings.valid[i] != 0 ? 1 : 0;
+  return count;
+}
+
+// Fits with the weight along the joint that its inexactness asks for.
+ChainFit fit_weighted(const Motion& motion, const Readings& readings, const ChainModel& start) {
+  ChainFit fit = fit_chain(motion, readings.value, start);
+  if (fit.axis_variance > 2.0 * kInexact) {
+    ChainFit again = fit_chain(motion, readings.value, fit.model, {.axis_weight = 1.0 / fit.axis_variance});
+    if (again.cost < fit.cost) fit = std::move(again);
+  }
+  return fit;
+}
+
+}  // namespace
+
+double scale_penalty(double scale, double sigma) {
+  constexpr double kLogRange = 25.0;  // natural logarithms that any scale may lie within
+  struct Unit {
+    double scale;
+    double share;
+  };
+  constexpr std::array<Unit, 3> kUnits{
+      Unit{1.0, 0.6}, Unit{std::numbers::pi / 180.0, 0.1}, Unit{1e-3, 0.1}};
+  const double size = std::abs(scale);
+  const double s = std::max(sigma, 1e-12);
+  const double width = std::min(1.0, s * std::sqrt(2.0 * std::numbers::pi) / std::max(size, 1e-300) / kLogRange);
+  double best = -2.0 * std::log(0.2 * width);
+  for (const Unit& unit : kUnits) {
+    const double tolerance = std::hypot(s, 0.004 * unit.scale);
+    const double z = (size - unit.scale) / tolerance;
+    best = std::min(best, z * z - 2.0 * std::log(unit.share));
+  }
+  return best;
+}
+
+RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Readings& readings) {
+  RelativeMotion out;
+  for (std::size_t i = 0; i < body.at.size(); ++i) {
+    const Sighting& s = body.at[i];
+    if (!s.seen || path.valid[i] == 0 || readings.valid[i] == 0) continue;
+    const Pose inverse = path.pose[i].inverse();
+    MotionSample sample{.instant = static_cast<int>(i),
+                        .pose = inverse * s.pose,
+                        .whitening = s.whitening,
+                        .alternative = {},
+                        .alternative_cost = s.alternative_cost};
+    if (s.alternative) sample.alternative = inverse * *s.alternative;
+    if (!path.covariance.empty()) {
+      const Matrix6d ad = adjoint(sample.pose.inverse());
+      sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
+      out.log_det += log_det_of(sample.whitening) - log_det_of(s.whitening);
+    }
+    out.motion.push_back(std::move(sample));
+  }
+  return out;
+}
+
+Attachment attachment_from(ChainFit fit, int parent, const RelativeMotion& relative, const Body& body,
+                           const Readings& readings) {
+  Attachment a = complete(std::move(fit), relative, seen_with_log(body, readings), readings);
+  a.parent = parent;
+  return a;
+}
+
+std::vector<Attachment> find_attachments(const Body& body, int parent, const LinkPath& path,
+                                         const Readings& readings, const std::vector<char>& usable,
+                                         const AttachmentOptions& options) {
+  std::vector<Attachment> out;
+  const RelativeMotion relative = relative_motion(body, path, readings);
+  const int seen = seen_with_log(body, readings);
+  if (relative.motion.size() < 5 || 3 * relative.motion.size() < static_cast<std::size_t>(seen)) return out;
+  const Screening screening = screen_motion(relative.motion, readings.value, usable,
+                                            {.coordinate_free = options.coordinate_free, .max_channels = 4});
+  const double limit = options.give_up_above * static_cast<double>(relative.motion.size());
+  double best = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : screening.candidates) {
+    const bool rest = candidate.start.joints.empty();
+    const bool enough = static_cast<int>(out.size()) >= options.max_refined && !rest;
+    if (!out.empty() && (candidate.cost > best + kHopeless || enough)) continue;
+    if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
+    ChainFit fit = fit_weighted(relative.motion, readings, candidate.start);
+    if (candidate.channel >= 0) fit = with_couplings(std::move(fit), relative.motion, readings, usable);
+    best = std::min(best, fit.cost);
+    Attachment a = complete(std::move(fit), relative, seen, readings);
+    a.parent = parent;
+    out.push_back(std::move(a));
+  }
+  if (out.empty()) return out;
+  const auto by_data = std::ranges::min_element(out, {}, [](const Attachment& a) { return a.data_cost; });
+  const double correlation = by_data->fit.correlation;
+  std::ranges::stable_sort(out, {}, [&](const Attachment& a) { return a.cost(correlation); });
+  return out;
+}
+
+Attachment refit(const Attachment& attachment, const Body& body, const LinkPath& path, const Readings& readings) {
+  const RelativeMotion relative = relative_motion(body, path, readings);
+  ChainModel start = attachment.fit.model;
+  if (!attachment.at_rest() && !attachment.driven()) {
+    // Free coordinates belong to samples: take them anew from the sightings.
+    start.coordinates.assign(relative.motion.size(), 0.0);
+    const Vector6d axis = axis_in_child(start, 0.0);
+    for (std::size_t i = 0; i < relative.motion.size(); ++i) {
+      double value = i > 0 ? start.coordinates[i - 1] : 0.0;
+      for (int pass = 0; pass < 6; ++pass) {
+        const Matrix6d& W = relative.motion[i].whitening;
+        const Vector6d u = W * axis;
+        const Vector6d r = W * fast_log(chain_pose_at(start, {value}).inverse() * relative.motion[i].pose);
+        value += u.dot(r) / u.squaredNorm();
+      }
+      start.coordinates[i] = value;
+    }
+  }
+  ChainFit fit = fit_weighted(relative.motion, readings, start);
+  Attachment a = complete(std::move(fit), relative, seen_with_log(body, readings), readings);
+  a.parent = attachment.parent;
+  return a;
+}
+
+double free_cost(const Body& body, const Readings& readings) {
+  const LinkPath camera = camera_path(static_cast<int>(body.at.size()));
+  const RelativeMotion relative = relative_motion(body, camera, readings);
+  if (relative.motion.empty()) return 0.0;
+  const Eigen::MatrixXd none(readings.value.rows(), 0);
+  return screen_motion(relative.motion, none, {}, {.coordinate_free = false}).free_cost;
+}
+
+LinkPath camera_path(int instants) {
+  LinkPath path;
+  path.pose.assign(static_cast<std::size_t>(instants), Pose{});
+  path.valid.assign(static_cast<std::size_t>(instants), 1);
+  return path;
+}
+
+LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath& parent,
+                 const Readings& readings) {
+  const ChainModel& model = attachment.fit.model;
+  const bool single = model.joints.size() == 1;
+  const bool driven = attachment.driven();
+  const bool inexact = single && (!driven || attachment.fit.axis_variance > kInexact);
+  const std::size_t n = parent.pose.size();
+  LinkPath path;
+  path.pose.resize(n);
+  path.valid.assign(n, 0);
+  if (single && !driven) path.coordinate.assign(n, std::nan(""));
+  if (inexact || !parent.covariance.empty()) path.covariance.assign(n, Matrix6d::Zero());
+  const Vector6d axis = single ? axis_in_child(model, 0.0) : Vector6d::Zero();
+  double previous = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (parent.valid[i] == 0 || readings.valid[i] == 0) continue;
+    const int instant = static_cast<int>(i);
+    Pose relative;
+    double variance = 0.0;
+    if (!inexact) {
+      relative = chain_pose(model, readings.value, instant);
+    } else {
+      double value = driven ? chain_coordinate(model.joints.front(), readings.value, instant) : previous;
+      const Sighting& s = body.at[i];
+      if (!s.seen && !driven) continue;
+      if (s.seen) {
+        const Vector6d u = s.whitening * axis;
+        const double sight = 1.0 / u.squaredNorm();
+        const double prior = driven ? (attachment.fit.axis_variance - 1.0) * sight : 0.0;
+        const double gain = driven ? prior / (prior + sight) : 1.0;
+        const Pose seen = parent.pose[i].inverse() * s.pose;
+        const int passes = driven ? 1 : 6;
+        for (int pass = 0; pass < passes; ++pass) {
+          const Vector6d r = s.whitening * fast_log(chain_pose_at(model, {value}).inverse() * seen);
+          value += gain * u.dot(r) * sight;
+        }
+        variance = driven ? gain * sight : sight;
+      } else {
+        variance = (attachment.fit.axis_variance - 1.0) / 1e6;
+      }
+      previous = value;
+      if (!driven) path.coordinate[i] = value;
+      relative = chain_pose_at(model, {value});
+    }
+    path.valid[i] = 1;
+    path.pose[i] = parent.pose[i] * relative;
+    if (path.covariance.empty()) continue;
+    path.covariance[i] = variance * axis * axis.transpose();
+    if (parent.covariance.empty()) continue;
+    const Matrix6d ad = adjoint(relative.inverse());
+    path.covariance[i] += ad * parent.covariance[i] * ad.transpose();
+  }
+  return path;
+}
+
+}  // namespace kinescope::structure_search

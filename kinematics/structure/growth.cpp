@@ -1,0 +1,429 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/growth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kinematics/structure/several_joints.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Rounds in which bodies may change places.
+constexpr int kMostRounds = 4;
+
+std::vector<char> moving_channels(const Readings& readings) {
+  std::vector<char> usable;
+  for (int c = 0; c < readings.channels(); ++c) usable.push_back(readings.moves(c) ? 1 : 0);
+  return usable;
+}
+
+class Grower {
+ public:
+  Grower(const Series& series, const Readings& readings, const GrowthOptions& options)
+      : series_(series), readings_(readings), options_(options), usable_(moving_channels(readings)) {
+    tree_.bodies.resize(series.bodies.size());
+    for (std::size_t b = 0; b < series.bodies.size(); ++b) {
+      tree_.bodies[b].free_cost = free_cost(series.bodies[b], readings);
+    }
+    GrownLink camera;
+    camera.path = camera_path(series.size());
+    add_link(std::move(camera));
+  }
+
+  GrownTree run() {
+    do {
+      while (attach_next()) {
+      }
+    } while (options_.paths_of_several_joints && attach_through_unseen_links());
+    for (int round = 0; round < kMostRounds && rearrange(); ++round) {
+    }
+    return std::move(tree_);
+  }
+
+ private:
+  const Body& body(std::size_t b) const { return series_.bodies[b]; }
+
+  void add_link(GrownLink link) {
+    tree_.links.push_back(std::move(link));
+    const int index = static_cast<int>(tree_.links.size()) - 1;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) look_at(b, index);
+  }
+
+  // Lists the ways in which body b may hang on a link.
+  void look_at(std::size_t b, int link) {
+    GrownBody& g = tree_.bodies[b];
+    if (tree_.links[static_cast<std::size_t>(link)].founder == static_cast<int>(b)) return;
+    if (g.link >= 0 && is_below(link, static_cast<int>(b))) return;
+    const Attachment* best = best_of(g);
+    AttachmentOptions options;
+    if (best != nullptr && body(b).seen > 0) {
+      options.give_up_above = std::max(0.0, best->data_cost / body(b).seen) + 3.0;
+    }
+    auto found = find_attachments(body(b), link, tree_.links[static_cast<std::size_t>(link)].path, readings_,
+                                  usable_, options);
+    for (Attachment& a : found) g.alternatives.push_back(std::move(a));
+  }
+
+  // Link `link` hangs (at any depth) on body b's own link.
+  bool is_below(int link, int b) const {
+    for (int l = link; l >= 0; l = tree_.links[static_cast<std::size_t>(l)].parent) {
+      if (tree_.links[static_cast<std::size_t>(l)].founder == b) return true;
+    }
+    return false;
+  }
+
+  static const Attachment* best_of(const GrownBody& g) {
+    const Attachment* by_data = nullptr;
+    for (const Attachment& a : g.alternatives) {
+      if (by_data == nullptr || a.data_cost < by_data->data_cost) by_data = &a;
+    }
+    if (by_data == nullptr) return nullptr;
+    const Attachment* best = nullptr;
+    for (const Attachment& a : g.alternatives) {
+      if (best == nullptr || a.cost(by_data->fit.correlation) < best->cost(by_data->fit.correlation)) best = &a;
+    }
+    return best;
+  }
+
+  bool acceptable(const GrownBody& g, const Attachment& a) const {
+    return a.fit.variance <= options_.accept_variance && a.data_cost < g.free_cost &&
+           (a.at_rest() || a.driven() || explains_enough(a));
+  }
+
+  // A joint without a channel has to leave much less than it explains, or free bodies pass as joints.
+  static bool explains_enough(const Attachment& a) {
+    const ChainModel& m = a.fit.model;
+    const auto [low, high] = std::ranges::minmax_element(m.coordinates);
+    const double travel = *high - *low;
+    const double rotation = m.joints.front().type == JointType::kRevolute ? travel : 0.0;
+    const Vector6d axis = axis_in_child(m, 0.0);
+    const double translation = travel * axis.tail<3>().norm();
+    const bool by_rotation = rotation > 10.0 * a.fit.rotation_rms;
+    const bool by_translation = translation > 10.0 * a.fit.translation_rms;
+    return m.joints.front().type == JointType::kRevolute ? by_rotation : by_translation;
+  }
+
+  // Attaches the body that fits best anywhere; false when none is acceptable.
+  bool attach_next() {
+    std::size_t chosen = tree_.bodies.size();
+    double least = kInfinity;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      const GrownBody& g = tree_.bodies[b];
+      if (g.link >= 0) continue;
+      const Attachment* best = best_of(g);
+      if (best == nullptr || !acceptable(g, *best)) continue;
+      // Rest first, then driven joints, then free coordinates; within each the cleanest.
+      const double rank = best->at_rest() ? 0.0 : best->driven() ? 1e3 : 1e6;
+      const double badness = rank + best->data_cost / std::max(1, body(b).seen);
+      if (badness < least) {
+        least = badness;
+        chosen = b;
+      }
+    }
+    if (chosen == tree_.bodies.size()) return false;
+    place(chosen, *best_of(tree_.bodies[chosen]));
+    return true;
+  }
+
+  void place(std::size_t b, Attachment attachment) {
+    GrownBody& g = tree_.bodies[b];
+    g.attachment = attachment;
+    if (attachment.at_rest()) {
+      g.link = attachment.parent;
+      return;
+    }
+    GrownLink link;
+    link.parent = attachment.parent;
+    link.founder = static_cast<int>(b);
+    link.path = path_of(attachment, body(b), tree_.links[static_cast<std::size_t>(link.parent)].path, readings_);
+    link.attachment = std::move(attachment);
+    g.link = static_cast<int>(tree_.links.size());
+    add_link(std::move(link));
+  }
+
+  bool attach_through_unseen_links() {
+    std::vector<char> unused = usable_;
+    for (const GrownLink& l : tree_.links) {
+      for (const ChainJoint& j : l.attachment.fit.model.joints) {
+        if (!j.terms.empty()) unused[static_cast<std::size_t>(j.terms.front().channel)] = 0;
+      }
+    }
+    std::size_t chosen = tree_.bodies.size();
+    Attachment best;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      const GrownBody& g = tree_.bodies[b];
+      if (g.link >= 0) continue;
+      for (std::size_t l = 0; l < tree_.links.size(); ++l) {
+        auto found = find_serial_attachment(body(b), static_cast<int>(l), tree_.links[l].path, readings_, unused);
+        if (!found || found->fit.variance > options_.accept_variance || found->data_cost > g.free_cost) continue;
+        const bool fewer = chosen == tree_.bodies.size() ||
+                           found->fit.model.joints.size() < best.fit.model.joints.size() ||
+                           (found->fit.model.joints.size() == best.fit.model.joints.size() &&
+                            found->data_cost / body(b).seen < best.data_cost / body(chosen).seen);
+        if (!fewer) continue;
+        best = std::move(*found);
+        chosen = b;
+      }
+    }
+    if (chosen == tree_.bodies.size()) return false;
+    tree_.bodies[chosen].alternatives.push_back(best);
+    place(chosen, std::move(best));
+    return true;
+  }
+
+  // Moves single bodies to better places, then deals out the channels; true when anything changed.
+  bool rearrange() {
+    bool changed = false;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) changed = improve(b) || changed;
+    changed = settle_channels() || changed;
+    return changed;
+  }
+
+  bool improve(std::size_t b) {
+    GrownBody& g = tree_.bodies[b];
+    if (g.link < 0) return false;
+    const Attachment* best = nullptr;
+    double least = g.attachment.cost(g.attachment.fit.correlation) - 1e-6;
+    for (const Attachment& a : g.alternatives) {
+      if (is_below(a.parent, static_cast<int>(b)) || conflicts(b, a)) continue;
+      const double cost = a.cost(g.attachment.fit.correlation);
+      if (cost >= least) continue;
+      least = cost;
+      best = &a;
+    }
+    if (best == nullptr) return false;
+    move(b, *best);
+    return true;
+  }
+
+  // The attachment's main channel already drives another joint.
+  bool conflicts(std::size_t b, const Attachment& a) const {
+    if (!a.driven()) return false;
+    for (const GrownLink& l : tree_.links) {
+      if (l.founder >= 0 && l.founder != static_cast<int>(b) && l.attachment.channel() == a.channel()) return true;
+    }
+    return false;
+  }
+
+  void move(std::size_t b, Attachment attachment) {
+    GrownBody& g = tree_.bodies[b];
+    const int own = own_link(b);
+    g.attachment = attachment;
+    if (own >= 0 && !attachment.at_rest()) {
+      GrownLink& link = tree_.links[static_cast<std::size_t>(own)];
+      link.parent = attachment.parent;
+      link.attachment = std::move(attachment);
+      refresh(own);
+    } else if (own >= 0) {
+      dissolve(own, attachment);
+    } else if (attachment.at_rest()) {
+      g.link = attachment.parent;
+    } else {
+      place(b, std::move(attachment));
+    }
+  }
+
+  int own_link(std::size_t b) const {
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      if (tree_.links[l].founder == static_cast<int>(b)) return static_cast<int>(l);
+    }
+    return -1;
+  }
+
+  // The founder of `own` turns out to rest on another link: everything on `own` is looked at anew.
+  void dissolve(int own, const Attachment& attachment) {
+    std::vector<std::size_t> homeless;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      if (is_below(tree_.bodies[b].link, tree_.links[static_cast<std::size_t>(own)].founder)) homeless.push_back(b);
+    }
+    const auto founder = static_cast<std::size_t>(tree_.links[static_cast<std::size_t>(own)].founder);
+    for (const std::size_t b : homeless) tree_.bodies[b].link = -1;
+    remove_links_without_bodies();
+    tree_.bodies[founder].link = attachment.parent;
+    relist();
+    while (attach_next()) {
+    }
+  }
+
+  void remove_links_without_bodies() {
+    std::vector<int> renamed(tree_.links.size(), -1);
+    std::vector<GrownLink> kept;
+    for (std::size_t l = 0; l < tree_.links.size(); ++l) {
+      const int founder = tree_.links[l].founder;
+      if (founder >= 0 && tree_.bodies[static_cast<std::size_t>(founder)].link != static_cast<int>(l)) continue;
+      renamed[l] = static_cast<int>(kept.size());
+      kept.push_back(std::move(tree_.links[l]));
+      if (kept.back().parent >= 0) kept.back().parent = renamed[static_cast<std::size_t>(kept.back().parent)];
+    }
+    tree_.links = std::move(kept);
+    for (GrownBody& g : tree_.bodies) {
+      if (g.link >= 0) g.link = renamed[static_cast<std::size_t>(g.link)];
+    }
+    for (GrownBody& g : tree_.bodies) g.alternatives.clear();
+  }
+
+  void relist() {
+    for (std::size_t l = 0; l < tree_.links.size(); ++l) {
+      for (std::size_t b = 0; b < tree_.bodies.size(); ++b) look_at(b, static_cast<int>(l));
+    }
+  }
+
+  // Recomputes the paths at and below a link, and what was said against them.
+  void refresh(int link) {
+    sort_links(link);
+    std::vector<int> touched;
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      GrownLink& g = tree_.links[l];
+      const bool below = static_cast<int>(l) == link || std::ranges::find(touched, g.parent) != touched.end();
+      if (!below) continue;
+      touched.push_back(static_cast<int>(l));
+      const Body& founder = body(static_cast<std::size_t>(g.founder));
+      const LinkPath& parent = tree_.links[static_cast<std::size_t>(g.parent)].path;
+      if (static_cast<int>(l) != link) g.attachment = refit(g.attachment, founder, parent, readings_);
+      tree_.bodies[static_cast<std::size_t>(g.founder)].attachment = g.attachment;
+      g.path = path_of(g.attachment, founder, parent, readings_);
+    }
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      GrownBody& g = tree_.bodies[b];
+      std::erase_if(g.alternatives, [&](const Attachment& a) {
+        return std::ranges::find(touched, a.parent) != touched.end();
+      });
+      for (const int l : touched) look_at(b, l);
+      if (g.attachment.at_rest() && std::ranges::find(touched, g.link) != touched.end()) {
+        g.attachment = refit(g.attachment, body(b), tree_.links[static_cast<std::size_t>(g.link)].path, readings_);
+      }
+    }
+  }
+
+  // Puts parents before children again after `moved` changed its parent; `moved` follows its new number.
+  void sort_links(int& moved) {
+    std::vector<int> renamed(tree_.links.size(), -1);
+    std::vector<GrownLink> sorted;
+    renamed[0] = 0;
+    sorted.push_back(std::move(tree_.links[0]));
+    for (bool again = true; again;) {
+      again = false;
+      for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+        if (renamed[l] >= 0 || renamed[static_cast<std::size_t>(tree_.links[l].parent)] < 0) continue;
+        renamed[l] = static_cast<int>(sorted.size());
+        sorted.push_back(std::move(tree_.links[l]));
+        sorted.back().parent = renamed[static_cast<std::size_t>(sorted.back().parent)];
+        sorted.back().attachment.parent = sorted.back().parent;
+        again = true;
+      }
+    }
+    tree_.links = std::move(sorted);
+    for (GrownBody& g : tree_.bodies) {
+      if (g.link >= 0) g.link = renamed[static_cast<std::size_t>(g.link)];
+      g.attachment.parent = renamed[static_cast<std::size_t>(g.attachment.parent)];
+      for (Attachment& a : g.alternatives) a.parent = renamed[static_cast<std::size_t>(a.parent)];
+    }
+    moved = renamed[static_cast<std::size_t>(moved)];
+  }
+
+  // Two joints with one main channel: the one that loses least takes its next best explanation.
+  bool settle_channels() {
+    bool changed = false;
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      for (std::size_t m = l + 1; m < tree_.links.size(); ++m) {
+        const int channel = tree_.links[l].attachment.channel();
+        if (channel < 0 || channel != tree_.links[m].attachment.channel()) continue;
+        changed = resolve(l, m, channel) || changed;
+      }
+    }
+    return changed;
+  }
+
+  bool resolve(std::size_t l, std::size_t m, int channel) {
+    if (reorder_terms(m, channel) || reorder_terms(l, channel)) return true;
+    const Attachment* other_l = without_channel(tree_.links[l], channel);
+    const Attachment* other_m = without_channel(tree_.links[m], channel);
+    const auto loss = [&](std::size_t link, const Attachment* other) {
+      if (other == nullptr) return kInfinity;
+      const Attachment& now = tree_.links[link].attachment;
+      return other->cost(now.fit.correlation) - now.cost(now.fit.correlation);
+    };
+    const double loss_l = loss(l, other_l);
+    const double loss_m = loss(m, other_m);
+    if (loss_l == kInfinity && loss_m == kInfinity) return false;
+    const bool take_l = loss_l < loss_m;
+    const auto founder = static_cast<std::size_t>(tree_.links[take_l ? l : m].founder);
+    move(founder, Attachment(take_l ? *other_l : *other_m));
+    return true;
+  }
+
+  // A coupled joint may take another of its channels as the main one.
+  bool reorder_terms(std::size_t link, int channel) {
+    Attachment& a = tree_.links[link].attachment;
+    if (a.fit.model.joints.size() != 1) return false;
+    auto& terms = a.fit.model.joints.front().terms;
+    for (std::size_t t = 1; t < terms.size(); ++t) {
+      const int candidate = terms[t].channel;
+      const bool taken = std::ranges::any_of(
+          tree_.links, [&](const GrownLink& l) { return l.founder >= 0 && l.attachment.channel() == candidate; });
+      if (candidate == channel || taken) continue;
+      std::swap(terms[0], terms[t]);
+      std::swap(a.fit.scale_sigma[0], a.fit.scale_sigma[t]);
+      tree_.bodies[static_cast<std::size_t>(tree_.links[link].founder)].attachment = a;
+      return true;
+    }
+    return false;
+  }
+
+  const Attachment* without_channel(const GrownLink& link, int channel) const {
+    const GrownBody& g = tree_.bodies[static_cast<std::size_t>(link.founder)];
+    const Attachment* best = nullptr;
+    const double correlation = link.attachment.fit.correlation;
+    for (const Attachment& a : g.alternatives) {
+      if (a.channel() == channel || is_below(a.parent, link.founder)) continue;
+      if (conflicts(static_cast<std::size_t>(link.founder), a)) continue;
+      if (best == nullptr || a.cost(correlation) < best->cost(correlation)) best = &a;
+    }
+    return best;
+  }
+
+  const Series& series_;
+  const Readings& readings_;
+  GrowthOptions options_;
+  std::vector<char> usable_;
+  GrownTree tree_;
+};
+
+}  // namespace
+
+GrownTree grow_tree(const Series& series, const Readings& readings, const GrowthOptions& options) {
+  return Grower(series, readings, options).run();
+}
+
+GrownTree refit_tree(const GrownTree& tree, const Series& series, const Readings& readings) {
+  GrownTree out = tree;
+  out.links.front().path = camera_path(series.size());
+  for (std::size_t l = 1; l < out.links.size(); ++l) {
+    GrownLink& link = out.links[l];
+    const auto founder = static_cast<std::size_t>(link.founder);
+    const LinkPath& parent = out.links[static_cast<std::size_t>(link.parent)].path;
+    link.attachment = refit(link.attachment, series.bodies[founder], parent, readings);
+    out.bodies[founder].attachment = link.attachment;
+    link.path = path_of(link.attachment, series.bodies[founder], parent, readings);
+  }
+  for (std::size_t b = 0; b < out.bodies.size(); ++b) {
+    GrownBody& body = out.bodies[b];
+    if (body.link < 0 || !body.attachment.at_rest()) continue;
+    body.attachment = refit(body.attachment, series.bodies[b],
+                            out.links[static_cast<std::size_t>(body.link)].path, readings);
+  }
+  return out;
+}
+
+double tree_cost(const GrownTree& tree) {
+  double sum = 0.0;
+  for (const GrownBody& b : tree.bodies) {
+    sum += b.link < 0 ? b.free_cost : b.attachment.cost(b.attachment.fit.correlation);
+  }
+  return sum;
+}
+
+}  // namespace kinescope::structure_search

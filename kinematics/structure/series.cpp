@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/series.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "kinematics/structure/tangent.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// Frames looked at on either side of one when it is judged by its neighbours.
+constexpr int kNeighbours = 4;
+// Neighbours further away than this (s) say nothing about a frame.
+constexpr double kNeighbourTime = 0.4;
+// A sighting this many times further from its neighbours than the median one is an outlier (about 9 sigma).
+constexpr double kOutlierRatio = 4.0;
+// Neighbouring frames belong to one smooth motion when they lie this close, as a multiple of the declared noise.
+constexpr double kSmoothRatio = 12.0;
+// and in rad and m (at 1 m), for recordings with little noise.
+constexpr double kSmoothStep = 0.06;
+// Noise below this is not believed: interpolation of the log alone is worse (rad, m).
+constexpr double kNoiseFloor = 2e-6;
+// Averaging stays within this much motion (rad; m at 1 m), so that the path is straight to its noise.
+constexpr double kAverageSpan = 0.06;
+
+Matrix6d floored(Matrix6d covariance) {
+  covariance.diagonal().array() += kNoiseFloor * kNoiseFloor;
+  return covariance;
+}
+
+// Median, component by component, of the neighbours' displacement from `pose`; nothing with too few.
+std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<double>& times_s, int f,
+                                         const Pose& pose) {
+  std::array<std::array<double, 2 * kNeighbours + 1>, 6> parts{};
+  std::size_t count = 0;
+  const Pose inverse = pose.inverse();
+  for (int g = std::max(0, f - kNeighbours);
+       g <= std::min(static_cast<int>(body.at.size()) - 1, f + kNeighbours); ++g) {
+    const auto at = static_cast<std::size_t>(g);
+    const double apart = std::abs(times_s[at] - times_s[static_cast<std::size_t>(f)]);
+    if (g == f || !body.at[at].seen || apart > kNeighbourTime) continue;
+    const Vector6d d = fast_log(inverse * body.at[at].pose);
+    for (std::size_t c = 0; c < 6; ++c) parts[c][count] = d(static_cast<Eigen::Index>(c));
+    ++count;
+  }
+  if (count < 3) return std::nullopt;
+  Vector6d median;
+  for (std::size_t c = 0; c < 6; ++c) {
+    const auto first = parts[c].begin();
+    const auto middle = first + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(first, middle, first + static_cast<std::ptrdiff_t>(count));
+    double value = *middle;
+    if (count % 2 == 0) value = 0.5 * (value + *std::max_element(first, middle));
+    median(static_cast<Eigen::Index>(c)) = value;
+  }
+  return median;
+}
+
+struct Deviations {
+  std::vector<double> main;         // whitened length of the displacement, one a frame; NaN where unknown
+  std::vector<double> alternative;  // of the other branch
+  double median = 0.0;
+  double step = 0.0;                // median displacement, rad and m together
+};
+
+Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
+  Deviations out;
+  const double unknown = std::nan("");
+  out.main.assign(body.at.size(), unknown);
+  out.alternative.assign(body.at.size(), unknown);
+  std::vector<double> known;
+  std::vector<double> steps;
+  for (std::size_t f = 0; f < body.at.size(); ++f) {
+    const Sighting& s = body.at[f];
+    if (!s.seen) continue;
+    const auto d = neighbour_median(body, times_s, static_cast<int>(f), s.pose);
+    if (!d) continue;
+    out.main[f] = (s.whitening * *d).norm();
+    known.push_back(out.main[f]);
+    steps.push_back(d->norm());
+    if (!s.alternative) continue;
+    const auto other = neighbour_median(body, times_s, static_cast<int>(f), *s.alternative);
+    if (other) out.alternative[f] = (s.whitening * *other).norm();
+  }
+  out.median = median_of(std::move(known));
+  out.step = median_of(std::move(steps));
+  return out;
+}
+
+bool is_smooth(const Deviations& d) {
+  return d.median > 0.0 && (d.median < kSmoothRatio || d.step < kSmoothStep);
+}
+
+void swap_branch(Sighting& s) {
+  std::swap(s.pose, *s.alternative);
+  s.alternative_cost = -s.alternative_cost;
+}
+
+// Takes the branch that agrees with the neighbours; drops the sighting when none does.
+void clean_in_time(Body& body, const Deviations& d) {
+  const double limit = kOutlierRatio * d.median;
+  for (std::size_t f = 0; f < body.at.size(); ++f) {
+    if (!body.at[f].seen || std::isnan(d.main[f]) || d.main[f] <= limit) continue;
+    if (d.alternative[f] < limit) {
+      swap_branch(body.at[f]);
+    } else {
+      body.at[f].seen = false;
+    }
+  }
+}
+
+// Robust noise over declared noise from fourth differences of the pose, which see no motion slower than a
+// few hertz: (1, -4, 6, -4, 1) has variance 70 sigma^2. Nothing with too few runs of five frames.
+std::optional<double> noise_from_differences(const Body& body) {
+  std::vector<double> absolute;
+  for (std::size_t f = 2; f + 2 < body.at.size(); ++f) {
+    const auto seen = [&](std::size_t g) { return body.at[g].seen; };
+    if (!seen(f - 2) || !seen(f - 1) || !seen(f) || !seen(f + 1) || !seen(f + 2)) continue;
+    const Pose inverse = body.at[f].pose.inverse();
+    const auto at = [&](std::size_t g) { return fast_log(inverse * body.at[g].pose); };
+    const Vector6d difference = at(f - 2) - 4.0 * at(f - 1) - 4.0 * at(f + 1) + at(f + 2);
+    const Vector6d white = body.at[f].whitening * difference / std::sqrt(70.0);
+    for (int c = 0; c < 6; ++c) absolute.push_back(std::abs(white(c)));
+  }
+  if (absolute.size() < 120) return std::nullopt;
+  return 1.4826 * median_of(std::move(absolute));
+}
+
+void scale_noise(Body& body, double scale) {
+  body.noise_scale = scale;
+  for (Sighting& s : body.at) {
+    if (!s.seen) continue;
+    s.covariance = floored(s.covariance * (scale * scale));
+    s.whitening = whitening_of(s.covariance);
+    s.alternative_cost /= scale * scale;
+  }
+}
+
+Body body_of(const PoseTrack& track, std::size_t frames) {
+  Body body;
+  body.id = track.id;
+  body.at.resize(frames);
+  for (const PoseSample& sample : track.samples) {
+    const bool finite = sample.T_camera_marker.translation.allFinite() &&
+                        sample.T_camera_marker.rotation.coeffs().allFinite() &&
+                        sample.covariance.allFinite();
+    if (!finite || sample.frame < 0 || static_cast<std::size_t>(sample.frame) >= frames) continue;
+    Sighting& s = body.at[static_cast<std::size_t>(sample.frame)];
+    s.seen = true;
+    s.pose = sample.T_camera_marker;
+    s.covariance = floored(sample.covariance);
+    s.whitening = whitening_of(s.covariance);
+    s.alternative = sample.T_camera_marker_alternative;
+    s.alternative_cost = sample.alternative_cost;
+  }
+  return body;
+}
+
+void count_seen(Series& series) {
+  for (Body& body : series.bodies) {
+    body.seen = static_cast<int>(std::ranges::count_if(body.at, &Sighting::seen));
+  }
+}
+
+// Largest motion (rad + m) from one frame to the next that all but one in twenty steps stay below.
+double fast_step(const Series& series) {
+  double fastest = 0.0;
+  for (const Body& body : series.bodies) {
+    std::vector<double> steps;
+    for (std::size_t f = 4; f < body.at.size(); f += 4) {
+      if (!body.at[f].seen || !body.at[f - 4].seen) continue;
+      steps.push_back(fast_log(body.at[f - 4].pose.inverse() * body.at[f].pose).norm() / 4.0);
+    }
+    if (steps.size() < 10) continue;
+    std::ranges::sort(steps);
+    fastest = std::max(fastest, steps[steps.size() * 19 / 20]);
+  }
+  return fastest;
+}
+
+// The mean of the sightings symmetric about a frame, at that frame's time.
+Sighting averaged(const Body& body, int f, int half_width) {
+  Sighting out = body.at[static_cast<std::size_t>(f)];
+  if (!out.seen || half_width == 0) return out;
+  const Pose inverse = out.pose.inverse();
+  Vector6d sum = Vector6d::Zero();
+  int count = 1;
+  for (int d = 1; d <= half_width; ++d) {
+    if (f - d < 0 || f + d >= static_cast<int>(body.at.size())) continue;
+    const Sighting& before = body.at[static_cast<std::size_t>(f - d)];
+    const Sighting& after = body.at[static_cast<std::size_t>(f + d)];
+    if (!before.seen || !after.seen) continue;
+    sum += fast_log(inverse * before.pose) + fast_log(inverse * after.pose);
+    count += 2;
+  }
+  out.pose = out.pose * exp_pose(sum / count);
+  out.covariance /= count;
+  out.whitening *= std::sqrt(static_cast<double>(count));
+  return out;
+}
+
+}  // namespace
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+Matrix6d whitening_of(const Matrix6d& covariance) {
+  const Eigen::LLT<Matrix6d> information(covariance.inverse());
+  if (information.info() != Eigen::Success) {
+    return covariance.diagonal().cwiseMax(kNoiseFloor * kNoiseFloor).cwiseSqrt().cwiseInverse().asDiagonal();
+  }
+  return information.matrixU();
+}
+
+Series clean_series(const PoseTracks& tracks) {
+  Series series;
+  series.times_s = tracks.times_s;
+  for (std::size_t f = 0; f < tracks.times_s.size(); ++f) series.frames.push_back(static_cast<int>(f));
+  for (const PoseTrack& track : tracks.tracks) {
+    series.bodies.push_back(body_of(track, tracks.times_s.size()));
+  }
+  std::ranges::sort(series.bodies, {}, &Body::id);
+  int smooth = 0;
+  int judged = 0;
+  for (Body& body : series.bodies) {
+    const Deviations d = deviations_of(body, series.times_s);
+    if (d.median > 0.0) ++judged;
+    if (!is_smooth(d)) continue;
+    ++smooth;
+    clean_in_time(body, d);
+    clean_in_time(body, deviations_of(body, series.times_s));
+    const auto noise = noise_from_differences(body);
+    if (noise) scale_noise(body, std::max(*noise, 1e-6));
+  }
+  series.smooth = judged > 0 && 2 * smooth > judged;
+  count_seen(series);
+  return series;
+}
+
+Series thinned(const Series& full, int max_instants) {
+  const int stride = std::max(1, (full.size() + max_instants - 1) / max_instants);
+  Series out;
+  out.smooth = full.smooth;
+  if (full.smooth && stride > 1) {
+    const double step = fast_step(full);
+    const int allowed = step > 0.0 ? static_cast<int>(kAverageSpan / step) : stride;
+    out.half_width = std::min(stride / 2, allowed / 2);
+  }
+  for (int f = stride / 2; f < full.size(); f += stride) {
+    out.frames.push_back(full.frames[static_cast<std::size_t>(f)]);
+    out.times_s.push_back(full.times_s[static_cast<std::size_t>(f)]);
+  }
+  for (const Body& body : full.bodies) {
+    Body& thin = out.bodies.emplace_back();
+    thin.id = body.id;
+    thin.noise_scale = body.noise_scale;
+    for (const int f : out.frames) thin.at.push_back(averaged(body, f, out.half_width));
+  }
+  count_seen(out);
+  return out;
+}
+
+}  // namespace kinescope::structure_search

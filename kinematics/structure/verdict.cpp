@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace kinescope::structure_search {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Larger log-odds mean nothing: the models are not that right.
+constexpr double kMostLogOdds = 1000.0;
+// Channels that agree this well move together.
+constexpr double kTogether = 0.995;
+// A channel that moves less than this many times what a marker could show is one that hardly moves.
+constexpr double kVisible = 6.0;
+
+std::string channel_words(const JointLog& log, const Readings& readings, int channel) {
+  return fmt::format("'{}'", log.channels[static_cast<std::size_t>(
+                                 readings.log_channel[static_cast<std::size_t>(channel)])]);
+}
+
+std::string type_words(const Attachment& a) {
+  if (a.at_rest()) return "fixed";
+  if (a.fit.model.joints.size() > 1) return fmt::format("{} joints in series", a.fit.model.joints.size());
+  return a.fit.model.joints.front().type == JointType::kRevolute ? "turning" : "sliding";
+}
+
+bool is_below(const GrownTree& tree, int link, int body) {
+  for (int l = link; l >= 0; l = tree.links[static_cast<std::size_t>(l)].parent) {
+    if (tree.links[static_cast<std::size_t>(l)].founder == body) return true;
+  }
+  return false;
+}
+
+// Same parent, type and main channel: the same answer.
+bool same_answer(const Attachment& a, const Attachment& b) {
+  if (a.parent != b.parent || a.fit.model.joints.size() != b.fit.model.joints.size()) return false;
+  if (a.at_rest()) return true;
+  if (a.channel() != b.channel()) {
+    // A coupled joint is the same whichever of its channels is called the main one.
+    const auto has = [](const Attachment& x, int c) {
+      return std::ranges::any_of(x.fit.model.joints.front().terms,
+                                 [&](const ChainTerm& t) { return t.channel == c; });
+    };
+    if (!a.driven() || !b.driven() || !has(a, b.channel()) || !has(b, a.channel())) return false;
+  }
+  for (std::size_t k = 0; k < a.fit.model.joints.size(); ++k) {
+    if (a.fit.model.joints[k].type != b.fit.model.joints[k].type) return false;
+  }
+  return true;
+}
+
+struct Alternative {
+  double loss = kInfinity;   // -2 ln odds against the answer
+  std::string words;
+  int first_channel = -1;    // the two channels that could be exchanged
+  int second_channel = -1;
+  int link = -1;             // whose joint it is about; -1: of a body at rest
+};
+
+class Judge {
+ public:
+  Judge(const GrownTree& tree, const Series& series, const Readings& readings, const JointLog& log)
+      : tree_(tree), series_(series), readings_(readings), log_(log) {}
+
+  std::vector<Alternative> alternatives() const {
+    std::vector<Alternative> out;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      add_of_body(b, out);
+      add_orders(b, out);
+    }
+    return out;
+  }
+
+ private:
+  void add_of_body(std::size_t b, std::vector<Alternative>& out) const {
+    const GrownBody& body = tree_.bodies[b];
+    if (body.link < 0) return;
+    const double correlation = body.attachment.fit.correlation;
+    const double now = body.attachment.cost(correlation);
+    std::vector<const Attachment*> listed;
+    for (const Attachment& a : body.alternatives) {
+      if (same_answer(a, body.attachment) || is_below(tree_, a.parent, static_cast<int>(b))) continue;
+      const bool again = std::ranges::any_of(listed, [&](const Attachment* l) { return same_answer(*l, a); });
+      if (again) continue;
+      listed.push_back(&a);
+      Alternative alternative;
+      alternative.loss = std::max(0.0, a.cost(correlation) - now + exchange_loss(b, a));
+      alternative.words = words(b, a);
+      alternative.first_channel = body.attachment.channel();
+      alternative.second_channel = a.channel();
+      alternative.link = own_link(b);
+      out.push_back(std::move(alternative));
+    }
+    const double free_loss = body.free_cost / correlation - now;
+    out.push_back({std::max(0.0, free_loss),
+                   fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1, own_link(b)});
+  }
+
+  // What the joint that has the alternative's channel now would lose by giving it up.
+  double exchange_loss(std::size_t b, const Attachment& a) const {
+    if (!a.driven()) return 0.0;
+    for (const GrownLink& link : tree_.links) {
+      if (link.founder < 0 || link.founder == static_cast<int>(b) || link.attachment.channel() != a.channel()) {
+        continue;
+      }
+      const GrownBody& other = tree_.bodies[static_cast<std::size_t>(link.founder)];
+      double least = 200.0;
+      for (const Attachment& x : other.alternatives) {
+        if (x.channel() == a.channel() || is_below(tree_, x.parent, link.founder)) continue;
+        const double k = link.attachment.fit.correlation;
+        least = std::min(least, x.cost(k) - link.attachment.cost(k));
+      }
+      return std::max(0.0, least);
+    }
+    return 0.0;
+  }
+
+  void add_orders(std::size_t b, std::vector<Alternative>& out) const {
+    const GrownBody& body = tree_.bodies[b];
+    if (own_link(b) < 0) return;
+    for (const OrderDoubt& d : body.attachment.order_doubts) {
+      out.push_back({d.loss / body.attachment.fit.correlation,
+                     fmt::format("the joints of {} and {} in the other order",
+                                 channel_words(log_, readings_, d.first), channel_words(log_, readings_, d.second)),
+                     -1, -1, own_link(b)});
+    }
+  }
+
+  int own_link(std::size_t b) const {
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      if (tree_.links[l].founder == static_cast<int>(b)) return static_cast<int>(l);
+    }
+    return -1;
+  }
+
+  std::string words(std::size_t b, const Attachment& a) const {
+    std::string text = fmt::format("tag {} on {}, {}", series_.bodies[b].id.value,
+                                   link_words(tree_, series_, a.parent), type_words(a));
+    if (a.driven()) text += fmt::format(" by channel {}", channel_words(log_, readings_, a.channel()));
+    else if (!a.at_rest()) text += " without a channel";
+    return text;
+  }
+
+  const GrownTree& tree_;
+  const Series& series_;
+  const Readings& readings_;
+  const JointLog& log_;
+};
+
+double channel_correlation(const Readings& r, int a, int b) {
+  const double aa = r.value.col(a).squaredNorm();
+  const double bb = r.value.col(b).squaredNorm();
+  return aa > 0.0 && bb > 0.0 ? std::abs(r.value.col(a).dot(r.value.col(b))) / std::sqrt(aa * bb) : 0.0;
+}
+
+void add_together_doubts(const std::vector<Alternative>& alternatives, const Readings& readings,
+                         const JointLog& log, const StructureOptions& options, Verdict& verdict) {
+  std::vector<std::pair<int, int>> told;
+  for (const Alternative& a : alternatives) {
+    if (a.first_channel < 0 || a.second_channel < 0 || a.loss > 2.0 * options.min_log_odds) continue;
+    const std::pair<int, int> pair = std::minmax(a.first_channel, a.second_channel);
+    if (std::ranges::find(told, pair) != told.end()) continue;
+    if (channel_correlation(readings, pair.first, pair.second) < kTogether) continue;
+    told.push_back(pair);
+    const std::string first = channel_words(log, readings, pair.first);
+    const std::string second = channel_words(log, readings, pair.second);
+    verdict.doubts.push_back(
+        {fmt::format("channels {} and {} move together: which of them drives which joint cannot be told", first, second),
+         fmt::format("record again with {} and {} moving at different times or speeds", first, second),
+         {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
+    verdict.status = StructureStatus::kUndetermined;
+  }
+}
+
+// rad or m per unit of a channel, as the found joints have it; 1 where there are none.
+double usual_scale(const GrownTree& tree, const Readings& readings) {
+  std::vector<double> scales;
+  for (const GrownLink& link : tree.links) {
+    if (link.founder < 0 || !link.attachment.driven()) continue;
+    const ChainTerm& t = link.attachment.fit.model.joints.front().terms.front();
+    scales.push_back(std::abs(t.scale) / readings.rms[static_cast<std::size_t>(t.channel)]);
+  }
+  return scales.empty() ? 1.0 : median_of(std::move(scales));
+}
+
+// The smallest motion (rad or m, RMS) that the best marker would show.
+double visible_motion(const Series& series) {
+  double least = kInfinity;
+  for (const Body& body : series.bodies) {
+    double sum = 0.0;
+    for (const Sighting& s : body.at) sum += s.seen ? s.covariance.topLeftCorner<3, 3>().trace() / 3.0 : 0.0;
+    if (body.seen > 0) least = std::min(least, std::sqrt(sum / body.seen / body.seen));
+  }
+  return kVisible * least;
+}
+
+bool drives_something(const GrownTree& tree, int channel) {
+  for (const GrownLink& link : tree.links) {
+    if (link.founder < 0) continue;
+    for (const ChainJoint& j : link.attachment.fit.model.joints) {
+      for (const ChainTerm& t : j.terms) {
+        if (t.channel == channel) return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Channels that hardly move, while there are markers between which their joint could hide.
+void add_still_doubts(const GrownTree& tree, const Series& series, const Readings& readings, const JointLog& log,
+                      Verdict& verdict) {
+  std::vector<int> markers(tree.links.size(), 0);
+  for (const GrownBody& b : tree.bodies) {
+    if (b.link >= 0) ++markers[static_cast<std::size_t>(b.link)];
+  }
+  const bool shared = std::ranges::any_of(markers, [](int m) { return m >= 2; });
+  const double scale = usual_scale(tree, readings);
+  for (int c = 0; c < readings.channels(); ++c) {
+    if (drives_something(tree, c)) continue;
+    const double motion = readings.rms[static_cast<std::size_t>(c)] * scale;
+    if (motion > visible_motion(series)) continue;
+    const bool hides = shared || (markers[0] >= 1 && readings.moves(c));
+    const std::string name = channel_words(log, readings, c);
+    verdict.doubts.push_back(
+        {fmt::format("channel {} hardly moves: whether it drives a joint cannot be told", name),
+         fmt::format("record again with {} moving over more of its range", name),
+         {name.substr(1, name.size() - 2)}});
+    if (hides) verdict.status = StructureStatus::kUndetermined;
+  }
+}
+
+void add_order_doubts(const GrownTree& tree, const Readings& readings, const JointLog& log,
+                      const StructureOptions& options, Verdict& verdict) {
+  for (const GrownLink& link : tree.links) {
+    if (link.founder < 0) continue;
+    for (const OrderDoubt& d : link.attachment.order_doubts) {
+      if (d.loss / link.attachment.fit.correlation > 2.0 * options.min_log_odds) continue;
+      const std::string first = channel_words(log, readings, d.first);
+      const std::string second = channel_words(log, readings, d.second);
+      verdict.doubts.push_back(
+          {fmt::format("the order of the joints of {} and {} is taken from the log: the recording fits either order",
+                       first, second),
+           fmt::format("record postures in which {} and {} are both away from where they rest, or put a marker on "
+                       "the link between them",
+                       first, second),
+           {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
+    }
+  }
+}
+
+void add_free_doubts(const GrownTree& tree, const Series& series, Verdict& verdict) {
+  for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
+    if (tree.bodies[b].link >= 0) continue;
+    const std::string name = fmt::format("tag {}", series.bodies[b].id.value);
+    verdict.doubts.push_back(
+        {fmt::format("{} moves, but by no joint that could be found", name),
+         fmt::format("if {} belongs to the robot, check that the log has the channels that move it and that its links "
+                     "carry markers",
+                     name),
+         {fmt::format("tag_{}", series.bodies[b].id.value)}});
+  }
+}
+
+}  // namespace
+
+std::string link_words(const GrownTree& tree, const Series& series, int link) {
+  if (link == 0) return "the camera's frame";
+  const int founder = tree.links[static_cast<std::size_t>(link)].founder;
+  return fmt::format("the link of tag {}", series.bodies[static_cast<std::size_t>(founder)].id.value);
+}
+
+Verdict judge(const GrownTree& tree, const Series& series, const Readings& readings, const JointLog& log,
+              const StructureOptions& options) {
+  Verdict verdict;
+  verdict.status = StructureStatus::kDetermined;
+  const std::vector<Alternative> all = Judge(tree, series, readings, log).alternatives();
+  verdict.link_log_odds.assign(tree.links.size(), kMostLogOdds);
+  verdict.link_runner_up.assign(tree.links.size(), "");
+  double odds = 0.0;
+  double least = 2.0 * kMostLogOdds;
+  for (const Alternative& a : all) {
+    odds += std::exp(-0.5 * a.loss);
+    if (a.loss < least) {
+      least = a.loss;
+      verdict.runner_up = a.words;
+    }
+    if (a.link < 0) continue;
+    double& own = verdict.link_log_odds[static_cast<std::size_t>(a.link)];
+    if (0.5 * a.loss >= own) continue;
+    own = 0.5 * a.loss;
+    verdict.link_runner_up[static_cast<std::size_t>(a.link)] = a.words;
+  }
+  verdict.probability = 1.0 / (1.0 + odds);
+  verdict.runner_up_log_odds = 0.5 * least;
+  if (verdict.runner_up_log_odds < options.min_log_odds) verdict.status = StructureStatus::kAmbiguous;
+  add_order_doubts(tree, readings, log, options, verdict);
+  add_free_doubts(tree, series, verdict);
+  add_together_doubts(all, readings, log, options, verdict);
+  add_still_doubts(tree, series, readings, log, verdict);
+  if (tree.links.size() < 2) {
+    verdict.status = StructureStatus::kUndetermined;
+    verdict.doubts.push_back({"no joint was found", "record the robot while every joint moves, one marker on every link", {}});
+  } else if (verdict.status == StructureStatus::kAmbiguous) {
+    verdict.doubts.push_back({fmt::format("it could also be: {}", verdict.runner_up),
+                              "record longer, with larger motions of the joints concerned", {}});
+  }
+  return verdict;
+}
+
+}  // namespace kinescope::structure_search
