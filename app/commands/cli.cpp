@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/cli.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "app/commands/command_line.h"
+#include "app/commands/progress_line.h"
+#include "app/io/nearest_name.h"
+
+namespace kinescope {
+namespace {
+
+std::string join_arguments(int argc, const char* const* argv) {
+  std::string text = "kinescope";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool plain =
+        !word.empty() && word.find_first_of(" \t\n'\"\\$`&|;<>()*?#!~") == std::string::npos;
+    text += plain ? fmt::format(" {}", word) : fmt::format(" '{}'", word);
+  }
+  return text;
+}
+
+/// One line, whatever the library wrote.
+std::string in_one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::ranges::replace(text, '\n', ' ');
+  return text;
+}
+
+void print_error(const std::string& message) {
+  fmt::print(stderr, "kinescope: {}\n", in_one_line(message));
+}
+
+/// Names of the subcommands, or of a subcommand's options.
+std::vector<std::string> known_words(const CLI::App& app, const CLI::App* command) {
+  std::vector<std::string> words;
+  if (command == nullptr) {
+    for (const CLI::App* sub : app.get_subcommands({})) words.push_back(sub->get_name());
+    return words;
+  }
+  for (const CLI::Option* option : command->get_options()) {
+    for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+  }
+  return words;
+}
+
+/// What CLI11 found wrong, with the nearest word that it would have taken.
+int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int argc,
+                       const char* const* argv) {
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const CLI::App* command = chosen.empty() ? nullptr : chosen.front();
+  std::string remedy = command == nullptr
+                           ? "see kinescope --help"
+                           : fmt::format("see kinescope {} --help", command->get_name());
+  std::string message = error.what();
+  if (command == nullptr && argc > 1 && argv[1][0] != '-') {
+    message = fmt::format("'{}' is no command", argv[1]);
+    remedy = did_you_mean(argv[1], known_words(app, nullptr));
+  } else if (command == nullptr) {
+    message = "name a command";
+    remedy = "run, inspect or camera; see kinescope --help";
+  } else {
+    const std::vector<std::string> extra = command->remaining();
+    const auto option =
+        std::ranges::find_if(extra, [](const std::string& word) { return word.starts_with("--"); });
+    if (option != extra.end()) {
+      message = fmt::format("{} is no option of {}", *option, command->get_name());
+      remedy = did_you_mean(*option, known_words(app, command));
+    }
+  }
+  print_error(fmt::format("{} ({})", in_one_line(message), remedy));
+  return static_cast<int>(ExitCode::kBadRequest);
+}
+
+ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
+  if (app.got_subcommand("run")) {
+    if (line.run.output.empty()) {
+      line.run.output = recording_name(line.run.recording.folder) + "_run";
+    }
+    line.run.calibrate.estimate_time_offset = !line.no_time_offset;
+    line.run.calibrate.estimate_intrinsics = line.run.estimate_intrinsics;
+    return run_command(line.run, console);
+  }
+  if (app.got_subcommand("inspect")) return inspect_command(line.inspect, console);
+  return camera_command(line.camera, console);
+}
+
+/// The command, with its progress; all that is thrown ends here.
+int run_guarded(const CLI::App& app, CommandLine& line) {
+  ProgressLine progress = ProgressLine::for_standard_error();
+  Console console{.json = line.output.json, .quiet = line.output.quiet, .progress = {}};
+  if (!console.quiet) {
+    console.progress = [&progress](std::string_view stage, int done, int total) {
+      progress.update(stage, done, total);
+    };
+  }
+  ExitCode code = ExitCode::kInternalError;
+  std::string message;
+  try {
+    code = run_parsed(app, line, console);
+  } catch (const Error& error) {
+    code = error.code();
+    message = error.what();
+  } catch (const std::bad_alloc&) {
+    message = "out of memory (a shorter video, or a machine with more of it)";
+  } catch (const std::exception& error) {
+    message =
+        fmt::format("internal error: {} (please report it with the command line)", error.what());
+  } catch (...) {
+    message = "internal error of unknown kind (please report it with the command line)";
+  }
+  progress.finish();
+  if (!message.empty()) print_error(message);
+  return static_cast<int>(code);
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  CLI::App app("Learns a robot's body from a video of markers and a joint log", "kinescope");
+  CommandLine line;
+  line.run.command_line = join_arguments(argc, argv);
+  add_commands(app, line);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+    return report_parse_error(app, error, argc, argv);
+  }
+  return run_guarded(app, line);
+}
+
+}  // namespace kinescope

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/command_line.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/io/nearest_name.h"
+#include "kinematics/core/csv.h"
+
+namespace kinescope {
+namespace {
+
+constexpr const char* kExitCodes =
+    "Exit codes:\n"
+    "  0  done\n"
+    "  1  internal error\n"
+    "  2  the command line or a setting makes no sense, or the output cannot be written\n"
+    "  3  an input cannot be read\n"
+    "  4  the data cannot determine what was asked; the message says what to record instead\n"
+    "  5  done, but outside a limit set with --fail-on";
+
+/// A finite number in a range. CLI::Range lets NaN through.
+CLI::Validator number_in(double least, double most) {
+  return {[least, most](const std::string& text) -> std::string {
+            const std::optional<double> value = parse_number(text);
+            if (value && std::isfinite(*value) && *value >= least && *value <= most) return {};
+            return fmt::format("'{}' is not a number from {} to {}", text, least, most);
+          },
+          fmt::format("{} to {}", least, most)};
+}
+
+/// A finite length above zero, m. Nothing on a board is larger than 10 m: that would be mm.
+CLI::Validator length_m() {
+  return {[](const std::string& text) -> std::string {
+            constexpr double kLongest = 10.0;
+            const std::optional<double> value = parse_number(text);
+            if (value && *value > 0.0 && *value < kLongest) return {};
+            return fmt::format("'{}' is no length in m above 0 and below {}", text, kLongest);
+          },
+          "m"};
+}
+
+/// One word of several.
+template <typename Enum>
+CLI::Option* add_choice(CLI::App& command, const char* name,
+                        const std::map<std::string, Enum>& words, Enum& value, const char* help) {
+  const auto check = [words](const std::string& text) -> std::string {
+    std::vector<std::string> known;
+    for (const auto& [word, meaning] : words) known.push_back(word);
+    if (words.contains(text)) return {};
+    return fmt::format("'{}' is not known; {}", text, did_you_mean(text, known));
+  };
+  return command
+      .add_option_function<std::string>(
+          name, [&value, words](const std::string& text) { value = words.at(text); }, help)
+      ->check(check);
+}
+
+void add_output_options(CLI::App& command, OutputOptions& output) {
+  command.add_flag("--json", output.json, "Print the result as JSON");
+  command.add_flag("--quiet", output.quiet, "No progress on standard error");
+}
+
+void add_path(CLI::App& command, const char* name, std::optional<std::filesystem::path>& path,
+              const char* help) {
+  command
+      .add_option_function<std::string>(
+          name, [&path](const std::string& text) { path = text; }, help)
+      ->type_name("FILE")
+      ->group("Files in place of those in the recording");
+}
+
+void add_recording_options(CLI::App& command, RecordingPaths& paths) {
+  command
+      .add_option_function<std::string>(
+          "RECORDING", [&paths](const std::string& text) { paths.folder = text; },
+          "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml")
+      ->required()
+      ->type_name("FOLDER");
+  add_path(command, "--video", paths.video, "Video file, or folder of images with times.csv");
+  add_path(command, "--joints", paths.joints, "Joint log: t in s, one column a channel");
+  add_path(command, "--camera", paths.camera, "Intrinsics (ROS camera_info, Kalibr or OpenCV)");
+  add_path(command, "--tags", paths.tags, "Marker family and sizes");
+  add_path(command, "--corners", paths.corners, "Detected corners in place of a video");
+  add_path(command, "--poses", paths.poses, "Marker poses in place of a video");
+  add_path(command, "--points", paths.points, "3-D points in place of a video (needs --nominal)");
+  add_path(command, "--nominal", paths.nominal,
+           "Nominal robot (URDF): the start, and the model to beat");
+}
+
+void add_estimation_options(CLI::App& run, CommandLine& line) {
+  static const std::map<std::string, FreeGeometry> kFree = {{"placement", FreeGeometry::kPlacement},
+                                                            {"offsets", FreeGeometry::kOffsets},
+                                                            {"geometry", FreeGeometry::kGeometry}};
+  CalibrateOptions& calibrate = line.run.calibrate;
+  const char* group = "What is estimated";
+  add_choice(
+      run, "--free", kFree, calibrate.free,
+      "placement: base and markers; offsets: + joint zeros; geometry: + joint axes (default)")
+      ->type_name("LEVEL")
+      ->group(group);
+  run.add_flag("--intrinsics", line.run.estimate_intrinsics,
+               "Estimate the camera's intrinsics too (always so without camera.yaml)")
+      ->group(group);
+  run.add_flag("--no-time-offset", line.no_time_offset,
+               "Trust the clocks of camera and log to agree")
+      ->group(group);
+  run.add_flag("--scales", calibrate.estimate_scales,
+               "Estimate the scale of channels in rad or m too (ticks: always)")
+      ->group(group);
+  run.add_option("--folds", calibrate.folds, "Blocks of unseen postures to test on; 0: none")
+      ->check(number_in(0, 50))
+      ->capture_default_str()
+      ->type_name("N")
+      ->group(group);
+}
+
+void add_detection_options(CLI::App& run, DetectOptions& detect) {
+  const char* group = "Detection";
+  run.add_option("--threads", detect.threads, "Threads")
+      ->check(number_in(1, 256))
+      ->capture_default_str()
+      ->type_name("N")
+      ->group(group);
+  run.add_option("--decimate", detect.detector.decimate,
+                 "Search at 1/N of the resolution: faster, and misses small markers")
+      ->check(number_in(1, 8))
+      ->capture_default_str()
+      ->type_name("N")
+      ->group(group);
+  run.add_option("--max-hamming", detect.detector.max_hamming,
+                 "Wrong bits of a marker to forgive: finds more, and invents more")
+      ->check(number_in(0, 3))
+      ->capture_default_str()
+      ->type_name("BITS")
+      ->group(group);
+}
+
+void add_run(CLI::App& app, CommandLine& line) {
+  CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
+  add_recording_options(run, line.run.recording);
+  run.add_option_function<std::string>(
+         "--output", [&line](const std::string& text) { line.run.output = text; },
+         "Folder for the results (default: <recording>_run here)")
+      ->type_name("FOLDER");
+  add_estimation_options(run, line);
+  add_detection_options(run, line.run.detect);
+  run.add_option("--fail-on", line.run.fail_on,
+                 "Limit that turns the exit code to 5, such as held_out_px>0.2; may be given again")
+      ->type_name("LIMIT")
+      ->allow_extra_args(false);
+  run.add_flag("--force", line.run.force, "Run every stage again, also where nothing changed");
+  add_output_options(run, line.output);
+  run.footer(fmt::format(
+      "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}", kExitCodes));
+}
+
+void add_inspect(CLI::App& app, CommandLine& line) {
+  CLI::App& inspect = *app.add_subcommand(
+      "inspect", "What a recording holds and what is wrong with it, in a few seconds");
+  add_recording_options(inspect, line.inspect.recording);
+  add_output_options(inspect, line.output);
+  inspect.footer(
+      fmt::format("Example:\n  kinescope inspect sample_videos/scara4_none\n\n{}", kExitCodes));
+}
+
+void add_board_options(CLI::App& camera, BoardSpec& board) {
+  static const std::map<std::string, BoardType> kBoards = {{"chessboard", BoardType::kChessboard},
+                                                           {"charuco", BoardType::kCharuco},
+                                                           {"aprilgrid", BoardType::kAprilGrid}};
+  const char* group = "Board";
+  add_choice(camera, "--board", kBoards, board.type, "chessboard, charuco or aprilgrid")
+      ->required()
+      ->type_name("TYPE")
+      ->group(group);
+  const auto count = [&](const char* name, int& value, const char* help) {
+    camera.add_option(name, value, help)
+        ->required()
+        ->check(number_in(1, 100))
+        ->type_name("N")
+        ->group(group);
+  };
+  count("--columns", board.columns,
+        "Inner corners (chessboard), squares (charuco) or tags (aprilgrid) across");
+  count("--rows", board.rows, "The same down");
+  camera
+      .add_option("--square", board.square_m,
+                  "Edge of a square, of a tag for aprilgrid; m, as measured")
+      ->required()
+      ->check(length_m())
+      ->type_name("M")
+      ->group(group);
+  camera.add_option("--marker", board.marker_m, "charuco: edge of a marker, m")
+      ->check(length_m())
+      ->type_name("M")
+      ->group(group);
+  camera
+      .add_option("--spacing", board.spacing, "aprilgrid: gap between tags as a share of the tag")
+      ->check(number_in(0.01, 5))
+      ->capture_default_str()
+      ->type_name("SHARE")
+      ->group(group);
+  camera
+      .add_option("--dictionary", board.dictionary,
+                  "charuco: dictionary (DICT_5X5_100); aprilgrid: family")
+      ->type_name("NAME")
+      ->group(group);
+  camera
+      .add_flag("--legacy", board.legacy_charuco,
+                "charuco: layout of OpenCV before 4.6 (even row counts)")
+      ->group(group);
+}
+
+void add_camera(CLI::App& app, CommandLine& line) {
+  static const std::map<std::string, DistortionModel> kModels = {
+      {"plumb_bob", DistortionModel::kPlumbBob},
+      {"rational_polynomial", DistortionModel::kRationalPolynomial},
+      {"equidistant", DistortionModel::kEquidistant}};
+  CLI::App& camera = *app.add_subcommand("camera", "Intrinsics from images or a video of a board");
+  camera
+      .add_option_function<std::string>(
+          "SOURCE", [&line](const std::string& text) { line.camera.source = text; },
+          "Folder of images, or a video")
+      ->required()
+      ->type_name("PATH");
+  add_board_options(camera, line.camera.board);
+  add_choice(camera, "--model", kModels, line.camera.calibration.model,
+             "plumb_bob (default), rational_polynomial or equidistant")
+      ->type_name("MODEL");
+  camera
+      .add_option_function<std::string>(
+          "--output", [&line](const std::string& text) { line.camera.output = text; },
+          "ROS camera_info file to write (default: camera.yaml)")
+      ->type_name("FILE");
+  add_output_options(camera, line.output);
+  camera.footer(fmt::format(
+      "Example:\n  kinescope camera board_images --board chessboard --columns 9 --rows 6 "
+      "--square 0.025\n\n{}",
+      kExitCodes));
+}
+
+}  // namespace
+
+void add_commands(CLI::App& app, CommandLine& line) {
+  app.set_version_flag("--version", fmt::format("kinescope {}", KINESCOPE_VERSION));
+  app.set_help_flag("--help,-h", "Print this help");
+  app.require_subcommand(1);
+  app.footer(
+      fmt::format("Example:\n  kinescope inspect sample_videos/scara4_none\n  kinescope run "
+                  "sample_videos/scara4_none\n\n{}",
+                  kExitCodes));
+  add_run(app, line);
+  add_inspect(app, line);
+  add_camera(app, line);
+}
+
+}  // namespace kinescope

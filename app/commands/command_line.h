@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the command line can say, and the help that explains it. Private to cli.cpp: shows CLI11.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "app/commands/commands.h"
+
+namespace kinescope {
+
+/// What all commands take.
+struct OutputOptions {
+  bool json = false;
+  bool quiet = false;
+};
+
+/// Everything the command line can say.
+struct CommandLine {
+  RunOptions run;
+  InspectOptions inspect;
+  CameraOptions camera;
+  OutputOptions output;
+  bool no_time_offset = false;
+};
+
+/// Adds the commands with their options, which write into `line`, and the help.
+void add_commands(CLI::App& app, CommandLine& line);
+
+}  // namespace kinescope

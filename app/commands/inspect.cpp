@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope inspect`: reads everything that can be read, says what is there, then a verdict.
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
+#include "app/commands/inspection.h"
+
+namespace kinescope {
+namespace {
+
+std::string_view name_of(RecordingEntry entry) {
+  switch (entry) {
+    case RecordingEntry::kVideo:
+      return "video";
+    case RecordingEntry::kCorners:
+      return "corners";
+    case RecordingEntry::kPoses:
+      return "poses";
+    case RecordingEntry::kPoints:
+      return "points";
+  }
+  return "unknown";
+}
+
+std::vector<std::string> file_names(const Recording& recording) {
+  constexpr std::size_t kMost = 8;  // a folder of images has thousands
+  std::vector<std::string> names;
+  for (const auto& path : recording.files) {
+    if (names.size() < kMost) names.push_back(path.filename().string());
+  }
+  if (recording.files.size() > kMost) {
+    names.push_back(fmt::format(".. {} files in all", recording.files.size()));
+  }
+  return names;
+}
+
+void print_video(const Recording& recording, const VideoFacts& video) {
+  fmt::print("video     {}: {} x {}, {}, {:.3f} frames/s\n", recording.video.filename().string(),
+             video.info.width, video.info.height,
+             video.info.codec.empty() ? "codec unknown" : video.info.codec, video.frame_rate_hz);
+  const double last_s = video.times_s.empty() ? 0.0 : video.times_s.back();
+  const double first_s = video.times_s.empty() ? 0.0 : video.times_s.front();
+  fmt::print(
+      "          {} frames from {:.3f} to {:.3f} s{}\n", video.frames_decoded, first_s, last_s,
+      video.decoded_to_end ? ""
+                           : fmt::format(" looked at, of {:.1f} s in all", video.info.duration_s));
+  fmt::print("markers   {} seen in {} frames searched\n", video.markers.size(),
+             video.frames_searched);
+  for (const MarkerFacts& marker : video.markers) {
+    fmt::print(
+        "  tag {:<5} {:>3} frames, {:5.1f} px wide, contrast {:3.0f}, blur {:.1f} px, {}\n",
+        marker.id.value, marker.frames, marker.edge_px, marker.contrast, marker.blur_px,
+        marker.size_m > 0.0 ? fmt::format("{:g} mm", 1e3 * marker.size_m) : "no size declared");
+  }
+}
+
+void print_log(const LogFacts& log) {
+  fmt::print(
+      "joints    {} channels, {} samples from {:.3f} to {:.3f} s, {:.1f} Hz, jitter {:.2f} ms, "
+      "longest gap {:.0f} ms\n",
+      log.channels.size(), log.samples, log.first_s, log.last_s, log.rate_hz, 1e3 * log.jitter_s,
+      1e3 * log.longest_gap_s);
+  for (const ChannelFacts& channel : log.channels) {
+    fmt::print("  {:<10} {:10.4f} to {:10.4f}  {}{}\n", channel.name, channel.lower, channel.upper,
+               channel.unit, channel.moves ? "" : ", never changes");
+  }
+}
+
+void print_sightings(const Recording& recording) {
+  if (recording.corners) {
+    fmt::print("corners   {} sightings in {} frames\n", recording.corners->observations.size(),
+               recording.corners->times_s.size());
+  }
+  if (recording.poses) {
+    fmt::print("poses     {} bodies in {} frames\n", recording.poses->tracks.size(),
+               recording.poses->times_s.size());
+  }
+  if (recording.points) {
+    fmt::print("points    {} sightings in {} frames\n", recording.points->observations.size(),
+               recording.points->times_s.size());
+  }
+}
+
+void print_inspection(const Inspection& inspection) {
+  const Recording& recording = inspection.recording;
+  fmt::print("recording {} ({}): {}\n", recording.settings.name, name_of(recording.entry),
+             fmt::join(file_names(recording), ", "));
+  if (inspection.video) print_video(recording, *inspection.video);
+  print_sightings(recording);
+  if (inspection.log) print_log(*inspection.log);
+  if (recording.camera) {
+    fmt::print("camera    {} x {}, focal length {:.1f} px, {}\n", recording.camera->width,
+               recording.camera->height, recording.camera->fx, to_string(recording.camera->model));
+  }
+  if (recording.nominal) {
+    fmt::print("nominal   {}: {} links, {} joints\n", recording.nominal->name,
+               recording.nominal->links.size(), recording.nominal->joints.size());
+  }
+  for (const Finding& finding : inspection.findings) {
+    fmt::print("{} {}\n", finding.problem ? "problem  " : "note     ", finding.text);
+  }
+  const auto problems = std::ranges::count(inspection.findings, true, &Finding::problem);
+  fmt::print("verdict   {}\n", inspection.ready() ? "ready to run"
+                                                  : fmt::format("not ready: {} problem{}", problems,
+                                                                problems == 1 ? "" : "s"));
+}
+
+nlohmann::json video_json(const VideoFacts& video) {
+  nlohmann::json markers = nlohmann::json::array();
+  for (const MarkerFacts& marker : video.markers) {
+    markers.push_back({{"id", marker.id.value},
+                       {"size_m", marker.size_m},
+                       {"frames", marker.frames},
+                       {"edge_px", marker.edge_px},
+                       {"contrast", marker.contrast},
+                       {"blur_px", marker.blur_px}});
+  }
+  return {{"width", video.info.width},
+          {"height", video.info.height},
+          {"codec", video.info.codec},
+          {"declared_frames", video.info.frame_count},
+          {"declared_duration_s", video.info.duration_s},
+          {"frames_decoded", video.frames_decoded},
+          {"decoded_to_end", video.decoded_to_end},
+          {"first_s", video.times_s.empty() ? 0.0 : video.times_s.front()},
+          {"last_s", video.times_s.empty() ? 0.0 : video.times_s.back()},
+          {"frame_rate_hz", video.frame_rate_hz},
+          {"longest_step_s", video.longest_step_s},
+          {"frames_searched", video.frames_searched},
+          {"markers", markers}};
+}
+
+nlohmann::json log_json(const LogFacts& log) {
+  nlohmann::json channels = nlohmann::json::array();
+  for (const ChannelFacts& channel : log.channels) {
+    channels.push_back({{"name", channel.name},
+                        {"unit", channel.unit},
+                        {"lower", channel.lower},
+                        {"upper", channel.upper},
+                        {"moves", channel.moves}});
+  }
+  return {{"samples", log.samples},
+          {"first_s", log.first_s},
+          {"last_s", log.last_s},
+          {"rate_hz", log.rate_hz},
+          {"jitter_s", log.jitter_s},
+          {"longest_gap_s", log.longest_gap_s},
+          {"longest_gap_at_s", log.longest_gap_at_s},
+          {"channels", channels}};
+}
+
+nlohmann::json inspection_json(const Inspection& inspection) {
+  const Recording& recording = inspection.recording;
+  nlohmann::json out = {{"schema", 1},
+                        {"recording", recording.settings.name},
+                        {"entry", name_of(recording.entry)},
+                        {"ready", inspection.ready()},
+                        {"camera_declared", recording.camera.has_value()},
+                        {"nominal", recording.nominal.has_value()},
+                        {"files", nlohmann::json::array()},
+                        {"problems", nlohmann::json::array()},
+                        {"notes", nlohmann::json::array()}};
+  for (const auto& path : recording.files) out["files"].push_back(path.filename().string());
+  for (const Finding& finding : inspection.findings) {
+    out[finding.problem ? "problems" : "notes"].push_back(finding.text);
+  }
+  if (inspection.video) out["video"] = video_json(*inspection.video);
+  if (inspection.log) out["log"] = log_json(*inspection.log);
+  return out;
+}
+
+void note_what_is_missing(Inspection& inspection) {
+  const Recording& recording = inspection.recording;
+  const bool by_image =
+      recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners;
+  if (by_image && !recording.camera) {
+    inspection.findings.push_back(
+        {false,
+         "no camera.yaml: the intrinsics are estimated too; `kinescope camera` does it better"});
+  }
+  if (recording.log.empty()) {
+    inspection.findings.push_back(
+        {false, "no joints.csv: the structure is found from the markers alone"});
+  }
+  if (recording.entry == RecordingEntry::kPoints && !recording.nominal) {
+    inspection.findings.push_back(
+        {true,
+         "points alone do not show a structure: give a nominal robot with --nominal robot.urdf"});
+  }
+}
+
+}  // namespace
+
+bool Inspection::ready() const { return std::ranges::none_of(findings, &Finding::problem); }
+
+Inspection inspect_recording(const RecordingPaths& paths, const Progress& progress) {
+  ReadAttempt attempt = try_read_recording(paths);
+  Inspection inspection;
+  inspection.recording = std::move(attempt.recording);
+  const Recording& recording = inspection.recording;
+  std::vector<Finding>& findings = inspection.findings;
+  for (const Error& error : attempt.errors) findings.push_back({true, error.what()});
+  for (const std::string& warning : recording.warnings) findings.push_back({false, warning});
+  if (recording.files.empty()) return inspection;
+  if (!recording.log.empty())
+    inspection.log = look_at_log(recording.log, recording.settings, findings);
+  if (!recording.video.empty()) {
+    try {
+      inspection.video = look_at_video(recording, progress, findings);
+    } catch (const Error& error) {
+      findings.push_back({true, error.what()});
+    }
+  }
+  if (attempt.errors.empty()) note_what_is_missing(inspection);
+  return inspection;
+}
+
+ExitCode inspect_command(const InspectOptions& options, const Console& console) {
+  const Inspection inspection = inspect_recording(options.recording, console.progress);
+  if (console.json) {
+    fmt::print("{}\n", inspection_json(inspection).dump(2));
+  } else {
+    print_inspection(inspection);
+  }
+  return inspection.ready() ? ExitCode::kDone : ExitCode::kBadInput;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/commands/inspection.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kLongGapS = 0.5;       ///< longer gaps are not bridged by the interpolation
+constexpr double kLittleMotion = 0.01;  ///< rad or m; an axis seen over less is hardly determined
+constexpr double kUnevenShare = 0.5;    ///< of the median step
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Whole numbers over a wide range are encoder ticks; more than a turn in either direction are
+/// degrees.
+std::string guess_unit(const Eigen::VectorXd& values) {
+  const double range = values.maxCoeff() - values.minCoeff();
+  const bool whole = (values.array() == values.array().round()).all();
+  if (whole && range > 20.0) return "ticks?";
+  constexpr double kMoreThanATurn = 2.5 * std::numbers::pi;
+  if (values.cwiseAbs().maxCoeff() > kMoreThanATurn && values.cwiseAbs().maxCoeff() <= 400.0)
+    return "deg?";
+  return "rad or m";
+}
+
+ChannelFacts look_at_channel(const JointLog& log, Eigen::Index channel,
+                             const RecordingSettings& settings, std::vector<Finding>& findings) {
+  const Eigen::VectorXd values = log.values.col(channel);
+  ChannelFacts facts{.name = log.channels[static_cast<std::size_t>(channel)], .unit = {}};
+  facts.lower = values.minCoeff();
+  facts.upper = values.maxCoeff();
+  const auto declared = settings.units.find(facts.name);
+  facts.unit = declared == settings.units.end() ? guess_unit(values) : declared->second;
+  facts.moves = facts.upper - facts.lower > 1e-9 * std::max(1.0, std::abs(facts.upper));
+  if (!facts.moves) {
+    findings.push_back(
+        {false, fmt::format("channel '{}' never changes: its joint cannot be found; move it, "
+                            "or leave it out",
+                            facts.name)});
+  } else if (facts.unit == "rad or m" && facts.upper - facts.lower < kLittleMotion) {
+    findings.push_back(
+        {false, fmt::format("channel '{}' moves by {:.4f} only: its axis will be uncertain; "
+                            "record it over a larger range",
+                            facts.name, facts.upper - facts.lower)});
+  }
+  if (facts.unit == "deg?") {
+    findings.push_back(
+        {false, fmt::format("channel '{}' looks like degrees ({:.1f} to {:.1f}): declare "
+                            "units: {{{}: deg}} in recording.yaml if so",
+                            facts.name, facts.lower, facts.upper, facts.name)});
+  }
+  return facts;
+}
+
+void look_at_steps(const JointLog& log, LogFacts& facts, std::vector<Finding>& findings) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < log.size(); ++i) {
+    steps.push_back(log.times_s[i] - log.times_s[i - 1]);
+    if (steps.back() <= facts.longest_gap_s) continue;
+    facts.longest_gap_s = steps.back();
+    facts.longest_gap_at_s = log.times_s[i - 1];
+  }
+  const double step = median(steps);
+  std::vector<double> deviations;
+  for (const double other : steps) deviations.push_back(std::abs(other - step));
+  facts.rate_hz = 1.0 / step;
+  facts.jitter_s = median(deviations);
+  if (facts.jitter_s > kUnevenShare * step) {
+    findings.push_back(
+        {false, fmt::format("the log's steps are uneven ({:.1f} ms around {:.1f} ms): are "
+                            "its times those of the measurement?",
+                            1e3 * facts.jitter_s, 1e3 * step)});
+  }
+}
+
+}  // namespace
+
+LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
+                     std::vector<Finding>& findings) {
+  LogFacts facts;
+  facts.samples = static_cast<int>(log.size());
+  facts.first_s = log.times_s.front();
+  facts.last_s = log.times_s.back();
+  if (log.size() > 1) look_at_steps(log, facts, findings);
+  if (log.size() < 10) {
+    findings.push_back({false, fmt::format("the log holds {} samples only", log.size())});
+  }
+  for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
+    facts.channels.push_back(look_at_channel(log, c, settings, findings));
+  }
+  const bool continuous = facts.rate_hz > 1.0 / kLongGapS;
+  if (continuous && facts.longest_gap_s > kLongGapS) {
+    findings.push_back(
+        {false, fmt::format("the log has a gap of {:.2f} s behind t = {:.3f} s: frames in it "
+                            "are not used",
+                            facts.longest_gap_s, facts.longest_gap_at_s)});
+  }
+  return facts;
+}
+
+}  // namespace kinescope

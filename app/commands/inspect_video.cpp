@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/commands/inspection.h"
+#include "calib/camera/camera_file.h"
+#include "calib/vision/tag_detector.h"
+
+namespace kinescope {
+namespace {
+
+constexpr int kFramesSearched = 20;
+constexpr int kFramesDecoded = 900;      ///< 30 s at 30 Hz, a second or two of work
+constexpr double kSmallMarkerPx = 20.0;  ///< below this the pose of a marker flips and jitters
+constexpr double kBlurredPx = 2.0;
+constexpr double kLowContrast = 40.0;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Grey value between pixels; nothing outside the image.
+std::optional<double> sample(const ImageView& image, const Eigen::Vector2d& at) {
+  const int x = static_cast<int>(std::floor(at.x()));
+  const int y = static_cast<int>(std::floor(at.y()));
+  if (x < 0 || y < 0 || x + 1 >= image.width || y + 1 >= image.height) return std::nullopt;
+  const std::uint8_t* p = image.data + std::ptrdiff_t{y} * image.stride + x;
+  const double u = at.x() - x;
+  const double v = at.y() - y;
+  return (1 - v) * ((1 - u) * p[0] + u * p[1]) +
+         v * ((1 - u) * p[image.stride] + u * p[image.stride + 1]);
+}
+
+struct Step {
+  double contrast = 0.0;
+  double blur_px = 0.0;
+};
+
+/// The step of grey values across an edge, at its middle: its height, and the sigma of the blur
+/// that would give its steepest slope (a blurred step has slope height / (sigma sqrt(2 pi))).
+std::optional<Step> step_across(const ImageView& image, const Eigen::Vector2d& a,
+                                const Eigen::Vector2d& b) {
+  constexpr double kSpacingPx = 0.5;
+  const Eigen::Vector2d along = b - a;
+  const Eigen::Vector2d normal = Eigen::Vector2d(along.y(), -along.x()).normalized();
+  const double reach = std::clamp(along.norm() / 10.0, 2.0, 8.0);
+  std::vector<double> profile;
+  for (double s = -reach; s <= reach; s += kSpacingPx) {
+    const auto value = sample(image, 0.5 * (a + b) + s * normal);
+    if (!value) return std::nullopt;
+    profile.push_back(*value);
+  }
+  const auto [low, high] = std::ranges::minmax(profile);
+  double slope = 0.0;
+  for (std::size_t i = 1; i < profile.size(); ++i) {
+    slope = std::max(slope, std::abs(profile[i] - profile[i - 1]) / kSpacingPx);
+  }
+  if (slope <= 0.0) return std::nullopt;
+  return Step{high - low, (high - low) / (slope * std::sqrt(2.0 * std::numbers::pi))};
+}
+
+/// What the searched frames showed of one marker.
+struct Sightings {
+  std::vector<double> edges_px, contrasts, blurs_px;
+  int frames = 0;
+};
+
+void add_sighting(Sightings& out, const ImageView& image, const TagObservation& tag) {
+  ++out.frames;
+  for (std::size_t i = 0; i < tag.corners_px.size(); ++i) {
+    const Eigen::Vector2d& a = tag.corners_px[i];
+    const Eigen::Vector2d& b = tag.corners_px[(i + 1) % tag.corners_px.size()];
+    out.edges_px.push_back((b - a).norm());
+    if (const auto step = step_across(image, a, b)) {
+      out.contrasts.push_back(step->contrast);
+      out.blurs_px.push_back(step->blur_px);
+    }
+  }
+}
+
+std::vector<MarkerFacts> summarise(const std::map<TagId, Sightings>& seen,
+                                   const MarkerSet& markers) {
+  std::vector<MarkerFacts> out;
+  for (const auto& [id, sightings] : seen) {
+    out.push_back({.id = id,
+                   .size_m = markers.size_m(id),
+                   .frames = sightings.frames,
+                   .edge_px = median(sightings.edges_px),
+                   .contrast = median(sightings.contrasts),
+                   .blur_px = median(sightings.blurs_px)});
+  }
+  return out;
+}
+
+/// Families of which something is seen although nothing of the declared one is.
+std::vector<std::string> other_families(const std::vector<GreyImage>& images,
+                                        const std::string& declared) {
+  std::vector<std::string> found;
+  for (const std::string& family : known_families()) {
+    if (family == declared) continue;
+    const auto detector = make_tag_detector(family, {.decimate = 2.0, .max_hamming = 0});
+    const bool seen = std::ranges::any_of(
+        images, [&](const GreyImage& image) { return !detector->detect(image.view()).empty(); });
+    if (seen) found.push_back(family);
+  }
+  return found;
+}
+
+void judge_nothing_seen(const Recording& recording, const std::vector<GreyImage>& images,
+                        std::vector<Finding>& findings) {
+  const std::vector<std::string> others = other_families(images, recording.markers.family);
+  const std::string remedy =
+      others.empty()
+          ? "are they sharp, bright and wider than 20 px?"
+          : fmt::format("but markers of {}: correct family in tags.yaml", fmt::join(others, ", "));
+  findings.push_back(
+      {true, fmt::format("no marker of family {} is seen: {}", recording.markers.family, remedy)});
+}
+
+void judge_markers(const Recording& recording, const VideoFacts& facts,
+                   std::vector<Finding>& findings) {
+  for (const MarkerFacts& marker : facts.markers) {
+    const int id = marker.id.value;
+    if (recording.markers.only_listed && !recording.markers.sizes_m.contains(marker.id)) {
+      findings.push_back(
+          {false, fmt::format("tag {} is seen but not listed in tags.yaml: it is left out; "
+                              "add its size if it sits on the robot",
+                              id)});
+      continue;
+    }
+    if (marker.edge_px < kSmallMarkerPx) {
+      findings.push_back(
+          {false, fmt::format("tag {} is {:.0f} px wide only: film closer or print it larger "
+                              "({:.0f} px and more)",
+                              id, marker.edge_px, 1.5 * kSmallMarkerPx)});
+    }
+    if (marker.blur_px > kBlurredPx) {
+      findings.push_back(
+          {false, fmt::format("tag {} is blurred (sigma {:.1f} px): focus, light, shorter "
+                              "exposure",
+                              id, marker.blur_px)});
+    }
+    if (marker.contrast > 0.0 && marker.contrast < kLowContrast) {
+      findings.push_back(
+          {false, fmt::format("tag {} has little contrast ({:.0f} of 255): more light", id,
+                              marker.contrast)});
+    }
+  }
+  for (const auto& [id, size] : recording.markers.sizes_m) {
+    if (std::ranges::find(facts.markers, id, &MarkerFacts::id) != facts.markers.end()) continue;
+    findings.push_back(
+        {false, fmt::format("tag {} is listed in tags.yaml but was not seen in the {} frames "
+                            "searched",
+                            id.value, facts.frames_searched)});
+  }
+  if (facts.markers.size() == 1) {
+    findings.push_back(
+        {false, "one marker only: at most one joint, between it and the camera, can be found"});
+  }
+}
+
+void judge_times(const Recording& recording, VideoFacts& facts, std::vector<Finding>& findings) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < facts.times_s.size(); ++i) {
+    steps.push_back(facts.times_s[i] - facts.times_s[i - 1]);
+  }
+  if (steps.empty()) return;
+  const double step = median(steps);
+  facts.frame_rate_hz = step > 0.0 ? 1.0 / step : 0.0;
+  facts.longest_step_s = std::ranges::max(steps);
+  if (step > 0.0 && facts.longest_step_s > 2.5 * step && facts.frame_rate_hz > 2.0) {
+    findings.push_back(
+        {false, fmt::format("frames are missing: up to {:.0f} ms between two of them, {:.0f} ms "
+                            "as a rule",
+                            1e3 * facts.longest_step_s, 1e3 * step)});
+  }
+  if (recording.log.empty()) return;
+  const double begin_s = facts.times_s.front();
+  const double seen_s = facts.times_s.back();
+  const double end_s =
+      facts.decoded_to_end ? seen_s : std::max(seen_s, begin_s + facts.info.duration_s);
+  require_time_overlap(recording.log, {begin_s, end_s}, recording.video.string());
+  const double common_s = std::min(end_s, recording.log.times_s.back()) -
+                          std::max(begin_s, recording.log.times_s.front());
+  if (end_s > begin_s && common_s < 0.8 * (end_s - begin_s)) {
+    findings.push_back(
+        {false, fmt::format("only {:.1f} s of the {:.1f} s of video are covered by the log",
+                            common_s, end_s - begin_s)});
+  }
+}
+
+}  // namespace
+
+VideoFacts look_at_video(const Recording& recording, const Progress& progress,
+                         std::vector<Finding>& findings) {
+  const std::unique_ptr<VideoReader> video = open_video(recording.video);
+  const std::unique_ptr<TagDetector> detector = make_tag_detector(recording.markers.family);
+  VideoFacts facts;
+  facts.info = video->info();
+  const int expected = facts.info.frame_count > 0 ? std::min(facts.info.frame_count, kFramesDecoded)
+                                                  : kFramesDecoded;
+  const int every = std::max(1, expected / kFramesSearched);
+  std::map<TagId, Sightings> seen;
+  std::vector<GreyImage>
+      kept;  // first, middle, last of those searched, for the search of other families
+  while (facts.frames_decoded < kFramesDecoded) {
+    std::optional<VideoFrame> frame = video->next();
+    if (!frame) {
+      facts.decoded_to_end = true;
+      break;
+    }
+    facts.times_s.push_back(frame->time_s + recording.settings.video_start_s);
+    if (facts.frames_decoded++ % every != 0) continue;
+    report(progress, "inspect", facts.frames_decoded, expected);
+    for (const TagObservation& tag : detector->detect(frame->image.view())) {
+      add_sighting(seen[tag.id], frame->image.view(), tag);
+    }
+    if (seen.empty() && facts.frames_searched % 9 == 0) kept.push_back(std::move(frame->image));
+    ++facts.frames_searched;
+  }
+  for (const std::string& warning : video->warnings()) findings.push_back({false, warning});
+  facts.markers = summarise(seen, recording.markers);
+  if (recording.camera) {
+    try {
+      static_cast<void>(with_image_size(*recording.camera, facts.info.width, facts.info.height,
+                                        recording.video.string()));
+    } catch (const Error& error) {
+      findings.push_back({true, error.what()});
+    }
+  }
+  try {
+    judge_times(recording, facts, findings);
+  } catch (const Error& error) {
+    findings.push_back({true, error.what()});
+  }
+  if (facts.markers.empty()) {
+    judge_nothing_seen(recording, kept, findings);
+  } else {
+    judge_markers(recording, facts, findings);
+  }
+  return facts;
+}
+
+}  // namespace kinescope

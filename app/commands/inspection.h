@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a recording.
+// Gives   Inspection: what it holds and what is wrong with it, from a quick look: about 20 frames
+// searched
+//         for markers, all samples of the log.
+// Not here: anything that takes longer than a few seconds; structure, calibration.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/io/recording.h"
+#include "calib/vision/video.h"
+#include "kinematics/core/progress.h"
+
+namespace kinescope {
+
+/// Something worth saying; a problem when `run` could not work with it.
+struct Finding {
+  bool problem = false;
+  std::string text;
+};
+
+/// One marker over the frames that were searched.
+struct MarkerFacts {
+  TagId id;
+  double size_m = 0.0;    ///< declared; 0: none
+  int frames = 0;         ///< in which it was seen
+  double edge_px = 0.0;   ///< median length of an edge
+  double contrast = 0.0;  ///< median step of grey values across the border, of 255
+  double blur_px = 0.0;   ///< median sigma of that step
+};
+
+struct VideoFacts {
+  VideoInfo info;
+  int frames_decoded = 0;
+  bool decoded_to_end = false;  ///< false: only the beginning was looked at
+  std::vector<double> times_s;  ///< of the decoded frames, on the log's clock
+  double frame_rate_hz = 0.0;   ///< from the median step
+  double longest_step_s = 0.0;
+  int frames_searched = 0;
+  std::vector<MarkerFacts> markers;  ///< by id
+};
+
+struct ChannelFacts {
+  std::string name;
+  std::string
+      unit;  ///< declared, or "rad or m"; "ticks?" and "deg?" where the values look like that
+  double lower = 0.0;
+  double upper = 0.0;
+  bool moves = true;
+};
+
+struct LogFacts {
+  int samples = 0;
+  double first_s = 0.0;
+  double last_s = 0.0;
+  double rate_hz = 0.0;   ///< from the median step
+  double jitter_s = 0.0;  ///< median deviation of a step from the median step
+  double longest_gap_s = 0.0;
+  double longest_gap_at_s = 0.0;
+  std::vector<ChannelFacts> channels;
+};
+
+struct Inspection {
+  Recording recording;
+  std::optional<VideoFacts> video;
+  std::optional<LogFacts> log;
+  std::vector<Finding> findings;
+
+  [[nodiscard]] bool ready() const;
+};
+
+[[nodiscard]] Inspection inspect_recording(const RecordingPaths& paths,
+                                           const Progress& progress = {});
+
+/// The log alone; its findings are added.
+[[nodiscard]] LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
+                                   std::vector<Finding>& findings);
+/// Decodes at most the first 900 frames. Throws bad_input for a video that cannot be read.
+[[nodiscard]] VideoFacts look_at_video(const Recording& recording, const Progress& progress,
+                                       std::vector<Finding>& findings);
+
+}  // namespace kinescope
