@@ -79,10 +79,12 @@ void Readings::update(double time_offset_s) {
     for (std::size_t f = 0; f < spec_->times_s.size(); ++f) {
       const auto row = static_cast<Eigen::Index>(f);
       const auto column = static_cast<Eigen::Index>(j);
-      const auto sample = interpolate(spec_->log, spec_->channel[j],
-                                      spec_->times_s[f] + time_offset_s, spec_->max_gap_s);
-      known_(row, column) = sample.has_value();
-      // Where the log ends while the offset moves, the last values stay: such frames are not used.
+      const double time_s = spec_->times_s[f] + time_offset_s;
+      // Where the offset moves a frame past the log's end while solving, the end's value stays.
+      const double inside_s =
+          std::clamp(time_s, spec_->log.times_s.front(), spec_->log.times_s.back());
+      const auto sample = interpolate(spec_->log, spec_->channel[j], inside_s, spec_->max_gap_s);
+      known_(row, column) = sample.has_value() && inside_s == time_s;
       if (!sample) continue;
       value_(row, column) = sample->value;
       rate_(row, column) = spec_->postures ? 0.0 : sample->rate;

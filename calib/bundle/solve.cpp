@@ -14,6 +14,8 @@ namespace {
 constexpr int kDenseLimit = 400;
 // Groups smaller than this share the common noise level.
 constexpr std::size_t kMinGroup = 30;
+// How far the time offset may move from its start without running into the ends of the log, s.
+constexpr double kOffsetMargin = 0.03;
 // Width of the Cauchy loss in units of the square root of a sighting's degrees of freedom.
 constexpr double kLossWidth = 3.0;
 
@@ -171,7 +173,10 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
 }
 
 std::vector<int> usable_sightings(const Spec& spec, const State& state) {
-  const Readings readings(spec, state.time_offset[0]);
+  // The offset will move: frames must stay within the log when it does.
+  const double margin_s = spec.free_time_offset ? kOffsetMargin : 0.0;
+  const Readings early(spec, state.time_offset[0] - margin_s);
+  const Readings late(spec, state.time_offset[0] + margin_s);
   std::vector<int> usable;
   for (std::size_t i = 0; i < spec.sightings.size(); ++i) {
     const Sighting& sighting = spec.sightings[i];
@@ -179,7 +184,7 @@ std::vector<int> usable_sightings(const Spec& spec, const State& state) {
     const auto& path = spec.path[marker.link.index()];
     const bool known = std::ranges::all_of(path, [&](int joint) {
       return spec.channel[static_cast<std::size_t>(joint)] < 0 ||
-             readings.known(sighting.frame, joint);
+             (early.known(sighting.frame, joint) && late.known(sighting.frame, joint));
     });
     if (known) usable.push_back(static_cast<int>(i));
   }
