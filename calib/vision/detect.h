@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a recording's video and what is declared about its markers.
-// Gives   TagObservations: corners with their sigma in every frame; wrong ids and ghosts put aside with a
+// Gives   TagObservations: corners with their sigma in every frame; wrong ids and ghosts put aside
+// with a
 //         reason.
+// Method  whole frames at reduced resolution and now and then at full; markers lost on the way are
+// looked for
+//         again in a window around where their neighbours in time say they are; refine_corners()
+//         gives corners and sigma; sightings.h decides what is believed.
 #pragma once
 
 #include <filesystem>
@@ -17,9 +22,14 @@
 namespace kinescope {
 
 struct DetectOptions {
-  DetectorOptions detector;
+  DetectorOptions detector{.decimate = 2.0};  ///< of the search over whole frames
   int threads = 2;
-  int min_sightings = 5;  ///< markers seen in fewer frames are ghosts
+  int min_sightings =
+      5;  ///< markers seen in fewer frames (or a tenth of a short recording) are ghosts
+  int full_search_every =
+      10;  ///< every so many frames are searched at full resolution, for small markers
+  bool fill_gaps = true;       ///< look again, at full resolution, where a marker should be
+  bool refine_corners = true;  ///< false keeps the detector's corners
 };
 
 struct Detection {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   one grey image.
-// Gives   the markers in it: id, four corners (px, centre of pixel at 0, AprilTag order), decoding margin.
-// Method  AprilTag 3 (Krogius et al. 2019) through the packaged library; ArUco dictionaries through OpenCV.
+// Gives   the markers in it: id, four corners (px, centre of pixel at 0, AprilTag order), decoding
+// margin. Method  AprilTag 3 (Krogius et al. 2019) through the packaged library; ArUco dictionaries
+// through OpenCV.
 #pragma once
 
 #include <memory>
@@ -15,11 +16,12 @@
 namespace kinescope {
 
 struct DetectorOptions {
-  double decimate = 1.0;   ///< search at 1/decimate of the resolution; more is faster and misses small tags
-  double blur_sigma = 0.0; ///< px, smoothing before the search
+  double decimate =
+      1.0;  ///< search at 1/decimate of the resolution; more is faster and misses small tags
+  double blur_sigma = 0.0;  ///< px, smoothing before the search
   bool refine_edges = true;
-  int max_hamming = 1;     ///< bits corrected at most; more finds more and invents more
-  double min_margin = 20.0;///< least decision margin (AprilTag families)
+  int max_hamming = 1;       ///< bits corrected at most; more finds more and invents more
+  double min_margin = 20.0;  ///< least decision margin (AprilTag families)
 };
 
 class TagDetector {
@@ -31,6 +33,18 @@ class TagDetector {
 
 /// Names of all families this build knows.
 [[nodiscard]] std::vector<std::string> known_families();
+
+/// What the refinement of corners must know of a family.
+struct TagLayout {
+  int cells = 8;            ///< along an edge between two corners
+  bool dark_inside = true;  ///< the border is dark inside and bright outside
+};
+
+/// Throws bad_request for a family we do not know.
+[[nodiscard]] TagLayout tag_layout(const std::string& family);
+
+/// Puts detections into the one order results have: frame, id, place of the first corner.
+void sort_detections(std::vector<TagObservation>& tags);
 
 /// Throws bad_request for a family we do not know (and names those we do).
 [[nodiscard]] std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,

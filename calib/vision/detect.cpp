@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/vision/detect.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "calib/vision/frame_workers.h"
+#include "calib/vision/refine_corners.h"
+#include "calib/vision/sightings.h"
+#include "calib/vision/video.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+// Corners that could not be refined, px: what the detectors themselves reach on difficult markers.
+constexpr double kAprilTagSigma = 0.3;
+constexpr double kArucoSigma = 0.8;
+// Lossy video moves edges, alike for neighbouring pixels and frames; measured on H.264 with known
+// corners.
+constexpr double kCompressionSigma = 0.025;
+// A gap in a track is searched where sightings on both sides, or one of them, are this near.
+constexpr double kGapBothSides_s = 1.0;
+constexpr double kGapOneSide_s = 0.2;
+constexpr double kLargeEdge = 150.0;  // px; larger markers are not lost for want of resolution
+
+using FrameTags = std::vector<std::vector<TagObservation>>;  // by frame
+
+struct Window {
+  TagId id;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // inclusive
+};
+
+// What one worker has of its own.
+struct Searcher {
+  std::unique_ptr<TagDetector> coarse;  // whole frames
+  std::unique_ptr<TagDetector> fine;    // full resolution
+};
+
+class Detecting {
+ public:
+  Detecting(const MarkerSet& markers, const DetectOptions& options)
+      : options_(options), layout_(tag_layout(markers.family)) {
+    detector_sigma_ = markers.family.starts_with("DICT") ? kArucoSigma : kAprilTagSigma;
+    DetectorOptions fine = options.detector;
+    fine.decimate = 1.0;
+    for (int i = 0; i < std::max(1, options.threads); ++i) {
+      searchers_.push_back(
+          {make_tag_detector(markers.family, options.detector),
+           options.detector.decimate > 1.0 ? make_tag_detector(markers.family, fine) : nullptr});
+    }
+  }
+
+  Detection search_frames(const std::filesystem::path& video, const Progress& progress) {
+    const std::unique_ptr<VideoReader> reader = open_video(video);
+    lossy_ = is_lossy(reader->info().codec);
+    Detection out;
+    out.observations.width = reader->info().width;
+    out.observations.height = reader->info().height;
+    const int every = std::max(1, options_.full_search_every);
+    out.observations.times_s = for_each_frame(
+        *reader, searchers_.size(),
+        [&](std::size_t worker, const VideoFrame& frame) {
+          Searcher& searcher = searchers_[worker];
+          const bool full = searcher.fine && frame.index % every == 0;
+          return finish((full ? searcher.fine : searcher.coarse)->detect(frame.image.view()),
+                        frame);
+        },
+        tags_, progress, "finding markers");
+    out.warnings = reader->warnings();
+    return out;
+  }
+
+  // Once more through the video, only where a marker was lost.
+  void search_gaps(const std::filesystem::path& video, const Detection& so_far,
+                   const Progress& progress) {
+    const std::map<int, std::vector<Window>> windows = find_gaps(so_far.observations);
+    if (windows.empty()) return;
+    const std::unique_ptr<VideoReader> reader = open_video(video);
+    FrameTags more;
+    for_each_frame(
+        *reader, searchers_.size(),
+        [&](std::size_t worker, const VideoFrame& frame) {
+          const auto found = windows.find(frame.index);
+          if (found == windows.end()) return std::vector<TagObservation>();
+          return finish(search_windows(*fine(worker), frame.image.view(), found->second), frame);
+        },
+        more, progress, "searching gaps");
+    for (std::size_t f = 0; f < std::min(more.size(), tags_.size()); ++f) {
+      tags_[f].insert(tags_[f].end(), more[f].begin(), more[f].end());
+    }
+  }
+
+  [[nodiscard]] std::vector<TagObservation> all() const {
+    std::vector<TagObservation> out;
+    for (const auto& frame : tags_) out.insert(out.end(), frame.begin(), frame.end());
+    return out;
+  }
+
+ private:
+  static bool is_lossy(const std::string& codec) {
+    static const std::set<std::string> kLossless = {"images",  "rawvideo", "ffv1",   "huffyuv",
+                                                    "ffvhuff", "png",      "utvideo"};
+    return !kLossless.contains(codec);
+  }
+
+  TagDetector* fine(std::size_t worker) const {
+    const Searcher& searcher = searchers_[worker];
+    return (searcher.fine ? searcher.fine : searcher.coarse).get();
+  }
+
+  // Refined corners, sigma and frame number.
+  std::vector<TagObservation> finish(std::vector<TagObservation> tags,
+                                     const VideoFrame& frame) const {
+    for (TagObservation& tag : tags) {
+      tag.frame = frame.index;
+      tag.sigma_px = detector_sigma_;
+      if (!options_.refine_corners) continue;
+      Corners start;
+      std::ranges::copy(tag.corners_px, start.begin());
+      const RefinedCorners refined = refine_corners(frame.image.view(), start, layout_);
+      if (refined.status != RefineStatus::kDone) continue;
+      std::ranges::copy(refined.corners_px, tag.corners_px.begin());
+      tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+    }
+    return tags;
+  }
+
+  static std::vector<TagObservation> search_windows(TagDetector& detector, const ImageView& image,
+                                                    const std::vector<Window>& windows) {
+    std::vector<TagObservation> out;
+    for (const Window& window : windows) {
+      const ImageView part{
+          image.data + static_cast<std::ptrdiff_t>(window.y0) * image.stride + window.x0,
+          window.x1 - window.x0 + 1, window.y1 - window.y0 + 1, image.stride};
+      for (TagObservation& tag : detector.detect(part)) {
+        if (tag.id != window.id) continue;
+        for (Eigen::Vector2d& corner : tag.corners_px) {
+          corner += Eigen::Vector2d(window.x0, window.y0);
+        }
+        out.push_back(std::move(tag));
+      }
+    }
+    return out;
+  }
+
+  // Where to look again: markers that are there before or after a frame, and not in it.
+  std::map<int, std::vector<Window>> find_gaps(const TagObservations& so_far) const {
+    std::map<TagId, std::vector<const TagObservation*>> tracks;
+    for (const TagObservation& tag : so_far.observations) tracks[tag.id].push_back(&tag);
+    std::map<int, std::vector<Window>> out;
+    const auto& times = so_far.times_s;
+    for (const auto& [id, track] : tracks) {
+      std::size_t next = 0;
+      for (int f = 0; f < static_cast<int>(times.size()); ++f) {
+        while (next < track.size() && track[next]->frame < f) ++next;
+        if (next < track.size() && track[next]->frame == f) continue;
+        const TagObservation* before = next > 0 ? track[next - 1] : nullptr;
+        const TagObservation* after = next < track.size() ? track[next] : nullptr;
+        if (auto window = expect(before, after, times, f, so_far.width, so_far.height)) {
+          window->id = id;
+          out[f].push_back(*window);
+        }
+      }
+    }
+    return out;
+  }
+
+  static std::optional<Window> expect(const TagObservation* before, const TagObservation* after,
+                                      const std::vector<double>& times, int frame, int width,
+                                      int height) {
+    const auto time = [&](int f) { return times[static_cast<std::size_t>(f)]; };
+    const double now = time(frame);
+    std::vector<Eigen::Vector2d> corners;
+    double reach = 0.0;  // px around the expected corners
+    if (before != nullptr && after != nullptr &&
+        time(after->frame) - time(before->frame) < kGapBothSides_s) {
+      corners = corners_between(*before, time(before->frame), *after, time(after->frame), now);
+      reach = 0.35 * corner_distance_px(before->corners_px, after->corners_px);
+    } else {
+      const bool follow = before != nullptr && now - time(before->frame) < kGapOneSide_s;
+      const bool precede = after != nullptr && time(after->frame) - now < kGapOneSide_s;
+      if (!follow && !precede) return std::nullopt;
+      corners = (follow ? before : after)->corners_px;
+      reach = mean_edge_px(corners);
+    }
+    const double edge = mean_edge_px(corners);
+    if (edge > kLargeEdge) return std::nullopt;
+    reach += 0.6 * edge + 8.0;
+    Eigen::Vector2d low = corners[0];
+    Eigen::Vector2d high = corners[0];
+    for (const Eigen::Vector2d& corner : corners) {
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+    Window window;
+    window.x0 = std::max(0, static_cast<int>(low.x() - reach));
+    window.y0 = std::max(0, static_cast<int>(low.y() - reach));
+    window.x1 = std::min(width - 1, static_cast<int>(high.x() + reach));
+    window.y1 = std::min(height - 1, static_cast<int>(high.y() + reach));
+    constexpr int kSmallest = 16;
+    if (window.x1 - window.x0 < kSmallest || window.y1 - window.y0 < kSmallest) return std::nullopt;
+    return window;
+  }
+
+  DetectOptions options_;
+  TagLayout layout_;
+  double detector_sigma_ = kAprilTagSigma;
+  bool lossy_ = true;
+  std::vector<Searcher> searchers_;
+  FrameTags tags_;
+};
+
+}  // namespace
+
+Detection detect_tags(const std::filesystem::path& video, const MarkerSet& markers,
+                      const DetectOptions& options, const Progress& progress) {
+  Detecting detecting(markers, options);
+  Detection out = detecting.search_frames(video, progress);
+  if (options.fill_gaps && options.detector.decimate > 1.0) {
+    Detection first = out;
+    first.observations.observations = detecting.all();
+    (void)sort_out_sightings(first.observations, markers, std::min(2, options.min_sightings));
+    detecting.search_gaps(video, first, progress);
+  }
+  out.observations.observations = detecting.all();
+  for (std::string& warning :
+       sort_out_sightings(out.observations, markers, options.min_sightings)) {
+    out.warnings.push_back(std::move(warning));
+  }
+  return out;
+}
+
+}  // namespace kinescope

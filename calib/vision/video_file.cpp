@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/vision/video_file.h"
+
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/display.h>
+#include <libavutil/pixdesc.h>
+#include <libswscale/swscale.h>
+}
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+struct FreeAv {
+  void operator()(AVFormatContext* p) const { avformat_close_input(&p); }
+  void operator()(AVCodecContext* p) const { avcodec_free_context(&p); }
+  void operator()(AVPacket* p) const { av_packet_free(&p); }
+  void operator()(AVFrame* p) const { av_frame_free(&p); }
+  void operator()(SwsContext* p) const { sws_freeContext(p); }
+};
+template <typename T>
+using Av = std::unique_ptr<T, FreeAv>;
+
+// The first plane holds 8-bit brightness, one byte a pixel.
+bool has_luma_plane(AVPixelFormat format) {
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(format);
+  if (d == nullptr) return false;
+  constexpr std::uint64_t kOther = AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL |
+                                   AV_PIX_FMT_FLAG_BITSTREAM | AV_PIX_FMT_FLAG_HWACCEL |
+                                   AV_PIX_FMT_FLAG_BAYER;
+  return (d->flags & kOther) == 0 && d->comp[0].depth == 8 && d->comp[0].step == 1 &&
+         d->comp[0].plane == 0 && d->comp[0].offset == 0;
+}
+
+GreyImage copy_plane(const std::uint8_t* data, int stride, int width, int height) {
+  GreyImage grey{width, height, {}};
+  const std::size_t row_bytes = static_cast<std::size_t>(width);
+  grey.pixels.resize(row_bytes * static_cast<std::size_t>(height));
+  for (int row = 0; row < height; ++row) {
+    std::memcpy(grey.pixels.data() + row_bytes * static_cast<std::size_t>(row),
+                data + static_cast<std::ptrdiff_t>(stride) * row, row_bytes);
+  }
+  return grey;
+}
+
+// Turns by quarter turns, counterclockwise as the display matrix counts.
+GreyImage turned(const GreyImage& in, int quarters) {
+  if (quarters == 0) return in;
+  const bool swap = quarters % 2 == 1;
+  GreyImage out{swap ? in.height : in.width, swap ? in.width : in.height, {}};
+  out.pixels.resize(in.pixels.size());
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      int sx = x;
+      int sy = y;
+      if (quarters == 1) sx = in.width - 1 - y, sy = x;
+      if (quarters == 2) sx = in.width - 1 - x, sy = in.height - 1 - y;
+      if (quarters == 3) sx = y, sy = in.height - 1 - x;
+      out.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width) +
+                 static_cast<std::size_t>(x)] =
+          in.pixels[static_cast<std::size_t>(sy) * static_cast<std::size_t>(in.width) +
+                    static_cast<std::size_t>(sx)];
+    }
+  }
+  return out;
+}
+
+class VideoFileReader final : public VideoReader {
+ public:
+  explicit VideoFileReader(const std::filesystem::path& path) : path_(path.string()) {
+    av_log_set_level(AV_LOG_QUIET);
+    check_readable(path);
+    open_container();
+    open_decoder();
+    fill_info();
+    first_ = decode_next();
+    if (!first_) {
+      throw bad_input(path_, "no frame of the video can be decoded",
+                      "the file is damaged or cut off; copy it again from the camera");
+    }
+  }
+
+  const VideoInfo& info() const override { return info_; }
+  const std::vector<std::string>& warnings() const override { return warnings_; }
+
+  std::optional<VideoFrame> next() override {
+    if (first_) return std::exchange(first_, std::nullopt);
+    if (finished_) return std::nullopt;
+    std::optional<VideoFrame> frame = decode_next();
+    if (!frame) finish();
+    return frame;
+  }
+
+ private:
+  void check_readable(const std::filesystem::path& path) const {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) {
+      throw bad_input(path_, "not a file", "name a video file or a folder of images");
+    }
+    if (std::filesystem::file_size(path, error) == 0) {
+      throw bad_input(path_, "the video is empty", "copy it again from the camera");
+    }
+  }
+
+  void open_container() {
+    AVFormatContext* raw = nullptr;
+    AVDictionary* settings = nullptr;
+    av_dict_set(&settings, "protocol_whitelist", "file",
+                0);  // a playlist must not reach the network
+    // "file:" keeps FFmpeg from reading a colon in the name as a protocol.
+    const int status = avformat_open_input(&raw, ("file:" + path_).c_str(), nullptr, &settings);
+    av_dict_free(&settings);
+    if (status < 0) {
+      throw bad_input(path_,
+                      "not a video that can be read, or one that is cut off before its index",
+                      "mp4, avi and mkv are read; a camera that lost power may have left an mp4 "
+                      "without an index");
+    }
+    container_.reset(raw);
+    // Text files pass as subtitles or "tty" animations.
+    const std::string_view format = container_->iformat->name;
+    const bool is_text = format == "tty" || format == "srt" || format == "ass";
+    if (is_text || avformat_find_stream_info(raw, nullptr) < 0) {
+      throw bad_input(path_, "not a video", "mp4, avi and mkv are read");
+    }
+    stream_ = av_find_best_stream(raw, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+    if (stream_ < 0) throw bad_input(path_, "holds no video stream", "name the video file");
+  }
+
+  void open_decoder() {
+    const AVCodecParameters* parameters = stream().codecpar;
+    const AVCodec* codec = avcodec_find_decoder(parameters->codec_id);
+    if (codec == nullptr) {
+      throw bad_input(path_,
+                      fmt::format("no decoder for {}", avcodec_get_name(parameters->codec_id)),
+                      "convert the video to H.264");
+    }
+    decoder_.reset(avcodec_alloc_context3(codec));
+    decoder_->thread_count = 1;  // frames are the unit of parallel work; damage shows in one place
+    decoder_->pkt_timebase = stream().time_base;
+    if (avcodec_parameters_to_context(decoder_.get(), parameters) < 0 ||
+        avcodec_open2(decoder_.get(), codec, nullptr) < 0) {
+      throw bad_input(path_, "the video's decoder does not start", "convert the video to H.264");
+    }
+    packet_.reset(av_packet_alloc());
+    frame_.reset(av_frame_alloc());
+  }
+
+  void fill_info() {
+    const AVStream& s = stream();
+    info_.codec = avcodec_get_name(s.codecpar->codec_id);
+    info_.frame_count = static_cast<int>(s.nb_frames);
+    if (s.duration != AV_NOPTS_VALUE) {
+      info_.duration_s = static_cast<double>(s.duration) * av_q2d(s.time_base);
+    } else if (container_->duration != AV_NOPTS_VALUE) {
+      info_.duration_s = static_cast<double>(container_->duration) / AV_TIME_BASE;
+    }
+    if (const auto* matrix = reinterpret_cast<const std::int32_t*>(
+            av_stream_get_side_data(&s, AV_PKT_DATA_DISPLAYMATRIX, nullptr))) {
+      const double angle = av_display_rotation_get(matrix);  // degrees counterclockwise
+      if (std::isfinite(angle)) {
+        quarters_ = ((static_cast<int>(std::lround(angle / 90.0)) % 4) + 4) % 4;
+      }
+    }
+  }
+
+  [[nodiscard]] const AVStream& stream() const {
+    return *container_->streams[static_cast<unsigned>(stream_)];
+  }
+
+  // The next undamaged frame with a stamp after its predecessor's.
+  std::optional<VideoFrame> decode_next() {
+    while (receive()) {
+      const bool damaged =
+          (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
+      if (damaged) after_damage_ = true;
+      if (!damaged && frame_->key_frame != 0) after_damage_ = false;
+      if (after_damage_) {
+        ++damaged_;
+        continue;
+      }
+      const std::optional<double> time = stamp();
+      if (!time) continue;
+      last_time_ = *time;
+      VideoFrame out{index_++, *time, grey()};
+      if (!size_known_) {
+        info_.width = out.image.width;  // as decoded and turned upright
+        info_.height = out.image.height;
+      }
+      if (size_known_ && (out.image.width != info_.width || out.image.height != info_.height)) {
+        warnings_.push_back(fmt::format(
+            "{}: the picture changes its size at {:.3f} s; reading stops", path_, *time));
+        finished_ = true;
+        return std::nullopt;
+      }
+      size_known_ = true;
+      return out;
+    }
+    return std::nullopt;
+  }
+
+  // Feeds packets until a frame comes out. False at the end.
+  bool receive() {
+    while (true) {
+      const int status = avcodec_receive_frame(decoder_.get(), frame_.get());
+      if (status == 0) return true;
+      if (status == AVERROR_EOF) return false;
+      if (status != AVERROR(EAGAIN)) {
+        if (drained_) return false;
+        after_damage_ = true;
+        ++damaged_;
+      }
+      feed();
+    }
+  }
+
+  void feed() {
+    if (drained_) return;
+    int status = av_read_frame(container_.get(), packet_.get());
+    while (status >= 0 && packet_->stream_index != stream_) {
+      av_packet_unref(packet_.get());
+      status = av_read_frame(container_.get(), packet_.get());
+    }
+    if (status < 0) {
+      if (status != AVERROR_EOF) read_error_ = true;
+      drained_ = true;
+      avcodec_send_packet(decoder_.get(), nullptr);
+      return;
+    }
+    ++packets_;
+    if ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) {  // cut off inside the packet
+      read_error_ = true;
+    } else if (avcodec_send_packet(decoder_.get(), packet_.get()) < 0) {
+      after_damage_ = true;
+      ++damaged_;
+    }
+    av_packet_unref(packet_.get());
+  }
+
+  std::optional<double> stamp() {
+    const double unit = av_q2d(stream().time_base);
+    if (frame_->best_effort_timestamp == AV_NOPTS_VALUE) {
+      ++unstamped_;
+      return std::nullopt;
+    }
+    const double time = static_cast<double>(frame_->best_effort_timestamp) * unit;
+    if (index_ > 0 && !(time > last_time_)) {
+      ++unordered_;
+      return std::nullopt;
+    }
+    return time;
+  }
+
+  GreyImage grey() {
+    const auto format = static_cast<AVPixelFormat>(frame_->format);
+    if (has_luma_plane(format)) {
+      const GreyImage plane =
+          copy_plane(frame_->data[0], frame_->linesize[0], frame_->width, frame_->height);
+      return turned(plane, quarters_);
+    }
+    scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height, format,
+                                       frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT,
+                                       nullptr, nullptr, nullptr));
+    if (!scaler_) {
+      throw bad_input(path_, "the video's pixel format cannot be turned to grey",
+                      "convert the video to H.264 with 4:2:0 colour");
+    }
+    Av<AVFrame> out(av_frame_alloc());
+    out->width = frame_->width;
+    out->height = frame_->height;
+    out->format = AV_PIX_FMT_GRAY8;
+    KINESCOPE_CHECK(av_frame_get_buffer(out.get(), 0) == 0, "no memory for a frame");
+    sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, frame_->height, out->data,
+              out->linesize);
+    return turned(copy_plane(out->data[0], out->linesize[0], out->width, out->height), quarters_);
+  }
+
+  void finish() {
+    finished_ = true;
+    if (damaged_ > 0) {
+      warnings_.push_back(
+          fmt::format("{}: {} damaged frames are left out (a damaged frame spoils those up to the "
+                      "next key frame)",
+                      path_, damaged_));
+    }
+    if (unstamped_ > 0) {
+      warnings_.push_back(
+          fmt::format("{}: {} frames carry no time stamp and are left out", path_, unstamped_));
+    }
+    if (unordered_ > 0) {
+      warnings_.push_back(
+          fmt::format("{}: the stamps of {} frames do not increase; these frames are left out",
+                      path_, unordered_));
+    }
+    const bool short_of_packets = info_.frame_count > 0 && packets_ < info_.frame_count;
+    if (read_error_ || short_of_packets) {
+      const std::string whole =
+          info_.frame_count > 0 ? fmt::format(" of {}", info_.frame_count) : std::string();
+      warnings_.push_back(
+          fmt::format("{}: the file ends early, after {:.3f} s: {}{} frames are used", path_,
+                      last_time_, index_, whole));
+    }
+  }
+
+  std::string path_;
+  Av<AVFormatContext> container_;
+  Av<AVCodecContext> decoder_;
+  Av<AVPacket> packet_;
+  Av<AVFrame> frame_;
+  Av<SwsContext> scaler_;
+  int stream_ = -1;
+  int quarters_ = 0;
+  VideoInfo info_;
+  std::vector<std::string> warnings_;
+  std::optional<VideoFrame> first_;
+  bool size_known_ = false;
+  bool drained_ = false;
+  bool finished_ = false;
+  bool read_error_ = false;
+  bool after_damage_ = false;
+  int packets_ = 0;
+  int index_ = 0;
+  int damaged_ = 0;
+  int unstamped_ = 0;
+  int unordered_ = 0;
+  double last_time_ = 0.0;
+};
+
+}  // namespace
+
+std::unique_ptr<VideoReader> open_video_file(const std::filesystem::path& path) {
+  return std::make_unique<VideoFileReader>(path);
+}
+
+}  // namespace kinescope
