@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every subcommand is a function from its options to the program's exit code, so that tests call it without a
+// process. Commands throw Error; only run_program() catches.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/io/recording.h"
+#include "calib/bundle/calibrate.h"
+#include "calib/vision/board.h"
+#include "calib/vision/detect.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/progress.h"
+
+namespace kinescope {
+
+/// Where the words go. Results to standard output, progress and warnings to standard error.
+struct Console {
+  bool json = false;
+  bool quiet = false;
+  Progress progress;  ///< filled by the program; empty in tests
+};
+
+struct RunOptions {
+  RecordingPaths recording;
+  std::filesystem::path output;   ///< the run folder; default: <recording's name>_run in the current folder
+  DetectOptions detect;
+  CalibrateOptions calibrate;
+  bool estimate_intrinsics = false;
+  bool force = false;             ///< run every stage again, also where nothing changed
+  std::vector<std::string> fail_on;  ///< limits such as "held_out_px>0.2" that turn the exit code to 5
+  std::string command_line;       ///< for the report
+};
+
+[[nodiscard]] ExitCode run_command(const RunOptions& options, const Console& console);
+
+struct InspectOptions {
+  RecordingPaths recording;
+};
+
+[[nodiscard]] ExitCode inspect_command(const InspectOptions& options, const Console& console);
+
+struct CameraOptions {
+  std::filesystem::path source;   ///< folder of images, or a video
+  BoardSpec board;
+  BoardOptions calibration;
+  std::filesystem::path output = "camera.yaml";
+};
+
+[[nodiscard]] ExitCode camera_command(const CameraOptions& options, const Console& console);
+
+}  // namespace kinescope

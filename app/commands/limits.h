@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Limits of --fail-on: "held_out_px>0.2" turns the exit code to 5 when the run's value is over it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/report/run_summary.h"
+
+namespace kinescope {
+
+struct Limit {
+  std::string quantity;
+  char comparison = '>';  ///< '>' or '<': what counts as outside
+  double value = 0.0;
+};
+
+/// Throws bad_request for a quantity we do not know (and names those we do) or a text that is no limit.
+[[nodiscard]] std::vector<Limit> parse_limits(const std::vector<std::string>& texts);
+
+/// Prints one line to standard error for every limit that is passed.
+[[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits);
+
+/// Throws undetermined when the answer must not be trusted: an axis that is not determined, a structure with
+/// another one as probable. Called once everything is written.
+void require_answer(const RunSummary& run);
+
+}  // namespace kinescope

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "calib/bundle/place_markers.h"
+#include "calib/camera/camera_file.h"
+#include "calib/tracks/pose_tracks_from_tags.h"
+
+namespace kinescope {
+namespace {
+
+// A channel whose slope is this near to a known unit is in that unit; what is left is an effect of the robot.
+constexpr double kUnitTolerance = 0.05;
+
+void require_overlap(const Recording& recording, const std::vector<double>& times_s) {
+  if (recording.log.empty() || times_s.empty()) return;
+  const double begin = recording.log.times_s.front();
+  const double end = recording.log.times_s.back();
+  if (times_s.back() >= begin && times_s.front() <= end) return;
+  throw bad_input(recording.log.source,
+                  fmt::format("covers {:.3f} to {:.3f} s, the frames {:.3f} to {:.3f} s: no overlap",
+                              begin, end, times_s.front(), times_s.back()),
+                  "give the video's start on the log's clock as video_start in recording.yaml");
+}
+
+void require_markers(const Recording& recording, const TagObservations& tags) {
+  const std::string source =
+      recording.video.empty() ? recording.folder.string() : recording.video.string();
+  if (tags.observations.empty()) {
+    std::map<std::string, int> reasons;
+    for (const RejectedTag& tag : tags.rejected) ++reasons[tag.reason];
+    std::string rejected;
+    for (const auto& [reason, count] : reasons) {
+      rejected += fmt::format("{}{} x {}", rejected.empty() ? "; rejected: " : ", ", count, reason);
+    }
+    throw bad_input(source,
+                    fmt::format("no marker of family {} was found in {} frames{}",
+                                recording.markers.family, tags.times_s.size(), rejected),
+                    "check the family in tags.yaml, and that the markers are sharp and at least 20 "
+                    "pixels wide");
+  }
+  std::set<int> unsized;
+  for (const TagObservation& seen : tags.observations) {
+    if (!recording.markers.boards.contains(seen.id) && !(recording.markers.size_m(seen.id) > 0.0)) {
+      unsized.insert(seen.id.value);
+    }
+  }
+  if (!unsized.empty()) {
+    throw bad_input((recording.folder / "tags.yaml").string(),
+                    fmt::format("no size for the markers seen with id {}", fmt::join(unsized, ", ")),
+                    "give default_size, or the size of each, in metres");
+  }
+}
+
+double nearest_unit(JointType type, double scale) {
+  const std::vector<double> units = type == JointType::kRevolute
+                                        ? std::vector<double>{1.0, kRadPerDegree}
+                                        : std::vector<double>{1.0, kMetrePerMillimetre};
+  for (const double unit : units) {
+    if (std::abs(scale / unit - 1.0) < kUnitTolerance) return unit;
+  }
+  return scale;
+}
+
+// The base frame seen from the frame the structure stands in (the camera's).
+Pose base_frame(const KinematicTree& tree, const std::optional<Eigen::Vector3d>& gravity) {
+  Pose T_camera_base;
+  const Marker* anchor = nullptr;
+  for (const Marker& marker : tree.markers) {
+    if (marker.link == LinkId{0} && anchor == nullptr) anchor = &marker;
+  }
+  if (anchor != nullptr) {
+    // A tag's z points into it: turned about x, the base's z leaves the tag.
+    T_camera_base = anchor->T_link_marker;
+    T_camera_base.rotation = T_camera_base.rotation * exp_rotation({std::numbers::pi, 0.0, 0.0});
+  } else {
+    // Upright before a level camera: x away from it, z up.
+    Eigen::Matrix3d R;
+    R << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+    T_camera_base.rotation = Eigen::Quaterniond(R);
+  }
+  if (gravity) {
+    const Eigen::Vector3d up = -gravity->normalized();
+    const Eigen::Vector3d z = T_camera_base.rotation * Eigen::Vector3d::UnitZ();
+    T_camera_base.rotation =
+        (Eigen::Quaterniond::FromTwoVectors(z, up) * T_camera_base.rotation).normalized();
+  }
+  return T_camera_base;
+}
+
+void move_base(KinematicTree& tree, const Pose& T_camera_base) {
+  const Pose T_base_camera = T_camera_base.inverse();
+  for (Joint& joint : tree.joints) {
+    if (joint.parent == LinkId{0}) joint.T_parent_joint = T_base_camera * joint.T_parent_joint;
+  }
+  for (Marker& marker : tree.markers) {
+    if (marker.link == LinkId{0}) marker.T_link_marker = T_base_camera * marker.T_link_marker;
+  }
+}
+
+void match_channels(const Recording& recording, KinematicTree& tree,
+                    std::vector<std::string>& warnings) {
+  std::vector<std::size_t> movable;
+  int named = 0;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (tree.joints[j].type == JointType::kFixed) continue;
+    movable.push_back(j);
+    if (recording.log.channel(tree.joints[j].name)) ++named;
+  }
+  if (named > 0) {
+    for (const std::size_t j : movable) {
+      if (recording.log.channel(tree.joints[j].name)) tree.joints[j].channel = tree.joints[j].name;
+    }
+    return;
+  }
+  std::vector<std::string> names;
+  for (const std::size_t j : movable) names.push_back(tree.joints[j].name);
+  if (movable.size() != recording.log.channels.size()) {
+    throw bad_input(recording.log.source,
+                    "no column is named like a joint of the nominal robot",
+                    fmt::format("name the columns {}", fmt::join(names, ", ")));
+  }
+  for (std::size_t k = 0; k < movable.size(); ++k) {
+    tree.joints[movable[k]].channel = recording.log.channels[k];
+  }
+  warnings.push_back(fmt::format(
+      "no column of {} is named like a joint of the nominal robot: taken in order ({} drives {}, ..)",
+      recording.log.source, recording.log.channels.front(), names.front()));
+}
+
+Eigen::MatrixXd nominal_values(const Recording& recording, const KinematicTree& tree,
+                               const std::vector<double>& times_s) {
+  const Eigen::MatrixXd readings = resample(recording.log, times_s);
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(times_s.size()),
+                                                 static_cast<Eigen::Index>(tree.joints.size()));
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const auto channel = recording.log.channel(tree.joints[j].channel);
+    if (!channel || tree.joints[j].type == JointType::kFixed) continue;
+    values.col(static_cast<Eigen::Index>(j)) = readings.col(*channel);
+  }
+  return values;
+}
+
+double edge_px(const TagObservation& seen) {
+  double sum = 0.0;
+  const std::size_t n = seen.corners_px.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    sum += (seen.corners_px[i] - seen.corners_px[(i + 1) % n]).norm();
+  }
+  return sum / static_cast<double>(n);
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+}  // namespace
+
+Observed observe(const Recording& recording, const RunOptions& options,
+                 const std::optional<TagObservations>& cached, const Progress& progress) {
+  Observed out;
+  switch (recording.entry) {
+    case RecordingEntry::kVideo: {
+      if (cached) {
+        out.tags = *cached;
+      } else {
+        Detection detection =
+            detect_tags(recording.video, recording.markers, options.detect, progress);
+        out.tags = std::move(detection.observations);
+        out.warnings = std::move(detection.warnings);
+        for (double& t : out.tags.times_s) t += recording.settings.video_start_s;
+      }
+      break;
+    }
+    case RecordingEntry::kCorners:
+      out.tags = *recording.corners;
+      break;
+    case RecordingEntry::kPoses:
+      out.measurements.poses = *recording.poses;
+      out.measurements.times_s = recording.poses->times_s;
+      break;
+    case RecordingEntry::kPoints:
+      out.measurements.points = *recording.points;
+      out.measurements.points.distances = recording.settings.target_distances;
+      out.measurements.times_s = recording.points->times_s;
+      break;
+  }
+  if (recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners) {
+    require_markers(recording, out.tags);
+    out.measurements.times_s = out.tags.times_s;
+    out.measurements.corners = out.tags.observations;
+  }
+  require_overlap(recording, out.measurements.times_s);
+  return out;
+}
+
+CameraModel choose_camera(const Recording& recording, const TagObservations& tags) {
+  if (tags.observations.empty()) return {};
+  if (!recording.camera) {
+    return pinhole_guess(tags.width, tags.height, focal_from_tags(tags, recording.markers));
+  }
+  if (tags.width == 0) return *recording.camera;
+  return with_image_size(*recording.camera, tags.width, tags.height,
+                         (recording.folder / "camera.yaml").string());
+}
+
+CalibrationStart start_from_structure(const Structure& structure, const Recording& recording,
+                                      const CameraModel& camera) {
+  CalibrationStart start;
+  start.tree = structure_tree(structure, recording.log);
+  start.tree.name = recording.settings.name;
+  for (Joint& joint : start.tree.joints) joint.scale = nearest_unit(joint.type, joint.scale);
+  for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
+  start.T_camera_base = base_frame(start.tree, recording.settings.gravity);
+  move_base(start.tree, start.T_camera_base);
+  start.camera = camera;
+  start.time_offset_s = structure.time_offset_s;
+  start.joint_values = structure.joint_values;
+  return start;
+}
+
+CalibrationStart start_from_nominal(const Recording& recording, const Measurements& measurements,
+                                    const PoseTracks& tracks, const CameraModel& camera,
+                                    std::vector<std::string>& warnings) {
+  CalibrationStart start;
+  start.tree = *recording.nominal;
+  start.nominal = true;
+  start.camera = camera;
+  match_channels(recording, start.tree, warnings);
+  const Eigen::MatrixXd values = nominal_values(recording, start.tree, measurements.times_s);
+  const Placement placement = recording.entry == RecordingEntry::kPoints
+                                  ? place_points(start.tree, values, measurements.points)
+                                  : place_markers(start.tree, values, tracks);
+  start.T_camera_base = placement.T_camera_base;
+  start.tree.markers = placement.markers;
+  for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
+  return start;
+}
+
+void require_determined(const Structure& structure) {
+  if (structure.status == StructureStatus::kDetermined ||
+      structure.status == StructureStatus::kAmbiguous) {
+    return;
+  }
+  if (structure.doubts.empty()) {
+    throw undetermined("structure", "the recording does not determine the robot's structure",
+                       "move every joint by at least 20 degrees (or 50 mm), each at its own time");
+  }
+  std::string what = structure.doubts.front().what;
+  for (std::size_t i = 1; i < structure.doubts.size(); ++i) what += "; " + structure.doubts[i].what;
+  throw undetermined("structure", what, structure.doubts.front().remedy);
+}
+
+std::vector<MarkerSummary> summarise_markers(const Observed& observed, const MarkerSet& markers) {
+  std::map<TagId, std::vector<const TagObservation*>> seen;
+  for (const TagObservation& tag : observed.tags.observations) seen[tag.id].push_back(&tag);
+  std::vector<MarkerSummary> out;
+  for (const auto& [id, sightings] : seen) {
+    std::vector<double> edges;
+    std::vector<double> sigmas;
+    for (const TagObservation* tag : sightings) {
+      edges.push_back(edge_px(*tag));
+      sigmas.push_back(tag->sigma_px);
+    }
+    out.push_back({id, markers.size_m(id), static_cast<int>(sightings.size()), median(edges),
+                   median(sigmas)});
+  }
+  for (const PoseTrack& track : observed.measurements.poses.tracks) {
+    out.push_back({track.id, 0.0, static_cast<int>(track.samples.size()), 0.0, 0.0});
+  }
+  std::map<TagId, int> points;
+  for (const PointObservation& point : observed.measurements.points.observations) {
+    ++points[point.id];
+  }
+  for (const auto& [id, count] : points) out.push_back({id, 0.0, count, 0.0, 0.0});
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The stages of `run` between the rooms: each takes the products before it and gives the next.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/commands/commands.h"
+#include "app/report/run_summary.h"
+#include "calib/bundle/calibrate.h"
+#include "kinematics/structure/structure.h"
+
+namespace kinescope {
+
+/// What the recording shows, whichever way it enters, and how it was seen.
+struct Observed {
+  Measurements measurements;
+  TagObservations tags;                ///< empty unless the recording enters by video or corners
+  std::vector<std::string> warnings;
+};
+
+/// Detects the markers of the video (or takes them from `cached`), or reads corners, poses or points.
+/// Throws bad_input when there is no marker, or none with a size; when video and log do not overlap in time.
+[[nodiscard]] Observed observe(const Recording& recording, const RunOptions& options,
+                               const std::optional<TagObservations>& cached,
+                               const Progress& progress);
+
+/// The declared camera, checked against the image size, or a guess from the markers' shapes.
+[[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
+
+/// A start from the found structure: units of the channels recognised, the base frame placed on the first tag at
+/// rest (its normal up; without one at the camera, upright), or level when gravity is declared.
+[[nodiscard]] CalibrationStart start_from_structure(const Structure& structure,
+                                                    const Recording& recording,
+                                                    const CameraModel& camera);
+
+/// A start from a nominal robot: channels matched by name (or by order, with a warning), markers placed.
+/// `warnings` receives what was assumed.
+[[nodiscard]] CalibrationStart start_from_nominal(const Recording& recording,
+                                                  const Measurements& measurements,
+                                                  const PoseTracks& tracks,
+                                                  const CameraModel& camera,
+                                                  std::vector<std::string>& warnings);
+
+/// Throws undetermined with the first doubt's words and remedy when the structure is not determined.
+void require_determined(const Structure& structure);
+
+/// Counts and sizes of what was seen of each marker.
+[[nodiscard]] std::vector<MarkerSummary> summarise_markers(const Observed& observed,
+                                                           const MarkerSet& markers);
+
+}  // namespace kinescope

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope run`: every arrow of the data's path on one page.
+#include <chrono>
+#include <cstdio>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "app/commands/commands.h"
+#include "app/commands/limits.h"
+#include "app/commands/pipeline.h"
+#include "app/commands/run_folder.h"
+#include "app/io/products.h"
+#include "app/report/report.h"
+#include "calib/quality/error_summary.h"
+#include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/urdf.h"
+
+namespace kinescope {
+namespace {
+
+// Wall-clock times of the stages, for the report.
+class Stopwatch {
+ public:
+  void lap(std::string stage, std::vector<StageTime>& times) {
+    const auto now = std::chrono::steady_clock::now();
+    times.push_back({std::move(stage), std::chrono::duration<double>(now - last_).count()});
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void describe_recording(const Recording& recording, const Observed& observed,
+                        const RunOptions& options, RunSummary& run) {
+  run.robot = recording.settings.name;
+  run.recording = recording.folder.filename().string();
+  run.entry = entry_name(recording.entry);
+  run.version = program_version();
+  run.command = options.command_line;
+  run.inputs = hash_inputs(recording);
+  run.options = list_options(options);
+  run.frames = static_cast<int>(observed.measurements.times_s.size());
+  if (run.frames > 1) {
+    run.duration_s = observed.measurements.times_s.back() - observed.measurements.times_s.front();
+  }
+  run.markers = summarise_markers(observed, recording.markers);
+  std::map<std::string, int> rejected;
+  for (const RejectedTag& tag : observed.tags.rejected) ++rejected[tag.reason];
+  run.rejected.assign(rejected.begin(), rejected.end());
+  run.warnings = recording.warnings;
+  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
+  run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();
+  run.log = recording.log;
+  run.nominal = recording.nominal;
+}
+
+void print_result(const RunSummary& run, const RunFolder& folder, const Console& console) {
+  if (console.json) {
+    fmt::print("{}\n", result_json(run).dump(2));
+    return;
+  }
+  const Verdict verdict = make_verdict(run);
+  fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  fmt::print("urdf    {}\nreport  {}\n", folder.file("robot.urdf").string(),
+             folder.file("report.html").string());
+}
+
+}  // namespace
+
+ExitCode run_command(const RunOptions& options, const Console& console) {
+  Stopwatch clock;
+  RunSummary run;
+  const std::vector<Limit> limits = parse_limits(options.fail_on);
+  const Recording recording = read_recording(options.recording);
+  const RunFolder folder(options, recording);
+  clock.lap("read", run.times);
+
+  const Observed observed =
+      observe(recording, options, folder.cached_observations(recording), console.progress);
+  folder.keep_observations(recording, observed.tags);
+  describe_recording(recording, observed, options, run);
+  clock.lap("detect", run.times);
+
+  const CameraModel camera = choose_camera(recording, observed.tags);
+  run.tracks = observed.tags.observations.empty()
+                   ? observed.measurements.poses
+                   : pose_tracks_from_tags(observed.tags, camera, recording.markers);
+  if (!run.tracks.tracks.empty()) folder.write("tracks.csv", tracks_csv(run.tracks));
+  clock.lap("track", run.times);
+
+  CalibrationStart start;
+  if (recording.nominal) {
+    start = start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
+  } else {
+    if (recording.entry == RecordingEntry::kPoints) {
+      throw bad_request("points.csv", "points alone do not show a structure",
+                        "give a nominal robot with --nominal robot.urdf");
+    }
+    StructureOptions structure_options;
+    structure_options.scan_time_offset = options.calibrate.estimate_time_offset;
+    run.structure = find_structure(run.tracks, recording.log, structure_options);
+    folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
+    require_determined(*run.structure);
+    start = start_from_structure(*run.structure, recording, camera);
+  }
+  clock.lap("structure", run.times);
+
+  CalibrateOptions calibrate_options = options.calibrate;
+  calibrate_options.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
+  run.calibration = calibrate(observed.measurements, recording.markers, recording.log, start,
+                              calibrate_options, console.progress);
+  run.errors = summarise_errors(run.calibration);
+  clock.lap("calibrate", run.times);
+
+  const std::string urdf = write_urdf(run.calibration.tree);
+  folder.write("robot.urdf", urdf);
+  folder.write("calibration.json", calibration_json(run.calibration).dump(1) + "\n");
+  folder.write("residuals.csv", residuals_csv(run.calibration));
+  folder.write("result.json", result_json(run).dump(2) + "\n");
+  clock.lap("write", run.times);
+  folder.write("report.html", report_html(run, urdf));
+  clock.lap("report", run.times);
+  folder.write("run.json", run_json(run).dump(2) + "\n");
+
+  print_result(run, folder, console);
+  require_answer(run);
+  return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/run_folder.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "app/io/products.h"
+#include "app/io/sha256.h"
+#include "kinematics/core/file.h"
+
+#ifndef KINESCOPE_VERSION
+#error "KINESCOPE_VERSION is set by the build"
+#endif
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr std::string_view kObservations = "observations.csv";
+constexpr std::string_view kObservationsKey = "observations.json";
+
+std::string describe_geometry(FreeGeometry free) {
+  switch (free) {
+    case FreeGeometry::kPlacement:
+      return "placement";
+    case FreeGeometry::kOffsets:
+      return "offsets";
+    case FreeGeometry::kGeometry:
+      return "geometry";
+  }
+  return "unknown";
+}
+
+// Of a file, or of the list of a folder's files with their hashes (as `sha256sum * | sha256sum`).
+std::string sha256_of_path(const fs::path& path) {
+  if (!fs::is_directory(path)) return sha256_of_file(path);
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(path)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  std::string list;
+  for (const fs::path& file : files) {
+    list += fmt::format("{}  {}\n", sha256_of_file(file), file.filename().string());
+  }
+  return sha256_of_text(list);
+}
+
+}  // namespace
+
+RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
+    : folder_(options.output), detect_(options.detect), force_(options.force) {
+  if (folder_.empty()) {
+    const std::string name = recording.folder.filename().string();
+    folder_ = (name.empty() ? "recording" : name) + "_run";
+  }
+  require_writable_folder(folder_);
+}
+
+void RunFolder::write(std::string_view name, std::string_view content) const {
+  write_file_atomically(folder_ / name, content);
+}
+
+std::string RunFolder::detection_key(const Recording& recording) const {
+  std::string key = fmt::format(
+      "kinescope {} video {} decimate {} blur {} refine {} hamming {} margin {} sightings {} start {}",
+      program_version(), sha256_of_path(recording.video), detect_.detector.decimate,
+      detect_.detector.blur_sigma, detect_.detector.refine_edges, detect_.detector.max_hamming,
+      detect_.detector.min_margin, detect_.min_sightings, recording.settings.video_start_s);
+  const MarkerSet& markers = recording.markers;
+  key += fmt::format(" family {} only_listed {} ids", markers.family, markers.only_listed);
+  for (const auto& [id, size] : markers.sizes_m) key += fmt::format(" {}", id.value);
+  return key;
+}
+
+std::optional<TagObservations> RunFolder::cached_observations(const Recording& recording) const {
+  if (force_ || recording.entry != RecordingEntry::kVideo) return std::nullopt;
+  if (!fs::exists(file(kObservations)) || !fs::exists(file(kObservationsKey))) return std::nullopt;
+  const json kept = json::parse(read_text_file(file(kObservationsKey)), nullptr, false);
+  if (!kept.is_object() || kept.value("key", "") != detection_key(recording)) return std::nullopt;
+  if (kept.value("sha256", "") != sha256_of_file(file(kObservations))) return std::nullopt;
+  TagObservations observations = read_corners(file(kObservations), recording.markers);
+  // The table holds only frames with a marker; the times of all frames and what was rejected stand here.
+  const std::vector<double> times = kept.at("times_s").get<std::vector<double>>();
+  std::size_t next = 0;
+  for (TagObservation& seen : observations.observations) {
+    const double t = observations.times_s[static_cast<std::size_t>(seen.frame)];
+    while (next < times.size() && times[next] < t) ++next;
+    seen.frame = static_cast<int>(next);
+  }
+  observations.times_s = times;
+  observations.width = kept.value("width", 0);
+  observations.height = kept.value("height", 0);
+  for (const json& tag : kept.at("rejected")) {
+    observations.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
+                                     tag.at("reason").get<std::string>()});
+  }
+  return observations;
+}
+
+void RunFolder::keep_observations(const Recording& recording,
+                                  const TagObservations& observations) const {
+  if (observations.observations.empty()) return;
+  write(kObservations, observations_csv(observations));
+  if (recording.entry != RecordingEntry::kVideo) return;
+  json rejected = json::array();
+  for (const RejectedTag& tag : observations.rejected) {
+    rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
+  }
+  const json kept{{"key", detection_key(recording)},
+                  {"sha256", sha256_of_file(file(kObservations))},
+                  {"width", observations.width},
+                  {"height", observations.height},
+                  {"times_s", observations.times_s},
+                  {"rejected", std::move(rejected)}};
+  write(kObservationsKey, kept.dump(1) + "\n");
+}
+
+std::string entry_name(RecordingEntry entry) {
+  switch (entry) {
+    case RecordingEntry::kVideo:
+      return "video";
+    case RecordingEntry::kCorners:
+      return "corners";
+    case RecordingEntry::kPoses:
+      return "poses";
+    case RecordingEntry::kPoints:
+      return "points";
+  }
+  return "unknown";
+}
+
+std::string program_version() { return KINESCOPE_VERSION; }
+
+std::vector<InputFile> hash_inputs(const Recording& recording) {
+  std::vector<InputFile> inputs;
+  for (const fs::path& path : recording.files) {
+    const fs::path relative = path.lexically_relative(recording.folder);
+    const bool inside = !relative.empty() && *relative.begin() != "..";
+    inputs.push_back({inside ? relative.string() : path.filename().string(),
+                      sha256_of_path(path)});
+  }
+  return inputs;
+}
+
+std::vector<std::pair<std::string, std::string>> list_options(const RunOptions& options) {
+  const CalibrateOptions& c = options.calibrate;
+  const DetectorOptions& d = options.detect.detector;
+  return {{"free", describe_geometry(c.free)},
+          {"estimate intrinsics", options.estimate_intrinsics ? "yes" : "when not declared"},
+          {"estimate time offset", c.estimate_time_offset ? "yes" : "no"},
+          {"estimate scales", c.estimate_scales ? "yes" : "when the unit is unknown"},
+          {"nominal prior", fmt::format("{} mm, {:.3f} deg", 1e3 * c.nominal_sigma_m,
+                                        c.nominal_sigma_rad / kRadPerDegree)},
+          {"rejection", fmt::format("{} sigma", c.reject_sigma)},
+          {"folds", fmt::format("{}", c.folds)},
+          {"decimate", fmt::format("{}", d.decimate)},
+          {"largest hamming distance", fmt::format("{}", d.max_hamming)},
+          {"least decision margin", fmt::format("{}", d.min_margin)},
+          {"least sightings of a marker", fmt::format("{}", options.detect.min_sightings)}};
+}
+
+json run_json(const RunSummary& run) {
+  json inputs = json::array();
+  for (const InputFile& file : run.inputs) {
+    inputs.push_back({{"name", file.name}, {"sha256", file.sha256}});
+  }
+  json options = json::object();
+  for (const auto& [name, value] : run.options) options[name] = value;
+  json times = json::array();
+  for (const StageTime& time : run.times) {
+    times.push_back({{"stage", time.stage}, {"seconds", time.seconds}});
+  }
+  return {{"schema", "kinescope.run"}, {"schema_version", 1},     {"program", "kinescope"},
+          {"version", run.version},    {"command", run.command},  {"recording", run.recording},
+          {"entry", run.entry},        {"inputs", inputs},        {"options", options},
+          {"seed", nullptr},           {"stages", std::move(times)}};
+}
+
+}  // namespace kinescope

@@ -1,0 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/cli.h"
+
+int main(int argc, char** argv) { return kinescope::run_program(argc, argv); }
