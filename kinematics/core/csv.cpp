@@ -33,12 +33,13 @@ std::vector<std::string> split(std::string_view line) {
 }
 
 void check_header(const CsvTable& table) {
-  const std::string where = table.source + ":1";
+  const std::string where = fmt::format("{}:{}", table.source, table.header_line);
   if (table.header.size() == 1) {
     for (const char delimiter : {';', '\t', ' '}) {
       if (table.header[0].find(delimiter) == std::string::npos) continue;
-      throw bad_input(where, fmt::format("columns are separated by '{}'",
-                                         delimiter == '\t' ? "tab" : std::string(1, delimiter)),
+      throw bad_input(where,
+                      fmt::format("columns are separated by '{}'",
+                                  delimiter == '\t' ? "tab" : std::string(1, delimiter)),
                       "separate them by commas, with a point in decimal numbers");
     }
   }
@@ -70,7 +71,7 @@ std::optional<std::size_t> CsvTable::column(std::string_view name) const {
 
 std::size_t CsvTable::require_column(std::string_view name) const {
   if (const auto found = column(name)) return *found;
-  throw bad_input(source + ":1", fmt::format("no column '{}'", name),
+  throw bad_input(fmt::format("{}:{}", source, header_line), fmt::format("no column '{}'", name),
                   fmt::format("the columns are {}", fmt::join(header, ", ")));
 }
 
@@ -82,9 +83,10 @@ double CsvTable::number(std::size_t row, std::size_t column) const {
   const std::string& cell = rows[row][column];
   const std::optional<double> value = parse_number(cell);
   if (!value || !std::isfinite(*value)) {
-    throw bad_input(place(row),
-                    fmt::format("column '{}' holds '{}', not a finite number", header[column], cell),
-                    "correct or remove the line");
+    throw bad_input(
+        place(row),
+        fmt::format("column '{}' holds '{}', not a finite number", header[column], cell),
+        "correct or remove the line");
   }
   return *value;
 }
@@ -124,14 +126,15 @@ CsvTable parse_csv(std::string_view text, std::string source) {
     std::vector<std::string> cells = split(line);
     if (table.header.empty()) {
       table.header = std::move(cells);
+      table.header_line = line_number;
       check_header(table);
       continue;
     }
     if (cells.size() != table.header.size()) {
-      throw bad_input(fmt::format("{}:{}", table.source, line_number),
-                      fmt::format("{} cells where the header has {}", cells.size(),
-                                  table.header.size()),
-                      "is the file cut off, or a comma missing?");
+      throw bad_input(
+          fmt::format("{}:{}", table.source, line_number),
+          fmt::format("{} cells where the header has {}", cells.size(), table.header.size()),
+          "is the file cut off, or a comma missing?");
     }
     table.rows.push_back(std::move(cells));
     table.lines.push_back(line_number);
@@ -149,7 +152,7 @@ CsvTable read_csv(const std::filesystem::path& path) {
 
 std::optional<double> parse_number(std::string_view text) {
   text = trim(text);
-  if (text.starts_with('+')) text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || text.empty()) return std::nullopt;

@@ -18,6 +18,7 @@ namespace kinescope {
 struct CsvTable {
   std::string source;                          ///< file name, for messages
   std::vector<std::string> header;             ///< column names, trimmed, no two alike
+  std::size_t header_line = 1;                 ///< line in the file of the header, from 1
   std::vector<std::vector<std::string>> rows;  ///< trimmed cells
   std::vector<std::size_t> lines;              ///< line in the file of each row, from 1
 

@@ -26,7 +26,7 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
     log.channels.push_back(name);
   }
   if (columns.empty()) {
-    throw bad_input(table.source + ":1", "no joint channel beside 't'",
+    throw bad_input(fmt::format("{}:{}", table.source, table.header_line), "no joint channel beside 't'",
                     "add one column a joint with its value in rad, m or ticks");
   }
   const auto rows = static_cast<Eigen::Index>(table.rows.size());

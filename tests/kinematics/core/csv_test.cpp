@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/core/csv.h"
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+template <typename Call>
+std::string refusal(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadInput);
+    return error.what();
+  }
+  return "accepted";
+}
+
+std::string parse_refusal(std::string_view text) {
+  return refusal([&] { static_cast<void>(parse_csv(text, "a.csv")); });
+}
+
+TEST(Csv, ReadsATable) {
+  const CsvTable table =
+      parse_csv("\xEF\xBB\xBF# a comment\nt, \"x\" ,y\r\n\n1,2,3\r\n# between\n4,,-5e-3", "a.csv");
+  EXPECT_EQ(table.header, (std::vector<std::string>{"t", "x", "y"}));
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_EQ(table.lines, (std::vector<std::size_t>{4, 6}));
+  EXPECT_EQ(table.number(1, 2), -5e-3);
+  EXPECT_FALSE(table.optional_number(1, 1));
+  EXPECT_EQ(table.integer(0, 0), 1);
+  EXPECT_FALSE(table.column("z"));
+  EXPECT_EQ(table.require_column("y"), 2U);
+}
+
+TEST(Csv, RefusesWithPlaceAndRemedy) {
+  EXPECT_EQ(parse_refusal(""), "a.csv: is empty (record it again)");
+  EXPECT_EQ(parse_refusal("\n# only this\n"), "a.csv: is empty (record it again)");
+  EXPECT_EQ(parse_refusal("t,x\n"), "a.csv: has a header but no rows (record it again)");
+  EXPECT_EQ(parse_refusal("t;x\n1;2\n"),
+            "a.csv:1: columns are separated by ';' (separate them by commas, with a point in "
+            "decimal numbers)");
+  EXPECT_NE(parse_refusal("t\tx\n1\t2\n").find("'tab'"), std::string::npos);
+  EXPECT_EQ(parse_refusal("t,x,x\n1,2,3\n"),
+            "a.csv:1: two columns are named 'x' (give every column its own name)");
+  EXPECT_EQ(parse_refusal("t,,x\n1,2,3\n"), "a.csv:1: column 2 has no name (name every column)");
+  EXPECT_NE(parse_refusal("1,2\n3,4\n").find("not column names"), std::string::npos);
+  EXPECT_EQ(parse_refusal("t,x\n1,2\n\n3\n"),
+            "a.csv:4: 1 cells where the header has 2 (is the file cut off, or a comma missing?)");
+  EXPECT_NE(parse_refusal(std::string_view("t,x\n1,\0\n", 8)).find("NUL"), std::string::npos);
+}
+
+TEST(Csv, NamesTheLineOfAHeaderBelowComments) {
+  EXPECT_EQ(parse_refusal("# made by a logger\n\nt,x,x\n1,2,3\n"),
+            "a.csv:3: two columns are named 'x' (give every column its own name)");
+}
+
+TEST(Csv, NumbersAreFinite) {
+  for (const std::string cell : {"nan", "inf", "-inf", "1,5", "1.5x", "x", "", "1e999", "0x10"}) {
+    const std::string text = "t,x\n1," + (cell == "1,5" ? std::string("1 5") : cell) + "\n";
+    const CsvTable table = parse_csv(text, "a.csv");
+    const std::string message = refusal([&] { static_cast<void>(table.number(0, 1)); });
+    EXPECT_TRUE(message.starts_with("a.csv:2: column 'x' holds '")) << cell << ": " << message;
+  }
+  const CsvTable table = parse_csv("t,x\n1,1.5\n", "a.csv");
+  EXPECT_NE(refusal([&] { static_cast<void>(table.integer(0, 1)); }), "accepted");
+  EXPECT_EQ(refusal([&] { static_cast<void>(table.require_column("q")); }),
+            "a.csv:1: no column 'q' (the columns are t, x)");
+}
+
+TEST(Csv, ParsesNumbersWhole) {
+  EXPECT_EQ(parse_number(" +1.5 "), 1.5);
+  EXPECT_EQ(parse_number("-2e-3"), -2e-3);
+  EXPECT_EQ(parse_number("1.5.2"), std::nullopt);
+  EXPECT_EQ(parse_number("+-1"), std::nullopt);
+  EXPECT_EQ(parse_number(""), std::nullopt);
+}
+
+}  // namespace
+}  // namespace kinescope

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/core/file.h"
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+namespace fs = std::filesystem;
+
+class FileTest : public testing::Test {
+ protected:
+  FileTest() { fs::create_directories(folder_); }
+  ~FileTest() override { fs::remove_all(folder_); }
+  fs::path folder_ = fs::path(testing::TempDir()) / "kinescope_file_test";
+};
+
+ExitCode code_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.code();
+  }
+  return ExitCode::kDone;
+}
+
+TEST_F(FileTest, WritesWholeFilesAndReadsThem) {
+  const std::string content("a\0b\r\n", 5);
+  write_file_atomically(folder_ / "a.bin", content);
+  EXPECT_EQ(read_text_file(folder_ / "a.bin"), content);
+  write_file_atomically(folder_ / "a.bin", "");
+  EXPECT_EQ(read_text_file(folder_ / "a.bin"), "");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "no temporary file is left";
+}
+
+TEST_F(FileTest, RefusesWhatCannotBeRead) {
+  EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(folder_ / "none")); }),
+            ExitCode::kBadInput);
+  EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(folder_)); }), ExitCode::kBadInput);
+  write_file_atomically(folder_ / "big", "12345");
+  EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(folder_ / "big", 4)); }),
+            ExitCode::kBadInput);
+  EXPECT_EQ(read_text_file(folder_ / "big", 5), "12345");
+}
+
+TEST_F(FileTest, RefusesWhatCannotBeWritten) {
+  EXPECT_EQ(code_of([&] { write_file_atomically(folder_ / "none" / "a", "x"); }),
+            ExitCode::kBadRequest);
+  fs::create_directories(folder_ / "taken" / "inside");
+  EXPECT_EQ(code_of([&] { write_file_atomically(folder_ / "taken", "x"); }), ExitCode::kBadRequest);
+  EXPECT_TRUE(fs::is_directory(folder_ / "taken")) << "nothing is overwritten";
+  write_file_atomically(folder_ / "file", "x");
+  EXPECT_EQ(code_of([&] { require_writable_folder(folder_ / "file" / "out"); }),
+            ExitCode::kBadRequest);
+  require_writable_folder(folder_ / "new" / "out");
+  EXPECT_TRUE(fs::is_empty(folder_ / "new" / "out")) << "the proof leaves nothing behind";
+}
+
+}  // namespace
+}  // namespace kinescope

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/log/joint_log.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/core/error.h"
+#include "kinematics/core/rng.h"
+
+namespace kinescope {
+namespace {
+
+std::string refusal(std::string_view text, const std::vector<std::string>& torques = {}) {
+  try {
+    static_cast<void>(parse_joint_log(text, "joints.csv", torques));
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadInput);
+    return error.what();
+  }
+  return "accepted";
+}
+
+/// A log of y(t) at uneven times in [0, 2].
+template <typename Function>
+JointLog sampled(Function y, int samples, double unevenness) {
+  Rng rng = Rng::from_name("JointLog.sampled");
+  JointLog log;
+  log.channels = {"a"};
+  log.values.resize(samples, 1);
+  for (int i = 0; i < samples; ++i) {
+    const double step = 2.0 / (samples - 1);
+    log.times_s.push_back(step * (i + unevenness * rng.uniform(-0.4, 0.4)));
+    log.values(i, 0) = y(log.times_s.back());
+  }
+  return log;
+}
+
+TEST(JointLog, KeepsChannelsAndLeavesTorquesOut) {
+  const JointLog log =
+      parse_joint_log("b,t,tau1,current,a\n1,0,9,7,2\n3,0.5,9,7,4\n", "j", {"current"});
+  EXPECT_EQ(log.channels, (std::vector<std::string>{"b", "a"}));
+  EXPECT_EQ(log.times_s, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(log.values(1, 0), 3.0);
+  EXPECT_EQ(log.values(1, 1), 4.0);
+  EXPECT_EQ(log.channel("a"), 1);
+  EXPECT_EQ(log.channel("tau1"), std::nullopt);
+}
+
+TEST(JointLog, RefusesWithLineAndRemedy) {
+  EXPECT_EQ(
+      refusal("t,a\n0,1\n0.1,2\n0.1,3\n"),
+      "joints.csv:4: time 0.100000 s does not come after 0.100000 s (sort the rows by time and "
+      "remove repeated stamps)");
+  EXPECT_NE(refusal("t,a\n0,1\n-1,2\n").find("joints.csv:3:"), std::string::npos);
+  EXPECT_NE(refusal("t,a\n0,1\n1,nan\n").find("joints.csv:3: column 'a' holds 'nan'"),
+            std::string::npos);
+  EXPECT_NE(refusal("t,a\nnan,1\n").find("joints.csv:2: column 't' holds 'nan'"),
+            std::string::npos);
+  EXPECT_NE(refusal("time,a\n0,1\n").find("no column 't'"), std::string::npos);
+  EXPECT_NE(refusal("t,tau1\n0,1\n").find("no joint channel"), std::string::npos);
+  EXPECT_NE(refusal("t,x\n0,1\n", {"x"}).find("no joint channel"), std::string::npos);
+  EXPECT_NE(refusal("t,a,a\n0,1,2\n").find("two columns"), std::string::npos);
+  EXPECT_NE(refusal("t;a\n0;1\n").find("separated by ';'"), std::string::npos);
+  EXPECT_NE(refusal("").find("is empty"), std::string::npos);
+}
+
+TEST(Interpolation, IsExactOnParabolasBetweenEvenOrUnevenSamples) {
+  // Slopes from a parabola through three points make the cubic exact for degree 2 away from the
+  // ends.
+  const auto y = [](double t) { return 1.0 - 2.0 * t + 3.0 * t * t; };
+  const auto rate = [](double t) { return -2.0 + 6.0 * t; };
+  constexpr double kExact = 1e-12;  // rounding, steps of 0.05 in the divisor
+  for (const double unevenness : {0.0, 1.0}) {
+    const JointLog log = sampled(y, 41, unevenness);
+    for (double t = 0.2; t < 1.8; t += 0.0137) {
+      const auto found = interpolate(log, 0, t);
+      ASSERT_TRUE(found);
+      EXPECT_NEAR(found->value, y(t), kExact);
+      EXPECT_NEAR(found->rate, rate(t), 100 * kExact);
+    }
+  }
+}
+
+TEST(Interpolation, ErrorFallsWithTheCubeOfTheStep) {
+  // Three-point slopes are of second order, so the cubic Hermite is of third order between samples.
+  const auto y = [](double t) { return std::sin(3.0 * t); };
+  const auto worst = [&](int samples) {
+    const JointLog log = sampled(y, samples, 0.0);
+    double error = 0.0;
+    for (double t = 0.3; t < 1.7; t += 0.001) {
+      error = std::max(error, std::abs(interpolate(log, 0, t)->value - y(t)));
+    }
+    return error;
+  };
+  const double ratio = worst(41) / worst(81);
+  EXPECT_GT(ratio, 6.5);
+  EXPECT_LT(worst(81), 2e-5);
+}
+
+TEST(Interpolation, HitsSamplesAndIsSmooth) {
+  const JointLog log = sampled([](double t) { return std::sin(5.0 * t); }, 21, 1.0);
+  for (std::size_t i = 1; i + 1 < log.size(); ++i) {
+    EXPECT_EQ(interpolate(log, 0, log.times_s[i])->value,
+              log.values(static_cast<Eigen::Index>(i), 0));
+    constexpr double kBeside = 1e-9;
+    const auto before = interpolate(log, 0, log.times_s[i] - kBeside);
+    const auto after = interpolate(log, 0, log.times_s[i] + kBeside);
+    EXPECT_NEAR(before->value, after->value, 1e-7);
+    EXPECT_NEAR(before->rate, after->rate, 1e-5);
+    EXPECT_NEAR(interpolate(log, 0, log.times_s[i])->rate, after->rate, 1e-5);
+  }
+}
+
+TEST(Interpolation, RateIsTheDerivativeOfTheValue) {
+  const JointLog log = sampled([](double t) { return std::sin(5.0 * t); }, 21, 1.0);
+  constexpr double kStep = 1e-6;
+  for (double t = 0.11; t < 1.9; t += 0.0731) {
+    const double numeric =
+        (interpolate(log, 0, t + kStep)->value - interpolate(log, 0, t - kStep)->value) /
+        (2.0 * kStep);
+    EXPECT_NEAR(interpolate(log, 0, t)->rate, numeric, 1e-6);
+  }
+}
+
+TEST(Interpolation, GivesNothingOutsideAndInGaps) {
+  JointLog log;
+  log.channels = {"a"};
+  log.times_s = {1.0, 1.1, 2.0};
+  log.values = Eigen::Vector3d(1, 2, 3);
+  EXPECT_FALSE(interpolate(log, 0, 0.999));
+  EXPECT_FALSE(interpolate(log, 0, 2.001));
+  EXPECT_TRUE(interpolate(log, 0, 1.0));
+  EXPECT_TRUE(interpolate(log, 0, 2.0));
+  EXPECT_FALSE(interpolate(log, 0, 1.5)) << "a gap of 0.9 s";
+  EXPECT_TRUE(interpolate(log, 0, 1.5, 1.0));
+  EXPECT_FALSE(interpolate(JointLog{}, 0, 1.0));
+}
+
+TEST(Interpolation, ASingleSampleHasItsValueAndNoRate) {
+  JointLog log;
+  log.channels = {"a"};
+  log.times_s = {3.0};
+  log.values.resize(1, 1);
+  log.values(0, 0) = 7.0;
+  EXPECT_EQ(interpolate(log, 0, 3.0)->value, 7.0);
+  EXPECT_EQ(interpolate(log, 0, 3.0)->rate, 0.0);
+}
+
+TEST(Resample, AddsTheOffsetToTheTimes) {
+  JointLog log;
+  log.channels = {"a", "b"};
+  log.times_s = {0.0, 0.1, 0.2, 0.3};
+  log.values.resize(4, 2);
+  log.values << 0, 10, 1, 11, 2, 12, 3, 13;
+  const Eigen::MatrixXd at = resample(log, {0.05, 0.15, 5.0}, 0.1);
+  EXPECT_NEAR(at(0, 0), 1.5, 1e-12);
+  EXPECT_NEAR(at(1, 1), 12.5, 1e-12);
+  EXPECT_TRUE(at.row(2).array().isNaN().all());
+  EXPECT_NEAR(resample_rates(log, {0.15}, 0.0)(0, 0), 10.0, 1e-9);
+}
+
+TEST(PostureLog, WhenEveryTimeIsAStamp) {
+  JointLog log;
+  log.times_s = {0.0, 1.0, 2.0};
+  EXPECT_TRUE(is_posture_log(log, {2.0, 0.0}));
+  EXPECT_FALSE(is_posture_log(log, {0.0, 0.5}));
+  EXPECT_FALSE(is_posture_log(JointLog{}, {0.0}));
+}
+
+}  // namespace
+}  // namespace kinescope
