@@ -26,8 +26,11 @@ constexpr double kArucoSigma = 0.8;
 // corners.
 constexpr double kCompressionSigma = 0.025;
 // A gap in a track is searched where sightings on both sides, or one of them, are this near.
-constexpr double kGapBothSides_s = 1.0;
+constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.2;
+// A glint beside a marker hides it from a detector that thresholds by the brightest pixel nearby;
+// so windows are searched again with brightness cut off at these grey levels.
+constexpr std::array<int, 5> kCeilings = {255, 200, 150, 110, 80};
 constexpr double kLargeEdge = 150.0;  // px; larger markers are not lost for want of resolution
 
 using FrameTags = std::vector<std::vector<TagObservation>>;  // by frame
@@ -136,18 +139,33 @@ class Detecting {
                                                     const std::vector<Window>& windows) {
     std::vector<TagObservation> out;
     for (const Window& window : windows) {
-      const ImageView part{
-          image.data + static_cast<std::ptrdiff_t>(window.y0) * image.stride + window.x0,
-          window.x1 - window.x0 + 1, window.y1 - window.y0 + 1, image.stride};
-      for (TagObservation& tag : detector.detect(part)) {
-        if (tag.id != window.id) continue;
-        for (Eigen::Vector2d& corner : tag.corners_px) {
-          corner += Eigen::Vector2d(window.x0, window.y0);
+      for (const int ceiling : kCeilings) {
+        const GreyImage part = cut(image, window, ceiling);
+        std::vector<TagObservation> found = detector.detect(part.view());
+        std::erase_if(found, [&](const TagObservation& tag) { return tag.id != window.id; });
+        for (TagObservation& tag : found) {
+          for (Eigen::Vector2d& corner : tag.corners_px) {
+            corner += Eigen::Vector2d(window.x0, window.y0);
+          }
+          out.push_back(std::move(tag));
         }
-        out.push_back(std::move(tag));
+        if (!found.empty()) break;
       }
     }
     return out;
+  }
+
+  static GreyImage cut(const ImageView& image, const Window& window, int ceiling) {
+    GreyImage part{window.x1 - window.x0 + 1, window.y1 - window.y0 + 1, {}};
+    part.pixels.reserve(static_cast<std::size_t>(part.width) *
+                        static_cast<std::size_t>(part.height));
+    for (int y = window.y0; y <= window.y1; ++y) {
+      const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * y;
+      for (int x = window.x0; x <= window.x1; ++x) {
+        part.pixels.push_back(static_cast<std::uint8_t>(std::min<int>(row[x], ceiling)));
+      }
+    }
+    return part;
   }
 
   // Where to look again: markers that are there before or after a frame, and not in it.
