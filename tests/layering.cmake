@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+#
+# Rejects includes that go up: cmake -DROOT=<source folder> -P layering.cmake
+# Each line of the table is a room and the rooms it may include beside itself; `house/*` is all rooms of a house.
+# No room sees tests/.
+cmake_minimum_required(VERSION 3.25)
+
+set(rooms
+    "kinematics/core:"
+    "kinematics/log: kinematics/core"
+    "kinematics/model: kinematics/core"
+    "kinematics/structure: kinematics/core kinematics/log kinematics/model"
+    "kinematics/urdf: kinematics/core kinematics/log kinematics/model"
+    "calib/camera: kinematics/*"
+    "calib/vision: kinematics/* calib/camera"
+    "calib/tracks: kinematics/* calib/camera"
+    "calib/bundle: kinematics/* calib/camera"
+    "calib/trace: kinematics/core"
+    "calib/effects: kinematics/* calib/camera calib/bundle calib/trace"
+    "calib/quality: kinematics/* calib/camera calib/bundle"
+    "dynamics/data: kinematics/*"
+    "dynamics/rigid: kinematics/* dynamics/data"
+    "dynamics/gp: kinematics/core"
+    "dynamics/identify: kinematics/* dynamics/data dynamics/rigid dynamics/gp"
+    "dynamics/effects: kinematics/* calib/trace dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
+    "dynamics/contact: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
+    "dynamics/control: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/effects dynamics/contact"
+    "dynamics/policy: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/effects dynamics/contact dynamics/control"
+    "app/config: kinematics/* calib/* dynamics/*"
+    "app/io: kinematics/* calib/* dynamics/* app/config"
+    "app/report: kinematics/* calib/* dynamics/* app/config"
+    "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report"
+    "app: app/commands")
+
+# Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
+set(third_parties
+    "opencv2/: calib/vision"
+    "apriltag: calib/vision"
+    "libav: calib/vision"
+    "libsw: calib/vision"
+    "ceres/: calib/bundle"
+    "urdf_: kinematics/urdf"
+    "console_bridge/: kinematics/urdf"
+    "tinyxml: kinematics/urdf"
+    "yaml-cpp/: calib/camera app/io"
+    "openssl/: app/io"
+    "nlohmann/: app/io app/report app/commands"
+    "CLI/: app/commands"
+    "gtest/: none")
+
+function(room_of file out)
+  if(file MATCHES "^([a-z]+/[a-z_]+)/")
+    set(${out} ${CMAKE_MATCH_1} PARENT_SCOPE)
+  else()
+    get_filename_component(folder ${file} DIRECTORY)
+    set(${out} ${folder} PARENT_SCOPE)
+  endif()
+endfunction()
+
+function(allowed_rooms room out known)
+  foreach(line IN LISTS rooms)
+    string(REGEX REPLACE ":.*" "" name "${line}")
+    if(name STREQUAL room)
+      string(REGEX REPLACE "^[^:]*: ?" "" list "${line}")
+      string(REPLACE " " ";" list "${list}")
+      set(${out} "${list}" PARENT_SCOPE)
+      set(${known} TRUE PARENT_SCOPE)
+      return()
+    endif()
+  endforeach()
+  set(${known} FALSE PARENT_SCOPE)
+endfunction()
+
+set(faults "")
+
+function(check_own file room target)
+  allowed_rooms(${room} allowed known)
+  room_of(${target} target_room)
+  string(REGEX REPLACE "/.*" "" target_house "${target_room}")
+  if(target_room STREQUAL room OR target_room IN_LIST allowed OR "${target_house}/*" IN_LIST allowed)
+    return()
+  endif()
+  set(faults "${faults}  ${file} includes ${target}: ${room} may see ${allowed}\n" PARENT_SCOPE)
+endfunction()
+
+function(check_third_party file room target)
+  foreach(line IN LISTS third_parties)
+    string(REGEX REPLACE ": .*" "" prefix "${line}")
+    string(FIND "${target}" "${prefix}" at)
+    if(NOT at EQUAL 0)
+      continue()
+    endif()
+    string(REGEX REPLACE "^[^:]*: " "" list "${line}")
+    string(REPLACE " " ";" list "${list}")
+    if(NOT room IN_LIST list)
+      set(faults "${faults}  ${file} includes <${target}>: only for ${list}\n" PARENT_SCOPE)
+    endif()
+    return()
+  endforeach()
+endfunction()
+
+file(GLOB_RECURSE files RELATIVE ${ROOT} ${ROOT}/app/*.h ${ROOT}/app/*.cpp ${ROOT}/calib/*.h
+     ${ROOT}/calib/*.cpp ${ROOT}/dynamics/*.h ${ROOT}/dynamics/*.cpp ${ROOT}/kinematics/*.h
+     ${ROOT}/kinematics/*.cpp)
+if(NOT files)
+  message(FATAL_ERROR "no source below ${ROOT}")
+endif()
+foreach(file IN LISTS files)
+  room_of(${file} room)
+  allowed_rooms(${room} allowed known)
+  if(NOT known)
+    set(faults "${faults}  ${file} is in ${room}, a room that tests/layering.cmake does not know\n")
+    continue()
+  endif()
+  file(STRINGS ${ROOT}/${file} includes REGEX "^[ \t]*#[ \t]*include[ \t]*[<\"]")
+  foreach(include IN LISTS includes)
+    string(REGEX REPLACE "^[^<\"]*[<\"]([^>\"]*).*$" "\\1" target "${include}")
+    if(target MATCHES "^(app|calib|dynamics|kinematics|tests)/")
+      check_own(${file} ${room} ${target})
+    elseif(include MATCHES "\"")
+      set(faults "${faults}  ${file} includes \"${target}\": write it from the root\n")
+    else()
+      check_third_party(${file} ${room} ${target})
+    endif()
+  endforeach()
+endforeach()
+
+if(faults)
+  message(FATAL_ERROR "includes that go up (STYLE, section 2):\n${faults}")
+endif()
