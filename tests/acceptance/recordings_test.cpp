@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The program end to end on rendered recordings, against their truth, with thresholds in degrees
+// and metres.
+#include <cstdio>
+#include <filesystem>
+#include <numbers>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/urdf.h"
+#include "tests/acceptance/truth_robot.h"
+#include "tests/truth/shared_data.h"
+
+namespace kinescope::acceptance {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// What the recordings without an undeclared effect must reach.
+constexpr double kMedianDirection = 0.02 * kDegree;
+constexpr double kWorstDirection = 0.06 * kDegree;
+constexpr double kMedianPosition = 0.1e-3;
+constexpr double kMarkerRms = 0.3e-3;
+constexpr double kLagTolerance = 0.5e-3;
+constexpr double kHeldOutRatio = 1.1;
+
+struct Case {
+  const char* name;
+  const char* place;  // below the sources, or below the shared data
+  bool shared;
+  bool clean;  // nothing undeclared but a lag, which is estimated
+};
+
+class Recordings : public testing::TestWithParam<Case> {
+ protected:
+  void SetUp() override {
+    if (GetParam().shared) {
+      const auto found = shared_data(GetParam().place);
+      if (!found) GTEST_SKIP() << "shared data " << GetParam().place << " is not on this machine";
+      recording_ = *found;
+    } else {
+      recording_ = fs::path(KINESCOPE_SOURCE_DIR) / GetParam().place;
+    }
+    output_ = fs::temp_directory_path() /
+              ("kinescope_" + std::string(GetParam().name) + "_" + std::to_string(::getpid()));
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(output_, ignored);
+  }
+
+  fs::path recording_;
+  fs::path output_;
+};
+
+TEST_P(Recordings, AgreesWithTheTruth) {
+  RunOptions options;
+  options.recording.folder = recording_;
+  options.output = output_;
+  const Console quiet{false, true, {}};
+  ASSERT_EQ(run_command(options, quiet), ExitCode::kDone);
+
+  const TruthRobot truth = read_truth(recording_ / "truth.json");
+  const KinematicTree learned = read_urdf(output_ / "robot.urdf");
+  EXPECT_EQ(structure_difference(truth, learned), "");
+  for (const char* product : {"observations.csv", "tracks.csv", "structure.json", "residuals.csv",
+                              "report.html", "result.json", "run.json"}) {
+    EXPECT_TRUE(fs::exists(output_ / product)) << product;
+  }
+  const json calibration = json::parse(read_text_file(output_ / "calibration.json"));
+  if (!GetParam().clean) return;
+
+  const TruthComparison error = compare_with_truth(truth, learned);
+  EXPECT_LT(error.median_direction_rad, kMedianDirection);
+  EXPECT_LT(error.worst_direction_rad, kWorstDirection);
+  EXPECT_LT(error.median_position_m, kMedianPosition);
+  EXPECT_LT(error.marker_rms_m, kMarkerRms);
+  EXPECT_NEAR(calibration.at("time_offset_s").get<double>(), -truth.latency_s, kLagTolerance);
+  EXPECT_LT(
+      calibration.at("held_out_rms").get<double>() / calibration.at("training_rms").get<double>(),
+      kHeldOutRatio);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rendered, Recordings,
+    testing::Values(Case{"scara4", "sample_videos/scara4_none", false, true},
+                    Case{"ur6", "sample_videos/ur6_none", false, true},
+                    Case{"gantry", "sample_videos/gantry_time_lag", false, true},
+                    Case{"ur6_gear", "synthetic/ur6_gear_eccentricity", true, false}),
+    [](const auto& instance) { return instance.param.name; });
+
+}  // namespace
+}  // namespace kinescope::acceptance
