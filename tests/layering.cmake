@@ -41,7 +41,7 @@ set(third_parties
     "ceres/: calib/bundle"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"
-    "tinyxml: kinematics/urdf"
+    "tinyxml: kinematics/urdf calib/camera"
     "yaml-cpp/: calib/camera app/io"
     "openssl/: app/io"
     "nlohmann/: app/io app/report app/commands"
