@@ -51,8 +51,8 @@ double penalty_of(const ChainFit& fit, const Readings& readings) {
       const double rms = readings.rms[static_cast<std::size_t>(term.channel)];
       --free_parameters;
       penalty += scale_penalty(term.scale / rms, fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms);
-      // Which further channel couples is one choice of many.
-      if (k > 0) penalty += 2.0 * std::log(std::max(2, readings.channels())) + 4.0;
+      // Couplings are rare (1 joint in 100), and which channel couples is one choice of many.
+      if (k > 0) penalty += 2.0 * std::log(100.0 * std::max(2, readings.channels()));
     }
   }
   const double r = axis_distance(fit.model);
@@ -163,12 +163,13 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
   for (const Candidate& candidate : screening.candidates) {
     const bool rest = candidate.start.joints.empty();
     const bool enough = static_cast<int>(out.size()) >= options.max_refined && !rest;
-    if (!out.empty() && (candidate.cost > best + kHopeless || enough)) continue;
+    const double hopeless = (rest ? 1.5 * best : best) + kHopeless;
+    if (!out.empty() && (candidate.cost > hopeless || enough)) continue;
     if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
     ChainFit fit = fit_weighted(relative.motion, readings, candidate.start);
     if (candidate.channel >= 0) fit = with_couplings(std::move(fit), relative.motion, readings, usable);
-    best = std::min(best, fit.cost);
     Attachment a = complete(std::move(fit), relative, seen, readings);
+    best = std::min(best, a.data_cost);
     a.parent = parent;
     out.push_back(std::move(a));
   }

@@ -8,11 +8,13 @@ namespace kinescope::structure_search {
 namespace {
 
 constexpr int kMostTerms = 4;
-// -2 ln likelihood that a further channel has to gain, correlation allowed for.
+// -2 ln likelihood that every further channel has to gain, correlation allowed for.
 constexpr double kMinGain = 18.0;
-// Least share of the variance along the joint that it has to remove: systematic errors of other kinds
-// (backlash, gear error) are always a little correlated with something.
+// Least share of the variance along the joint that each has to remove, in the end: systematic errors of other
+// kinds (backlash, gear error) are always a little correlated with something.
 constexpr double kMinShare = 0.15;
+// The same while terms are added: of two that almost cancel, the first alone removes little.
+constexpr double kLeastShare = 0.01;
 
 // Coordinate error of every sample, rad or m, with its weight 1 / variance.
 struct AxisResidual {
@@ -113,19 +115,29 @@ ChainFit pruned(ChainFit fit, const Motion& motion, const Readings& readings) {
 ChainFit with_couplings(ChainFit fit, const Motion& motion, const Readings& readings,
                         const std::vector<char>& usable) {
   if (fit.model.joints.size() != 1 || fit.axis_variance < 1.05 || readings.channels() < 2) return fit;
-  while (static_cast<int>(fit.model.joints.front().terms.size()) < kMostTerms) {
-    if (fit.residuals.empty()) {
-      fit = fit_chain(motion, readings.value, fit.model, {.max_iterations = 2, .with_residuals = true});
-    }
-    const Addition addition = best_addition(fit, motion, readings, usable);
-    if (addition.channel < 0 || addition.share < kMinShare) break;
-    ChainModel model = fit.model;
+  // Terms are added greedily first and judged together afterwards: with one of two that are missing, what is
+  // left still looks like a slow error.
+  std::vector<ChainFit> grown;
+  grown.push_back(fit_chain(motion, readings.value, fit.model, {.max_iterations = 2, .with_residuals = true}));
+  while (static_cast<int>(grown.size()) < kMostTerms && grown.back().axis_variance > 1.05) {
+    const Addition addition = best_addition(grown.back(), motion, readings, usable);
+    if (addition.channel < 0 || addition.share < kLeastShare) break;
+    ChainModel model = grown.back().model;
     model.joints.front().terms.push_back({addition.channel, addition.scale});
-    ChainFit next = fit_chain(motion, readings.value, std::move(model), {.with_residuals = true});
-    if (fit.cost - next.cost < kMinGain * next.correlation) break;
-    fit = std::move(next);
-    if (fit.axis_variance < 1.05) break;
+    grown.push_back(fit_chain(motion, readings.value, std::move(model), {.with_residuals = true}));
   }
+  double correlation = grown.front().correlation;
+  for (const ChainFit& g : grown) correlation = std::min(correlation, g.correlation);
+  std::size_t chosen = 0;
+  const auto judged = [&](std::size_t n) {
+    return grown[n].cost / correlation + kMinGain * static_cast<double>(n);
+  };
+  for (std::size_t n = 1; n < grown.size(); ++n) {
+    const double most = grown.front().axis_variance * std::pow(1.0 - kMinShare, static_cast<double>(n));
+    if (grown[n].axis_variance <= most && judged(n) < judged(chosen)) chosen = n;
+  }
+  if (chosen == 0) return fit;
+  fit = std::move(grown[chosen]);
   fit = pruned(std::move(fit), motion, readings);
   // By size, so that the main channel stands first.
   auto& terms = fit.model.joints.front().terms;

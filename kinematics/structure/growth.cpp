@@ -199,11 +199,12 @@ class Grower {
     return true;
   }
 
-  // The attachment's main channel already drives another joint.
+  // The attachment's main channel already drives another joint, which has no other to take instead.
   bool conflicts(std::size_t b, const Attachment& a) const {
     if (!a.driven()) return false;
     for (const GrownLink& l : tree_.links) {
-      if (l.founder >= 0 && l.founder != static_cast<int>(b) && l.attachment.channel() == a.channel()) return true;
+      if (l.founder < 0 || l.founder == static_cast<int>(b) || l.attachment.channel() != a.channel()) continue;
+      if (l.attachment.fit.model.joints.front().terms.size() == 1) return true;
     }
     return false;
   }
@@ -218,7 +219,7 @@ class Grower {
       link.attachment = std::move(attachment);
       refresh(own);
     } else if (own >= 0) {
-      dissolve(own, attachment);
+      dissolve(own, std::move(attachment));
     } else if (attachment.at_rest()) {
       g.link = attachment.parent;
     } else {
@@ -234,21 +235,24 @@ class Grower {
   }
 
   // The founder of `own` turns out to rest on another link: everything on `own` is looked at anew.
-  void dissolve(int own, const Attachment& attachment) {
+  void dissolve(int own, Attachment attachment) {
     std::vector<std::size_t> homeless;
     for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
       if (is_below(tree_.bodies[b].link, tree_.links[static_cast<std::size_t>(own)].founder)) homeless.push_back(b);
     }
     const auto founder = static_cast<std::size_t>(tree_.links[static_cast<std::size_t>(own)].founder);
     for (const std::size_t b : homeless) tree_.bodies[b].link = -1;
-    remove_links_without_bodies();
+    const std::vector<int> renamed = remove_links_without_bodies();
+    attachment.parent = renamed[static_cast<std::size_t>(attachment.parent)];
     tree_.bodies[founder].link = attachment.parent;
+    tree_.bodies[founder].attachment = std::move(attachment);
     relist();
     while (attach_next()) {
     }
   }
 
-  void remove_links_without_bodies() {
+  // Gives the new number of every link, -1 for those that are gone.
+  std::vector<int> remove_links_without_bodies() {
     std::vector<int> renamed(tree_.links.size(), -1);
     std::vector<GrownLink> kept;
     for (std::size_t l = 0; l < tree_.links.size(); ++l) {
@@ -256,13 +260,19 @@ class Grower {
       if (founder >= 0 && tree_.bodies[static_cast<std::size_t>(founder)].link != static_cast<int>(l)) continue;
       renamed[l] = static_cast<int>(kept.size());
       kept.push_back(std::move(tree_.links[l]));
-      if (kept.back().parent >= 0) kept.back().parent = renamed[static_cast<std::size_t>(kept.back().parent)];
+      GrownLink& link = kept.back();
+      if (link.parent < 0) continue;
+      link.parent = renamed[static_cast<std::size_t>(link.parent)];
+      link.attachment.parent = link.parent;
     }
     tree_.links = std::move(kept);
     for (GrownBody& g : tree_.bodies) {
-      if (g.link >= 0) g.link = renamed[static_cast<std::size_t>(g.link)];
+      g.alternatives.clear();
+      if (g.link < 0) continue;
+      g.link = renamed[static_cast<std::size_t>(g.link)];
+      g.attachment.parent = renamed[static_cast<std::size_t>(g.attachment.parent)];
     }
-    for (GrownBody& g : tree_.bodies) g.alternatives.clear();
+    return renamed;
   }
 
   void relist() {
@@ -324,8 +334,10 @@ class Grower {
     moved = renamed[static_cast<std::size_t>(moved)];
   }
 
-  // Two joints with one main channel: the one that loses least takes its next best explanation.
+  // Every channel is the main one of one joint: coupled joints take another of theirs where that helps; of
+  // two joints that still share one, the one that loses least takes its next best explanation.
   bool settle_channels() {
+    deal_main_channels();
     bool changed = false;
     for (std::size_t l = 1; l < tree_.links.size(); ++l) {
       for (std::size_t m = l + 1; m < tree_.links.size(); ++m) {
@@ -337,8 +349,53 @@ class Grower {
     return changed;
   }
 
+  // Largest matching of joints and channels they depend on (Kuhn's augmenting paths), stronger terms first.
+  void deal_main_channels() {
+    std::vector<std::size_t> single;
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      if (tree_.links[l].attachment.driven() && tree_.links[l].attachment.fit.model.joints.size() == 1) {
+        single.push_back(l);
+      }
+    }
+    std::vector<int> owner(usable_.size(), -1);
+    std::ranges::stable_sort(single, {}, [&](std::size_t l) { return terms_of(l).size(); });
+    for (const std::size_t l : single) {
+      std::vector<char> visited(usable_.size(), 0);
+      static_cast<void>(claim(static_cast<int>(l), owner, visited));
+    }
+    for (std::size_t c = 0; c < owner.size(); ++c) {
+      if (owner[c] >= 0) make_main(static_cast<std::size_t>(owner[c]), static_cast<int>(c));
+    }
+  }
+
+  std::vector<ChainTerm>& terms_of(std::size_t link) {
+    return tree_.links[link].attachment.fit.model.joints.front().terms;
+  }
+
+  bool claim(int link, std::vector<int>& owner, std::vector<char>& visited) {
+    for (const ChainTerm& t : terms_of(static_cast<std::size_t>(link))) {
+      const auto c = static_cast<std::size_t>(t.channel);
+      if (visited[c] != 0) continue;
+      visited[c] = 1;
+      if (owner[c] >= 0 && !claim(owner[c], owner, visited)) continue;
+      owner[c] = link;
+      return true;
+    }
+    return false;
+  }
+
+  void make_main(std::size_t link, int channel) {
+    auto& terms = terms_of(link);
+    for (std::size_t t = 1; t < terms.size(); ++t) {
+      if (terms[t].channel != channel) continue;
+      std::swap(terms[0], terms[t]);
+      auto& sigma = tree_.links[link].attachment.fit.scale_sigma;
+      std::swap(sigma[0], sigma[t]);
+    }
+    tree_.bodies[static_cast<std::size_t>(tree_.links[link].founder)].attachment = tree_.links[link].attachment;
+  }
+
   bool resolve(std::size_t l, std::size_t m, int channel) {
-    if (reorder_terms(m, channel) || reorder_terms(l, channel)) return true;
     const Attachment* other_l = without_channel(tree_.links[l], channel);
     const Attachment* other_m = without_channel(tree_.links[m], channel);
     const auto loss = [&](std::size_t link, const Attachment* other) {
@@ -353,24 +410,6 @@ class Grower {
     const auto founder = static_cast<std::size_t>(tree_.links[take_l ? l : m].founder);
     move(founder, Attachment(take_l ? *other_l : *other_m));
     return true;
-  }
-
-  // A coupled joint may take another of its channels as the main one.
-  bool reorder_terms(std::size_t link, int channel) {
-    Attachment& a = tree_.links[link].attachment;
-    if (a.fit.model.joints.size() != 1) return false;
-    auto& terms = a.fit.model.joints.front().terms;
-    for (std::size_t t = 1; t < terms.size(); ++t) {
-      const int candidate = terms[t].channel;
-      const bool taken = std::ranges::any_of(
-          tree_.links, [&](const GrownLink& l) { return l.founder >= 0 && l.attachment.channel() == candidate; });
-      if (candidate == channel || taken) continue;
-      std::swap(terms[0], terms[t]);
-      std::swap(a.fit.scale_sigma[0], a.fit.scale_sigma[t]);
-      tree_.bodies[static_cast<std::size_t>(tree_.links[link].founder)].attachment = a;
-      return true;
-    }
-    return false;
   }
 
   const Attachment* without_channel(const GrownLink& link, int channel) const {

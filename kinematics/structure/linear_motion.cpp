@@ -54,8 +54,12 @@ LinearMotion linear_motion(const Motion& motion) {
   out.mean = mean_pose(motion);
   out.whitening = average_whitening(motion);
   out.y.resize(6, n);
+  out.weight.resize(n);
   const Pose inverse = out.mean.inverse();
+  const Eigen::Array<double, 6, 1> average = out.whitening.diagonal().array();
   for (Eigen::Index i = 0; i < n; ++i) {
+    const auto own = motion[static_cast<std::size_t>(i)].whitening.diagonal().array();
+    out.weight(i) = (own / average).square().mean();
     const Vector6d y = fast_log(inverse * motion[static_cast<std::size_t>(i)].pose);
     out.widest = std::max(out.widest, y.head<3>().norm());
     out.y.col(i) = y;
@@ -63,7 +67,7 @@ LinearMotion linear_motion(const Motion& motion) {
   out.y = out.whitening.triangularView<Eigen::Upper>() * out.y;
   out.kept.assign(motion.size(), 1);
   out.count = static_cast<int>(n);
-  const Vector6d centre = out.y.rowwise().mean();
+  const Vector6d centre = out.y * out.weight / out.weight.sum();
   out.y.colwise() -= centre;
   return out;
 }

@@ -14,6 +14,7 @@ struct LinearMotion {
   Pose mean;
   Matrix6d whitening;         ///< average; upper triangular
   Eigen::MatrixXd y;          ///< 6 x samples, whitened, centred over the kept samples
+  Eigen::VectorXd weight;     ///< of each sample: its information over the average one
   std::vector<char> kept;     ///< samples that are no outliers
   int count = 0;              ///< kept ones
   double widest = 0.0;        ///< largest rotation from the mean, rad

@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include "kinematics/structure/linear_motion.h"
+#include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/wide_turn.h"
 
@@ -15,8 +19,6 @@ namespace {
 
 // Rotation slopes below this many standard deviations are no evidence for a turn.
 constexpr double kTurnEvidence = 3.5;
-// Beyond this distance (m) of the axis a slide is looked at as well.
-constexpr double kFarAxis = 1.0;
 // A sample this many times further than the median from the best line is left out.
 constexpr double kTrim = 25.0;
 
@@ -47,55 +49,110 @@ Direction principal_direction(const Matrix6d& G, int samples) {
   return d;
 }
 
-void add_candidates(const LinearMotion& linear, const Direction& d, const Motion& motion,
-                    std::vector<Candidate>& out) {
-  const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
-  const Matrix6d covariance =
-      (linear.whitening.transpose() * linear.whitening).inverse() / std::max(1, linear.count);
-  const double rotation_sigma = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
-  const double rotation = twist.head<3>().norm();
-  const double translation = twist.tail<3>().norm();
-  const bool turn = rotation > kTurnEvidence * rotation_sigma;
-  const bool slide = !turn || translation > kFarAxis * rotation;
-  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
-    if (type == JointType::kRevolute ? !turn : !slide) continue;
-    Candidate c;
-    c.channel = d.channel;
-    c.cost = d.cost;
-    ChainJoint joint = joint_from_twist(linear.mean, twist, type);
-    const double scale = type == JointType::kRevolute ? rotation : translation;
-    c.start.mount = linear.mean;
-    if (d.channel >= 0) {
-      joint.terms = {{d.channel, scale}};
-    } else {
-      const Vector6d unit = d.slope / d.slope.squaredNorm();
-      for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
-        c.start.coordinates.push_back(scale * unit.dot(linear.y.col(i)));
-      }
-    }
-    c.start.joints = {std::move(joint)};
-    out.push_back(std::move(c));
-  }
-  static_cast<void>(motion);
+// The best slope without rotation: b / qq projected, and what it leaves.
+Direction slide_of(const LinearMotion& linear, const Matrix6d& G, const Direction& d, double qq) {
+  const Eigen::Matrix<double, 6, 3> W = linear.whitening.rightCols<3>();
+  Direction out = d;
+  out.slope = W * (W.transpose() * W).ldlt().solve(W.transpose() * d.slope);
+  if (out.slope.squaredNorm() < 1e-30) return out;
+  const Vector6d u = out.slope.normalized();
+  const double total = u.dot(G * u);
+  // Sum of squares along u after regression on the coordinate, whose slope along u is u . d.slope.
+  const double explained = std::pow(u.dot(d.slope), 2) * qq;
+  out.cost = split_cost(std::max(0.0, total - explained), std::max(0.0, G.trace() - total), linear.count);
+  if (d.channel < 0) out.cost += linear.count * std::log1p(std::pow(u.dot(d.slope), 2));
+  return out;
 }
 
-// Leaves out the samples that lie far from the line along the best direction; true when there are any.
-bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Direction& best) {
+void add_candidate(const LinearMotion& linear, const Direction& d, JointType type, std::vector<Candidate>& out) {
+  const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
+  const double scale = type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
+  if (!(scale > 1e-12)) return;
+  Candidate c;
+  c.channel = d.channel;
+  c.cost = d.cost;
+  ChainJoint joint = joint_from_twist(linear.mean, twist, type);
+  c.start.mount = linear.mean;
+  if (d.channel >= 0) {
+    joint.terms = {{d.channel, scale}};
+  } else {
+    const Vector6d unit = d.slope / d.slope.squaredNorm();
+    for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
+      c.start.coordinates.push_back(scale * unit.dot(linear.y.col(i)));
+    }
+  }
+  c.start.joints = {std::move(joint)};
+  out.push_back(std::move(c));
+}
+
+// A turn where the rotation shows, and a slide; each with the cost it leaves.
+void add_candidates(const LinearMotion& linear, const Direction& d, const Matrix6d& G, double qq,
+                    std::vector<Candidate>& out) {
+  const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
+  const Matrix6d covariance = (linear.whitening.transpose() * linear.whitening).inverse() / std::max(1.0, qq);
+  const double rotation_sigma = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
+  if (twist.head<3>().norm() > kTurnEvidence * rotation_sigma) add_candidate(linear, d, JointType::kRevolute, out);
+  add_candidate(linear, slide_of(linear, G, d, qq), JointType::kPrismatic, out);
+}
+
+// Squared residuals of all samples about one direction (none: about the mean).
+std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::MatrixXd& q, const Direction& d) {
   std::vector<double> squared;
+  squared.reserve(static_cast<std::size_t>(linear.y.cols()));
   for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
     Vector6d r = linear.y.col(i);
-    if (best.channel >= 0) {
-      r -= best.slope * q(best.channel, i);
-    } else if (best.slope.squaredNorm() > 0.0) {
-      const Vector6d u = best.slope.normalized();
+    if (d.channel >= 0) {
+      r -= d.slope * q(d.channel, i);
+    } else if (d.slope.squaredNorm() > 0.0) {
+      const Vector6d u = d.slope.normalized();
       r -= u.dot(r) * u;
     }
-    squared.push_back(r.squaredNorm());
+    squared.push_back(linear.weight(i) * r.squaredNorm());
   }
-  const double limit = kTrim * std::max(1.0, median_of(squared) / 5.35);
+  return squared;
+}
+
+// Cost of rest about the median, which few outliers do not move.
+double rest_cost(const LinearMotion& linear) {
+  Vector6d centre;
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    std::vector<double> values(static_cast<std::size_t>(linear.y.cols()));
+    for (Eigen::Index i = 0; i < linear.y.cols(); ++i) values[static_cast<std::size_t>(i)] = linear.y(c, i);
+    centre(c) = median_of(std::move(values));
+  }
+  ResidualParts parts;
+  for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
+    parts.across.push_back(linear.weight(i) * (linear.y.col(i) - centre).squaredNorm());
+    parts.along.push_back(0.0);
+    parts.penalty.push_back(0.0);
+  }
+  return residual_scale(parts).cost;
+}
+
+struct Regression {
+  std::vector<Direction> driven;  // by cost
+  Direction principal;
+  Matrix6d G;                     // sum of y y'
+  Eigen::VectorXd power;          // sum of squares of every channel
+};
+
+// Leaves out the samples that lie far from the direction most samples follow; true when there are any.
+bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Regression& r) {
+  std::vector<Direction> tried{Direction{}, r.principal};
+  for (std::size_t k = 0; k < std::min<std::size_t>(2, r.driven.size()); ++k) tried.push_back(r.driven[k]);
+  std::vector<double> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Direction& d : tried) {
+    std::vector<double> squared = squared_residuals(linear, q, d);
+    const double median = median_of(squared);
+    if (median >= least) continue;
+    least = median;
+    best = std::move(squared);
+  }
+  const double limit = kTrim * std::max(1.0, least / 5.35) * 1.5;
   bool any = false;
-  for (std::size_t i = 0; i < squared.size(); ++i) {
-    if (linear.kept[i] == 0 || squared[i] <= limit * 1.5) continue;
+  for (std::size_t i = 0; i < best.size(); ++i) {
+    if (linear.kept[i] == 0 || best[i] <= limit) continue;
     linear.kept[i] = 0;
     --linear.count;
     any = true;
@@ -103,30 +160,26 @@ bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Direction& best)
   return any;
 }
 
-struct Regression {
-  std::vector<Direction> driven;  // by cost
-  Direction principal;
-  double rest_cost = 0.0;
-};
-
 Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q, const std::vector<char>& usable) {
-  Eigen::VectorXd weight(linear.y.cols());
-  for (Eigen::Index i = 0; i < weight.size(); ++i) weight(i) = linear.kept[static_cast<std::size_t>(i)];
+  Eigen::VectorXd weight = linear.weight;
+  for (Eigen::Index i = 0; i < weight.size(); ++i) weight(i) *= linear.kept[static_cast<std::size_t>(i)];
   const double n = std::max(1, linear.count);
-  const Vector6d y_mean = linear.y * weight / n;
+  const double total = std::max(1e-12, weight.sum());
+  const Vector6d y_mean = linear.y * weight / total;
+  weight = weight.cwiseSqrt();
   const Eigen::MatrixXd y = (linear.y.colwise() - y_mean) * weight.asDiagonal();
   const Matrix6d G = y * y.transpose();
   Regression out;
-  out.rest_cost = split_cost(0.0, G.trace(), linear.count);
-  const double variance = std::max(1.0, G.trace() / (6.0 * n));
-  out.rest_cost = G.trace() / variance + 6.0 * n * std::log(variance);
+  out.G = G;
+  out.power = Eigen::VectorXd::Zero(q.rows());
   out.principal = principal_direction(G, linear.count);
   if (q.rows() == 0) return out;
-  const Eigen::VectorXd q_mean = q * weight / n;
+  const Eigen::VectorXd q_mean = q * weight.cwiseAbs2() / total;
   const Eigen::MatrixXd centred = (q.colwise() - q_mean) * weight.asDiagonal();
   const Eigen::MatrixXd B = y * centred.transpose();
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     const double qq = centred.row(k).squaredNorm();
+    out.power(k) = qq;
     if (usable[static_cast<std::size_t>(k)] == 0 || qq < 1e-6 * n) continue;
     out.driven.push_back(driven_direction(G, B.col(k), qq, static_cast<int>(k), linear.count));
   }
@@ -168,13 +221,11 @@ Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings, c
   out.free_cost = free_motion_cost(linear);
   out.mean_length = std::sqrt(linear.y.squaredNorm() / std::max<double>(1.0, static_cast<double>(motion.size())));
   Regression r = regress(linear, q, usable);
-  const Direction& best =
-      r.driven.empty() || r.principal.cost < r.driven.front().cost ? r.principal : r.driven.front();
-  if (trim(linear, q, best) && linear.count > 8) r = regress(linear, q, usable);
+  for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass) r = regress(linear, q, usable);
 
   Candidate rest;
   rest.start.mount = linear.mean;
-  rest.cost = r.rest_cost;
+  rest.cost = rest_cost(linear);
   out.candidates.push_back(std::move(rest));
   if (linear.widest > kWideTurn) {
     for (Candidate& c : wide_turn_candidates(motion, q, usable, linear, options.coordinate_free)) {
@@ -182,8 +233,10 @@ Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings, c
     }
   }
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
-  for (std::size_t k = 0; k < channels; ++k) add_candidates(linear, r.driven[k], motion, out.candidates);
-  if (options.coordinate_free) add_candidates(linear, r.principal, motion, out.candidates);
+  for (std::size_t k = 0; k < channels; ++k) {
+    add_candidates(linear, r.driven[k], r.G, r.power(r.driven[k].channel), out.candidates);
+  }
+  if (options.coordinate_free) add_candidates(linear, r.principal, r.G, linear.count, out.candidates);
   std::ranges::stable_sort(out.candidates, {}, &Candidate::cost);
   return out;
 }
