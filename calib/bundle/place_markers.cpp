@@ -256,6 +256,12 @@ std::vector<PointPair> point_pairs(const KinematicTree& nominal,
   return pairs;
 }
 
+bool carries_links(const KinematicTree& tree, LinkId link) {
+  return std::ranges::any_of(tree.joints, [&](const Joint& joint) {
+    return joint.parent == link && joint.type != JointType::kFixed;
+  });
+}
+
 }  // namespace
 
 Placement place_points(const KinematicTree& nominal, const Eigen::MatrixXd& joint_values,
@@ -274,6 +280,9 @@ Placement place_points(const KinematicTree& nominal, const Eigen::MatrixXd& join
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t l = nominal.links.size(); l-- > 1;) {
       const LinkId link{static_cast<int>(l)};
+      // A point on an inner joint's axis rests whatever the joints do: sockets alone would always
+      // choose it.
+      if (!measured && carries_links(nominal, link)) continue;
       const auto pairs = point_pairs(nominal, joint_values, points, id, link);
       if (pairs.size() < 4) continue;
       PointFit fit;

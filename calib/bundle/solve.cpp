@@ -6,6 +6,7 @@
 #include <map>
 
 #include <ceres/solver.h>
+#include <glog/logging.h>
 
 namespace kinescope::bundle {
 namespace {
@@ -31,6 +32,9 @@ double median(std::vector<double> values) {
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
+
+// Ceres reports failed evaluations through glog to standard error; the summary says the same.
+void silence_glog() { FLAGS_minloglevel = google::GLOG_FATAL; }
 
 struct Misfit {
   int sighting = 0;
@@ -151,6 +155,7 @@ double freedom_factor(const Spec& spec, State& state, const std::vector<int>& us
 
 SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
                    const BuildOptions& build_options, int max_iterations) {
+  silence_glog();
   BuiltProblem built(spec, state, sightings, build_options);
   if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
   int unknowns = 0;

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Calibration without a joint log: the values are unknowns too.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "calib/bundle/calibrate.h"
+#include "tests/truth/camera_world.h"
+
+namespace kinescope {
+namespace {
+
+TEST(UnknownValues, AxesAndValuesTogether) {
+  truth::WorldOptions options;
+  options.joints = {JointType::kRevolute, JointType::kPrismatic};
+  options.sigma_px = 0.05;
+  options.frames = 120;
+  const truth::World world = truth::make_world(options);
+  CalibrationStart start = truth::perturbed_start(world, 0.01, 0.003, 1);
+  for (Joint& joint : start.tree.joints) joint.channel.clear();
+  start.joint_values = world.joint_values.array() + 0.01;
+  const Calibration found = calibrate(world.measurements, world.markers, {}, start);
+  EXPECT_EQ(found.status, CalibrationStatus::kConverged) << found.status_reason;
+  EXPECT_NEAR(found.final_rms, 0.05, 0.005);
+  EXPECT_LT(found.held_out_rms / found.training_rms, 1.1);
+  // The zero is free: compare changes against the first frame. 4 sigma of a 34 px tag's angle.
+  for (Eigen::Index j = 0; j < 2; ++j) {
+    const Eigen::VectorXd expected = world.joint_values.col(j).array() - world.joint_values(0, j);
+    const Eigen::VectorXd value = found.joint_values.col(j).array() - found.joint_values(0, j);
+    const double tolerance = j == 0 ? 0.02 : 0.004;
+    EXPECT_LT((expected - value).cwiseAbs().maxCoeff(), tolerance) << j;
+  }
+  for (const JointEstimate& joint : found.joints) {
+    ASSERT_TRUE(joint.direction_sigma_rad);
+    EXPECT_LT(*joint.direction_sigma_rad, 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace kinescope
