@@ -18,7 +18,7 @@
 namespace kinescope {
 
 struct InputFile {
-  std::string name;    ///< relative to the recording
+  std::string name;  ///< relative to the recording
   std::string sha256;
 };
 
@@ -37,16 +37,16 @@ struct MarkerSummary {
 };
 
 struct RunSummary {
-  std::string robot;            ///< name
-  std::string recording;        ///< folder name
-  std::string entry;            ///< "video", "corners", "poses", "points"
-  std::string version;          ///< of the program
-  std::string command;          ///< how to reproduce
+  std::string robot;      ///< name
+  std::string recording;  ///< folder name
+  std::string entry;      ///< "video", "corners", "poses", "points"
+  std::string version;    ///< of the program
+  std::string command;    ///< how to reproduce
   std::vector<InputFile> inputs;
   std::vector<std::pair<std::string, std::string>> options;  ///< name, value
   std::vector<StageTime> times;
 
-  int frames = 0;               ///< of the recording
+  int frames = 0;  ///< of the recording
   double duration_s = 0.0;
   std::vector<MarkerSummary> markers;
   std::vector<std::pair<std::string, int>> rejected;  ///< reason, count
@@ -54,8 +54,8 @@ struct RunSummary {
   bool camera_declared = true;
 
   JointLog log;
-  PoseTracks tracks;            ///< empty for points
-  std::optional<Structure> structure;   ///< none when a nominal robot was given
+  PoseTracks tracks;                   ///< empty for points
+  std::optional<Structure> structure;  ///< none when a nominal robot was given
   std::optional<KinematicTree> nominal;
   Calibration calibration;
   ErrorSummary errors;

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/report/findings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/report/facts.h"
+#include "app/report/numbers.h"
+
+namespace kinescope::report {
+namespace {
+
+// Weights: what spoils the answer stands before what widens it, before what could be better.
+constexpr double kFailure = 100.0;
+constexpr double kDoubt = 90.0;
+constexpr double kNoCheck = 70.0;
+constexpr double kUnseen = 60.0;
+constexpr double kModelError = 50.0;
+constexpr double kAdvice = 10.0;
+
+constexpr double kFewIndependentFrames = 30.0;
+constexpr double kNoiseLimit = 1.5;
+constexpr double kSmallTurn = 0.35;      ///< rad: below, an axis is poorly placed by its own motion
+constexpr double kRarelySeen = 0.3;      ///< share of the frames
+constexpr double kSmallMarker = 25.0;    ///< px: below, tilt and depth are poorly seen
+constexpr double kOftenRejected = 0.05;  ///< share of the sightings of one marker
+
+/// A sentence of other rooms, closed with a full stop.
+std::string sentence(std::string text) {
+  if (text.empty()) return text;
+  const char first = text.front();
+  if (first >= 'a' && first <= 'z') text.front() = static_cast<char>(first - 'a' + 'A');
+  const char last = text.back();
+  if (last != '.' && last != '!' && last != '?') text += '.';
+  return text;
+}
+
+void add_failures(const RunSummary& run, std::vector<Finding>& findings) {
+  const Calibration& calibration = run.calibration;
+  if (calibration.status == CalibrationStatus::kConverged) return;
+  std::string what = fmt::format("The calibration is {}", to_string(calibration.status));
+  if (!calibration.status_reason.empty()) what += ": " + calibration.status_reason;
+  findings.push_back({kFailure, sentence(what), ""});
+}
+
+void add_structure_doubts(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.structure) return;
+  double weight = run.structure->status == StructureStatus::kDetermined ? kUnseen : kDoubt;
+  for (const StructureDoubt& doubt : run.structure->doubts) {
+    findings.push_back({weight, sentence(doubt.what), sentence(doubt.remedy)});
+    weight -= 0.1;
+  }
+}
+
+void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
+  const double ratio = held_out_ratio(run.calibration);
+  if (ratio == 0.0) {
+    findings.push_back({kNoCheck, "The error on unseen data is not known: nothing was held out.",
+                        "Record more postures, so that some can be held out."});
+  } else if (ratio > kRatioLimit) {
+    findings.push_back(
+        {kModelError + std::min(ratio, 10.0),
+         fmt::format("On unseen postures the error is {:.2f} times that of the fit: model and "
+                     "postures, not the measuring noise, limit the accuracy.",
+                     ratio),
+         "Record postures spread over the whole range of every joint, several of them moving at "
+         "once."});
+  }
+}
+
+void add_dependence(const RunSummary& run, const Analysis& analysis,
+                    std::vector<Finding>& findings) {
+  const auto strongest = std::ranges::find_if(
+      analysis.dependence, [](const Dependence& one) { return one.explained >= kDependenceLimit; });
+  if (strongest == analysis.dependence.end()) return;
+  const double weight = 2.0 * kAdvice + kModelError * strongest->explained;
+  const std::string share = fmt::format("{:.0f} %", 100.0 * strongest->explained);
+  if (strongest->time) {
+    const bool corners = run.calibration.kind == MeasurementKind::kCorners;
+    findings.push_back(
+        {weight,
+         fmt::format("{} of the residual drifts with time (up to ±{} for one marker): something "
+                     "moved or changed "
+                     "during the recording.",
+                     share,
+                     fmt::format("{} {}",
+                                 uncertainty_text(strongest->half_range,
+                                                  corners ? Quantity::kPixels : Quantity::kLength),
+                                 corners ? "px" : "mm")),
+         "Check that camera, base and markers sit firmly, and record again."});
+    return;
+  }
+  const Joint& joint = run.calibration.tree.joints.at(static_cast<std::size_t>(strongest->joint));
+  const bool slides = joint.type == JointType::kPrismatic;
+  const Quantity quantity = slides ? Quantity::kLength : Quantity::kAngle;
+  findings.push_back(
+      {weight,
+       fmt::format(
+           "{} of what is left along the motion of {} repeats with its value (as an error of "
+           "{} in this joint): an effect that the model lacks.",
+           share, joint.name,
+           fmt::format("±{}{}{}", uncertainty_text(strongest->half_range, quantity),
+                       slides ? " " : "", display_unit(quantity).text)),
+       fmt::format("Record slow sweeps of {} alone over its whole range, in both directions, to "
+                   "show the effect by itself.",
+                   joint.name)});
+}
+
+void add_noise(const RunSummary& run, const Analysis& analysis, std::vector<Finding>& findings) {
+  const Calibration& calibration = run.calibration;
+  if (calibration.sigma_scale > kNoiseLimit) {
+    findings.push_back(
+        {kModelError * 0.3 + std::min(calibration.sigma_scale, 10.0),
+         fmt::format("The residuals are {:.1f} times the declared noise of the measurement; the "
+                     "uncertainties are widened accordingly.",
+                     calibration.sigma_scale),
+         ""});
+  }
+  const int frames = analysis.independent_frames;
+  if (frames > 0 && frames < kFewIndependentFrames) {
+    std::string what = fmt::format("The frames count as about {} independent ones", frames);
+    if (calibration.correlation_time_s > 0.0) {
+      what += fmt::format(" (residuals stay alike for {})",
+                          text_with_unit(calibration.correlation_time_s, Quantity::kTime));
+    }
+    findings.push_back(
+        {kModelError * 0.25, what + ".", "Record longer, with more different postures."});
+  }
+}
+
+void add_weak_directions(const RunSummary& run, std::vector<Finding>& findings) {
+  for (const WeakDirection& weak : run.calibration.observability.weak) {
+    if (weak.words.empty()) continue;
+    constexpr double kLost = 1e-6;  ///< of the largest singular value: nothing is known there
+    findings.push_back(
+        {weak.relative_singular_value < kLost ? kUnseen : kAdvice + 1.0, sentence(weak.words), ""});
+    break;
+  }
+}
+
+void add_small_travel(const RunSummary& run, std::vector<Finding>& findings) {
+  const Calibration& calibration = run.calibration;
+  const Joint* weakest = nullptr;
+  double travel = 0.0, worst = 0.0;
+  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+       ++j) {
+    const JointEstimate& estimate = calibration.joints[j];
+    if (calibration.tree.joints[j].type == JointType::kFixed || !estimate.direction_sigma_rad) {
+      continue;
+    }
+    if (*estimate.direction_sigma_rad > worst) {
+      worst = *estimate.direction_sigma_rad;
+      weakest = &calibration.tree.joints[j];
+      travel = estimate.range.upper - estimate.range.lower;
+    }
+  }
+  if (weakest == nullptr) return;
+  const bool slides = weakest->type == JointType::kPrismatic;
+  const std::string moved = text_with_unit(travel, slides ? Quantity::kLength : Quantity::kAngle);
+  const bool small = !slides && travel < kSmallTurn;
+  const std::string uncertainty = uncertainty_text(kCoverageFactor * worst, Quantity::kAngle);
+  findings.push_back(
+      {small ? kModelError * 0.5 : kAdvice,
+       fmt::format("The axis of {} is the least certain ({}°, k = 2); it moved through {}.",
+                   weakest->name, uncertainty, moved),
+       fmt::format("Move {} further than the {} seen here.", weakest->name, moved)});
+}
+
+void add_poor_markers(const RunSummary& run, std::vector<Finding>& findings) {
+  const MarkerSummary* rare = nullptr;
+  const MarkerSummary* small = nullptr;
+  for (const MarkerSummary& marker : run.markers) {
+    if (run.calibration.tree.marker(marker.id) == nullptr) continue;
+    if (marker.frames_seen < kRarelySeen * run.frames &&
+        (rare == nullptr || marker.frames_seen < rare->frames_seen)) {
+      rare = &marker;
+    }
+    if (marker.median_edge_px > 0.0 && marker.median_edge_px < kSmallMarker &&
+        (small == nullptr || marker.median_edge_px < small->median_edge_px)) {
+      small = &marker;
+    }
+  }
+  if (rare != nullptr) {
+    findings.push_back(
+        {kAdvice + 3.0,
+         fmt::format("{} was seen in {} of {} frames only.", marker_name(rare->id),
+                     rare->frames_seen, run.frames),
+         fmt::format("Place the camera or the marker so that {} faces it more often.",
+                     marker_name(rare->id))});
+  }
+  if (small != nullptr) {
+    findings.push_back({kAdvice + 2.0,
+                        fmt::format("{} is only {} across in the image.", marker_name(small->id),
+                                    text_with_unit(small->median_edge_px, Quantity::kPixels)),
+                        "Bring the camera closer, or use larger markers or more pixels."});
+  }
+  for (std::size_t m = 0; m < run.calibration.markers.size(); ++m) {
+    const MarkerEstimate& estimate = run.calibration.markers[m];
+    const int seen = estimate.used + estimate.rejected;
+    if (seen == 0 || estimate.rejected <= kOftenRejected * seen) continue;
+    const TagId id = run.calibration.tree.markers[m].id;
+    findings.push_back(
+        {kAdvice + 4.0,
+         fmt::format("{} of {} sightings of {} were left out as outliers.", estimate.rejected, seen,
+                     marker_name(id)),
+         fmt::format("Check that {} is flat, firmly fixed and fully in view.", marker_name(id))});
+  }
+}
+
+void add_camera(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.calibration.kind != MeasurementKind::kCorners || run.camera_declared) return;
+  findings.push_back(
+      {kAdvice + 5.0,
+       "The camera was not declared: its intrinsics are estimated from the same markers.",
+       "Calibrate the camera from a board (`kinescope camera`)."});
+}
+
+void add_noise_floor(const RunSummary& run, std::vector<Finding>& findings) {
+  const double ratio = held_out_ratio(run.calibration);
+  const bool spoiled = std::ranges::any_of(
+      findings, [](const Finding& finding) { return finding.weight > kAdvice + 6.0; });
+  if (spoiled || ratio == 0.0) return;
+  const double change = 100.0 * (ratio - 1.0);
+  findings.push_back(
+      {kAdvice + 6.0,
+       fmt::format("The noise of the measurement limits the accuracy: the error on unseen "
+                   "data is within {:.0f} % of that of the fit, and no structure of the residual "
+                   "stands out.",
+                   std::max(1.0, std::ceil(std::abs(change) - 1e-9))),
+       ""});
+}
+
+}  // namespace
+
+std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis) {
+  std::vector<Finding> findings;
+  add_failures(run, findings);
+  add_structure_doubts(run, findings);
+  add_held_out(run, findings);
+  add_dependence(run, analysis, findings);
+  add_noise(run, analysis, findings);
+  add_weak_directions(run, findings);
+  add_small_travel(run, findings);
+  add_poor_markers(run, findings);
+  add_camera(run, findings);
+  add_noise_floor(run, findings);
+  std::ranges::stable_sort(findings, std::greater{}, &Finding::weight);
+  if (findings.empty()) findings.push_back({0.0, "Nothing was fitted.", ""});
+  return findings;
+}
+
+}  // namespace kinescope::report

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What limits a result, and what to record instead; the weightiest first.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/report/analysis.h"
+#include "app/report/run_summary.h"
+
+namespace kinescope::report {
+
+struct Finding {
+  double weight = 0.0;  ///< orders the findings; no other meaning
+  std::string what;     ///< one sentence with its number
+  std::string remedy;   ///< one sentence; may be empty
+};
+
+/// At least one: where nothing limits the model, the noise of the measurement does.
+[[nodiscard]] std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis);
+
+}  // namespace kinescope::report

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Errors before and after, training and held out apart.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/html.h"
+#include "app/report/plot.h"
+#include "app/report/sections.h"
+
+namespace kinescope::report {
+namespace {
+
+struct Measure {
+  std::string_view key;  ///< suffix of the document's keys
+  std::string_view name;
+  Quantity quantity;
+};
+
+/// The measures that this kind of recording has.
+std::vector<Measure> measures(MeasurementKind kind) {
+  std::vector<Measure> list;
+  if (kind == MeasurementKind::kCorners) {
+    list.push_back({"px", "corner in the image, px", Quantity::kPixels});
+    list.push_back({"m", "marker across the line of sight, mm", Quantity::kLength});
+    list.push_back({"rad", "marker about the line of sight, °", Quantity::kAngle});
+  } else {
+    list.push_back({"m", "position, mm", Quantity::kLength});
+    if (kind == MeasurementKind::kPose) list.push_back({"rad", "rotation, °", Quantity::kAngle});
+  }
+  return list;
+}
+
+struct State {
+  std::string_view key;
+  std::string_view name;
+};
+
+std::vector<State> states(const RunSummary& run) {
+  return {{"before", run.nominal ? "before (nominal robot)" : "before (structure, no refinement)"},
+          {"training", "after, training"},
+          {"held_out", "after, held out"}};
+}
+
+std::string overall_table(const Facts& facts) {
+  Table table("errors-table", "Length of the error vector, all markers", facts.result);
+  table.header({"Measure", "Model", "Count", "Rms", "Median", "95 %", "Largest"});
+  for (const Measure& measure : measures(facts.run.calibration.kind)) {
+    for (const State& state : states(facts.run)) {
+      const std::string at = fmt::format("/errors/all/{}_{}", state.key, measure.key);
+      table.begin_row();
+      table.text(measure.name);
+      table.text(state.name);
+      table.number(at + "/count", Quantity::kCount);
+      for (const std::string_view statistic : {"rms", "median", "p95", "max"}) {
+        table.number(fmt::format("{}/{}", at, statistic), measure.quantity);
+      }
+    }
+  }
+  return table.str();
+}
+
+std::string rows_table(const Facts& facts, std::string_view id, std::string_view caption,
+                       std::string_view list, const std::vector<ErrorRow>& rows) {
+  Table table(id, caption, facts.result);
+  std::vector<std::string> head = {list == "links" ? "Link" : "Marker", "Sightings"};
+  const std::vector<Measure> all = measures(facts.run.calibration.kind);
+  for (const Measure& measure : all) {
+    const std::string unit(display_unit(measure.quantity).text);
+    head.insert(head.end(), {"Before, " + unit, "Training, " + unit, "Held out, " + unit});
+  }
+  head.push_back(fmt::format("Largest held out, {}", display_unit(all.front().quantity).text));
+  table.header(head);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::string at = fmt::format("/errors/{}/{}", list, k);
+    table.begin_row();
+    table.text(rows[k].name);
+    table.number(at + "/training_m/count", Quantity::kCount);
+    for (const Measure& measure : all) {
+      for (const State& state : states(facts.run)) {
+        table.number(fmt::format("{}/{}_{}/rms", at, state.key, measure.key), measure.quantity);
+      }
+    }
+    table.number(fmt::format("{}/held_out_{}/max", at, all.front().key), all.front().quantity);
+  }
+  return table.str();
+}
+
+/// Lengths of the errors of one state, sorted.
+std::vector<double> lengths(const Calibration& calibration, std::string_view state) {
+  std::vector<double> result;
+  for (const SightingResidual& sighting : calibration.residuals) {
+    if (!sighting.used) continue;
+    if (calibration.kind == MeasurementKind::kCorners) {
+      const auto& corners = state == "before"     ? sighting.before_px
+                            : state == "training" ? sighting.corners_px
+                                                  : sighting.held_out_px;
+      for (const Eigen::Vector2d& corner : corners) result.push_back(corner.norm());
+    } else {
+      const Vector6d& shift = state == "before"     ? sighting.before_displacement
+                              : state == "training" ? sighting.displacement
+                                                    : sighting.held_out_displacement;
+      if (!shift.isZero(0.0)) result.push_back(1000.0 * shift.tail<3>().norm());
+    }
+  }
+  std::erase_if(result, [](double length) { return !(length > 0.0) || !std::isfinite(length); });
+  std::ranges::sort(result);
+  return result;
+}
+
+/// Empirical distribution of the error's length, on a logarithmic scale, thinned to its shape.
+std::string distribution_plot(const Facts& facts) {
+  const bool corners = facts.run.calibration.kind == MeasurementKind::kCorners;
+  double low = 1e300, high = 0.0;
+  std::vector<std::vector<double>> all;
+  for (const State& state : states(facts.run)) {
+    all.push_back(lengths(facts.run.calibration, state.key));
+    if (all.back().empty()) continue;
+    low = std::min(low, all.back()[all.back().size() / 50]);
+    high = std::max(high, all.back().back());
+  }
+  if (!(high > low)) return "";
+  const double unit_low = std::log10(low), unit_high = std::log10(high);
+  Plot plot("Share of errors below a length",
+            {.label = corners ? "error, px" : "error, mm",
+             .lower = unit_low,
+             .upper = unit_high,
+             .log10 = true},
+            {.label = "share below, %", .lower = 0.0, .upper = 100.0},
+            {.width = 460.0, .height = 240.0});
+  constexpr std::size_t kSteps = 200;
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    const std::vector<double>& sorted = all[s];
+    if (sorted.empty()) continue;
+    std::vector<Eigen::Vector2d> curve;
+    for (std::size_t k = 0; k <= kSteps; ++k) {
+      const std::size_t i = k * (sorted.size() - 1) / kSteps;
+      curve.emplace_back(std::log10(sorted[i]),
+                         100.0 * static_cast<double>(i + 1) / static_cast<double>(sorted.size()));
+    }
+    const std::string css = series_class(s) + (s == 2 ? " dashed" : "");
+    plot.line(curve, css);
+    plot.legend(states(facts.run)[s].name, css);
+  }
+  return plot.str();
+}
+
+}  // namespace
+
+std::string errors_section(const Facts& facts) {
+  std::string out = section_head("errors", "Errors before and after");
+  out += paragraph(
+      "Held out: predicted by a model that was fitted without that part of the recording. Outliers "
+      "left out of the "
+      "fit are in none of these figures; they are counted under data quality.");
+  out += overall_table(facts);
+  const std::string plot = distribution_plot(facts);
+  if (!plot.empty()) out += figure(plot, "Distribution of the error's length.", "half");
+  out += rows_table(facts, "errors-links-table", "Rms of the error, per link", "links",
+                    facts.run.errors.links);
+  out += rows_table(facts, "errors-markers-table", "Rms of the error, per marker", "markers",
+                    facts.run.errors.markers);
+  return out + "</section>\n";
+}
+
+}  // namespace kinescope::report

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The verdict: sentences that say no more than the numbers do.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/facts.h"
+#include "app/report/findings.h"
+#include "app/report/numbers.h"
+
+namespace kinescope::report {
+namespace {
+
+std::string counted(std::size_t count, std::string_view one) {
+  return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    if (k > 0) text += k + 1 == words.size() ? " and " : ", ";
+    text += words[k];
+  }
+  return text;
+}
+
+/// "R R P R": the moving joints in the tree's order.
+std::string type_letters(const KinematicTree& tree) {
+  std::string letters;
+  for (const Joint& joint : tree.joints) {
+    if (joint.type == JointType::kFixed) continue;
+    if (!letters.empty()) letters += ' ';
+    letters += joint.type == JointType::kRevolute ? 'R' : 'P';
+  }
+  return letters;
+}
+
+bool is_chain(const KinematicTree& tree) {
+  std::vector<int> children(tree.links.size(), 0);
+  for (const Joint& joint : tree.joints) {
+    if (++children[joint.parent.index()] > 1) return false;
+  }
+  return true;
+}
+
+std::size_t moving_joints(const KinematicTree& tree) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      tree.joints, [](const Joint& joint) { return joint.type != JointType::kFixed; }));
+}
+
+/// "every one is driven by a logged channel" and its weaker forms.
+std::string driving_words(const RunSummary& run) {
+  std::vector<std::string> undriven;
+  for (const Joint& joint : run.calibration.tree.joints) {
+    if (joint.type != JointType::kFixed && joint.channel.empty()) undriven.push_back(joint.name);
+  }
+  if (run.log.empty()) return "no joint log: the joint values are estimates from the markers";
+  const std::size_t moving = moving_joints(run.calibration.tree);
+  if (undriven.empty()) {
+    return moving == 1 ? "driven by a logged channel" : "each driven by its own logged channel";
+  }
+  return fmt::format("no logged channel drives {}", joined(undriven));
+}
+
+std::string certainty_words(const Structure& structure) {
+  switch (structure.status) {
+    case StructureStatus::kDetermined:
+      return fmt::format("probability of the whole {}", probability_text(structure.probability));
+    case StructureStatus::kAmbiguous:
+      return fmt::format("but this recording does not settle it (odds {} against: {})",
+                         odds_text(structure.runner_up_log_odds), structure.runner_up);
+    case StructureStatus::kUndetermined:
+      return "but this recording cannot determine the structure";
+    case StructureStatus::kNotRun:
+      break;
+  }
+  return "structure not examined";
+}
+
+std::string found_words(const RunSummary& run) {
+  const KinematicTree& tree = run.calibration.tree;
+  const std::size_t moving = moving_joints(tree);
+  std::string text;
+  if (!run.structure) {
+    text = fmt::format("Nominal robot {}: {}", tree.name, counted(moving, "joint"));
+    if (moving > 0) text += fmt::format(" ({})", type_letters(tree));
+    text += fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), "marker"),
+                        driving_words(run));
+    return text;
+  }
+  if (moving == 0) {
+    text = fmt::format("No joint found among {}", counted(tree.markers.size(), "marker"));
+  } else {
+    text = fmt::format("{} in a {} ({}) carrying {}; {}", counted(moving, "joint"),
+                       is_chain(tree) ? "chain" : "tree", type_letters(tree),
+                       counted(tree.markers.size(), "marker"), driving_words(run));
+  }
+  text += "; " + certainty_words(*run.structure) + ".";
+  if (!run.structure->free_markers.empty()) {
+    std::vector<std::string> names;
+    for (const TagId id : run.structure->free_markers) names.push_back(marker_name(id));
+    text += fmt::format(" {} move{} with no joint of this robot.", joined(names),
+                        names.size() == 1 ? "s" : "");
+  }
+  return text;
+}
+
+/// "0.071 px (0.12 mm, 0.02°)": the rms of one state of the model.
+std::string error_words(const ErrorStatistics& px, const ErrorStatistics& m,
+                        const ErrorStatistics& rad) {
+  std::vector<std::string> parts;
+  if (px.count > 0) parts.push_back(text_with_unit(px.rms, Quantity::kPixels));
+  if (m.count > 0) parts.push_back(text_with_unit(m.rms, Quantity::kLength));
+  if (rad.count > 0 && px.count == 0) parts.push_back(text_with_unit(rad.rms, Quantity::kAngle));
+  if (parts.empty()) return "";
+  std::string text = parts.front();
+  for (std::size_t k = 1; k < parts.size(); ++k) text += (px.count > 0 ? ", or " : ", ") + parts[k];
+  return text;
+}
+
+std::string prediction_words(const RunSummary& run) {
+  const ErrorRow& all = run.errors.all;
+  const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
+  const std::string training = error_words(all.training_px, all.training_m, all.training_rad);
+  const std::string before = error_words(all.before_px, all.before_m, all.before_rad);
+  const std::string_view what =
+      run.calibration.kind == MeasurementKind::kPoint ? "Points" : "Markers";
+  std::string text;
+  if (!held_out.empty()) {
+    text = fmt::format("{} {} that the fit has not seen are predicted to {} (rms)", what,
+                       run.log.empty() ? "in stretches of the recording" : "at postures", held_out);
+    if (!training.empty()) text += fmt::format("; those it has seen to {}", training);
+  } else if (!training.empty()) {
+    text =
+        fmt::format("{} are reproduced to {} (rms), on the data of the fit itself", what, training);
+  } else {
+    return "No error can be given: nothing was fitted.";
+  }
+  if (run.nominal && !before.empty()) {
+    text += fmt::format("; with the nominal robot it was {}", before);
+  }
+  return text + ".";
+}
+
+std::string axis_words(const Calibration& calibration) {
+  double direction = 0.0, position = 0.0;
+  std::string worst;
+  std::vector<std::string> unknown;
+  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+       ++j) {
+    const Joint& joint = calibration.tree.joints[j];
+    const JointEstimate& estimate = calibration.joints[j];
+    if (joint.type == JointType::kFixed) continue;
+    if (!estimate.direction_sigma_rad) {
+      unknown.push_back(joint.name);
+      continue;
+    }
+    if (*estimate.direction_sigma_rad > direction) {
+      direction = *estimate.direction_sigma_rad;
+      worst = joint.name;
+    }
+    if (estimate.position_sigma_m) position = std::max(position, *estimate.position_sigma_m);
+  }
+  std::string text;
+  if (direction > 0.0) {
+    text = fmt::format(" Joint axes are known to {}° in direction",
+                       uncertainty_text(kCoverageFactor * direction, Quantity::kAngle));
+    if (position > 0.0) {
+      text += fmt::format(" and {} mm in position",
+                          uncertainty_text(kCoverageFactor * position, Quantity::kLength));
+    }
+    text += fmt::format(" or better (expanded uncertainty, k = 2; least certain: {}).", worst);
+  }
+  if (!unknown.empty()) {
+    text += fmt::format(" No uncertainty can be given for the axis of {}.", joined(unknown));
+  }
+  return text;
+}
+
+std::string clock_words(const RunSummary& run) {
+  const Calibration& calibration = run.calibration;
+  if (run.log.empty() || !calibration.time_offset_sigma_s) return "";
+  return fmt::format(
+      " Joint log time = frame time {} ({}) ms.", calibration.time_offset_s < 0.0 ? "-" : "+",
+      value_and_uncertainty(std::abs(calibration.time_offset_s),
+                            kCoverageFactor * *calibration.time_offset_sigma_s, Quantity::kDelay));
+}
+
+}  // namespace
+
+Verdict make_verdict(const RunSummary& run, const Analysis& analysis) {
+  Verdict verdict;
+  verdict.found = found_words(run);
+  verdict.accurate = prediction_words(run) + axis_words(run.calibration) + clock_words(run);
+  constexpr std::size_t kMostFindings = 3;
+  std::vector<Finding> findings = find_limits(run, analysis);
+  if (findings.size() > kMostFindings) findings.resize(kMostFindings);
+  for (const Finding& finding : findings) {
+    if (!verdict.limits.empty()) verdict.limits += ' ';
+    verdict.limits += finding.what;
+    if (finding.remedy.empty() || verdict.next.find(finding.remedy) != std::string::npos) continue;
+    if (!verdict.next.empty()) verdict.next += ' ';
+    verdict.next += finding.remedy;
+  }
+  if (verdict.next.empty()) {
+    verdict.next =
+        "Nothing in this recording calls for another one; to confirm the figures, record the same "
+        "robot again and compare the two results.";
+  }
+  return verdict;
+}
+
+}  // namespace kinescope::report
+
+namespace kinescope {
+
+Verdict make_verdict(const RunSummary& run) {
+  return report::make_verdict(run, report::analyse(run));
+}
+
+}  // namespace kinescope

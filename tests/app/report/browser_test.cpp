@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The page in a real browser: opened from disk, the 3-D view starts and no script fails.
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "app/report/report.h"
+#include "tests/app/report/synthetic_run.h"
+
+namespace kinescope {
+namespace {
+
+std::string output_of(const std::string& command) {
+  std::string text;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return text;
+  std::array<char, 65536> buffer{};
+  for (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe); n > 0;
+       n = fread(buffer.data(), 1, buffer.size(), pipe)) {
+    text.append(buffer.data(), n);
+  }
+  pclose(pipe);
+  return text;
+}
+
+std::string browser() {
+  const std::string found =
+      output_of("command -v chromium chromium-browser google-chrome 2>/dev/null");
+  return found.substr(0, found.find('\n'));
+}
+
+/// The DOM after the scripts ran; the console's messages go to `console`.
+std::string opened(const RunSummary& run, std::string& console) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("kinescope_report_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "report.html") << report_html(run, "");
+  const std::string log = (folder / "console.txt").string();
+  const std::string dom = output_of(
+      "timeout 90 " + browser() +
+      " --headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
+      "--disable-background-networking"
+      " --disable-component-update --disable-sync --enable-logging=stderr --v=0 --user-data-dir=" +
+      (folder / "profile").string() + " --virtual-time-budget=4000 --dump-dom file://" +
+      (folder / "report.html").string() + " 2>" + log);
+  std::ifstream in(log);
+  console.assign(std::istreambuf_iterator<char>(in), {});
+  std::filesystem::remove_all(folder);
+  return dom;
+}
+
+/// Messages of the page's own scripts; the graphics driver's remarks are not theirs.
+std::string complaints(const std::string& console) {
+  std::string found;
+  std::istringstream lines(console);
+  for (std::string line; std::getline(lines, line);) {
+    const bool driver = line.find("WebGL") != std::string::npos;
+    if (line.find(":CONSOLE:") != std::string::npos && !driver) found += line + '\n';
+  }
+  return found;
+}
+
+std::string root_element(const std::string& dom) {
+  const std::size_t at = dom.find("<html");
+  return at == std::string::npos ? dom.substr(0, 200) : dom.substr(at, dom.find('>', at) - at);
+}
+
+TEST(Browser, OpensFromDiskAndStartsTheView) {
+  if (browser().empty()) GTEST_SKIP() << "no Chromium on this machine";
+  for (const SyntheticRunOptions& options :
+       {SyntheticRunOptions{}, SyntheticRunOptions{.kind = MeasurementKind::kPose},
+        SyntheticRunOptions{.kind = MeasurementKind::kPoint, .nominal = true},
+        SyntheticRunOptions{.robot = "</script><script>alert(1)</script>"}}) {
+    std::string console;
+    const std::string dom = opened(synthetic_run(options), console);
+    const std::string root = root_element(dom);
+    if (root.find("no-webgl") != std::string::npos) GTEST_SKIP() << "this Chromium has no WebGL";
+    EXPECT_NE(root.find("data-viewer=\"running\""), std::string::npos) << root;
+    EXPECT_EQ(root.find("data-viewer-error"), std::string::npos) << root;
+    EXPECT_NE(dom.find("<canvas"), std::string::npos);
+    EXPECT_NE(dom.find("class=\"cursor\""), std::string::npos);
+    EXPECT_EQ(complaints(console), "");
+  }
+}
+
+TEST(Browser, AnEmptyRunOpensToo) {
+  if (browser().empty()) GTEST_SKIP() << "no Chromium on this machine";
+  std::string console;
+  const std::string root = root_element(opened({}, console));
+  EXPECT_NE(root.find("data-viewer=\"empty\""), std::string::npos) << root;
+  EXPECT_EQ(complaints(console), "");
+}
+
+}  // namespace
+}  // namespace kinescope

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "app/report/report.h"
+#include "tests/app/report/synthetic_run.h"
+
+namespace kinescope {
+namespace {
+
+bool has(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(Verdict, OfAVideoWithALog) {
+  const Verdict verdict = make_verdict(synthetic_run());
+  EXPECT_TRUE(has(verdict.found, "3 joints in a chain (R R P)")) << verdict.found;
+  EXPECT_TRUE(has(verdict.found, "each driven by its own logged channel")) << verdict.found;
+  EXPECT_TRUE(has(verdict.found, "0.999930")) << verdict.found;
+  EXPECT_TRUE(has(verdict.accurate, "at postures that the fit has not seen")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, " px, or ")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, "least certain: q3")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, "frame time + (12.30 ± 0.42) ms")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.limits, "noise of the measurement limits")) << verdict.limits;
+  EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;
+}
+
+TEST(Verdict, ALateLogHasAMinus) {
+  RunSummary run = synthetic_run();
+  run.calibration.time_offset_s = -0.0123;
+  EXPECT_TRUE(has(make_verdict(run).accurate, "frame time - (12.30 ± 0.42) ms"));
+}
+
+TEST(Verdict, NamesTheJointThatTheResidualFollows) {
+  constexpr double kGearError = 0.002;  // rad; 0.115 degrees, well above the corner noise
+  const Verdict verdict = make_verdict(synthetic_run({.gear_error_rad = kGearError}));
+  EXPECT_TRUE(has(verdict.limits, "along the motion of q2")) << verdict.limits;
+  EXPECT_TRUE(has(verdict.limits, "±0.11") || has(verdict.limits, "±0.10")) << verdict.limits;
+  EXPECT_TRUE(has(verdict.next, "sweeps of q2")) << verdict.next;
+  EXPECT_FALSE(has(verdict.limits, "noise of the measurement limits")) << verdict.limits;
+}
+
+TEST(Verdict, SaysWhenUnseenDataAreWorse) {
+  RunSummary run = synthetic_run();
+  run.calibration.held_out_rms = 1.4 * run.calibration.training_rms;
+  EXPECT_TRUE(has(make_verdict(run).limits, "1.40 times"));
+  run.calibration.folds = 0;
+  EXPECT_TRUE(has(make_verdict(run).limits, "nothing was held out"));
+}
+
+TEST(Verdict, OfPointsWithANominalRobot) {
+  const Verdict verdict =
+      make_verdict(synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true}));
+  EXPECT_TRUE(has(verdict.found, "Nominal robot bench_arm: 3 joints")) << verdict.found;
+  EXPECT_TRUE(has(verdict.accurate, "with the nominal robot it was")) << verdict.accurate;
+  EXPECT_FALSE(has(verdict.accurate, "px")) << verdict.accurate;
+  EXPECT_FALSE(has(verdict.found, "probability")) << verdict.found;
+}
+
+TEST(Verdict, WithoutALogTheValuesAreEstimates) {
+  const Verdict verdict = make_verdict(synthetic_run({.log = false}));
+  EXPECT_TRUE(has(verdict.found, "the joint values are estimates from the markers"))
+      << verdict.found;
+  EXPECT_TRUE(has(verdict.accurate, "in stretches of the recording")) << verdict.accurate;
+  EXPECT_FALSE(has(verdict.accurate, "frame time")) << verdict.accurate;
+}
+
+TEST(Verdict, AnUndeterminedStructureStandsFirst) {
+  RunSummary run = synthetic_run();
+  run.structure->status = StructureStatus::kUndetermined;
+  run.structure->doubts = {{"q2 and q3 move together", "Move q3 while q2 rests", {"q2", "q3"}}};
+  const Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.found, "cannot determine the structure")) << verdict.found;
+  EXPECT_EQ(verdict.limits.find("Q2 and q3 move together."), 0U) << verdict.limits;
+  EXPECT_EQ(verdict.next.find("Move q3 while q2 rests."), 0U) << verdict.next;
+}
+
+TEST(Verdict, AFailedSolveIsSaidFirst) {
+  RunSummary run = synthetic_run();
+  run.calibration.status = CalibrationStatus::kNotConverged;
+  run.calibration.status_reason = "100 iterations were not enough";
+  EXPECT_EQ(make_verdict(run).limits.find("The calibration is not converged: 100 iterations"), 0U);
+}
+
+TEST(Verdict, PointsAtAMarkerThatIsRarelySeenOrOftenRejected) {
+  RunSummary run = synthetic_run();
+  run.markers[3].frames_seen = 20;
+  EXPECT_TRUE(has(make_verdict(run).limits, "tag_7 was seen in 20 of 300 frames only."));
+  run = synthetic_run();
+  run.calibration.markers[2].rejected = 60;
+  EXPECT_TRUE(has(make_verdict(run).limits, "sightings of tag_2 were left out"));
+}
+
+}  // namespace
+}  // namespace kinescope
