@@ -55,7 +55,7 @@ void read_log(Recording& recording, const RecordingFiles& files) {
     for (const std::string& name : settings.torque_channels) {
       if (name.starts_with("tau") || all.channel(name)) continue;
       throw bad_input(files.settings->string(),
-                      fmt::format("torque_channels names '{}', which is not logged", name),
+                      fmt::format("torques names '{}', which is not logged", name),
                       did_you_mean(name, all.channels));
     }
   }

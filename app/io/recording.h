@@ -30,7 +30,7 @@ struct RecordingPaths {
   std::optional<std::filesystem::path> video, joints, camera, tags, corners, poses, points, nominal;
 };
 
-/// recording.yaml as a value. Its keys: name, torque_channels, gravity, fixed_tags, video_start,
+/// recording.yaml as a value. Its keys: name, torques, gravity, fixed_tags, video_start,
 /// target_distances (list of from, to, distance, sigma) and units (channel: unit).
 struct RecordingSettings {
   std::string name;                          ///< of the robot; default: the folder's name

@@ -43,11 +43,11 @@ std::string read_unit(const YamlValue& value) {
 
 RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   const YamlValue file = YamlValue::read(path);
-  file.only_keys({"name", "torque_channels", "gravity", "fixed_tags", "video_start",
-                  "target_distances", "units"});
+  file.only_keys(
+      {"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances", "units"});
   RecordingSettings settings;
   if (const auto name = file.find("name")) settings.name = name->text();
-  if (const auto list = file.find("torque_channels")) {
+  if (const auto list = file.find("torques")) {
     for (const YamlValue& item : list->items()) settings.torque_channels.push_back(item.text());
   }
   if (const auto gravity = file.find("gravity")) settings.gravity = read_direction(*gravity);

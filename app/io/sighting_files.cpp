@@ -131,9 +131,11 @@ bool has_corners(const MarkerSet& markers, TagId id) {
 
 /// Unit quaternion of a row. The columns' order is x, y, z, w.
 Eigen::Quaterniond quaternion(const CsvTable& table, std::size_t row) {
-  const Eigen::Quaterniond q(
-      table.number(row, table.require_column("qw")), table.number(row, table.require_column("qx")),
-      table.number(row, table.require_column("qy")), table.number(row, table.require_column("qz")));
+  Eigen::Quaterniond q;
+  const char* const columns[] = {"qx", "qy", "qz", "qw"};
+  for (int i = 0; i < 4; ++i) {
+    q.coeffs()[i] = table.number(row, table.require_column(columns[i]));
+  }
   constexpr double kNoRotation = 1e-3;
   if (q.norm() < kNoRotation) {
     throw bad_input(table.place(row), fmt::format("the quaternion has length {}", q.norm()),

@@ -36,17 +36,18 @@ YamlValue YamlValue::read(const std::filesystem::path& path) {
   if (!root.IsMap()) {
     throw bad_input(source, "does not hold keys with values", "write lines such as key: value");
   }
-  return {root, source, ""};
+  return {root, root.Mark(), source, ""};
 }
 
-std::string YamlValue::place() const { return line_of(source_, node_.Mark()); }
+std::string YamlValue::place() const { return line_of(source_, mark_); }
 
 Error YamlValue::error(const std::string& what, const std::string& remedy) const {
   return bad_input(place(), key_.empty() ? what : fmt::format("{} {}", key_, what), remedy);
 }
 
-YamlValue YamlValue::below(const YAML::Node& node, const std::string& key) const {
-  return {node, source_, key_.empty() ? key : fmt::format("{}.{}", key_, key)};
+YamlValue YamlValue::below(const YAML::Node& node, const YAML::Mark& mark,
+                           const std::string& key) const {
+  return {node, mark, source_, key_.empty() ? key : fmt::format("{}.{}", key_, key)};
 }
 
 std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
@@ -55,10 +56,10 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) throw error("has a key that is no word", "write key: value");
     const std::string name = entry.first.Scalar();
-    // An alias or an empty value stands where its key stands.
-    YamlValue value = below(entry.second, name);
+    // Of a value that is not there yaml-cpp says the next line; and a mapping begins below its key.
+    YamlValue value = below(entry.second, entry.first.Mark(), name);
     if (std::ranges::find(out, name, &std::pair<std::string, YamlValue>::first) != out.end()) {
-      throw below(entry.first, name).error("stands there twice", "keep one of them");
+      throw value.error("stands there twice", "keep one of them");
     }
     out.emplace_back(name, std::move(value));
   }
@@ -69,7 +70,7 @@ std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) throw error("is no list", "write it as [a, b] or as lines of - a");
   std::vector<YamlValue> out;
   for (std::size_t i = 0; i < node_.size(); ++i) {
-    out.push_back(below(node_[i], fmt::format("{}", i)));
+    out.push_back(below(node_[i], node_[i].Mark(), fmt::format("{}", i)));
   }
   return out;
 }
@@ -100,7 +101,7 @@ std::string YamlValue::text() const {
 }
 
 double YamlValue::number() const {
-  const std::string written = node_.IsScalar() ? node_.Scalar() : "no single value";
+  const std::string written = node_.IsScalar() ? node_.Scalar() : "";
   const std::optional<double> value = parse_number(written);
   if (!value || !std::isfinite(*value)) {
     throw error(fmt::format("is '{}', not a finite number", written),

@@ -27,9 +27,4 @@ namespace kinescope {
 /// or an offset keeps its SI value as the joint value. Throws std::logic_error for an invalid tree.
 [[nodiscard]] std::string write_urdf(const KinematicTree& tree);
 
-/// The same robot with the channel's reading (in rad or m) as the value of each joint: offsets move into the
-/// joint's place, the sign of a scale into its axis; limits follow. With value = |scale| * reading, forward
-/// kinematics is that of the given tree at scale * reading + offset.
-[[nodiscard]] KinematicTree with_readings_as_values(const KinematicTree& tree);
-
 }  // namespace kinescope

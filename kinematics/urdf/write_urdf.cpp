@@ -314,23 +314,4 @@ std::string write_urdf(const KinematicTree& tree) {
   return printer.CStr();
 }
 
-KinematicTree with_readings_as_values(const KinematicTree& tree) {
-  KinematicTree out = tree;
-  for (Joint& joint : out.joints) {
-    if (joint.type == JointType::kFixed) continue;
-    const double sign = joint.scale < 0.0 ? -1.0 : 1.0;
-    joint.T_parent_joint =
-        joint.T_parent_joint * joint_motion(joint.type, joint.axis, joint.offset);
-    joint.axis *= sign;
-    if (joint.limits) {
-      const double a = sign * (joint.limits->lower - joint.offset);
-      const double b = sign * (joint.limits->upper - joint.offset);
-      joint.limits = JointLimits{std::min(a, b), std::max(a, b)};
-    }
-    joint.scale = std::abs(joint.scale);
-    joint.offset = 0.0;
-  }
-  return out;
-}
-
 }  // namespace kinescope

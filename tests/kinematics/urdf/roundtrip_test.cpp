@@ -130,50 +130,5 @@ TEST(UrdfWrite, FixedAxisAnglesInTheOrderOfUrdf) {
   EXPECT_NEAR(std::stod(match[3]), 0.5 * std::numbers::pi, 1e-15);
 }
 
-TEST(UrdfReadings, OffsetAndSignMoveIntoTheGeometry) {
-  Rng rng = Rng::from_name("UrdfReadings");
-  for (int robot = 0; robot < 20; ++robot) {
-    KinematicTree tree = random_tree(rng, 6, 4);
-    for (Joint& joint : tree.joints) {
-      joint.scale = rng.uniform(-2.0, 2.0);
-      joint.offset = rng.normal();
-    }
-    const KinematicTree by_reading = with_readings_as_values(tree);
-    for (int posture = 0; posture < 10; ++posture) {
-      const Eigen::VectorXd reading = random_values(rng, tree);
-      Eigen::VectorXd value = reading;
-      Eigen::VectorXd unsigned_value = reading;
-      for (Eigen::Index j = 0; j < value.size(); ++j) {
-        const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
-        value[j] = joint.scale * reading[j] + joint.offset;
-        unsigned_value[j] = std::abs(joint.scale) * reading[j];
-      }
-      const std::vector<Pose> expected = forward_kinematics(tree, value);
-      const std::vector<Pose> found = forward_kinematics(by_reading, unsigned_value);
-      for (std::size_t i = 0; i < expected.size(); ++i) {
-        EXPECT_LT(pose_distance(expected[i], found[i]), kExact);
-      }
-    }
-  }
-}
-
-TEST(UrdfReadings, LimitsFollow) {
-  KinematicTree tree;
-  tree.links = {{"base"}, {"tip"}};
-  Joint joint;
-  joint.name = "j";
-  joint.type = JointType::kPrismatic;
-  joint.parent = LinkId{0};
-  joint.child = LinkId{1};
-  joint.scale = -1.0;
-  joint.offset = 0.25;
-  joint.limits = JointLimits{-0.5, 0.75};  // readings from -0.5 to 0.75
-  tree.joints.push_back(joint);
-  const KinematicTree out = with_readings_as_values(tree);
-  EXPECT_EQ(out.joints[0].limits, (JointLimits{-0.5, 0.75}));
-  tree.joints[0].scale = 1.0;
-  EXPECT_EQ(with_readings_as_values(tree).joints[0].limits, (JointLimits{-0.75, 0.5}));
-}
-
 }  // namespace
 }  // namespace kinescope

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/app/io/recording_folder.h"
+
+namespace kinescope {
+namespace {
+
+class SightingFiles : public testing::Test {
+ protected:
+  SightingFiles() { markers_.default_size_m = 0.05; }
+
+  TagObservations corners(std::string_view text) {
+    folder_.write("corners.csv", text);
+    return read_corners(folder_.path() / "corners.csv", markers_);
+  }
+  PoseTracks poses(std::string_view text) {
+    folder_.write("poses.csv", text);
+    return read_poses(folder_.path() / "poses.csv");
+  }
+  PointObservations points(std::string_view text) {
+    folder_.write("points.csv", text);
+    return read_points(folder_.path() / "points.csv");
+  }
+  std::string corners_refusal(std::string_view text) {
+    return folder_.refusal_of([&] { static_cast<void>(corners(text)); });
+  }
+  std::string poses_refusal(std::string_view text) {
+    return folder_.refusal_of([&] { static_cast<void>(poses(text)); });
+  }
+  std::string points_refusal(std::string_view text) {
+    return folder_.refusal_of([&] { static_cast<void>(points(text)); });
+  }
+
+  RecordingFolder folder_;
+  MarkerSet markers_;
+};
+
+TEST_F(SightingFiles, CornersInAnyOrderOfRows) {
+  const TagObservations found = corners(
+      "t,tag,corner,u,v,sigma\n2.5,4,1,3,4,0.3\n2.5,4,0,1,2,0.4\n2.5,4,3,7,8,\n1.5,9,0,0,0,1\n1.5,"
+      "9,1,1,0,1\n"
+      "1.5,9,2,1,1,1\n1.5,9,3,0,1,1\n2.5,4,2,5,6,0.1\n");
+  EXPECT_EQ(found.times_s, (std::vector<double>{1.5, 2.5}));
+  ASSERT_EQ(found.observations.size(), 2U);
+  EXPECT_EQ(found.observations[0].id, TagId{9});
+  const TagObservation& tag = found.observations[1];
+  EXPECT_EQ(tag.frame, 1);
+  ASSERT_EQ(tag.corners_px.size(), 4U);
+  for (int c = 0; c < 4; ++c) {
+    EXPECT_EQ(tag.corners_px[static_cast<std::size_t>(c)], Eigen::Vector2d(2 * c + 1, 2 * c + 2));
+  }
+  // Root mean square of 0.4, 0.3, 0.1 and 0.1 where none is declared.
+  EXPECT_NEAR(tag.sigma_px, std::sqrt((0.16 + 0.09 + 0.01 + 0.01) / 4.0), 1e-15);
+}
+
+TEST_F(SightingFiles, CornersTakeMoreColumns) {
+  const TagObservations found = corners(
+      "t,tag,corner,u,v,sigma,hamming,margin\n0,1,0,0,0,1,2,55\n0,1,1,1,0,1,2,55\n0,1,2,1,1,1,2,"
+      "55\n"
+      "0,1,3,0,1,1,2,55\n");
+  EXPECT_EQ(found.observations[0].hamming, 2);
+  EXPECT_EQ(found.observations[0].decision_margin, 55.0);
+}
+
+TEST_F(SightingFiles, CornersOfABoard) {
+  markers_ = {};
+  markers_.only_listed = true;
+  markers_.boards[TagId{0}] = std::vector<Eigen::Vector3d>(2);
+  const TagObservations found = corners("t,tag,corner,u,v\n0,0,0,5,6\n0,0,1,7,8\n0,3,0,1,1\n");
+  ASSERT_EQ(found.observations.size(), 1U);
+  EXPECT_EQ(found.observations[0].corners_px.size(), 2U);
+  ASSERT_EQ(found.rejected.size(), 1U) << "tag 3 is not listed";
+  EXPECT_EQ(found.rejected[0].id, TagId{3});
+}
+
+TEST_F(SightingFiles, CornersRefused) {
+  const std::string head = "t,tag,corner,u,v,sigma\n";
+  EXPECT_EQ(corners_refusal(head + "0,1,0,0,0,1\n0,1,1,0,0,1\n0,1,2,0,0,1\n"),
+            "corners.csv:4: tag 1 at t = 0 has 3 corners of 4 (give all of them, or leave the "
+            "sighting out)");
+  EXPECT_NE(
+      corners_refusal(head + "0,1,4,0,0,1\n").find("corners.csv:2: tag 1 at t = 0 has no corner 4"),
+      std::string::npos);
+  EXPECT_NE(corners_refusal(head + "0,1,0,0,0,1\n0,1,0,0,0,1\n")
+                .find("corners.csv:3: tag 1 at t = 0 has its corner 0 twice"),
+            std::string::npos);
+  EXPECT_NE(corners_refusal(head + "0,-1,0,0,0,1\n").find("corners.csv:2: column 'tag' holds -1"),
+            std::string::npos);
+  EXPECT_NE(corners_refusal(head + "0,1.5,0,0,0,1\n").find("not a whole number"),
+            std::string::npos);
+  EXPECT_NE(corners_refusal(head + "0,1,0,nan,0,1\n").find("column 'u' holds 'nan'"),
+            std::string::npos);
+  EXPECT_NE(corners_refusal(head + "0,1,0,0,0,0\n").find("column 'sigma' holds 0"),
+            std::string::npos);
+  EXPECT_NE(corners_refusal("t,tag,u,v\n0,1,0,0\n").find("no column 'corner'"), std::string::npos);
+  markers_.default_size_m = 0.0;
+  EXPECT_NE(corners_refusal(head + "0,1,0,0,0,1\n").find("tag 1 has no declared size"),
+            std::string::npos);
+  markers_.only_listed = true;
+  EXPECT_NE(corners_refusal(head + "0,1,0,0,0,1\n").find("holds no tag that tags.yaml lists"),
+            std::string::npos);
+}
+
+TEST_F(SightingFiles, PosesWithTheirNoise) {
+  const PoseTracks found = poses(
+      "t,body,x,y,z,qx,qy,qz,qw,sigma_m,sigma_rad\n1,5,1,2,3,0,0,2,2,0.01,0.02\n0,5,0,0,0,0,0,0,-1,"
+      ",\n"
+      "0,2,0,0,0,1,0,0,0,,\n");
+  EXPECT_EQ(found.times_s, (std::vector<double>{0.0, 1.0}));
+  ASSERT_EQ(found.tracks.size(), 2U);
+  EXPECT_EQ(found.tracks[0].id, TagId{2});
+  const PoseSample& sample = found.tracks[1].samples[1];
+  EXPECT_EQ(sample.frame, 1);
+  EXPECT_EQ(sample.T_camera_marker.translation, Eigen::Vector3d(1, 2, 3));
+  // A quarter turn about z, its quaternion made a unit one.
+  EXPECT_LT((sample.T_camera_marker.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY())
+                .norm(),
+            1e-15);
+  EXPECT_NEAR(sample.covariance(0, 0), 4e-4, 1e-18) << "rotation first";
+  EXPECT_NEAR(sample.covariance(5, 5), 1e-4, 1e-18);
+  EXPECT_EQ(sample.covariance(0, 5), 0.0);
+}
+
+TEST_F(SightingFiles, PosesRefused) {
+  const std::string head = "t,body,x,y,z,qx,qy,qz,qw\n";
+  EXPECT_EQ(poses_refusal(head + "0,1,0,0,0,0,0,0,0\n"),
+            "poses.csv:2: the quaternion has length 0 (columns qx, qy, qz, qw hold a unit "
+            "quaternion; leave rows "
+            "without a pose out)");
+  EXPECT_NE(poses_refusal(head + "0,1,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,0,1\n")
+                .find("poses.csv:3: body 1 at t = 0 stands there twice"),
+            std::string::npos);
+  EXPECT_NE(poses_refusal(head + "0,1,,0,0,0,0,0,1\n").find("poses.csv:2: column 'x' holds ''"),
+            std::string::npos);
+  EXPECT_NE(poses_refusal("t,body,x,y,z\n0,1,0,0,0\n").find("no column 'qx'"), std::string::npos);
+  EXPECT_NE(poses_refusal("t,body,x,y,z,qx,qy,qz,qw,sigma_m\n0,1,0,0,0,0,0,0,1,-1\n")
+                .find("'sigma_m' holds -1"),
+            std::string::npos);
+}
+
+TEST_F(SightingFiles, PointsInTheTrackersFrameOrInATarget) {
+  const PointObservations found =
+      points("t,point,x,y,z,sigma,target\n0,1,1,2,3,0.002,\n1,1,,,,,left\n");
+  ASSERT_EQ(found.observations.size(), 2U);
+  EXPECT_EQ(*found.observations[0].position_m, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(found.observations[0].sigma_m, 0.002);
+  EXPECT_FALSE(found.observations[1].position_m);
+  EXPECT_EQ(found.observations[1].target, "left");
+  EXPECT_EQ(found.observations[1].frame, 1);
+}
+
+TEST_F(SightingFiles, PointsRefused) {
+  EXPECT_NE(points_refusal("t,point,x,y,z\n0,1,,,\n")
+                .find("points.csv:2: has neither a position nor a target"),
+            std::string::npos);
+  EXPECT_NE(
+      points_refusal("t,point,x,y,z\n0,1,1,,\n").find("points.csv:2: some of x, y, z are empty"),
+      std::string::npos);
+  EXPECT_NE(points_refusal("t,point,x,y,z\n0,1,1,2,3\n0,1,1,2,3\n").find("stands there twice"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace kinescope
