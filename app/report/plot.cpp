@@ -233,8 +233,8 @@ std::string Plot::axes() const {
                      drawn(size_.height - bottom_), drawn(size_.width - right_));
 }
 
-std::string Plot::legend_text() const {
-  std::string text;
+std::vector<Eigen::Vector2d> Plot::legend_places() const {
+  std::vector<Eigen::Vector2d> places;
   double x = left_, y = size_.height + 10.0;
   for (const auto& [name, css_class] : legend_) {
     const double width = 22.0 + kCharacterWidth * static_cast<double>(name.size());
@@ -242,28 +242,27 @@ std::string Plot::legend_text() const {
       x = left_;
       y += kLegendRow;
     }
+    places.emplace_back(x, y);
+    x += width;
+  }
+  return places;
+}
+
+std::string Plot::legend_text() const {
+  const std::vector<Eigen::Vector2d> places = legend_places();
+  std::string text;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto& [name, css_class] = legend_[k];
     text += fmt::format(
         "<path class=\"key {}\" d=\"M{} {}h11\"/><text class=\"tick\" x=\"{}\" y=\"{}\">{}</text>",
-        css_class, drawn(x), drawn(y - 4), drawn(x + 15), drawn(y), escaped(name));
-    x += width;
+        css_class, drawn(places[k].x()), drawn(places[k].y() - 4), drawn(places[k].x() + 15),
+        drawn(places[k].y()), escaped(name));
   }
   return text;
 }
 
 std::string Plot::str() const {
-  double height = size_.height;
-  if (!legend_.empty()) {
-    double x = left_;
-    height += kLegendRow;
-    for (const auto& [name, css_class] : legend_) {
-      const double width = 22.0 + kCharacterWidth * static_cast<double>(name.size());
-      if (x + width > size_.width && x > left_) {
-        x = left_;
-        height += kLegendRow;
-      }
-      x += width;
-    }
-  }
+  const double height = legend_.empty() ? size_.height : legend_places().back().y() + 5.0;
   const double width = size_.width - left_ - right_;
   const double inner = size_.height - top_ - bottom_;
   std::string time;

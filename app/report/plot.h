@@ -68,6 +68,8 @@ class Plot {
   [[nodiscard]] std::string x_axis() const;
   [[nodiscard]] std::string y_axis() const;
   [[nodiscard]] std::string axes() const;
+  /// Left end of each legend entry; entries that do not fit go to the next row.
+  [[nodiscard]] std::vector<Eigen::Vector2d> legend_places() const;
   [[nodiscard]] std::string legend_text() const;
 
   std::string name_;

@@ -27,38 +27,44 @@ struct Verdict {
 
 [[nodiscard]] Verdict make_verdict(const RunSummary& run);
 
-/// result.json: every number that the report shows. SI units (rad, m, s, px), named in the key. A number that is not
-/// known is null, never NaN. `expanded` is an expanded uncertainty, coverage_factor (2) standard ones. Keys may be
-/// added under the same schema_version; a changed meaning raises it.
+/// result.json: every number that the report shows. SI units (rad, m, s, px), named in the key. A
+/// number that is not known is null, never NaN. `expanded` is an expanded uncertainty,
+/// coverage_factor (2) standard ones. Keys may be added under the same schema_version; a changed
+/// meaning raises it.
 ///
 ///   schema, schema_version, coverage_factor
 ///   run            robot, recording, entry, kind (corners, poses, points), version, command,
 ///                  inputs [name, sha256], options [name, value], times [stage, seconds], total_s
 ///   verdict        found, accurate, limits, next: the sentences that the report opens with
-///   data           frames, duration_s, independent_frames (residuals are alike over time), image_coverage
+///   data           frames, duration_s, independent_frames (residuals are alike over time),
+///   image_coverage
 ///                  (share of an 8 x 6 grid; corners only), camera_declared,
-///                  markers [id, link, size_m, frames_seen, share_seen, median_edge_px, median_sigma_px],
-///                  rejected [reason, count], channels [name, samples, min, max, joint, idle], warnings
-///   structure      null for a nominal robot; else status (determined, ambiguous, undetermined), probability, runner_up,
+///                  markers [id, link, size_m, frames_seen, share_seen, median_edge_px,
+///                  median_sigma_px], rejected [reason, count], channels [name, samples, min, max,
+///                  joint, idle], warnings
+///   structure      null for a nominal robot; else status (determined, ambiguous, undetermined),
+///   probability, runner_up,
 ///                  runner_up_log_odds, links [name, markers], free_markers, idle_channels,
 ///                  doubts [what, remedy, names],
-///                  joints [type, parent, child, driven_by {channel, scale, scale_sigma}, couplings, offset,
-///                  travel, rotation_rms_rad, translation_rms_m, log_odds, runner_up]
+///                  joints [type, parent, child, driven_by {channel, scale, scale_sigma},
+///                  couplings, offset, travel, rotation_rms_rad, translation_rms_m, log_odds,
+///                  runner_up]
 ///   calibration    status, reason, gauge, time_offset_s (joint-log time = frame time + offset) and
-///                  time_offset_expanded_s, sightings_used, sightings_rejected, sigma_scale (noise found over declared),
-///                  before_rms, training_rms, held_out_rms, final_rms (one coordinate: px for corners, m else),
-///                  held_out_over_training, the same as *_rotation_rms_rad for poses, folds,
-///                  correlation_time_s, iterations, initial_cost, final_cost, warnings,
-///                  joints [name, type, parent, child, channel, unit, scale, scale_expanded, offset, offset_expanded,
-///                  origin (pose), axis_base, point_base_m, direction_expanded_rad, position_expanded_m,
-///                  range, travel, change_against_nominal {shift_m, turn_rad, offset}],
-///                  markers [id, link, size_m, mount (pose), rotation_expanded_rad, translation_expanded_m, used,
-///                  rejected],
+///                  time_offset_expanded_s, sightings_used, sightings_rejected, sigma_scale (noise
+///                  found over declared), before_rms, training_rms, held_out_rms, final_rms (one
+///                  coordinate: px for corners, m else), held_out_over_training, the same as
+///                  *_rotation_rms_rad for poses, folds, correlation_time_s, iterations,
+///                  initial_cost, final_cost, warnings, joints [name, type, parent, child, channel,
+///                  unit, scale, scale_expanded, offset, offset_expanded, origin (pose), axis_base,
+///                  point_base_m, direction_expanded_rad, position_expanded_m, range, travel,
+///                  change_against_nominal {shift_m, turn_rad, offset}], markers [id, link, size_m,
+///                  mount (pose), rotation_expanded_rad, translation_expanded_m, used, rejected],
 ///                  camera {pose_in_base, rotation_expanded_rad, translation_expanded_m,
-///                  intrinsics {model, width, height, estimated, values [name, unit, value, expanded]}},
-///                  parameters [name, block, unit, value, sigma, sigma_white, expanded]
-///                  (a pose: translation_m, quaternion_wxyz, rpy_rad as in URDF)
-///   errors         all, links [], markers []: name and {before, training, held_out}_{px, m, rad}, each
+///                  intrinsics {model, width, height, estimated, values [name, unit, value,
+///                  expanded]}}, parameters [name, block, unit, value, sigma, sigma_white,
+///                  expanded] (a pose: translation_m, quaternion_wxyz, rpy_rad as in URDF)
+///   errors         all, links [], markers []: name and {before, training, held_out}_{px, m, rad},
+///   each
 ///                  count, rms, median, p95, max of the error's length (count 0: nothing else)
 ///   residuals      unit, components, component_rms, outside_two_sigma (share),
 ///                  dependence [on, share, half_range, half_range_unit, frames]
@@ -66,8 +72,8 @@ struct Verdict {
 ///                  parameters [parameter, weight]], strong_correlations [a, b, correlation]
 [[nodiscard]] nlohmann::json result_json(const RunSummary& run);
 
-/// The page. `urdf` is shown in it where it is not empty. About 0.8 MB, most of it the viewer; the 3-D view's
-/// data are thinned to 600 frames and 400 000 residual numbers, each plot to 2500 dots.
+/// The page. `urdf` is shown in it where it is not empty. About 0.8 MB, most of it the viewer; the
+/// 3-D view's data are thinned to 600 frames and 400 000 residual numbers, each plot to 2500 dots.
 [[nodiscard]] std::string report_html(const RunSummary& run, std::string_view urdf);
 
 }  // namespace kinescope

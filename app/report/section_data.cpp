@@ -144,7 +144,7 @@ std::string rejected_table(const Facts& facts) {
   if (facts.run.rejected.empty()) {
     return paragraph("No detection was rejected.", "note");
   }
-  Table table("rejected-table", "Detections rejected before the fit", facts.result);
+  Table table("rejected-table", "Detections rejected", facts.result);
   table.header({"Reason", "Count"});
   for (std::size_t k = 0; k < facts.run.rejected.size(); ++k) {
     table.begin_row();

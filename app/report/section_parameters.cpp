@@ -154,13 +154,10 @@ std::string clock_and_lens(const Facts& facts) {
     out += table.str();
   }
   if (calibration.kind != MeasurementKind::kCorners) return out;
-  Table table(
-      "intrinsics-table",
-      fmt::format(
-          "Camera model {} ({} × {} px), {}", kinescope::to_string(calibration.camera.model),
-          calibration.camera.width, calibration.camera.height,
-          calibration.intrinsics_estimated ? "estimated with the rest" : "as declared, held"),
-      facts.result);
+  Table table("intrinsics-table",
+              fmt::format("Camera: {}, {} × {} px", kinescope::to_string(calibration.camera.model),
+                          calibration.camera.width, calibration.camera.height),
+              facts.result);
   table.header({"Intrinsic", "Value", "U"});
   const nlohmann::json& values =
       facts.result.at("calibration").at("camera").at("intrinsics").at("values");

@@ -86,7 +86,7 @@ std::string verdict_section(const Facts& facts) {
 std::string identity_section(const Facts& facts) {
   const RunSummary& run = facts.run;
   std::string out = section_head("identity", "Identity");
-  Table table("identity-table", "What was calibrated, from what, with what", facts.result);
+  Table table("identity-table", "This run", facts.result);
   const auto row = [&](std::string_view name, const std::string& value) {
     table.begin_row();
     table.text(name);
@@ -106,7 +106,7 @@ std::string identity_section(const Facts& facts) {
   }
   out += inputs.str();
   if (!run.options.empty()) {
-    Table options("options-table", "Options of this run", facts.result);
+    Table options("options-table", "Options", facts.result);
     options.header({"Option", "Value"});
     for (const auto& [name, value] : run.options) {
       options.begin_row();
@@ -187,7 +187,7 @@ std::string reproduce_section(const Facts& facts, std::string_view urdf) {
       "only the times differ:");
   out += "<pre id=\"command\">" + escaped(run.command) + "</pre>\n";
   if (!run.times.empty()) {
-    Table times("times-table", "Time of each stage, this run", facts.result);
+    Table times("times-table", "Stage times", facts.result);
     times.header({"Stage", "Time, s"});
     for (std::size_t k = 0; k < run.times.size(); ++k) {
       times.begin_row();

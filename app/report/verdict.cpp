@@ -84,20 +84,22 @@ std::string certainty_words(const Structure& structure) {
 std::string found_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
   const std::size_t moving = moving_joints(tree);
+  const std::string_view what =
+      run.calibration.kind == MeasurementKind::kPoint ? "point" : "marker";
   std::string text;
   if (!run.structure) {
     text = fmt::format("Nominal robot {}: {}", tree.name, counted(moving, "joint"));
     if (moving > 0) text += fmt::format(" ({})", type_letters(tree));
-    text += fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), "marker"),
-                        driving_words(run));
+    text +=
+        fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), what), driving_words(run));
     return text;
   }
   if (moving == 0) {
-    text = fmt::format("No joint found among {}", counted(tree.markers.size(), "marker"));
+    text = fmt::format("No joint found among {}", counted(tree.markers.size(), what));
   } else {
     text = fmt::format("{} in a {} ({}) carrying {}; {}", counted(moving, "joint"),
                        is_chain(tree) ? "chain" : "tree", type_letters(tree),
-                       counted(tree.markers.size(), "marker"), driving_words(run));
+                       counted(tree.markers.size(), what), driving_words(run));
   }
   text += "; " + certainty_words(*run.structure) + ".";
   if (!run.structure->free_markers.empty()) {

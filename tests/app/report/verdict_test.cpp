@@ -52,7 +52,8 @@ TEST(Verdict, SaysWhenUnseenDataAreWorse) {
 TEST(Verdict, OfPointsWithANominalRobot) {
   const Verdict verdict =
       make_verdict(synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true}));
-  EXPECT_TRUE(has(verdict.found, "Nominal robot bench_arm: 3 joints")) << verdict.found;
+  EXPECT_TRUE(has(verdict.found, "Nominal robot bench_arm: 3 joints (R R P), 4 points calibrated"))
+      << verdict.found;
   EXPECT_TRUE(has(verdict.accurate, "with the nominal robot it was")) << verdict.accurate;
   EXPECT_FALSE(has(verdict.accurate, "px")) << verdict.accurate;
   EXPECT_FALSE(has(verdict.found, "probability")) << verdict.found;
