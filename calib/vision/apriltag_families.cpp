@@ -16,14 +16,28 @@
 namespace kinescope {
 namespace {
 
+// The codes of tag36h11 with two black cells around them instead of one, as Kalibr prints its
+// boards.
+apriltag_family_t* tag36h11_wide_create() {
+  apriltag_family_t* family = tag36h11_create();
+  family->width_at_border += 2;
+  family->total_width += 2;
+  for (std::uint32_t i = 0; i < family->nbits; ++i) {
+    ++family->bit_x[i];
+    ++family->bit_y[i];
+  }
+  return family;
+}
+
 struct Entry {
   std::string_view name;
   apriltag_family_t* (*create)();
   void (*destroy)(apriltag_family_t*);
 };
 
-constexpr std::array<Entry, 8> kFamilies = {{
+constexpr std::array<Entry, 9> kFamilies = {{
     {"tag36h11", tag36h11_create, tag36h11_destroy},
+    {"tag36h11b2", tag36h11_wide_create, tag36h11_destroy},
     {"tag25h9", tag25h9_create, tag25h9_destroy},
     {"tag16h5", tag16h5_create, tag16h5_destroy},
     {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
