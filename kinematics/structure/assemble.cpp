@@ -10,16 +10,18 @@ namespace {
 
 const Eigen::Vector3d kZ = Eigen::Vector3d::UnitZ();
 
-// One joint as it goes into the structure, with everything counted in SI units from the channels' zero.
+// One joint as it goes into the structure, with everything counted in SI units from the channels'
+// zero.
 struct SiJoint {
   JointType type = JointType::kRevolute;
-  Pose frame;                       // z = axis, turned so that the main scale is positive
-  double zero = 0.0;                // the joint's value where the search's coordinate is zero
-  double sign = 1.0;                // of the search's coordinate in the new frame
-  std::vector<ChannelTerm> terms;   // main first
+  Pose frame;                      // z = axis, turned so that the main scale is positive
+  double zero = 0.0;               // the joint's value where the search's coordinate is zero
+  double sign = 1.0;               // of the search's coordinate in the new frame
+  std::vector<ChannelTerm> terms;  // main first
 };
 
-// The first component of noticeable size is positive: a choice of direction that depends on nothing else.
+// The first component of noticeable size is positive: a choice of direction that depends on nothing
+// else.
 bool points_forward(const Eigen::Vector3d& axis) {
   Eigen::Index largest = 0;
   axis.cwiseAbs().maxCoeff(&largest);
@@ -31,20 +33,22 @@ SiJoint si_joint(const ChainJoint& joint, const Pose& mount, const Readings& rea
   SiJoint out;
   out.type = joint.type;
   out.frame = joint.frame;
-  const bool forward =
-      joint.terms.empty() ? points_forward(joint.frame.rotation * kZ) : joint.terms.front().scale > 0.0;
+  const bool forward = joint.terms.empty() ? points_forward(joint.frame.rotation * kZ)
+                                           : joint.terms.front().scale > 0.0;
   if (!forward) {
     out.sign = -1.0;
     out.frame.rotation = out.frame.rotation * Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0);
   }
   // Slide the origin along the axis to the child's marker (for a slide: onto it).
   const Eigen::Vector3d p = out.frame.inverse() * mount.translation;
-  const Eigen::Vector3d origin = joint.type == JointType::kRevolute ? Eigen::Vector3d(0.0, 0.0, p.z()) : p;
+  const Eigen::Vector3d origin =
+      joint.type == JointType::kRevolute ? Eigen::Vector3d(0.0, 0.0, p.z()) : p;
   out.frame.translation = out.frame * origin;
   for (std::size_t t = 0; t < joint.terms.size(); ++t) {
     const auto c = static_cast<std::size_t>(joint.terms[t].channel);
     const double scale = out.sign * joint.terms[t].scale / readings.rms[c];
-    out.terms.push_back({readings.log_channel[c], scale, scale_sigma[first_term + t] / readings.rms[c]});
+    out.terms.push_back(
+        {readings.log_channel[c], scale, scale_sigma[first_term + t] / readings.rms[c]});
     out.zero += scale * readings.mean[c];
   }
   return out;
@@ -74,8 +78,8 @@ Places place_markers(const GrownTree& tree, const Series& series, Structure& out
   return places;
 }
 
-double travel_of(const SiJoint& joint, const Readings& readings, const std::vector<double>& coordinates,
-                 const ChainJoint& chain) {
+double travel_of(const SiJoint& joint, const Readings& readings,
+                 const std::vector<double>& coordinates, const ChainJoint& chain) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (std::size_t i = 0; i < readings.valid.size(); ++i) {
@@ -94,8 +98,9 @@ double travel_of(const SiJoint& joint, const Readings& readings, const std::vect
 }
 
 // Adds the joints (and unseen links between them) of one grown link.
-void add_joints(const GrownTree& tree, std::size_t l, const Readings& readings, const Verdict& verdict,
-                const Places& places, const std::vector<int>& number, Structure& out) {
+void add_joints(const GrownTree& tree, std::size_t l, const Readings& readings,
+                const Verdict& verdict, const Places& places, const std::vector<int>& number,
+                Structure& out) {
   const GrownLink& link = tree.links[l];
   const ChainFit& fit = link.attachment.fit;
   Pose tail = places.T_reference_founder[static_cast<std::size_t>(link.parent)];
@@ -140,7 +145,8 @@ void add_joints(const GrownTree& tree, std::size_t l, const Readings& readings, 
 
 }  // namespace
 
-Structure assemble(const GrownTree& tree, const Series& full, const Readings& readings, const Verdict& verdict) {
+Structure assemble(const GrownTree& tree, const Series& full, const Readings& readings,
+                   const Verdict& verdict) {
   Structure out;
   out.status = verdict.status;
   out.probability = verdict.probability;

@@ -2,7 +2,6 @@
 #include "kinematics/structure/attachment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -12,7 +11,8 @@
 namespace kinescope::structure_search {
 namespace {
 
-// A channel is inexact (backlash, gear error) when the residual along the joint is this much larger.
+// A channel is inexact (backlash, gear error) when the residual along the joint is this much
+// larger.
 constexpr double kInexact = 1.5;
 // Candidates this much worse (-2 ln likelihood, linear) than the best refined one are not refined.
 constexpr double kHopeless = 60.0;
@@ -23,14 +23,21 @@ double log_det_of(const Matrix6d& W) {
   return -2.0 * sum;
 }
 
+// Of a coordinate about its mean or, where neighbouring samples tell more, about the sample before
+// (half the mean square step: the same for white noise, far less for a smooth motion).
 double coordinate_variance(const ChainModel& model) {
+  const auto n = static_cast<double>(model.coordinates.size());
   double mean = 0.0;
-  for (const double c : model.coordinates) mean += c / static_cast<double>(model.coordinates.size());
+  for (const double c : model.coordinates) mean += c / n;
   double variance = 0.0;
+  double steps = 0.0;
+  double previous = model.coordinates.front();
   for (const double c : model.coordinates) {
-    variance += (c - mean) * (c - mean) / static_cast<double>(model.coordinates.size());
+    variance += (c - mean) * (c - mean) / n;
+    steps += (c - previous) * (c - previous) / (2.0 * n);
+    previous = c;
   }
-  return variance;
+  return std::min(variance, steps);
 }
 
 // Distance of the child from the axis; 0 for slides.
@@ -50,7 +57,11 @@ double penalty_of(const ChainFit& fit, const Readings& readings) {
       const ChainTerm& term = joint.terms[k];
       const double rms = readings.rms[static_cast<std::size_t>(term.channel)];
       --free_parameters;
-      penalty += scale_penalty(term.scale / rms, fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms);
+      penalty +=
+          scale_penalty(term.scale / rms, fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms,
+                        readings.si_share, rms);
+      // Which channel drives the joint is one choice of many.
+      if (k == 0) penalty += 2.0 * std::log(std::max(1, readings.channels()));
       // Couplings are rare (1 joint in 100), and which channel couples is one choice of many.
       if (k > 0) penalty += 2.0 * std::log(100.0 * std::max(2, readings.channels()));
     }
@@ -73,18 +84,40 @@ double coordinate_cost(const ChainFit& fit, const Motion& motion) {
   return sum;
 }
 
-Attachment complete(ChainFit fit, const RelativeMotion& relative, int seen, const Readings& readings) {
+// Arm (m) at which rotations are compared with translations.
+constexpr double kLever = 0.3;
+
+double motion_size(const Motion& motion) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(motion.size());
+  for (const MotionSample& s : motion) mean += s.pose.translation / n;
+  const Eigen::Quaterniond middle = motion[motion.size() / 2].pose.rotation.conjugate();
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  double squared = 0.0;
+  for (const MotionSample& s : motion) {
+    const Eigen::Vector3d w = log_rotation(middle * s.pose.rotation);
+    turn += w / n;
+    squared += ((s.pose.translation - mean).squaredNorm() + kLever * kLever * w.squaredNorm()) / n;
+  }
+  return std::sqrt(std::max(0.0, squared - kLever * kLever * turn.squaredNorm()));
+}
+
+Attachment complete(ChainFit fit, const RelativeMotion& relative, int seen,
+                    const Readings& readings) {
   Attachment a;
-  const double share = relative.motion.empty() ? 1.0 : seen / static_cast<double>(relative.motion.size());
+  const double share =
+      relative.motion.empty() ? 1.0 : seen / static_cast<double>(relative.motion.size());
   a.data_cost = share * (fit.cost + relative.log_det + coordinate_cost(fit, relative.motion));
   a.penalty = penalty_of(fit, readings);
+  a.motion_size = relative.motion.empty() ? 0.0 : motion_size(relative.motion);
   a.fit = std::move(fit);
   return a;
 }
 
 int seen_with_log(const Body& body, const Readings& readings) {
   int count = 0;
-  for (std::size_t i = 0; i < body.at.size(); ++i) count += body.at[i].seen && readings.valid[i] != 0 ? 1 : 0;
+  for (std::size_t i = 0; i < body.at.size(); ++i)
+    count += body.at[i].seen && readings.valid[i] != 0 ? 1 : 0;
   return count;
 }
 
@@ -92,7 +125,8 @@ int seen_with_log(const Body& body, const Readings& readings) {
 ChainFit fit_weighted(const Motion& motion, const Readings& readings, const ChainModel& start) {
   ChainFit fit = fit_chain(motion, readings.value, start);
   if (fit.axis_variance > 2.0 * kInexact) {
-    ChainFit again = fit_chain(motion, readings.value, fit.model, {.axis_weight = 1.0 / fit.axis_variance});
+    ChainFit again =
+        fit_chain(motion, readings.value, fit.model, {.axis_weight = 1.0 / fit.axis_variance});
     if (again.cost < fit.cost) fit = std::move(again);
   }
   return fit;
@@ -100,23 +134,30 @@ ChainFit fit_weighted(const Motion& motion, const Readings& readings, const Chai
 
 }  // namespace
 
-double scale_penalty(double scale, double sigma) {
+double Attachment::explained_ratio() const {
+  // A fifth of the noise at least: less cannot be seen.
+  const double excess = std::sqrt(std::max(0.04, 1.0 - 1.0 / fit.variance));
+  const double left = std::hypot(fit.translation_rms, kLever * fit.rotation_rms) * excess;
+  return motion_size / std::max(left, 1e-12);
+}
+
+double scale_penalty(double scale, double sigma, double si_share, double rms) {
   constexpr double kLogRange = 25.0;  // natural logarithms that any scale may lie within
-  struct Unit {
-    double scale;
-    double share;
-  };
-  constexpr std::array<Unit, 3> kUnits{
-      Unit{1.0, 0.6}, Unit{std::numbers::pi / 180.0, 0.1}, Unit{1e-3, 0.1}};
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  constexpr double kMillimetre = 1e-3;
   const double size = std::abs(scale);
   const double s = std::max(sigma, 1e-12);
-  const double width = std::min(1.0, s * std::sqrt(2.0 * std::numbers::pi) / std::max(size, 1e-300) / kLogRange);
-  double best = -2.0 * std::log(0.2 * width);
-  for (const Unit& unit : kUnits) {
-    const double tolerance = std::hypot(s, 0.004 * unit.scale);
-    const double z = (size - unit.scale) / tolerance;
-    best = std::min(best, z * z - 2.0 * std::log(unit.share));
-  }
+  const double width =
+      std::min(1.0, s * std::sqrt(2.0 * std::numbers::pi) / std::max(size, 1e-300) / kLogRange);
+  const double other = 0.25 * (1.0 - si_share);
+  double best = -2.0 * std::log(2.0 * other * width);
+  const auto consider = [&](double unit, double share) {
+    const double z = (size - unit) / std::hypot(s, 0.004 * unit);
+    best = std::min(best, z * z - 2.0 * std::log(share));
+  };
+  consider(1.0, si_share);
+  if (rms > 0.3) consider(kDegree, other);
+  if (rms > 1.0) consider(kMillimetre, other);
   return best;
 }
 
@@ -142,8 +183,8 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
   return out;
 }
 
-Attachment attachment_from(ChainFit fit, int parent, const RelativeMotion& relative, const Body& body,
-                           const Readings& readings) {
+Attachment attachment_from(ChainFit fit, int parent, const RelativeMotion& relative,
+                           const Body& body, const Readings& readings) {
   Attachment a = complete(std::move(fit), relative, seen_with_log(body, readings), readings);
   a.parent = parent;
   return a;
@@ -155,9 +196,11 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
   std::vector<Attachment> out;
   const RelativeMotion relative = relative_motion(body, path, readings);
   const int seen = seen_with_log(body, readings);
-  if (relative.motion.size() < 5 || 3 * relative.motion.size() < static_cast<std::size_t>(seen)) return out;
-  const Screening screening = screen_motion(relative.motion, readings.value, usable,
-                                            {.coordinate_free = options.coordinate_free, .max_channels = 4});
+  if (relative.motion.size() < 5 || 3 * relative.motion.size() < static_cast<std::size_t>(seen))
+    return out;
+  const Screening screening =
+      screen_motion(relative.motion, readings.value, usable,
+                    {.coordinate_free = options.coordinate_free, .max_channels = 4});
   const double limit = options.give_up_above * static_cast<double>(relative.motion.size());
   double best = std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : screening.candidates) {
@@ -167,20 +210,23 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
     if (!out.empty() && (candidate.cost > hopeless || enough)) continue;
     if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
     ChainFit fit = fit_weighted(relative.motion, readings, candidate.start);
-    if (candidate.channel >= 0) fit = with_couplings(std::move(fit), relative.motion, readings, usable);
+    if (candidate.channel >= 0)
+      fit = with_couplings(std::move(fit), relative.motion, readings, usable);
     Attachment a = complete(std::move(fit), relative, seen, readings);
     best = std::min(best, a.data_cost);
     a.parent = parent;
     out.push_back(std::move(a));
   }
   if (out.empty()) return out;
-  const auto by_data = std::ranges::min_element(out, {}, [](const Attachment& a) { return a.data_cost; });
+  const auto by_data =
+      std::ranges::min_element(out, {}, [](const Attachment& a) { return a.data_cost; });
   const double correlation = by_data->fit.correlation;
   std::ranges::stable_sort(out, {}, [&](const Attachment& a) { return a.cost(correlation); });
   return out;
 }
 
-Attachment refit(const Attachment& attachment, const Body& body, const LinkPath& path, const Readings& readings) {
+Attachment refit(const Attachment& attachment, const Body& body, const LinkPath& path,
+                 const Readings& readings) {
   const RelativeMotion relative = relative_motion(body, path, readings);
   ChainModel start = attachment.fit.model;
   if (!attachment.at_rest() && !attachment.driven()) {
@@ -192,7 +238,8 @@ Attachment refit(const Attachment& attachment, const Body& body, const LinkPath&
       for (int pass = 0; pass < 6; ++pass) {
         const Matrix6d& W = relative.motion[i].whitening;
         const Vector6d u = W * axis;
-        const Vector6d r = W * fast_log(chain_pose_at(start, {value}).inverse() * relative.motion[i].pose);
+        const Vector6d r =
+            W * fast_log(chain_pose_at(start, {value}).inverse() * relative.motion[i].pose);
         value += u.dot(r) / u.squaredNorm();
       }
       start.coordinates[i] = value;
@@ -201,6 +248,7 @@ Attachment refit(const Attachment& attachment, const Body& body, const LinkPath&
   ChainFit fit = fit_weighted(relative.motion, readings, start);
   Attachment a = complete(std::move(fit), relative, seen_with_log(body, readings), readings);
   a.parent = attachment.parent;
+  a.order_doubts = attachment.order_doubts;
   return a;
 }
 
@@ -241,7 +289,8 @@ LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath&
     if (!inexact) {
       relative = chain_pose(model, readings.value, instant);
     } else {
-      double value = driven ? chain_coordinate(model.joints.front(), readings.value, instant) : previous;
+      double value =
+          driven ? chain_coordinate(model.joints.front(), readings.value, instant) : previous;
       const Sighting& s = body.at[i];
       if (!s.seen && !driven) continue;
       if (s.seen) {

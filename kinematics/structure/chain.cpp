@@ -41,7 +41,8 @@ Pose motion_of(JointType type, double value) {
 }
 
 // Ad(T^-1) v.
-Vector6d seen_from(const Pose& T, const Eigen::Vector3d& rotation, const Eigen::Vector3d& translation) {
+Vector6d seen_from(const Pose& T, const Eigen::Vector3d& rotation,
+                   const Eigen::Vector3d& translation) {
   const Eigen::Quaterniond inverse = T.rotation.conjugate();
   Vector6d out;
   out << inverse * rotation, inverse * (translation - T.translation.cross(rotation));
@@ -87,11 +88,12 @@ SampleResidual residual_of(const MotionSample& sample, const Pose& predicted_inv
   return r;
 }
 
-// Columns of d(right perturbation of the pose) / d(parameters): joints in order (tilts, shifts, scales), mount.
-// `to_child[k]` is the moved frame of joint k seen to the child. Returns the axis of the last joint.
+// Columns of d(right perturbation of the pose) / d(parameters): joints in order (tilts, shifts,
+// scales), mount. `to_child[k]` is the moved frame of joint k seen to the child. Returns the axis
+// of the last joint.
 Vector6d fill_jacobian(const ChainModel& model, const std::vector<Pose>& to_child,
-                       const std::vector<double>& values, const Eigen::MatrixXd& readings, int instant,
-                       Jacobian& J) {
+                       const std::vector<double>& values, const Eigen::MatrixXd& readings,
+                       int instant, Jacobian& J) {
   Eigen::Index column = 0;
   Vector6d axis = Vector6d::Zero();
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
@@ -114,7 +116,8 @@ Vector6d fill_jacobian(const ChainModel& model, const std::vector<Pose>& to_chil
       axis = seen_from(S, zero, Eigen::Vector3d::UnitZ());
     }
     column += geometry_size(joint.type);
-    for (const ChainTerm& term : joint.terms) J.col(column++) = readings(instant, term.channel) * axis;
+    for (const ChainTerm& term : joint.terms)
+      J.col(column++) = readings(instant, term.channel) * axis;
   }
   J.rightCols<6>().setIdentity();
   return axis;
@@ -160,21 +163,23 @@ Normal linearise(const Motion& motion, const ChainModel& model, const Eigen::Mat
   Jacobian J(6, size);
   Jacobian WJ(6, size);
   const double keep = 1.0 - std::sqrt(axis_weight);
-  for_each_sample(motion, model, readings, [&](std::size_t i, const Pose& predicted, const Workspace& w) {
-    if (weights[i] <= 0.0) return;
-    const SampleResidual r = residual_of(motion[i], predicted.inverse());
-    const Vector6d axis = fill_jacobian(model, w.to_child, w.values, readings, motion[i].instant, J);
-    WJ.noalias() = motion[i].whitening.triangularView<Eigen::Upper>() * J;
-    Vector6d white = r.white;
-    if (model.joints.size() == 1 && axis_weight < 1.0) {
-      const Vector6d u = (motion[i].whitening * axis).normalized();
-      white -= keep * u.dot(white) * u;
-      const Eigen::RowVectorXd along = u.transpose() * WJ;
-      WJ.noalias() -= (keep * u) * along;
-    }
-    n.H.selfadjointView<Eigen::Lower>().rankUpdate(WJ.transpose(), weights[i]);
-    n.g.noalias() += weights[i] * (WJ.transpose() * white);
-  });
+  for_each_sample(motion, model, readings,
+                  [&](std::size_t i, const Pose& predicted, const Workspace& w) {
+                    if (weights[i] <= 0.0) return;
+                    const SampleResidual r = residual_of(motion[i], predicted.inverse());
+                    const Vector6d axis =
+                        fill_jacobian(model, w.to_child, w.values, readings, motion[i].instant, J);
+                    WJ.noalias() = motion[i].whitening.triangularView<Eigen::Upper>() * J;
+                    Vector6d white = r.white;
+                    if (model.joints.size() == 1 && axis_weight < 1.0) {
+                      const Vector6d u = (motion[i].whitening * axis).normalized();
+                      white -= keep * u.dot(white) * u;
+                      const Eigen::RowVectorXd along = u.transpose() * WJ;
+                      WJ.noalias() -= (keep * u) * along;
+                    }
+                    n.H.selfadjointView<Eigen::Lower>().rankUpdate(WJ.transpose(), weights[i]);
+                    n.g.noalias() += weights[i] * (WJ.transpose() * white);
+                  });
   n.H.triangularView<Eigen::StrictlyUpper>() = n.H.transpose();
   return n;
 }
@@ -182,33 +187,35 @@ Normal linearise(const Motion& motion, const ChainModel& model, const Eigen::Mat
 struct Evaluation {
   ResidualParts parts;
   std::vector<Vector6d> white;
-  std::vector<Vector6d> plain;   // unwhitened, without the part along the joint
+  std::vector<Vector6d> plain;  // unwhitened, without the part along the joint
 };
 
-Evaluation evaluate(const Motion& motion, const ChainModel& model, const Eigen::MatrixXd& readings) {
+Evaluation evaluate(const Motion& motion, const ChainModel& model,
+                    const Eigen::MatrixXd& readings) {
   Evaluation e;
   const bool split = model.joints.size() == 1;
   e.parts.split = split;
   e.parts.free_axis = is_free(model);
-  for_each_sample(motion, model, readings, [&](std::size_t i, const Pose& predicted, const Workspace& w) {
-    const SampleResidual r = residual_of(motion[i], predicted.inverse());
-    e.white.push_back(r.white);
-    double along = 0.0;
-    if (split) {
-      const JointType type = model.joints.front().type;
-      const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-      const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-      const Vector6d axis = type == JointType::kRevolute ? seen_from(w.to_child[0], z, zero)
-                                                         : seen_from(w.to_child[0], zero, z);
-      const Vector6d white_axis = motion[i].whitening * axis;
-      const double lever = white_axis.norm();
-      along = white_axis.dot(r.white) / lever;
-      e.parts.lever.push_back(lever);
-    }
-    e.parts.along.push_back(along);
-    e.parts.across.push_back(std::max(0.0, r.white.squaredNorm() - along * along));
-    e.parts.penalty.push_back(r.penalty);
-  });
+  for_each_sample(
+      motion, model, readings, [&](std::size_t i, const Pose& predicted, const Workspace& w) {
+        const SampleResidual r = residual_of(motion[i], predicted.inverse());
+        e.white.push_back(r.white);
+        double along = 0.0;
+        if (split) {
+          const JointType type = model.joints.front().type;
+          const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+          const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+          const Vector6d axis = type == JointType::kRevolute ? seen_from(w.to_child[0], z, zero)
+                                                             : seen_from(w.to_child[0], zero, z);
+          const Vector6d white_axis = motion[i].whitening * axis;
+          const double lever = white_axis.norm();
+          along = white_axis.dot(r.white) / lever;
+          e.parts.lever.push_back(lever);
+        }
+        e.parts.along.push_back(along);
+        e.parts.across.push_back(std::max(0.0, r.white.squaredNorm() - along * along));
+        e.parts.penalty.push_back(r.penalty);
+      });
   return e;
 }
 
@@ -237,7 +244,8 @@ void update_coordinates(ChainModel& model, const Evaluation& e) {
   static_cast<void>(mean);
 }
 
-std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd& H, double variance) {
+std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd& H,
+                                 double variance) {
   std::vector<double> sigma;
   const Eigen::MatrixXd damped =
       H + 1e-9 * Eigen::MatrixXd(H.diagonal().cwiseMax(1e-12).asDiagonal());
@@ -253,7 +261,8 @@ std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd&
   return sigma;
 }
 
-void describe(const Motion& motion, const Evaluation& e, const ResidualScale& scale, ChainFit& fit) {
+void describe(const Motion& motion, const Evaluation& e, const ResidualScale& scale,
+              ChainFit& fit) {
   std::vector<double> rotation;
   std::vector<double> translation;
   for (std::size_t i = 0; i < motion.size(); ++i) {
@@ -302,7 +311,8 @@ Vector6d axis_in_child(const ChainModel& model, double coordinate) {
   const Pose to_child = joint.frame.inverse() * model.mount;
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-  return joint.type == JointType::kRevolute ? seen_from(to_child, z, zero) : seen_from(to_child, zero, z);
+  return joint.type == JointType::kRevolute ? seen_from(to_child, z, zero)
+                                            : seen_from(to_child, zero, z);
 }
 
 ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainModel start,
@@ -314,7 +324,7 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
   const double axis_weight = free ? 0.0 : options.axis_weight;
   ChainModel model = std::move(start);
   Evaluation e = evaluate(motion, model, readings);
-  ResidualScale scale = residual_scale(e.parts);
+  ResidualScale scale = residual_scale(e.parts, options.outlier_cost);
   double damping = model.joints.size() > 1 ? 1e-3 : 1e-7;
   Normal normal;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
@@ -327,7 +337,7 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
     apply_step(next, step);
     if (free) update_coordinates(next, evaluate(motion, next, readings));
     Evaluation e_next = evaluate(motion, next, readings);
-    const ResidualScale scale_next = residual_scale(e_next.parts);
+    const ResidualScale scale_next = residual_scale(e_next.parts, options.outlier_cost);
     const double gain = scale.cost - scale_next.cost;
     if (gain > 0.0) {
       model = std::move(next);

@@ -4,9 +4,10 @@
 // Gives   ChainModel: none (rest), one or several joints in series that explain it, and how well.
 // Frames  pose(t) = prod_k [F_k exp(z theta_k(t)) F_k^-1] M, all in the frame of the first body;
 //         theta_k = sum over terms of scale * reading, readings centred and scaled to unit RMS.
-// Method  robust Gauss-Newton (Levenberg-Marquardt damping) on whitened pose residuals. The residual is
-//         split into the part along the joint, where a channel may be inexact (backlash, coupling), and the
-//         rest; each part has its own noise scale, at least that of the sightings.
+// Method  robust Gauss-Newton (Levenberg-Marquardt damping) on whitened pose residuals. The
+// residual is
+//         split into the part along the joint, where a channel may be inexact (backlash, coupling),
+//         and the rest; each part has its own noise scale, at least that of the sightings.
 #pragma once
 
 #include <optional>
@@ -50,35 +51,41 @@ struct ChainFit {
   ChainModel model;
   int samples = 0;
   int parameters = 0;
-  double cost = 0.0;         ///< without any penalty for parameters
-  double variance = 1.0;     ///< of the residual across the joint, over the declared one; at least 1
-  double axis_variance = 1.0;///< the same along the joint
-  double raw_variance = 1.0; ///< as variance, may be below 1
-  double correlation = 1.0;  ///< number of neighbouring samples that err alike (integrated autocorrelation)
-  double rotation_rms = 0.0; ///< rad, m: robust size of what is left (across the joint)
+  double cost = 0.0;      ///< without any penalty for parameters
+  double variance = 1.0;  ///< of the residual across the joint, over the declared one; at least 1
+  double axis_variance = 1.0;  ///< the same along the joint
+  double raw_variance = 1.0;   ///< as variance, may be below 1
+  double correlation =
+      1.0;  ///< number of neighbouring samples that err alike (integrated autocorrelation)
+  double rotation_rms = 0.0;  ///< rad, m: robust size of what is left (across the joint)
   double translation_rms = 0.0;
-  std::vector<double> scale_sigma;   ///< of every term in order, per RMS of the channel
-  std::vector<Vector6d> residuals;   ///< whitened, one a sample
+  std::vector<double> scale_sigma;  ///< of every term in order, per RMS of the channel
+  std::vector<Vector6d> residuals;  ///< whitened, one a sample
 };
 
 struct ChainFitOptions {
   int max_iterations = 8;
-  double axis_weight = 1.0;  ///< weight of the residual along the joint, 1: channels are exact, 0: not used
+  double axis_weight =
+      1.0;  ///< weight of the residual along the joint, 1: channels are exact, 0: not used
+  double outlier_cost = 30.0;  ///< most that one sample may cost
   bool with_residuals = false;
 };
 
 /// Pose of the last body for one row of readings.
-[[nodiscard]] Pose chain_pose(const ChainModel& model, const Eigen::MatrixXd& readings, int instant);
+[[nodiscard]] Pose chain_pose(const ChainModel& model, const Eigen::MatrixXd& readings,
+                              int instant);
 /// The same with the coordinates given, one a joint.
 [[nodiscard]] Pose chain_pose_at(const ChainModel& model, const std::vector<double>& coordinates);
 /// Coordinate of joint k.
-[[nodiscard]] double chain_coordinate(const ChainJoint& joint, const Eigen::MatrixXd& readings, int instant);
+[[nodiscard]] double chain_coordinate(const ChainJoint& joint, const Eigen::MatrixXd& readings,
+                                      int instant);
 
 /// Refines `start`. `readings`: instants x channels.
-[[nodiscard]] ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainModel start,
-                                 const ChainFitOptions& options = {});
+[[nodiscard]] ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings,
+                                 ChainModel start, const ChainFitOptions& options = {});
 
-/// The axis of the (last) joint as a body twist of the child at one posture; unit rotation or translation.
+/// The axis of the (last) joint as a body twist of the child at one posture; unit rotation or
+/// translation.
 [[nodiscard]] Vector6d axis_in_child(const ChainModel& model, double coordinate);
 
 }  // namespace kinescope::structure_search

@@ -10,8 +10,8 @@ namespace {
 constexpr int kMostTerms = 4;
 // -2 ln likelihood that every further channel has to gain, correlation allowed for.
 constexpr double kMinGain = 18.0;
-// Least share of the variance along the joint that each has to remove, in the end: systematic errors of other
-// kinds (backlash, gear error) are always a little correlated with something.
+// Least share of the variance along the joint that each has to remove, in the end: systematic
+// errors of other kinds (backlash, gear error) are always a little correlated with something.
 constexpr double kMinShare = 0.15;
 // The same while terms are added: of two that almost cancel, the first alone removes little.
 constexpr double kLeastShare = 0.01;
@@ -42,7 +42,7 @@ AxisResidual axis_residual(const ChainFit& fit, const Motion& motion) {
 struct Addition {
   int channel = -1;
   double scale = 0.0;
-  double share = 0.0;   // of the variance removed
+  double share = 0.0;  // of the variance removed
 };
 
 // The channel that, beside those already there, removes most of the residual along the axis.
@@ -54,7 +54,8 @@ Addition best_addition(const ChainFit& fit, const Motion& motion, const Readings
   const auto n = static_cast<Eigen::Index>(motion.size());
   const auto column = [&](int c) {
     Eigen::VectorXd q(n);
-    for (Eigen::Index i = 0; i < n; ++i) q(i) = readings.value(motion[static_cast<std::size_t>(i)].instant, c);
+    for (Eigen::Index i = 0; i < n; ++i)
+      q(i) = readings.value(motion[static_cast<std::size_t>(i)].instant, c);
     return q;
   };
   // Project out the constant and the channels already present.
@@ -77,7 +78,8 @@ Addition best_addition(const ChainFit& fit, const Motion& motion, const Readings
   const double total = dot(left, left);
   Addition best;
   for (int c = 0; c < readings.channels(); ++c) {
-    if (usable[static_cast<std::size_t>(c)] == 0 || std::ranges::find(present, c) != present.end()) continue;
+    if (usable[static_cast<std::size_t>(c)] == 0 || std::ranges::find(present, c) != present.end())
+      continue;
     const Eigen::VectorXd q = column(c);
     const Eigen::VectorXd qr = reduce(q);
     const double qq = dot(qr, qr);
@@ -96,7 +98,8 @@ ChainFit pruned(ChainFit fit, const Motion& motion, const Readings& readings) {
     std::size_t weakest = 0;
     double least = 1e300;
     for (std::size_t t = 0; t < terms.size(); ++t) {
-      const double z = std::abs(terms[t].scale) / std::max(1e-300, fit.scale_sigma[t] * std::sqrt(fit.correlation));
+      const double z = std::abs(terms[t].scale) /
+                       std::max(1e-300, fit.scale_sigma[t] * std::sqrt(fit.correlation));
       if (z < least) {
         least = z;
         weakest = t;
@@ -104,7 +107,8 @@ ChainFit pruned(ChainFit fit, const Motion& motion, const Readings& readings) {
     }
     if (least > 4.0) break;
     ChainModel model = fit.model;
-    model.joints.front().terms.erase(model.joints.front().terms.begin() + static_cast<std::ptrdiff_t>(weakest));
+    model.joints.front().terms.erase(model.joints.front().terms.begin() +
+                                     static_cast<std::ptrdiff_t>(weakest));
     fit = fit_chain(motion, readings.value, std::move(model));
   }
   return fit;
@@ -114,11 +118,13 @@ ChainFit pruned(ChainFit fit, const Motion& motion, const Readings& readings) {
 
 ChainFit with_couplings(ChainFit fit, const Motion& motion, const Readings& readings,
                         const std::vector<char>& usable) {
-  if (fit.model.joints.size() != 1 || fit.axis_variance < 1.05 || readings.channels() < 2) return fit;
-  // Terms are added greedily first and judged together afterwards: with one of two that are missing, what is
-  // left still looks like a slow error.
+  if (fit.model.joints.size() != 1 || fit.axis_variance < 1.05 || readings.channels() < 2)
+    return fit;
+  // Terms are added greedily first and judged together afterwards: with one of two that are
+  // missing, what is left still looks like a slow error.
   std::vector<ChainFit> grown;
-  grown.push_back(fit_chain(motion, readings.value, fit.model, {.max_iterations = 2, .with_residuals = true}));
+  grown.push_back(
+      fit_chain(motion, readings.value, fit.model, {.max_iterations = 2, .with_residuals = true}));
   while (static_cast<int>(grown.size()) < kMostTerms && grown.back().axis_variance > 1.05) {
     const Addition addition = best_addition(grown.back(), motion, readings, usable);
     if (addition.channel < 0 || addition.share < kLeastShare) break;
@@ -133,7 +139,8 @@ ChainFit with_couplings(ChainFit fit, const Motion& motion, const Readings& read
     return grown[n].cost / correlation + kMinGain * static_cast<double>(n);
   };
   for (std::size_t n = 1; n < grown.size(); ++n) {
-    const double most = grown.front().axis_variance * std::pow(1.0 - kMinShare, static_cast<double>(n));
+    const double most =
+        grown.front().axis_variance * std::pow(1.0 - kMinShare, static_cast<double>(n));
     if (grown[n].axis_variance <= most && judged(n) < judged(chosen)) chosen = n;
   }
   if (chosen == 0) return fit;
@@ -143,7 +150,8 @@ ChainFit with_couplings(ChainFit fit, const Motion& motion, const Readings& read
   auto& terms = fit.model.joints.front().terms;
   std::vector<std::size_t> order(terms.size());
   for (std::size_t t = 0; t < order.size(); ++t) order[t] = t;
-  std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t t) { return std::abs(terms[t].scale); });
+  std::ranges::stable_sort(order, std::greater<>{},
+                           [&](std::size_t t) { return std::abs(terms[t].scale); });
   std::vector<ChainTerm> sorted;
   std::vector<double> sigma;
   for (const std::size_t t : order) {

@@ -23,7 +23,10 @@ std::vector<char> moving_channels(const Readings& readings) {
 class Grower {
  public:
   Grower(const Series& series, const Readings& readings, const GrowthOptions& options)
-      : series_(series), readings_(readings), options_(options), usable_(moving_channels(readings)) {
+      : series_(series),
+        readings_(readings),
+        options_(options),
+        usable_(moving_channels(readings)) {
     tree_.bodies.resize(series.bodies.size());
     for (std::size_t b = 0; b < series.bodies.size(); ++b) {
       tree_.bodies[b].free_cost = free_cost(series.bodies[b], readings);
@@ -62,9 +65,14 @@ class Grower {
     if (best != nullptr && body(b).seen > 0) {
       options.give_up_above = std::max(0.0, best->data_cost / body(b).seen) + 3.0;
     }
-    auto found = find_attachments(body(b), link, tree_.links[static_cast<std::size_t>(link)].path, readings_,
-                                  usable_, options);
-    for (Attachment& a : found) g.alternatives.push_back(std::move(a));
+    auto found = find_attachments(body(b), link, tree_.links[static_cast<std::size_t>(link)].path,
+                                  readings_, usable_, options);
+    const bool rests = std::ranges::any_of(
+        found, [&](const Attachment& a) { return rests_for_all_practical_purposes(body(b), a); });
+    for (Attachment& a : found) {
+      if (rests && !a.at_rest() && !a.driven()) continue;
+      g.alternatives.push_back(std::move(a));
+    }
   }
 
   // Link `link` hangs (at any depth) on body b's own link.
@@ -83,27 +91,40 @@ class Grower {
     if (by_data == nullptr) return nullptr;
     const Attachment* best = nullptr;
     for (const Attachment& a : g.alternatives) {
-      if (best == nullptr || a.cost(by_data->fit.correlation) < best->cost(by_data->fit.correlation)) best = &a;
+      if (best == nullptr ||
+          a.cost(by_data->fit.correlation) < best->cost(by_data->fit.correlation))
+        best = &a;
     }
     return best;
   }
 
-  bool acceptable(const GrownBody& g, const Attachment& a) const {
-    return a.fit.variance <= options_.accept_variance && a.data_cost < g.free_cost &&
-           (a.at_rest() || a.driven() || explains_enough(a));
+  // What is left of rest is so small that no robot moves by it: corners that err alike from frame
+  // to frame (compression, one light) pass for a slow motion in the statistics, but not in
+  // millimetres.
+  bool rests_for_all_practical_purposes(const Body& b, const Attachment& a) const {
+    constexpr double kTurn = 0.015;   // rad
+    constexpr double kShift = 0.004;  // of the distance from the camera
+    double distance = 0.0;
+    int count = 0;
+    for (const Sighting& s : b.at) {
+      if (!s.seen) continue;
+      distance += s.pose.translation.norm();
+      ++count;
+    }
+    return a.at_rest() && count > 0 && a.fit.rotation_rms < kTurn &&
+           a.fit.translation_rms < kShift * distance / count;
   }
 
-  // A joint without a channel has to leave much less than it explains, or free bodies pass as joints.
-  static bool explains_enough(const Attachment& a) {
-    const ChainModel& m = a.fit.model;
-    const auto [low, high] = std::ranges::minmax_element(m.coordinates);
-    const double travel = *high - *low;
-    const double rotation = m.joints.front().type == JointType::kRevolute ? travel : 0.0;
-    const Vector6d axis = axis_in_child(m, 0.0);
-    const double translation = travel * axis.tail<3>().norm();
-    const bool by_rotation = rotation > 10.0 * a.fit.rotation_rms;
-    const bool by_translation = translation > 10.0 * a.fit.translation_rms;
-    return m.joints.front().type == JointType::kRevolute ? by_rotation : by_translation;
+  bool acceptable(std::size_t b, const Attachment& a) const {
+    if (rests_for_all_practical_purposes(body(b), a)) return true;
+    const GrownBody& g = tree_.bodies[b];
+    if (a.data_cost >= g.free_cost) return false;
+    const double ratio = a.explained_ratio();
+    const bool clean = a.fit.variance <= options_.accept_variance || ratio > options_.accept_ratio;
+    if (a.at_rest() || a.driven()) return clean;
+    // A joint without a channel has to leave much less than it explains, or free bodies pass as
+    // joints.
+    return clean && ratio > options_.free_ratio;
   }
 
   // Attaches the body that fits best anywhere; false when none is acceptable.
@@ -114,7 +135,7 @@ class Grower {
       const GrownBody& g = tree_.bodies[b];
       if (g.link >= 0) continue;
       const Attachment* best = best_of(g);
-      if (best == nullptr || !acceptable(g, *best)) continue;
+      if (best == nullptr || !acceptable(b, *best)) continue;
       // Rest first, then driven joints, then free coordinates; within each the cleanest.
       const double rank = best->at_rest() ? 0.0 : best->driven() ? 1e3 : 1e6;
       const double badness = rank + best->data_cost / std::max(1, body(b).seen);
@@ -138,7 +159,8 @@ class Grower {
     GrownLink link;
     link.parent = attachment.parent;
     link.founder = static_cast<int>(b);
-    link.path = path_of(attachment, body(b), tree_.links[static_cast<std::size_t>(link.parent)].path, readings_);
+    link.path = path_of(attachment, body(b),
+                        tree_.links[static_cast<std::size_t>(link.parent)].path, readings_);
     link.attachment = std::move(attachment);
     g.link = static_cast<int>(tree_.links.size());
     add_link(std::move(link));
@@ -151,27 +173,31 @@ class Grower {
         if (!j.terms.empty()) unused[static_cast<std::size_t>(j.terms.front().channel)] = 0;
       }
     }
-    std::size_t chosen = tree_.bodies.size();
-    Attachment best;
+    struct Case {
+      std::size_t body;
+      std::size_t link;
+      SerialOutlook outlook;
+    };
+    std::vector<Case> cases;
     for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
-      const GrownBody& g = tree_.bodies[b];
-      if (g.link >= 0) continue;
-      for (std::size_t l = 0; l < tree_.links.size(); ++l) {
-        auto found = find_serial_attachment(body(b), static_cast<int>(l), tree_.links[l].path, readings_, unused);
-        if (!found || found->fit.variance > options_.accept_variance || found->data_cost > g.free_cost) continue;
-        const bool fewer = chosen == tree_.bodies.size() ||
-                           found->fit.model.joints.size() < best.fit.model.joints.size() ||
-                           (found->fit.model.joints.size() == best.fit.model.joints.size() &&
-                            found->data_cost / body(b).seen < best.data_cost / body(chosen).seen);
-        if (!fewer) continue;
-        best = std::move(*found);
-        chosen = b;
+      for (std::size_t l = 0; l < tree_.links.size() && tree_.bodies[b].link < 0; ++l) {
+        const SerialOutlook o = serial_outlook(body(b), tree_.links[l].path, readings_, unused);
+        if (o.channels > 0) cases.push_back({b, l, o});
       }
     }
-    if (chosen == tree_.bodies.size()) return false;
-    tree_.bodies[chosen].alternatives.push_back(best);
-    place(chosen, std::move(best));
-    return true;
+    std::ranges::stable_sort(
+        cases, {}, [](const Case& c) { return std::pair(c.outlook.channels, c.outlook.residual); });
+    constexpr std::size_t kMostCases = 6;
+    for (std::size_t i = 0; i < std::min(cases.size(), kMostCases); ++i) {
+      const Case& c = cases[i];
+      auto found = find_serial_attachment(body(c.body), static_cast<int>(c.link),
+                                          tree_.links[c.link].path, readings_, unused);
+      if (!found || !acceptable(static_cast<std::size_t>(c.body), *found)) continue;
+      tree_.bodies[c.body].alternatives.push_back(*found);
+      place(c.body, std::move(*found));
+      return true;
+    }
+    return false;
   }
 
   // Moves single bodies to better places, then deals out the channels; true when anything changed.
@@ -203,7 +229,9 @@ class Grower {
   bool conflicts(std::size_t b, const Attachment& a) const {
     if (!a.driven()) return false;
     for (const GrownLink& l : tree_.links) {
-      if (l.founder < 0 || l.founder == static_cast<int>(b) || l.attachment.channel() != a.channel()) continue;
+      if (l.founder < 0 || l.founder == static_cast<int>(b) ||
+          l.attachment.channel() != a.channel())
+        continue;
       if (l.attachment.fit.model.joints.front().terms.size() == 1) return true;
     }
     return false;
@@ -238,9 +266,11 @@ class Grower {
   void dissolve(int own, Attachment attachment) {
     std::vector<std::size_t> homeless;
     for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
-      if (is_below(tree_.bodies[b].link, tree_.links[static_cast<std::size_t>(own)].founder)) homeless.push_back(b);
+      if (is_below(tree_.bodies[b].link, tree_.links[static_cast<std::size_t>(own)].founder))
+        homeless.push_back(b);
     }
-    const auto founder = static_cast<std::size_t>(tree_.links[static_cast<std::size_t>(own)].founder);
+    const auto founder =
+        static_cast<std::size_t>(tree_.links[static_cast<std::size_t>(own)].founder);
     for (const std::size_t b : homeless) tree_.bodies[b].link = -1;
     const std::vector<int> renamed = remove_links_without_bodies();
     attachment.parent = renamed[static_cast<std::size_t>(attachment.parent)];
@@ -257,7 +287,9 @@ class Grower {
     std::vector<GrownLink> kept;
     for (std::size_t l = 0; l < tree_.links.size(); ++l) {
       const int founder = tree_.links[l].founder;
-      if (founder >= 0 && tree_.bodies[static_cast<std::size_t>(founder)].link != static_cast<int>(l)) continue;
+      if (founder >= 0 &&
+          tree_.bodies[static_cast<std::size_t>(founder)].link != static_cast<int>(l))
+        continue;
       renamed[l] = static_cast<int>(kept.size());
       kept.push_back(std::move(tree_.links[l]));
       GrownLink& link = kept.back();
@@ -287,12 +319,14 @@ class Grower {
     std::vector<int> touched;
     for (std::size_t l = 1; l < tree_.links.size(); ++l) {
       GrownLink& g = tree_.links[l];
-      const bool below = static_cast<int>(l) == link || std::ranges::find(touched, g.parent) != touched.end();
+      const bool below =
+          static_cast<int>(l) == link || std::ranges::find(touched, g.parent) != touched.end();
       if (!below) continue;
       touched.push_back(static_cast<int>(l));
       const Body& founder = body(static_cast<std::size_t>(g.founder));
       const LinkPath& parent = tree_.links[static_cast<std::size_t>(g.parent)].path;
-      if (static_cast<int>(l) != link) g.attachment = refit(g.attachment, founder, parent, readings_);
+      if (static_cast<int>(l) != link)
+        g.attachment = refit(g.attachment, founder, parent, readings_);
       tree_.bodies[static_cast<std::size_t>(g.founder)].attachment = g.attachment;
       g.path = path_of(g.attachment, founder, parent, readings_);
     }
@@ -303,12 +337,14 @@ class Grower {
       });
       for (const int l : touched) look_at(b, l);
       if (g.attachment.at_rest() && std::ranges::find(touched, g.link) != touched.end()) {
-        g.attachment = refit(g.attachment, body(b), tree_.links[static_cast<std::size_t>(g.link)].path, readings_);
+        g.attachment = refit(g.attachment, body(b),
+                             tree_.links[static_cast<std::size_t>(g.link)].path, readings_);
       }
     }
   }
 
-  // Puts parents before children again after `moved` changed its parent; `moved` follows its new number.
+  // Puts parents before children again after `moved` changed its parent; `moved` follows its new
+  // number.
   void sort_links(int& moved) {
     std::vector<int> renamed(tree_.links.size(), -1);
     std::vector<GrownLink> sorted;
@@ -317,7 +353,8 @@ class Grower {
     for (bool again = true; again;) {
       again = false;
       for (std::size_t l = 1; l < tree_.links.size(); ++l) {
-        if (renamed[l] >= 0 || renamed[static_cast<std::size_t>(tree_.links[l].parent)] < 0) continue;
+        if (renamed[l] >= 0 || renamed[static_cast<std::size_t>(tree_.links[l].parent)] < 0)
+          continue;
         renamed[l] = static_cast<int>(sorted.size());
         sorted.push_back(std::move(tree_.links[l]));
         sorted.back().parent = renamed[static_cast<std::size_t>(sorted.back().parent)];
@@ -334,8 +371,9 @@ class Grower {
     moved = renamed[static_cast<std::size_t>(moved)];
   }
 
-  // Every channel is the main one of one joint: coupled joints take another of theirs where that helps; of
-  // two joints that still share one, the one that loses least takes its next best explanation.
+  // Every channel is the main one of one joint: coupled joints take another of theirs where that
+  // helps; of two joints that still share one, the one that loses least takes its next best
+  // explanation.
   bool settle_channels() {
     deal_main_channels();
     bool changed = false;
@@ -349,11 +387,13 @@ class Grower {
     return changed;
   }
 
-  // Largest matching of joints and channels they depend on (Kuhn's augmenting paths), stronger terms first.
+  // Largest matching of joints and channels they depend on (Kuhn's augmenting paths), stronger
+  // terms first.
   void deal_main_channels() {
     std::vector<std::size_t> single;
     for (std::size_t l = 1; l < tree_.links.size(); ++l) {
-      if (tree_.links[l].attachment.driven() && tree_.links[l].attachment.fit.model.joints.size() == 1) {
+      if (tree_.links[l].attachment.driven() &&
+          tree_.links[l].attachment.fit.model.joints.size() == 1) {
         single.push_back(l);
       }
     }
@@ -392,7 +432,8 @@ class Grower {
       auto& sigma = tree_.links[link].attachment.fit.scale_sigma;
       std::swap(sigma[0], sigma[t]);
     }
-    tree_.bodies[static_cast<std::size_t>(tree_.links[link].founder)].attachment = tree_.links[link].attachment;
+    tree_.bodies[static_cast<std::size_t>(tree_.links[link].founder)].attachment =
+        tree_.links[link].attachment;
   }
 
   bool resolve(std::size_t l, std::size_t m, int channel) {

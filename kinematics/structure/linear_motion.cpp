@@ -77,11 +77,10 @@ double split_cost(double along_sum, double across_sum, int samples) {
 }
 
 double free_motion_cost(const LinearMotion& linear) {
-  const Matrix6d covariance = linear.y * linear.y.transpose() / std::max(1, linear.count);
-  const Matrix6d ratio = Matrix6d::Identity() + covariance;
-  const Eigen::LLT<Matrix6d> factor(ratio);
-  const double log_det = 2.0 * Matrix6d(factor.matrixL()).diagonal().array().log().sum();
-  return linear.count * (6.0 + log_det);
+  const auto n = static_cast<double>(linear.y.cols());
+  const Matrix6d covariance = linear.y * linear.y.transpose() / n;
+  const Eigen::LLT<Matrix6d> factor(Matrix6d::Identity() + covariance);
+  return n * (6.0 + 2.0 * Matrix6d(factor.matrixL()).diagonal().array().log().sum());
 }
 
 }  // namespace kinescope::structure_search

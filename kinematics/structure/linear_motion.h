@@ -12,17 +12,18 @@ namespace kinescope::structure_search {
 /// y(t) = log(mean^-1 T(t)), whitened with one average matrix.
 struct LinearMotion {
   Pose mean;
-  Matrix6d whitening;         ///< average; upper triangular
-  Eigen::MatrixXd y;          ///< 6 x samples, whitened, centred over the kept samples
-  Eigen::VectorXd weight;     ///< of each sample: its information over the average one
-  std::vector<char> kept;     ///< samples that are no outliers
-  int count = 0;              ///< kept ones
-  double widest = 0.0;        ///< largest rotation from the mean, rad
+  Matrix6d whitening;      ///< average; upper triangular
+  Eigen::MatrixXd y;       ///< 6 x samples, whitened, centred over the kept samples
+  Eigen::VectorXd weight;  ///< of each sample: its information over the average one
+  std::vector<char> kept;  ///< samples that are no outliers
+  int count = 0;           ///< kept ones
+  double widest = 0.0;     ///< largest rotation from the mean, rad
 };
 
 [[nodiscard]] LinearMotion linear_motion(const Motion& motion);
 
-/// -2 ln likelihood of residual sums split along (1) and across (5) a direction, noise scale free but >= 1.
+/// -2 ln likelihood of residual sums split along (1) and across (5) a direction, noise scale free
+/// but >= 1.
 [[nodiscard]] double split_cost(double along_sum, double across_sum, int samples);
 
 /// Cost of the same residuals under a free motion with the covariance of y.

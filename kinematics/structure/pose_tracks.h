@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The poses of markers (or of tracked bodies) over time, in the frame of the fixed camera (or tracker).
+// The poses of markers (or of tracked bodies) over time, in the frame of the fixed camera (or
+// tracker).
 #pragma once
 
 #include <optional>
@@ -13,11 +14,11 @@ namespace kinescope {
 
 /// One marker in one frame.
 struct PoseSample {
-  int frame = 0;                                   ///< index into PoseTracks::times_s
-  Pose T_camera_marker;                            ///< the branch that is believed
-  Matrix6d covariance = Matrix6d::Identity();      ///< of a right perturbation; rad, m
-  std::optional<Pose> T_camera_marker_alternative; ///< the other planar branch, where there is one
-  double alternative_cost = 0.0;                   ///< chi-square of the other branch minus this one's
+  int frame = 0;                                    ///< index into PoseTracks::times_s
+  Pose T_camera_marker;                             ///< the branch that is believed
+  Matrix6d covariance = Matrix6d::Identity();       ///< of a right perturbation; rad, m
+  std::optional<Pose> T_camera_marker_alternative;  ///< the other planar branch, where there is one
+  double alternative_cost = 0.0;  ///< chi-square of the other branch minus this one's
 };
 
 struct PoseTrack {
@@ -26,8 +27,8 @@ struct PoseTrack {
 };
 
 struct PoseTracks {
-  std::vector<double> times_s;     ///< of every frame, strictly increasing
-  std::vector<PoseTrack> tracks;   ///< by id
+  std::vector<double> times_s;    ///< of every frame, strictly increasing
+  std::vector<PoseTrack> tracks;  ///< by id
 };
 
 }  // namespace kinescope

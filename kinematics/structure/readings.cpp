@@ -13,11 +13,13 @@ constexpr double kStill = 1e-9;
 
 Eigen::MatrixXd ordered(const Eigen::MatrixXd& values, const std::vector<int>& order) {
   Eigen::MatrixXd out(values.rows(), values.cols());
-  for (std::size_t c = 0; c < order.size(); ++c) out.col(static_cast<Eigen::Index>(c)) = values.col(order[c]);
+  for (std::size_t c = 0; c < order.size(); ++c)
+    out.col(static_cast<Eigen::Index>(c)) = values.col(order[c]);
   return out;
 }
 
-Readings raw_readings(const JointLog& log, const Series& series, double offset_s, double max_gap_s) {
+Readings raw_readings(const JointLog& log, const Series& series, double offset_s,
+                      double max_gap_s) {
   Readings r;
   r.log_channel = channel_order(log);
   const auto n = static_cast<Eigen::Index>(series.size());
@@ -59,7 +61,8 @@ std::vector<int> channel_order(const JointLog& log) {
   return order;
 }
 
-Readings readings_at(const JointLog& log, const Series& series, double time_offset_s, double max_gap_s) {
+Readings readings_at(const JointLog& log, const Series& series, double time_offset_s,
+                     double max_gap_s) {
   Readings r = raw_readings(log, series, time_offset_s, max_gap_s);
   const double count = std::max<double>(1.0, static_cast<double>(std::ranges::count(r.valid, 1)));
   for (Eigen::Index c = 0; c < r.value.cols(); ++c) {
@@ -76,11 +79,12 @@ Readings readings_at(const JointLog& log, const Series& series, double time_offs
   return r;
 }
 
-Readings readings_like(const Readings& other, const JointLog& log, const Series& series, double time_offset_s,
-                       double max_gap_s) {
+Readings readings_like(const Readings& other, const JointLog& log, const Series& series,
+                       double time_offset_s, double max_gap_s) {
   Readings r = raw_readings(log, series, time_offset_s, max_gap_s);
   r.mean = other.mean;
   r.rms = other.rms;
+  r.si_share = other.si_share;
   normalise(r);
   return r;
 }

@@ -37,7 +37,7 @@ double squared_of(const ResidualParts& p, const ResidualScale& s, std::size_t i)
 
 }  // namespace
 
-ResidualScale residual_scale(const ResidualParts& parts) {
+ResidualScale residual_scale(const ResidualParts& parts, double outlier_cost) {
   ResidualScale scale;
   const double dof = parts.split ? 5.0 : 6.0;
   scale.raw_across = trimmed_variance(parts.across, dof, parts.split ? kMedian5 : kMedian6);
@@ -50,7 +50,7 @@ ResidualScale residual_scale(const ResidualParts& parts) {
     scale.along = std::max(1.0, trimmed_variance(squared, 1.0, 0.4549));
   }
   for (std::size_t i = 0; i < parts.across.size(); ++i) {
-    scale.cost += std::min(squared_of(parts, scale, i) + parts.penalty[i], kOutlierCost);
+    scale.cost += std::min(squared_of(parts, scale, i) + parts.penalty[i], outlier_cost);
   }
   scale.cost += samples * (dof * std::log(scale.across) + std::log(scale.along));
   return scale;

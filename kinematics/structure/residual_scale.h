@@ -11,8 +11,8 @@ namespace kinescope::structure_search {
 
 /// Whitened residuals of all samples, split along and across the joint.
 struct ResidualParts {
-  bool split = false;           ///< true: along has 1 degree of freedom, across 5; false: across has 6
-  bool free_axis = false;       ///< the coordinate is fitted to each sample: along is 0
+  bool split = false;      ///< true: along has 1 degree of freedom, across 5; false: across has 6
+  bool free_axis = false;  ///< the coordinate is fitted to each sample: along is 0
   std::vector<double> along;    ///< signed
   std::vector<double> across;   ///< squared length
   std::vector<double> lever;    ///< whitened length of the axis: 1 / sigma of the coordinate
@@ -30,11 +30,14 @@ struct ResidualScale {
 /// A sample costs at most this much: outliers (flips) are as likely as a 1 in 10^6 residual.
 inline constexpr double kOutlierCost = 30.0;
 
-/// Cost = sum_i min(across_i / s2 + along_i^2 / a2 + penalty_i, kOutlierCost) + dof ln s2 + ln a2 per sample.
-[[nodiscard]] ResidualScale residual_scale(const ResidualParts& parts);
+/// Cost = sum_i min(across_i / s2 + along_i^2 / a2 + penalty_i, outlier_cost) + dof ln s2 + ln a2
+/// per sample.
+[[nodiscard]] ResidualScale residual_scale(const ResidualParts& parts,
+                                           double outlier_cost = kOutlierCost);
 
 /// Weight of every sample: 1 near zero, redescending to 0 (Geman and McClure).
-[[nodiscard]] std::vector<double> robust_weights(const ResidualParts& parts, const ResidualScale& scale);
+[[nodiscard]] std::vector<double> robust_weights(const ResidualParts& parts,
+                                                 const ResidualScale& scale);
 
 /// 1 + 2 sum of the autocorrelations until they vanish, mean over the components; at least 1.
 [[nodiscard]] double integrated_autocorrelation(const std::vector<Vector6d>& residuals);

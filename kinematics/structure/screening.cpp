@@ -29,13 +29,15 @@ struct Direction {
   double cost = 0.0;
 };
 
-Direction driven_direction(const Matrix6d& G, const Vector6d& b, double qq, int channel, int samples) {
+Direction driven_direction(const Matrix6d& G, const Vector6d& b, double qq, int channel,
+                           int samples) {
   Direction d;
   d.channel = channel;
   d.slope = b / qq;
   const Vector6d u = b.normalized();
   const double total = u.dot(G * u);
-  d.cost = split_cost(std::max(0.0, total - b.squaredNorm() / qq), std::max(0.0, G.trace() - total), samples);
+  d.cost = split_cost(std::max(0.0, total - b.squaredNorm() / qq), std::max(0.0, G.trace() - total),
+                      samples);
   return d;
 }
 
@@ -45,7 +47,8 @@ Direction principal_direction(const Matrix6d& G, int samples) {
   const double along = eigen.eigenvalues()(5);
   d.slope = eigen.eigenvectors().col(5) * std::sqrt(along / samples);
   const double variance = along / samples;
-  d.cost = split_cost(samples, std::max(0.0, G.trace() - along), samples) + samples * std::log(1.0 + variance);
+  d.cost = split_cost(samples, std::max(0.0, G.trace() - along), samples) +
+           samples * std::log(1.0 + variance);
   return d;
 }
 
@@ -59,14 +62,17 @@ Direction slide_of(const LinearMotion& linear, const Matrix6d& G, const Directio
   const double total = u.dot(G * u);
   // Sum of squares along u after regression on the coordinate, whose slope along u is u . d.slope.
   const double explained = std::pow(u.dot(d.slope), 2) * qq;
-  out.cost = split_cost(std::max(0.0, total - explained), std::max(0.0, G.trace() - total), linear.count);
+  out.cost =
+      split_cost(std::max(0.0, total - explained), std::max(0.0, G.trace() - total), linear.count);
   if (d.channel < 0) out.cost += linear.count * std::log1p(std::pow(u.dot(d.slope), 2));
   return out;
 }
 
-void add_candidate(const LinearMotion& linear, const Direction& d, JointType type, std::vector<Candidate>& out) {
+void add_candidate(const LinearMotion& linear, const Direction& d, JointType type,
+                   std::vector<Candidate>& out) {
   const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
-  const double scale = type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
+  const double scale =
+      type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
   if (!(scale > 1e-12)) return;
   Candidate c;
   c.channel = d.channel;
@@ -89,14 +95,17 @@ void add_candidate(const LinearMotion& linear, const Direction& d, JointType typ
 void add_candidates(const LinearMotion& linear, const Direction& d, const Matrix6d& G, double qq,
                     std::vector<Candidate>& out) {
   const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
-  const Matrix6d covariance = (linear.whitening.transpose() * linear.whitening).inverse() / std::max(1.0, qq);
+  const Matrix6d covariance =
+      (linear.whitening.transpose() * linear.whitening).inverse() / std::max(1.0, qq);
   const double rotation_sigma = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
-  if (twist.head<3>().norm() > kTurnEvidence * rotation_sigma) add_candidate(linear, d, JointType::kRevolute, out);
+  if (twist.head<3>().norm() > kTurnEvidence * rotation_sigma)
+    add_candidate(linear, d, JointType::kRevolute, out);
   add_candidate(linear, slide_of(linear, G, d, qq), JointType::kPrismatic, out);
 }
 
 // Squared residuals of all samples about one direction (none: about the mean).
-std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::MatrixXd& q, const Direction& d) {
+std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::MatrixXd& q,
+                                      const Direction& d) {
   std::vector<double> squared;
   squared.reserve(static_cast<std::size_t>(linear.y.cols()));
   for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
@@ -117,7 +126,8 @@ double rest_cost(const LinearMotion& linear) {
   Vector6d centre;
   for (Eigen::Index c = 0; c < 6; ++c) {
     std::vector<double> values(static_cast<std::size_t>(linear.y.cols()));
-    for (Eigen::Index i = 0; i < linear.y.cols(); ++i) values[static_cast<std::size_t>(i)] = linear.y(c, i);
+    for (Eigen::Index i = 0; i < linear.y.cols(); ++i)
+      values[static_cast<std::size_t>(i)] = linear.y(c, i);
     centre(c) = median_of(std::move(values));
   }
   ResidualParts parts;
@@ -132,14 +142,16 @@ double rest_cost(const LinearMotion& linear) {
 struct Regression {
   std::vector<Direction> driven;  // by cost
   Direction principal;
-  Matrix6d G;                     // sum of y y'
-  Eigen::VectorXd power;          // sum of squares of every channel
+  Matrix6d G;             // sum of y y'
+  Eigen::VectorXd power;  // sum of squares of every channel
 };
 
-// Leaves out the samples that lie far from the direction most samples follow; true when there are any.
+// Leaves out the samples that lie far from the direction most samples follow; true when there are
+// any.
 bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Regression& r) {
   std::vector<Direction> tried{Direction{}, r.principal};
-  for (std::size_t k = 0; k < std::min<std::size_t>(2, r.driven.size()); ++k) tried.push_back(r.driven[k]);
+  for (std::size_t k = 0; k < std::min<std::size_t>(2, r.driven.size()); ++k)
+    tried.push_back(r.driven[k]);
   std::vector<double> best;
   double least = std::numeric_limits<double>::infinity();
   for (const Direction& d : tried) {
@@ -160,9 +172,11 @@ bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Regression& r) {
   return any;
 }
 
-Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q, const std::vector<char>& usable) {
+Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q,
+                   const std::vector<char>& usable) {
   Eigen::VectorXd weight = linear.weight;
-  for (Eigen::Index i = 0; i < weight.size(); ++i) weight(i) *= linear.kept[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < weight.size(); ++i)
+    weight(i) *= linear.kept[static_cast<std::size_t>(i)];
   const double n = std::max(1, linear.count);
   const double total = std::max(1e-12, weight.sum());
   const Vector6d y_mean = linear.y * weight / total;
@@ -213,15 +227,17 @@ ChainJoint joint_from_twist(const Pose& T0, const Vector6d& twist, JointType typ
   return joint;
 }
 
-Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings, const std::vector<char>& usable,
-                        const ScreeningOptions& options) {
+Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
+                        const std::vector<char>& usable, const ScreeningOptions& options) {
   Screening out;
   LinearMotion linear = linear_motion(motion);
   const Eigen::MatrixXd q = readings_of(motion, readings);
   out.free_cost = free_motion_cost(linear);
-  out.mean_length = std::sqrt(linear.y.squaredNorm() / std::max<double>(1.0, static_cast<double>(motion.size())));
+  out.mean_length =
+      std::sqrt(linear.y.squaredNorm() / std::max<double>(1.0, static_cast<double>(motion.size())));
   Regression r = regress(linear, q, usable);
-  for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass) r = regress(linear, q, usable);
+  for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass)
+    r = regress(linear, q, usable);
 
   Candidate rest;
   rest.start.mount = linear.mean;
@@ -236,7 +252,8 @@ Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings, c
   for (std::size_t k = 0; k < channels; ++k) {
     add_candidates(linear, r.driven[k], r.G, r.power(r.driven[k].channel), out.candidates);
   }
-  if (options.coordinate_free) add_candidates(linear, r.principal, r.G, linear.count, out.candidates);
+  if (options.coordinate_free)
+    add_candidates(linear, r.principal, r.G, linear.count, out.candidates);
   std::ranges::stable_sort(out.candidates, {}, &Candidate::cost);
   return out;
 }

@@ -16,15 +16,24 @@ namespace {
 constexpr int kNeighbours = 4;
 // Neighbours further away than this (s) say nothing about a frame.
 constexpr double kNeighbourTime = 0.4;
-// A sighting this many times further from its neighbours than the median one is an outlier (about 9 sigma).
+// A sighting this many times further from its neighbours than the median one is an outlier (about 9
+// sigma).
 constexpr double kOutlierRatio = 4.0;
-// Neighbouring frames belong to one smooth motion when they lie this close, as a multiple of the declared noise.
+// but no nearer than this many declared sigmas: a still stretch must not make a moving one look
+// wild.
+constexpr double kOutlierFloor = 7.0;
+// Declared noise is not believed to be larger than the true one by more than this: what one frame
+// shows against the next lacks every slow error.
+constexpr double kLeastNoiseScale = 0.2;
+// Neighbouring frames belong to one smooth motion when they lie this close, as a multiple of the
+// declared noise.
 constexpr double kSmoothRatio = 12.0;
 // and in rad and m (at 1 m), for recordings with little noise.
 constexpr double kSmoothStep = 0.06;
 // Noise below this is not believed: interpolation of the log alone is worse (rad, m).
 constexpr double kNoiseFloor = 2e-6;
-// Averaging stays within this much motion (rad; m at 1 m), so that the path is straight to its noise.
+// Averaging stays within this much motion (rad; m at 1 m), so that the path is straight to its
+// noise.
 constexpr double kAverageSpan = 0.06;
 
 Matrix6d floored(Matrix6d covariance) {
@@ -32,9 +41,10 @@ Matrix6d floored(Matrix6d covariance) {
   return covariance;
 }
 
-// Median, component by component, of the neighbours' displacement from `pose`; nothing with too few.
-std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<double>& times_s, int f,
-                                         const Pose& pose) {
+// Median, component by component, of the neighbours' displacement from `pose`; nothing with too
+// few.
+std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<double>& times_s,
+                                         int f, const Pose& pose) {
   std::array<std::array<double, 2 * kNeighbours + 1>, 6> parts{};
   std::size_t count = 0;
   const Pose inverse = pose.inverse();
@@ -61,10 +71,10 @@ std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<dou
 }
 
 struct Deviations {
-  std::vector<double> main;         // whitened length of the displacement, one a frame; NaN where unknown
+  std::vector<double> main;  // whitened length of the displacement, one a frame; NaN where unknown
   std::vector<double> alternative;  // of the other branch
   double median = 0.0;
-  double step = 0.0;                // median displacement, rad and m together
+  double step = 0.0;  // median displacement, rad and m together
 };
 
 Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
@@ -102,7 +112,7 @@ void swap_branch(Sighting& s) {
 
 // Takes the branch that agrees with the neighbours; drops the sighting when none does.
 void clean_in_time(Body& body, const Deviations& d) {
-  const double limit = kOutlierRatio * d.median;
+  const double limit = std::max(kOutlierRatio * d.median, kOutlierFloor);
   for (std::size_t f = 0; f < body.at.size(); ++f) {
     if (!body.at[f].seen || std::isnan(d.main[f]) || d.main[f] <= limit) continue;
     if (d.alternative[f] < limit) {
@@ -113,8 +123,9 @@ void clean_in_time(Body& body, const Deviations& d) {
   }
 }
 
-// Robust noise over declared noise from fourth differences of the pose, which see no motion slower than a
-// few hertz: (1, -4, 6, -4, 1) has variance 70 sigma^2. Nothing with too few runs of five frames.
+// Robust noise over declared noise from fourth differences of the pose, which see no motion slower
+// than a few hertz: (1, -4, 6, -4, 1) has variance 70 sigma^2. Nothing with too few runs of five
+// frames.
 std::optional<double> noise_from_differences(const Body& body) {
   std::vector<double> absolute;
   for (std::size_t f = 2; f + 2 < body.at.size(); ++f) {
@@ -215,7 +226,11 @@ double median_of(std::vector<double> values) {
 Matrix6d whitening_of(const Matrix6d& covariance) {
   const Eigen::LLT<Matrix6d> information(covariance.inverse());
   if (information.info() != Eigen::Success) {
-    return covariance.diagonal().cwiseMax(kNoiseFloor * kNoiseFloor).cwiseSqrt().cwiseInverse().asDiagonal();
+    return covariance.diagonal()
+        .cwiseMax(kNoiseFloor * kNoiseFloor)
+        .cwiseSqrt()
+        .cwiseInverse()
+        .asDiagonal();
   }
   return information.matrixU();
 }
@@ -223,7 +238,8 @@ Matrix6d whitening_of(const Matrix6d& covariance) {
 Series clean_series(const PoseTracks& tracks) {
   Series series;
   series.times_s = tracks.times_s;
-  for (std::size_t f = 0; f < tracks.times_s.size(); ++f) series.frames.push_back(static_cast<int>(f));
+  for (std::size_t f = 0; f < tracks.times_s.size(); ++f)
+    series.frames.push_back(static_cast<int>(f));
   for (const PoseTrack& track : tracks.tracks) {
     series.bodies.push_back(body_of(track, tracks.times_s.size()));
   }
@@ -238,7 +254,7 @@ Series clean_series(const PoseTracks& tracks) {
     clean_in_time(body, d);
     clean_in_time(body, deviations_of(body, series.times_s));
     const auto noise = noise_from_differences(body);
-    if (noise) scale_noise(body, std::max(*noise, 1e-6));
+    if (noise) scale_noise(body, std::max(*noise, kLeastNoiseScale));
   }
   series.smooth = judged > 0 && 2 * smooth > judged;
   count_seen(series);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   PoseTracks. Gives Series: the same sightings cleaned in time, with the noise they really have, at
-// no more instants than the search needs. Flips that stand alone in time are swapped for their other branch
-// or dropped; neighbouring frames are averaged symmetrically about the instant, so that its time stays exact.
+// Takes   PoseTracks. Gives Series: the same sightings cleaned in time, with the noise they really
+// have, at no more instants than the search needs. Flips that stand alone in time are swapped for
+// their other branch or dropped; neighbouring frames are averaged symmetrically about the instant,
+// so that its time stays exact.
 #pragma once
 
 #include <optional>
@@ -17,26 +18,27 @@ namespace kinescope::structure_search {
 /// One marker at one instant.
 struct Sighting {
   bool seen = false;
-  Pose pose;                                 ///< in the camera's frame
-  Matrix6d covariance = Matrix6d::Zero();    ///< right perturbation
-  Matrix6d whitening = Matrix6d::Identity(); ///< W with W' W = covariance^-1, upper triangular
+  Pose pose;                                  ///< in the camera's frame
+  Matrix6d covariance = Matrix6d::Zero();     ///< right perturbation
+  Matrix6d whitening = Matrix6d::Identity();  ///< W with W' W = covariance^-1, upper triangular
   std::optional<Pose> alternative;
   double alternative_cost = 0.0;
 };
 
 struct Body {
   TagId id;
-  std::vector<Sighting> at;    ///< one an instant
-  double noise_scale = 1.0;    ///< noise found over noise declared; already in the covariances
-  int seen = 0;                ///< instants with a sighting
+  std::vector<Sighting> at;  ///< one an instant
+  double noise_scale = 1.0;  ///< noise found over noise declared; already in the covariances
+  int seen = 0;              ///< instants with a sighting
 };
 
 struct Series {
-  std::vector<double> times_s;   ///< of the instants
-  std::vector<int> frames;       ///< frame of each instant
-  int half_width = 0;            ///< frames averaged on either side
-  bool smooth = false;           ///< neighbouring frames see nearly the same posture (a video, not a list of stops)
-  std::vector<Body> bodies;      ///< by id
+  std::vector<double> times_s;  ///< of the instants
+  std::vector<int> frames;      ///< frame of each instant
+  int half_width = 0;           ///< frames averaged on either side
+  bool smooth =
+      false;  ///< neighbouring frames see nearly the same posture (a video, not a list of stops)
+  std::vector<Body> bodies;  ///< by id
 
   [[nodiscard]] int size() const { return static_cast<int>(times_s.size()); }
 };

@@ -16,14 +16,20 @@ constexpr std::size_t kMostJoints = 8;
 constexpr std::size_t kExhaustive = 4;
 // Samples used while orders are compared.
 constexpr std::size_t kMostSamples = 120;
-// -2 ln likelihood by which another order has to be better than one nearer to the log's (odds of 1 to 100).
+// -2 ln likelihood by which another order has to be better than one nearer to the log's (odds of 1
+// to 100).
 constexpr double kClearly = 9.2;
 // Standard deviations of a regression coefficient below which a channel does not matter.
 constexpr double kSignificant = 6.0;
+// Most that one sample may cost here: few postures may be all that shows a joint.
+constexpr double kOutlier = 120.0;
 // A coupling has to gain this much (-2 ln likelihood).
 constexpr double kCouplingGain = 25.0;
-// Variance over the declared one up to which a chain needs no coupling.
-constexpr double kGood = 1.5;
+// Cost a sample (6 expected) up to which a chain is good as it is. Not the variance alone: a joint
+// swept by itself that does not fit looks like a few outliers.
+constexpr double kGood = 7.5;
+
+bool is_good(const ChainFit& fit) { return fit.cost < kGood * fit.samples; }
 
 // The part of the problem that does not change with the order of the joints.
 struct Problem {
@@ -33,25 +39,27 @@ struct Problem {
   Pose T0;                       // child there
   std::vector<int> channels;     // that matter, in the log's order
   std::vector<Vector6d> twists;  // body twist of each at T0, per unit reading
+  std::vector<double> rms;       // of the channels, in their own units
+  double residual = 0.0;  // whitened variance that the linear model leaves near the reference
 };
 
-std::size_t central_sample(const Motion& motion, const Eigen::MatrixXd& readings, const std::vector<int>& channels) {
-  std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();
+// The sample with the smallest sum of distances to all others (the home posture when joints move
+// one by one); with `skip` > 0 the next ones that are a fair way off.
+std::size_t central_sample(const Motion& motion, const Eigen::MatrixXd& readings,
+                           const std::vector<int>& channels, int skip) {
+  std::vector<std::pair<double, std::size_t>> sums;
   for (std::size_t i = 0; i < motion.size(); ++i) {
-    // Sum of distances to all others: the medoid, which is the home posture when joints move one by one.
     double sum = 0.0;
     for (const MotionSample& other : motion) {
       double d = 0.0;
-      for (const int c : channels) d += std::pow(readings(motion[i].instant, c) - readings(other.instant, c), 2);
+      for (const int c : channels)
+        d += std::pow(readings(motion[i].instant, c) - readings(other.instant, c), 2);
       sum += std::sqrt(d);
     }
-    if (sum < least - 1e-12) {
-      least = sum;
-      best = i;
-    }
+    sums.emplace_back(sum, i);
   }
-  return best;
+  std::ranges::stable_sort(sums);
+  return sums[std::min(sums.size() - 1, static_cast<std::size_t>(skip) * sums.size() / 8)].second;
 }
 
 std::vector<std::size_t> nearest_first(const Problem& p, const std::vector<int>& channels) {
@@ -71,7 +79,7 @@ std::vector<std::size_t> nearest_first(const Problem& p, const std::vector<int>&
 void regress_twists(Problem& p, const std::vector<int>& channels) {
   const auto order = nearest_first(p, channels);
   const auto K = static_cast<Eigen::Index>(channels.size());
-  const std::size_t wanted = std::max<std::size_t>(4 * channels.size() + 6, order.size() / 3);
+  const std::size_t wanted = std::max<std::size_t>(2 * channels.size() + 4, order.size() / 3);
   const std::size_t count = std::min(order.size(), wanted);
   Eigen::MatrixXd A(static_cast<Eigen::Index>(count), K + 1);
   Eigen::MatrixXd Y(static_cast<Eigen::Index>(count), 6);
@@ -80,7 +88,8 @@ void regress_twists(Problem& p, const std::vector<int>& channels) {
     const MotionSample& s = p.motion[order[i]];
     const auto row = static_cast<Eigen::Index>(i);
     A(row, K) = 1.0;
-    for (Eigen::Index k = 0; k < K; ++k) A(row, k) = p.readings(s.instant, channels[static_cast<std::size_t>(k)]);
+    for (Eigen::Index k = 0; k < K; ++k)
+      A(row, k) = p.readings(s.instant, channels[static_cast<std::size_t>(k)]);
     Y.row(row) = fast_log(inverse * s.pose).transpose();
   }
   Eigen::MatrixXd H = A.transpose() * A;
@@ -90,10 +99,14 @@ void regress_twists(Problem& p, const std::vector<int>& channels) {
   const Eigen::MatrixXd residual = Y - A * X;
   const double dof = std::max(1.0, static_cast<double>(count) - static_cast<double>(K) - 1.0);
   const Eigen::VectorXd variance = residual.colwise().squaredNorm().transpose() / dof;
+  const Matrix6d W = p.motion[order.front()].whitening;
+  p.residual = (residual * W.transpose()).squaredNorm() / (6.0 * dof);
   for (Eigen::Index k = 0; k < K; ++k) {
     double strongest = 0.0;
     for (Eigen::Index c = 0; c < 6; ++c) {
-      strongest = std::max(strongest, std::abs(X(k, c)) / std::sqrt(std::max(1e-300, variance(c) * covariance(k, k))));
+      strongest =
+          std::max(strongest,
+                   std::abs(X(k, c)) / std::sqrt(std::max(1e-300, variance(c) * covariance(k, k))));
     }
     if (strongest < kSignificant) continue;
     p.channels.push_back(channels[static_cast<std::size_t>(k)]);
@@ -103,13 +116,15 @@ void regress_twists(Problem& p, const std::vector<int>& channels) {
 
 JointType type_of(const Vector6d& twist) {
   constexpr double kFarthest = 8.0;  // m: no joint turns about an axis further away
-  return twist.tail<3>().norm() > kFarthest * twist.head<3>().norm() ? JointType::kPrismatic : JointType::kRevolute;
+  return twist.tail<3>().norm() > kFarthest * twist.head<3>().norm() ? JointType::kPrismatic
+                                                                     : JointType::kRevolute;
 }
 
 ChainJoint joint_of(const Problem& p, std::size_t k, const Vector6d& twist) {
   const JointType type = type_of(twist);
   ChainJoint joint = joint_from_twist(p.T0, twist, type);
-  const double scale = type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
+  const double scale =
+      type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
   joint.terms = {{p.channels[k], scale}};
   return joint;
 }
@@ -121,21 +136,30 @@ ChainModel start_model(const Problem& p, const std::vector<std::size_t>& order) 
   return model;
 }
 
-// From the postures near the reference outwards, so that the start need only be right near it.
+// From the postures near the reference outwards, so that the start need only be right near it; and
+// all at once, which wins where the start is good.
 ChainFit fit_outwards(const Problem& p, ChainModel model, std::size_t most_samples) {
   const auto order = nearest_first(p, p.channels);
   const std::size_t stride = std::max<std::size_t>(1, order.size() / most_samples);
+  ChainFit at_once;
   ChainFit fit;
-  for (const double share : {0.35, 0.65, 1.0}) {
+  for (const double share : {1.0, 0.35, 0.65, 1.0}) {
     Motion part;
     const auto count = static_cast<std::size_t>(share * static_cast<double>(order.size()));
     for (std::size_t i = 0; i < count; i += stride) part.push_back(p.motion[order[i]]);
     if (part.size() < 2 * p.channels.size() + 4 && share < 1.0) continue;
     std::ranges::sort(part, {}, &MotionSample::instant);
-    fit = fit_chain(part, p.readings, std::move(model), {.max_iterations = share < 1.0 ? 8 : 25});
-    model = fit.model;
+    const bool first = at_once.samples == 0;
+    fit = fit_chain(part, p.readings, model,
+                    {.max_iterations = share < 1.0 ? 8 : 25, .outlier_cost = kOutlier});
+    if (first) {
+      at_once = fit;
+      if (is_good(fit)) return fit;
+    } else {
+      model = fit.model;
+    }
   }
-  return fit;
+  return fit.cost < at_once.cost ? fit : at_once;
 }
 
 struct Ordered {
@@ -181,7 +205,8 @@ Ordered best_order(const Problem& p) {
   return best;
 }
 
-// All couplings (joint a also moved by the channel of joint b), each tried at a ratio of -1, 0 and 1.
+// All couplings (joint a also moved by the channel of joint b), each tried at a ratio of -1, 0
+// and 1.
 ChainFit best_coupling(const Problem& p, const Ordered& now) {
   ChainFit best = now.fit;
   for (std::size_t a = 0; a < now.order.size(); ++a) {
@@ -197,11 +222,13 @@ ChainFit best_coupling(const Problem& p, const Ordered& now) {
         if (present) continue;
         if (ratio != 0.0) {
           model = start_model(p, now.order);
-          const double step = ratio * model.joints[b].terms.front().scale / model.joints[a].terms.front().scale;
+          const double step = ratio * p.rms[static_cast<std::size_t>(p.channels[kb])] /
+                              p.rms[static_cast<std::size_t>(p.channels[ka])];
           const Vector6d left = p.twists[kb] - step * p.twists[ka];
           if (left.norm() < 1e-9) continue;
           model.joints[b] = joint_of(p, kb, left);
-          model.joints[a].terms.push_back({p.channels[kb], step * model.joints[a].terms.front().scale});
+          model.joints[a].terms.push_back(
+              {p.channels[kb], step * model.joints[a].terms.front().scale});
         } else {
           joint.terms.push_back({p.channels[kb], 0.0});
         }
@@ -213,7 +240,8 @@ ChainFit best_coupling(const Problem& p, const Ordered& now) {
   return best;
 }
 
-// Readings count from their mean again: the chain at the reference posture goes into frames and mount.
+// Readings count from their mean again: the chain at the reference posture goes into frames and
+// mount.
 ChainModel recentred(const ChainModel& model, const Eigen::VectorXd& reference) {
   ChainModel out = model;
   Pose shift;
@@ -240,7 +268,8 @@ ChainModel swapped(const ChainModel& model, std::size_t k) {
 std::vector<OrderDoubt> order_doubts(const Problem& p, const ChainFit& fit) {
   std::vector<OrderDoubt> doubts;
   for (std::size_t k = 0; k + 1 < fit.model.joints.size(); ++k) {
-    const ChainFit other = fit_chain(p.motion, p.readings, swapped(fit.model, k), {.max_iterations = 25});
+    const ChainFit other = fit_chain(p.motion, p.readings, swapped(fit.model, k),
+                                     {.max_iterations = 25, .outlier_cost = kOutlier});
     const double loss = other.cost - fit.cost;
     if (loss > 40.0) continue;
     doubts.push_back({fit.model.joints[k].terms.front().channel,
@@ -249,17 +278,38 @@ std::vector<OrderDoubt> order_doubts(const Problem& p, const ChainFit& fit) {
   return doubts;
 }
 
+// Takes out joints whose loss costs less than they are worth.
+ChainFit pruned(const Problem& p, ChainFit fit) {
+  constexpr double kWorth =
+      40.0;  // -2 ln likelihood, for five parameters and the choice of a channel
+  for (std::size_t k = 0; k < fit.model.joints.size() && fit.model.joints.size() > 1;) {
+    ChainModel model = fit.model;
+    model.joints.erase(model.joints.begin() + static_cast<std::ptrdiff_t>(k));
+    ChainFit without = fit_chain(p.motion, p.readings, std::move(model),
+                                 {.max_iterations = 15, .outlier_cost = kOutlier});
+    if (without.cost - fit.cost < kWorth) {
+      fit = std::move(without);
+      k = 0;
+    } else {
+      ++k;
+    }
+  }
+  return fit;
+}
+
 std::optional<Problem> make_problem(const RelativeMotion& relative, const Readings& readings,
-                                    const std::vector<char>& unused) {
+                                    const std::vector<char>& unused, int skip) {
   std::vector<int> channels;
   for (int c = 0; c < readings.channels(); ++c) {
     if (unused[static_cast<std::size_t>(c)] != 0) channels.push_back(c);
   }
-  std::ranges::sort(channels, {}, [&](int c) { return readings.log_channel[static_cast<std::size_t>(c)]; });
+  std::ranges::sort(channels, {},
+                    [&](int c) { return readings.log_channel[static_cast<std::size_t>(c)]; });
   if (channels.size() < 2 || relative.motion.size() < 4 * channels.size()) return std::nullopt;
   Problem p;
+  p.rms = readings.rms;
   p.motion = relative.motion;
-  const MotionSample& centre = p.motion[central_sample(p.motion, readings.value, channels)];
+  const MotionSample& centre = p.motion[central_sample(p.motion, readings.value, channels, skip)];
   p.reference = readings.value.row(centre.instant).transpose();
   p.readings = readings.value.rowwise() - p.reference.transpose();
   p.T0 = centre.pose;
@@ -270,23 +320,39 @@ std::optional<Problem> make_problem(const RelativeMotion& relative, const Readin
 
 }  // namespace
 
+SerialOutlook serial_outlook(const Body& body, const LinkPath& path, const Readings& readings,
+                             const std::vector<char>& unused) {
+  const auto p = make_problem(relative_motion(body, path, readings), readings, unused, 0);
+  if (!p) return {};
+  return {static_cast<int>(p->channels.size()), p->residual};
+}
+
 std::optional<Attachment> find_serial_attachment(const Body& body, int parent, const LinkPath& path,
-                                                 const Readings& readings, const std::vector<char>& unused) {
+                                                 const Readings& readings,
+                                                 const std::vector<char>& unused) {
+  constexpr int kReferences = 4;
   const RelativeMotion relative = relative_motion(body, path, readings);
-  const auto p = make_problem(relative, readings, unused);
-  if (!p) return std::nullopt;
-  Ordered best = best_order(*p);
-  for (std::size_t n = 0; n < p->channels.size() && best.fit.variance > kGood; ++n) {
-    ChainFit coupled = best_coupling(*p, best);
-    if (best.fit.cost - coupled.cost < kCouplingGain) break;
-    best.fit = std::move(coupled);
+  std::optional<Attachment> best;
+  for (int skip = 0; skip < kReferences; ++skip) {
+    const auto p = make_problem(relative, readings, unused, skip);
+    if (!p) continue;
+    Ordered ordered = best_order(*p);
+    for (std::size_t n = 0; n < p->channels.size() && !is_good(ordered.fit); ++n) {
+      ChainFit coupled = best_coupling(*p, ordered);
+      if (ordered.fit.cost - coupled.cost < kCouplingGain) break;
+      ordered.fit = std::move(coupled);
+    }
+    ChainFit fit = pruned(*p, fit_chain(p->motion, p->readings, ordered.fit.model,
+                                        {.max_iterations = 25, .outlier_cost = kOutlier}));
+    if (fit.model.joints.size() < 2) continue;
+    if (best && best->data_cost <= fit.cost) continue;
+    std::vector<OrderDoubt> doubts = order_doubts(*p, fit);
+    fit.model = recentred(fit.model, p->reference);
+    best = attachment_from(std::move(fit), parent, relative, body, readings);
+    best->order_doubts = std::move(doubts);
+    if (is_good(best->fit)) break;
   }
-  ChainFit fit = fit_chain(p->motion, p->readings, best.fit.model, {.max_iterations = 25});
-  std::vector<OrderDoubt> doubts = order_doubts(*p, fit);
-  fit.model = recentred(fit.model, p->reference);
-  Attachment a = attachment_from(std::move(fit), parent, relative, body, readings);
-  a.order_doubts = std::move(doubts);
-  return a;
+  return best;
 }
 
 }  // namespace kinescope::structure_search

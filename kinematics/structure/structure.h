@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   PoseTracks (marker poses over time) and, where there is one, a JointLog.
-// Gives   Structure: which marker is on which link, what joins what, joint types, driving channels with
+// Gives   Structure: which marker is on which link, what joins what, joint types, driving channels
+// with
 //         sign and scale, a start for the calibration, and how probable that answer is.
 // Frames  link 0 holds the camera (or tracker) and every marker that never moves against it.
-// Method  Dalla Libera et al. 2019, 2021 in the rigid-body form: relative motion of every pair of bodies
-//         as rest, turn or slide along one coordinate; that coordinate regressed on all channels; the most
-//         probable spanning tree.
+// Method  Dalla Libera et al. 2019, 2021 in the rigid-body form: relative motion of every pair of
+// bodies
+//         as rest, turn or slide along one coordinate; that coordinate regressed on all channels;
+//         the most probable spanning tree.
 // Not here: images, corners, refinement (calib/bundle).
 #pragma once
 
@@ -22,8 +24,8 @@ namespace kinescope {
 
 /// One term of what drives a joint: value = sum over terms of scale * reading + offset.
 struct ChannelTerm {
-  int channel = -1;      ///< index into JointLog::channels
-  double scale = 1.0;    ///< rad or m per unit of the channel
+  int channel = -1;    ///< index into JointLog::channels
+  double scale = 1.0;  ///< rad or m per unit of the channel
   double scale_sigma = 0.0;
 };
 
@@ -32,21 +34,21 @@ struct StructureJoint {
   JointType type = JointType::kRevolute;
   int parent_link = 0;
   int child_link = 0;
-  std::optional<ChannelTerm> channel;   ///< the main channel; none when no log drives it
-  std::vector<ChannelTerm> couplings;   ///< further channels that also move it
-  Pose T_parent_joint;                  ///< parent's reference marker (camera for link 0) to the joint; z = axis
-  Pose T_joint_child;                   ///< joint (at value 0) to the child's reference marker
-  double offset = 0.0;                  ///< value = scale * reading + offset, rad or m
-  double travel = 0.0;                  ///< range of the value seen, rad or m
-  double rotation_rms_rad = 0.0;        ///< what the joint leaves of the relative motion
+  std::optional<ChannelTerm> channel;  ///< the main channel; none when no log drives it
+  std::vector<ChannelTerm> couplings;  ///< further channels that also move it
+  Pose T_parent_joint;  ///< parent's reference marker (camera for link 0) to the joint; z = axis
+  Pose T_joint_child;   ///< joint (at value 0) to the child's reference marker
+  double offset = 0.0;  ///< value = scale * reading + offset, rad or m
+  double travel = 0.0;  ///< range of the value seen, rad or m
+  double rotation_rms_rad = 0.0;  ///< what the joint leaves of the relative motion
   double translation_rms_m = 0.0;
-  double log_odds = 0.0;                ///< ln of the odds of this joint's hypothesis against its runner-up
-  std::string runner_up;                ///< the next best hypothesis for this joint, in words
+  double log_odds = 0.0;  ///< ln of the odds of this joint's hypothesis against its runner-up
+  std::string runner_up;  ///< the next best hypothesis for this joint, in words
 };
 
 /// A rigid body of the structure.
 struct StructureLink {
-  std::vector<TagId> markers;            ///< by id; the first is the reference (for link 0: the camera is)
+  std::vector<TagId> markers;  ///< by id; the first is the reference (for link 0: the camera is)
   std::vector<Pose> T_reference_marker;  ///< of each marker, in the reference's frame
 };
 
@@ -61,7 +63,8 @@ struct StructureDoubt {
 
 struct Structure {
   StructureStatus status = StructureStatus::kNotRun;
-  std::vector<StructureLink> links;    ///< links[0]: at rest in the camera's frame; may hold no marker
+  std::vector<StructureLink>
+      links;  ///< links[0]: at rest in the camera's frame; may hold no marker
   std::vector<StructureJoint> joints;  ///< parents stand before children
   std::vector<TagId> free_markers;     ///< markers that move with no joint we know (free bodies)
   std::vector<int> idle_channels;      ///< channels that drive nothing
@@ -71,25 +74,25 @@ struct Structure {
   double time_offset_s = 0.0;          ///< joint-log time = frame time + offset, from the scan
   double time_offset_sigma_s = 0.0;
   std::vector<StructureDoubt> doubts;
-  /// Without a log (or for joints that no channel drives): value of each joint in each frame, frames x
-  /// joints; NaN where unknown or driven by a channel.
+  /// Without a log (or for joints that no channel drives): value of each joint in each frame,
+  /// frames x joints; NaN where unknown or driven by a channel.
   Eigen::MatrixXd joint_values;
 };
 
 struct StructureOptions {
-  double max_time_offset_s = 1.0;   ///< half width of the scan for the time offset
-  double min_log_odds = 4.6;        ///< below this (1:100) an answer is called ambiguous
-  double max_gap_s = 0.5;           ///< gaps of the log longer than this are not bridged
-  bool scan_time_offset = true;     ///< off for postures measured at rest
+  double max_time_offset_s = 1.0;  ///< half width of the scan for the time offset
+  double min_log_odds = 4.6;       ///< below this (1:100) an answer is called ambiguous
+  double max_gap_s = 0.5;          ///< gaps of the log longer than this are not bridged
+  bool scan_time_offset = true;    ///< off for postures measured at rest
 };
 
-/// Cost O(bodies^2 * channels * frames). Deterministic; independent of the order of markers and channels
-/// but for their numbering in the result.
+/// Cost O(bodies^2 * channels * frames). Deterministic; independent of the order of markers and
+/// channels but for their numbering in the result.
 [[nodiscard]] Structure find_structure(const PoseTracks& tracks, const JointLog& log,
                                        const StructureOptions& options = {});
 
-/// The found structure as a tree with SI joint values: joints named after their channels (or joint<k>), links
-/// link<k>, root "base" = the frame of the camera.
+/// The found structure as a tree with SI joint values: joints named after their channels (or
+/// joint<k>), links link<k>, root "base" = the frame of the camera.
 [[nodiscard]] KinematicTree structure_tree(const Structure& structure, const JointLog& log);
 
 }  // namespace kinescope

@@ -45,7 +45,8 @@ KinematicTree structure_tree(const Structure& structure, const JointLog& log) {
   for (std::size_t l = 0; l < structure.links.size(); ++l) {
     tree.links.push_back({l == 0 ? std::string("base") : fmt::format("link{}", l)});
   }
-  // The reference marker of every link (the camera for link 0) in the link's frame, its joint's frame.
+  // The reference marker of every link (the camera for link 0) in the link's frame, its joint's
+  // frame.
   std::vector<Pose> T_link_reference(structure.links.size());
   for (const StructureJoint& joint : structure.joints) {
     T_link_reference[static_cast<std::size_t>(joint.child_link)] = joint.T_joint_child;
@@ -57,7 +58,8 @@ KinematicTree structure_tree(const Structure& structure, const JointLog& log) {
     out.type = joint.type;
     out.parent = LinkId{joint.parent_link};
     out.child = LinkId{joint.child_link};
-    out.T_parent_joint = T_link_reference[static_cast<std::size_t>(joint.parent_link)] * joint.T_parent_joint;
+    out.T_parent_joint =
+        T_link_reference[static_cast<std::size_t>(joint.parent_link)] * joint.T_parent_joint;
     out.offset = joint.offset;
     if (!joint.channel) continue;
     out.channel = log.channels[static_cast<std::size_t>(joint.channel->channel)];
@@ -66,8 +68,8 @@ KinematicTree structure_tree(const Structure& structure, const JointLog& log) {
   for (std::size_t l = 0; l < structure.links.size(); ++l) {
     const StructureLink& link = structure.links[l];
     for (std::size_t m = 0; m < link.markers.size(); ++m) {
-      tree.markers.push_back(
-          {link.markers[m], LinkId{static_cast<int>(l)}, T_link_reference[l] * link.T_reference_marker[m], 0.0});
+      tree.markers.push_back({link.markers[m], LinkId{static_cast<int>(l)},
+                              T_link_reference[l] * link.T_reference_marker[m], 0.0});
     }
   }
   return tree;

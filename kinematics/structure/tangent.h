@@ -9,9 +9,10 @@
 
 namespace kinescope::structure_search {
 
-/// Translation part of the logarithm for a known rotation vector (any length but multiples of 2 pi):
-/// V^-1 p = p - w x p / 2 + c w x (w x p). Barfoot 2017, eq. 7.80 and 7.86.
-[[nodiscard]] inline Eigen::Vector3d log_translation(const Eigen::Vector3d& w, const Eigen::Vector3d& p) {
+/// Translation part of the logarithm for a known rotation vector (any length but multiples of 2
+/// pi): V^-1 p = p - w x p / 2 + c w x (w x p). Barfoot 2017, eq. 7.80 and 7.86.
+[[nodiscard]] inline Eigen::Vector3d log_translation(const Eigen::Vector3d& w,
+                                                     const Eigen::Vector3d& p) {
   const double squared = w.squaredNorm();
   double c = 1.0 / 12.0 + squared / 720.0;
   if (squared > 1e-4) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The scan for the offset between the frames' clock and the log's. For a pair of neighbouring bodies the
-// logarithm of their relative pose is linear in one channel (few, when coupled) at the right offset and at
-// no other, so the offset is where the bodies' best regressions are best together.
+// The scan for the offset between the frames' clock and the log's. For a pair of neighbouring
+// bodies the logarithm of their relative pose is linear in one channel (few, when coupled) at the
+// right offset and at no other, so the offset is where the bodies' best regressions are best
+// together.
 #include <algorithm>
 #include <cmath>
 
@@ -14,14 +15,14 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr double kCoarsestStep = 0.1;   // s
-constexpr double kFinestStep = 0.02;    // s
+constexpr double kCoarsestStep = 0.1;  // s
+constexpr double kFinestStep = 0.02;   // s
 constexpr int kMostInstants = 160;
 // How much better (-2 ln likelihood) than no offset the best one has to be.
 constexpr double kClearly = 25.0;
 
 struct Pair {
-  int first = -1;   // body; -1: the camera
+  int first = -1;  // body; -1: the camera
   int second = 0;
   LinearMotion linear;
   std::vector<int> instants;
@@ -38,7 +39,8 @@ Motion pair_motion(const Series& series, int first, int second) {
     sample.pose = child.pose;
     sample.whitening = child.whitening;
     if (first >= 0) {
-      const Sighting& parent = series.bodies[static_cast<std::size_t>(first)].at[static_cast<std::size_t>(i)];
+      const Sighting& parent =
+          series.bodies[static_cast<std::size_t>(first)].at[static_cast<std::size_t>(i)];
       if (!parent.seen) continue;
       sample.pose = parent.pose.inverse() * child.pose;
       const Matrix6d ad = adjoint(sample.pose.inverse());
@@ -103,7 +105,8 @@ double pair_cost(const Pair& pair, const Readings& readings) {
 double total_cost(const std::vector<Pair>& pairs, const Series& series, const Readings& readings) {
   std::vector<double> best(series.bodies.size(), std::nan(""));
   for (const Pair& pair : pairs) {
-    const double cost = pair_cost(pair, readings) * series.bodies[static_cast<std::size_t>(pair.second)].seen;
+    const double cost =
+        pair_cost(pair, readings) * series.bodies[static_cast<std::size_t>(pair.second)].seen;
     double& b = best[static_cast<std::size_t>(pair.second)];
     if (std::isnan(b) || cost < b) b = cost;
   }
@@ -125,7 +128,8 @@ double scan_step(const Readings& readings) {
 
 }  // namespace
 
-double scan_time_offset(const Series& series, const JointLog& log, double half_width_s, double max_gap_s) {
+double scan_time_offset(const Series& series, const JointLog& log, double half_width_s,
+                        double max_gap_s) {
   const Series thin = thinned(series, kMostInstants);
   const std::vector<Pair> pairs = moving_pairs(thin);
   const double step = scan_step(readings_at(log, thin, 0.0, max_gap_s));
@@ -135,7 +139,8 @@ double scan_time_offset(const Series& series, const JointLog& log, double half_w
     cost.push_back(total_cost(pairs, thin, readings_at(log, thin, s * step, max_gap_s)));
   }
   const auto best = static_cast<int>(std::ranges::min_element(cost) - cost.begin());
-  if (cost[static_cast<std::size_t>(best)] > cost[static_cast<std::size_t>(steps)] - kClearly) return 0.0;
+  if (cost[static_cast<std::size_t>(best)] > cost[static_cast<std::size_t>(steps)] - kClearly)
+    return 0.0;
   double shift = 0.0;
   if (best > 0 && best < 2 * steps) {
     const double left = cost[static_cast<std::size_t>(best - 1)];

@@ -25,7 +25,8 @@ std::string channel_words(const JointLog& log, const Readings& readings, int cha
 
 std::string type_words(const Attachment& a) {
   if (a.at_rest()) return "fixed";
-  if (a.fit.model.joints.size() > 1) return fmt::format("{} joints in series", a.fit.model.joints.size());
+  if (a.fit.model.joints.size() > 1)
+    return fmt::format("{} joints in series", a.fit.model.joints.size());
   return a.fit.model.joints.front().type == JointType::kRevolute ? "turning" : "sliding";
 }
 
@@ -55,11 +56,11 @@ bool same_answer(const Attachment& a, const Attachment& b) {
 }
 
 struct Alternative {
-  double loss = kInfinity;   // -2 ln odds against the answer
+  double loss = kInfinity;  // -2 ln odds against the answer
   std::string words;
-  int first_channel = -1;    // the two channels that could be exchanged
+  int first_channel = -1;  // the two channels that could be exchanged
   int second_channel = -1;
-  int link = -1;             // whose joint it is about; -1: of a body at rest
+  int link = -1;  // whose joint it is about; -1: of a body at rest
 };
 
 class Judge {
@@ -84,8 +85,10 @@ class Judge {
     const double now = body.attachment.cost(correlation);
     std::vector<const Attachment*> listed;
     for (const Attachment& a : body.alternatives) {
-      if (same_answer(a, body.attachment) || is_below(tree_, a.parent, static_cast<int>(b))) continue;
-      const bool again = std::ranges::any_of(listed, [&](const Attachment* l) { return same_answer(*l, a); });
+      if (same_answer(a, body.attachment) || is_below(tree_, a.parent, static_cast<int>(b)))
+        continue;
+      const bool again =
+          std::ranges::any_of(listed, [&](const Attachment* l) { return same_answer(*l, a); });
       if (again) continue;
       listed.push_back(&a);
       Alternative alternative;
@@ -98,14 +101,16 @@ class Judge {
     }
     const double free_loss = body.free_cost / correlation - now;
     out.push_back({std::max(0.0, free_loss),
-                   fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1, own_link(b)});
+                   fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1,
+                   own_link(b)});
   }
 
   // What the joint that has the alternative's channel now would lose by giving it up.
   double exchange_loss(std::size_t b, const Attachment& a) const {
     if (!a.driven()) return 0.0;
     for (const GrownLink& link : tree_.links) {
-      if (link.founder < 0 || link.founder == static_cast<int>(b) || link.attachment.channel() != a.channel()) {
+      if (link.founder < 0 || link.founder == static_cast<int>(b) ||
+          link.attachment.channel() != a.channel()) {
         continue;
       }
       const GrownBody& other = tree_.bodies[static_cast<std::size_t>(link.founder)];
@@ -126,7 +131,8 @@ class Judge {
     for (const OrderDoubt& d : body.attachment.order_doubts) {
       out.push_back({d.loss / body.attachment.fit.correlation,
                      fmt::format("the joints of {} and {} in the other order",
-                                 channel_words(log_, readings_, d.first), channel_words(log_, readings_, d.second)),
+                                 channel_words(log_, readings_, d.first),
+                                 channel_words(log_, readings_, d.second)),
                      -1, -1, own_link(b)});
     }
   }
@@ -141,8 +147,10 @@ class Judge {
   std::string words(std::size_t b, const Attachment& a) const {
     std::string text = fmt::format("tag {} on {}, {}", series_.bodies[b].id.value,
                                    link_words(tree_, series_, a.parent), type_words(a));
-    if (a.driven()) text += fmt::format(" by channel {}", channel_words(log_, readings_, a.channel()));
-    else if (!a.at_rest()) text += " without a channel";
+    if (a.driven())
+      text += fmt::format(" by channel {}", channel_words(log_, readings_, a.channel()));
+    else if (!a.at_rest())
+      text += " without a channel";
     return text;
   }
 
@@ -155,14 +163,16 @@ class Judge {
 double channel_correlation(const Readings& r, int a, int b) {
   const double aa = r.value.col(a).squaredNorm();
   const double bb = r.value.col(b).squaredNorm();
-  return aa > 0.0 && bb > 0.0 ? std::abs(r.value.col(a).dot(r.value.col(b))) / std::sqrt(aa * bb) : 0.0;
+  return aa > 0.0 && bb > 0.0 ? std::abs(r.value.col(a).dot(r.value.col(b))) / std::sqrt(aa * bb)
+                              : 0.0;
 }
 
 void add_together_doubts(const std::vector<Alternative>& alternatives, const Readings& readings,
                          const JointLog& log, const StructureOptions& options, Verdict& verdict) {
   std::vector<std::pair<int, int>> told;
   for (const Alternative& a : alternatives) {
-    if (a.first_channel < 0 || a.second_channel < 0 || a.loss > 2.0 * options.min_log_odds) continue;
+    if (a.first_channel < 0 || a.second_channel < 0 || a.loss > 2.0 * options.min_log_odds)
+      continue;
     const std::pair<int, int> pair = std::minmax(a.first_channel, a.second_channel);
     if (std::ranges::find(told, pair) != told.end()) continue;
     if (channel_correlation(readings, pair.first, pair.second) < kTogether) continue;
@@ -170,8 +180,11 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
     const std::string first = channel_words(log, readings, pair.first);
     const std::string second = channel_words(log, readings, pair.second);
     verdict.doubts.push_back(
-        {fmt::format("channels {} and {} move together: which of them drives which joint cannot be told", first, second),
-         fmt::format("record again with {} and {} moving at different times or speeds", first, second),
+        {fmt::format(
+             "channels {} and {} move together: which of them drives which joint cannot be told",
+             first, second),
+         fmt::format("record again with {} and {} moving at different times or speeds", first,
+                     second),
          {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
     verdict.status = StructureStatus::kUndetermined;
   }
@@ -193,7 +206,8 @@ double visible_motion(const Series& series) {
   double least = kInfinity;
   for (const Body& body : series.bodies) {
     double sum = 0.0;
-    for (const Sighting& s : body.at) sum += s.seen ? s.covariance.topLeftCorner<3, 3>().trace() / 3.0 : 0.0;
+    for (const Sighting& s : body.at)
+      sum += s.seen ? s.covariance.topLeftCorner<3, 3>().trace() / 3.0 : 0.0;
     if (body.seen > 0) least = std::min(least, std::sqrt(sum / body.seen / body.seen));
   }
   return kVisible * least;
@@ -212,8 +226,8 @@ bool drives_something(const GrownTree& tree, int channel) {
 }
 
 // Channels that hardly move, while there are markers between which their joint could hide.
-void add_still_doubts(const GrownTree& tree, const Series& series, const Readings& readings, const JointLog& log,
-                      Verdict& verdict) {
+void add_still_doubts(const GrownTree& tree, const Series& series, const Readings& readings,
+                      const JointLog& log, Verdict& verdict) {
   std::vector<int> markers(tree.links.size(), 0);
   for (const GrownBody& b : tree.bodies) {
     if (b.link >= 0) ++markers[static_cast<std::size_t>(b.link)];
@@ -243,9 +257,11 @@ void add_order_doubts(const GrownTree& tree, const Readings& readings, const Joi
       const std::string first = channel_words(log, readings, d.first);
       const std::string second = channel_words(log, readings, d.second);
       verdict.doubts.push_back(
-          {fmt::format("the order of the joints of {} and {} is taken from the log: the recording fits either order",
+          {fmt::format("the order of the joints of {} and {} is taken from the log: the recording "
+                       "fits either order",
                        first, second),
-           fmt::format("record postures in which {} and {} are both away from where they rest, or put a marker on "
+           fmt::format("record postures in which {} and {} are both away from where they rest, or "
+                       "put a marker on "
                        "the link between them",
                        first, second),
            {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
@@ -257,12 +273,12 @@ void add_free_doubts(const GrownTree& tree, const Series& series, Verdict& verdi
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     if (tree.bodies[b].link >= 0) continue;
     const std::string name = fmt::format("tag {}", series.bodies[b].id.value);
-    verdict.doubts.push_back(
-        {fmt::format("{} moves, but by no joint that could be found", name),
-         fmt::format("if {} belongs to the robot, check that the log has the channels that move it and that its links "
-                     "carry markers",
-                     name),
-         {fmt::format("tag_{}", series.bodies[b].id.value)}});
+    verdict.doubts.push_back({fmt::format("{} moves, but by no joint that could be found", name),
+                              fmt::format("if {} belongs to the robot, check that the log has the "
+                                          "channels that move it and that its links "
+                                          "carry markers",
+                                          name),
+                              {fmt::format("tag_{}", series.bodies[b].id.value)}});
   }
 }
 
@@ -271,11 +287,12 @@ void add_free_doubts(const GrownTree& tree, const Series& series, Verdict& verdi
 std::string link_words(const GrownTree& tree, const Series& series, int link) {
   if (link == 0) return "the camera's frame";
   const int founder = tree.links[static_cast<std::size_t>(link)].founder;
-  return fmt::format("the link of tag {}", series.bodies[static_cast<std::size_t>(founder)].id.value);
+  return fmt::format("the link of tag {}",
+                     series.bodies[static_cast<std::size_t>(founder)].id.value);
 }
 
-Verdict judge(const GrownTree& tree, const Series& series, const Readings& readings, const JointLog& log,
-              const StructureOptions& options) {
+Verdict judge(const GrownTree& tree, const Series& series, const Readings& readings,
+              const JointLog& log, const StructureOptions& options) {
   Verdict verdict;
   verdict.status = StructureStatus::kDetermined;
   const std::vector<Alternative> all = Judge(tree, series, readings, log).alternatives();
@@ -297,17 +314,21 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   }
   verdict.probability = 1.0 / (1.0 + odds);
   verdict.runner_up_log_odds = 0.5 * least;
-  if (verdict.runner_up_log_odds < options.min_log_odds) verdict.status = StructureStatus::kAmbiguous;
+  if (verdict.runner_up_log_odds < options.min_log_odds)
+    verdict.status = StructureStatus::kAmbiguous;
   add_order_doubts(tree, readings, log, options, verdict);
   add_free_doubts(tree, series, verdict);
   add_together_doubts(all, readings, log, options, verdict);
   add_still_doubts(tree, series, readings, log, verdict);
   if (tree.links.size() < 2) {
     verdict.status = StructureStatus::kUndetermined;
-    verdict.doubts.push_back({"no joint was found", "record the robot while every joint moves, one marker on every link", {}});
+    verdict.doubts.push_back({"no joint was found",
+                              "record the robot while every joint moves, one marker on every link",
+                              {}});
   } else if (verdict.status == StructureStatus::kAmbiguous) {
     verdict.doubts.push_back({fmt::format("it could also be: {}", verdict.runner_up),
-                              "record longer, with larger motions of the joints concerned", {}});
+                              "record longer, with larger motions of the joints concerned",
+                              {}});
   }
   return verdict;
 }

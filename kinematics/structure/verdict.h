@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a grown tree with everything that was looked at beside it.
-// Gives   how probable the whole is, what the next best would be, and what the recording cannot decide.
+// Gives   how probable the whole is, what the next best would be, and what the recording cannot
+// decide.
 #pragma once
 
 #include "kinematics/structure/growth.h"
@@ -13,7 +14,7 @@ struct Verdict {
   double probability = 0.0;
   double runner_up_log_odds = 0.0;
   std::string runner_up;
-  std::vector<double> link_log_odds;        ///< of every link's joint; 0 for the camera's
+  std::vector<double> link_log_odds;  ///< of every link's joint; 0 for the camera's
   std::vector<std::string> link_runner_up;
   std::vector<StructureDoubt> doubts;
   StructureStatus status = StructureStatus::kNotRun;

@@ -14,19 +14,20 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-// The axis all increments between neighbours in `order` share (unit, child frame): their principal direction.
+// The axis all increments between neighbours in `order` share (unit, child frame): their principal
+// direction.
 Eigen::Vector3d shared_axis(const Motion& motion, const std::vector<std::size_t>& order) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 1; i < order.size(); ++i) {
-    const Eigen::Vector3d w =
-        log_rotation(motion[order[i - 1]].pose.rotation.conjugate() * motion[order[i]].pose.rotation);
+    const Eigen::Vector3d w = log_rotation(motion[order[i - 1]].pose.rotation.conjugate() *
+                                           motion[order[i]].pose.rotation);
     sum += w * w.transpose();
   }
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(2);
 }
 
-// Angle about `axis` from the first sample of `order`, unwrapped from neighbour to neighbour. The angle of
-// R about u is 2 atan2(u . vec, w), exact when R turns about u alone.
+// Angle about `axis` from the first sample of `order`, unwrapped from neighbour to neighbour. The
+// angle of R about u is 2 atan2(u . vec, w), exact when R turns about u alone.
 std::vector<double> unwrapped_angles(const Motion& motion, const std::vector<std::size_t>& order,
                                      const Eigen::Vector3d& axis) {
   std::vector<double> angle(motion.size(), 0.0);
@@ -48,7 +49,8 @@ struct Line {
 };
 
 Line line_through(const std::vector<double>& angle, const Eigen::RowVectorXd& q) {
-  const Eigen::Map<const Eigen::RowVectorXd> a(angle.data(), static_cast<Eigen::Index>(angle.size()));
+  const Eigen::Map<const Eigen::RowVectorXd> a(angle.data(),
+                                               static_cast<Eigen::Index>(angle.size()));
   const double q_mean = q.mean();
   const double a_mean = a.mean();
   const double qq = (q.array() - q_mean).square().sum();
@@ -102,8 +104,8 @@ double start_cost(const Motion& motion, const Candidate& c, const Eigen::MatrixX
 }  // namespace
 
 std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::MatrixXd& q,
-                                            const std::vector<char>& usable, const LinearMotion& linear,
-                                            bool coordinate_free) {
+                                            const std::vector<char>& usable,
+                                            const LinearMotion& linear, bool coordinate_free) {
   std::vector<Candidate> out;
   std::vector<std::size_t> order(motion.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -120,7 +122,8 @@ std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::M
   }
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     if (usable[static_cast<std::size_t>(k)] == 0) continue;
-    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return q(k, static_cast<Eigen::Index>(i)); });
+    std::ranges::stable_sort(order, {},
+                             [&](std::size_t i) { return q(k, static_cast<Eigen::Index>(i)); });
     const Eigen::Vector3d axis = shared_axis(motion, order);
     const Line line = line_through(unwrapped_angles(motion, order, axis), q.row(k));
     Candidate c = candidate_from(motion, order.front(), axis);

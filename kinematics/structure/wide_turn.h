@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Turns so wide that the logarithm wraps: rotation vectors unwrapped along the sorted channel, or time.
+// Turns so wide that the logarithm wraps: rotation vectors unwrapped along the sorted channel, or
+// time.
 #pragma once
 
 #include <vector>
@@ -14,8 +15,10 @@ namespace kinescope::structure_search {
 inline constexpr double kWideTurn = 2.3;
 
 /// Starts for a turn by any number of revolutions. `q`: channels x samples.
-[[nodiscard]] std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::MatrixXd& q,
+[[nodiscard]] std::vector<Candidate> wide_turn_candidates(const Motion& motion,
+                                                          const Eigen::MatrixXd& q,
                                                           const std::vector<char>& usable,
-                                                          const LinearMotion& linear, bool coordinate_free);
+                                                          const LinearMotion& linear,
+                                                          bool coordinate_free);
 
 }  // namespace kinescope::structure_search

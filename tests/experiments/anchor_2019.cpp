@@ -17,10 +17,10 @@ constexpr double kSlideParameters = 15.0;
 struct Pair {
   int first = 0;
   int second = 0;
-  Eigen::MatrixXd rotation;   // frames x 9, entries of R_ij
-  Eigen::MatrixXd position;   // frames x 3, p_ij
-  double rotation_variance = 0.0;   // of one entry
-  double position_variance = 0.0;   // of one component
+  Eigen::MatrixXd rotation;        // frames x 9, entries of R_ij
+  Eigen::MatrixXd position;        // frames x 3, p_ij
+  double rotation_variance = 0.0;  // of one entry
+  double position_variance = 0.0;  // of one component
 };
 
 struct Edge {
@@ -38,8 +38,8 @@ double residual_sum(const Eigen::MatrixXd& Y, const Eigen::MatrixXd& A) {
 }
 
 // -2 ln likelihood with known noise, and BIC.
-double cost_of(const Pair& pair, const Eigen::MatrixXd& rotation_basis, const Eigen::MatrixXd& position_basis,
-               double parameters) {
+double cost_of(const Pair& pair, const Eigen::MatrixXd& rotation_basis,
+               const Eigen::MatrixXd& position_basis, double parameters) {
   const double rotation = residual_sum(pair.rotation, rotation_basis) / pair.rotation_variance;
   const double position = residual_sum(pair.position, position_basis) / pair.position_variance;
   return rotation + position + parameters * std::log(static_cast<double>(pair.rotation.rows()));
@@ -61,14 +61,16 @@ std::vector<std::vector<Pose>> poses_at(const PoseTracks& tracks, const std::vec
   std::vector<std::vector<Pose>> out;
   for (const PoseTrack& t : tracks.tracks) {
     std::vector<Pose> all(tracks.times_s.size());
-    for (const PoseSample& s : t.samples) all[static_cast<std::size_t>(s.frame)] = s.T_camera_marker;
+    for (const PoseSample& s : t.samples)
+      all[static_cast<std::size_t>(s.frame)] = s.T_camera_marker;
     std::vector<Pose>& chosen = out.emplace_back();
     for (const int f : frames) chosen.push_back(all[static_cast<std::size_t>(f)]);
   }
   return out;
 }
 
-Pair make_pair(int i, int j, const std::vector<std::vector<Pose>>& poses, const AnchorOptions& options) {
+Pair make_pair(int i, int j, const std::vector<std::vector<Pose>>& poses,
+               const AnchorOptions& options) {
   const auto& a = poses[static_cast<std::size_t>(i)];
   const auto& b = poses[static_cast<std::size_t>(j)];
   const auto n = static_cast<Eigen::Index>(a.size());
@@ -97,8 +99,10 @@ void add_edges(const Pair& pair, const Eigen::MatrixXd& signals, std::vector<Edg
     Eigen::MatrixXd line(n, 2);
     line << one, signals.col(k);
     const auto channel = static_cast<int>(k);
-    edges.push_back({pair.first, pair.second, channel, JointType::kRevolute, cost_of(pair, turn, turn, kTurnParameters)});
-    edges.push_back({pair.first, pair.second, channel, JointType::kPrismatic, cost_of(pair, one, line, kSlideParameters)});
+    edges.push_back({pair.first, pair.second, channel, JointType::kRevolute,
+                     cost_of(pair, turn, turn, kTurnParameters)});
+    edges.push_back({pair.first, pair.second, channel, JointType::kPrismatic,
+                     cost_of(pair, one, line, kSlideParameters)});
   }
 }
 
@@ -109,7 +113,8 @@ int root_of(std::vector<int>& parent, int i) {
 
 }  // namespace
 
-std::vector<AnchorEdge> find_edges_2019(const PoseTracks& tracks, const JointLog& log, const AnchorOptions& options) {
+std::vector<AnchorEdge> find_edges_2019(const PoseTracks& tracks, const JointLog& log,
+                                        const AnchorOptions& options) {
   const std::vector<int> frames = common_frames(tracks);
   std::vector<double> times;
   for (const int f : frames) times.push_back(tracks.times_s[static_cast<std::size_t>(f)]);

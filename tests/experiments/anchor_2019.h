@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The structure tests of Dalla Libera et al. 2019 (arXiv 1903.04410), rebuilt as the figure to beat: linear tests
-// of every pair of markers against every signal, weighted by the likelihood of a noise level that it is told,
-// and the cheapest tree with one signal an edge. Knows no flips, scales, lags, couplings.
+// The structure tests of Dalla Libera et al. 2019 (arXiv 1903.04410), rebuilt as the figure to
+// beat: linear tests of every pair of markers against every signal, weighted by the likelihood of a
+// noise level that it is told, and the cheapest tree with one signal an edge. Knows no flips,
+// scales, lags, couplings.
 #pragma once
 
 #include <vector>
@@ -23,7 +24,7 @@ struct AnchorEdge {
 struct AnchorOptions {
   double sigma_rad = 0.01;
   double sigma_m = 0.001;
-  bool serial = true;   ///< no marker has more than two neighbours
+  bool serial = true;  ///< no marker has more than two neighbours
 };
 
 /// Uses the frames in which every marker was seen.

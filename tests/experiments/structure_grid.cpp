@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Structure identification on simulated pose tracks: the 2019 tests and find_structure on identical recordings.
-// Usage: structure_grid [trials a cell, default 10] [part of the cells' names]
+// Structure identification on simulated pose tracks: the 2019 tests and find_structure on identical
+// recordings. Usage: structure_grid [trials a cell, default 10] [part of the cells' names]
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -40,7 +40,8 @@ std::vector<TrueEdge> true_edges(const RandomRobot& robot, const RobotRecording&
   std::vector<TrueEdge> edges;
   for (std::size_t j = 0; j < robot.tree.joints.size(); ++j) {
     const Joint& joint = robot.tree.joints[j];
-    edges.push_back({joint.parent.value, joint.child.value, joint.type, recording.channel_of_joint[j]});
+    edges.push_back(
+        {joint.parent.value, joint.child.value, joint.type, recording.channel_of_joint[j]});
   }
   std::ranges::sort(edges);
   return edges;
@@ -64,31 +65,36 @@ bool is_right(const Structure& found, const RandomRobot& robot, const RobotRecor
       true_link[l] = link;
     }
   }
-  // Links without a marker are named by the joint that leads there: its channel tells which one it is.
+  // Links without a marker are named by the joint that leads there: its channel tells which one it
+  // is.
   std::vector<TrueEdge> edges;
   for (const StructureJoint& j : found.joints) {
     if (!j.channel) return false;
     int& child = true_link[static_cast<std::size_t>(j.child_link)];
     if (child < 0) {
       for (std::size_t k = 0; k < recording.channel_of_joint.size(); ++k) {
-        if (recording.channel_of_joint[k] == j.channel->channel) child = robot.tree.joints[k].child.value;
+        if (recording.channel_of_joint[k] == j.channel->channel)
+          child = robot.tree.joints[k].child.value;
       }
     }
-    edges.push_back({true_link[static_cast<std::size_t>(j.parent_link)], child, j.type, j.channel->channel});
+    edges.push_back(
+        {true_link[static_cast<std::size_t>(j.parent_link)], child, j.type, j.channel->channel});
   }
   std::ranges::sort(edges);
   return edges == true_edges(robot, recording);
 }
 
-bool is_right(const std::vector<AnchorEdge>& found, const RandomRobot& robot, const RobotRecording& recording) {
+bool is_right(const std::vector<AnchorEdge>& found, const RandomRobot& robot,
+              const RobotRecording& recording) {
   const auto links = link_of_tags(robot);
   std::vector<TrueEdge> edges;
   for (const AnchorEdge& e : found) {
     const int a = links.at(e.first);
     const int b = links.at(e.second);
     // Edges of the 2019 tests have no direction: take the one the truth has.
-    const bool forward = std::ranges::any_of(
-        robot.tree.joints, [&](const Joint& j) { return j.parent.value == a && j.child.value == b; });
+    const bool forward = std::ranges::any_of(robot.tree.joints, [&](const Joint& j) {
+      return j.parent.value == a && j.child.value == b;
+    });
     edges.push_back({forward ? a : b, forward ? b : a, e.type, e.channel});
   }
   std::ranges::sort(edges);
@@ -106,14 +112,16 @@ struct Tally {
 };
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 void explain(const Cell& cell, int trial, const Structure& found, const RandomRobot& robot,
              const RobotRecording& recording) {
-  fmt::print("    wrong: {} trial {}  p={:.4f} log-odds {:.1f} lag {:.3f}  status {}  runner-up: {}\n", cell.name, trial,
-             found.probability, found.runner_up_log_odds, found.time_offset_s, static_cast<int>(found.status),
-             found.runner_up);
+  fmt::print(
+      "    wrong: {} trial {}  p={:.4f} log-odds {:.1f} lag {:.3f}  status {}  runner-up: {}\n",
+      cell.name, trial, found.probability, found.runner_up_log_odds, found.time_offset_s,
+      static_cast<int>(found.status), found.runner_up);
   const auto links = link_of_tags(robot);
   for (std::size_t l = 0; l < found.links.size(); ++l) {
     fmt::print("      link {}:", l);
@@ -124,8 +132,8 @@ void explain(const Cell& cell, int trial, const Structure& found, const RandomRo
     fmt::print("      {} -> {} {} by {} x{:.3g}", j.parent_link, j.child_link, to_string(j.type),
                j.channel ? j.channel->channel : -1, j.channel ? j.channel->scale : 0.0);
     for (const ChannelTerm& c : j.couplings) fmt::print(" + {} x{:.3g}", c.channel, c.scale);
-    fmt::print("  travel {:.3f} rms {:.4f} {:.4f} log-odds {:.1f}\n", j.travel, j.rotation_rms_rad, j.translation_rms_m,
-               j.log_odds);
+    fmt::print("  travel {:.3f} rms {:.4f} {:.4f} log-odds {:.1f}\n", j.travel, j.rotation_rms_rad,
+               j.translation_rms_m, j.log_odds);
   }
   for (const TagId t : found.free_markers) fmt::print("      free: true{}\n", links.at(t));
   for (const TrueEdge& e : true_edges(robot, recording)) {
@@ -139,14 +147,14 @@ Tally run_cell(const Cell& cell, int trials, bool verbose) {
     Rng rng = Rng::from_name("structure_grid " + cell.name, static_cast<std::uint64_t>(trial));
     const RandomRobot robot = random_robot(cell.robot, rng);
     const RobotRecording recording = record(robot, cell.recording, rng);
-    const bool anchor_applies = cell.robot.unmarked_links.empty() && cell.robot.markers_per_link == 1 &&
-                                cell.robot.base_marker;
+    const bool anchor_applies = cell.robot.unmarked_links.empty() &&
+                                cell.robot.markers_per_link == 1 && cell.robot.base_marker;
     ++tally.trials;
     auto start = std::chrono::steady_clock::now();
     if (anchor_applies) {
-      const auto edges = find_edges_2019(
-          recording.tracks, recording.log,
-          {cell.recording.sigma_rad, cell.recording.sigma_m, !cell.robot.tree});
+      const auto edges =
+          find_edges_2019(recording.tracks, recording.log,
+                          {cell.recording.sigma_rad, cell.recording.sigma_m, !cell.robot.tree});
       tally.anchor_ms += milliseconds_since(start);
       tally.anchor_right += is_right(edges, robot, recording) ? 1 : 0;
     }
@@ -165,9 +173,9 @@ Tally run_cell(const Cell& cell, int trials, bool verbose) {
 
 void print(const Cell& cell, const Tally& t) {
   const double n = t.trials;
-  fmt::print("{:44} {:7.1f} {:7.1f} {:9.1f} {:9.1f} {:8.1f} {:10}\n", cell.name, 100.0 * t.anchor_right / n,
-             100.0 * t.right / n, t.anchor_ms / n, t.ms / n, 100.0 * t.sure / n,
-             t.sure > 0 ? fmt::format("{}/{}", t.sure_wrong, t.sure) : "-");
+  fmt::print("{:44} {:7.1f} {:7.1f} {:9.1f} {:9.1f} {:8.1f} {:10}\n", cell.name,
+             100.0 * t.anchor_right / n, 100.0 * t.right / n, t.anchor_ms / n, t.ms / n,
+             100.0 * t.sure / n, t.sure > 0 ? fmt::format("{}/{}", t.sure_wrong, t.sure) : "-");
   std::fflush(stdout);
 }
 
@@ -179,9 +187,11 @@ std::vector<Cell> base_cells() {
   std::vector<Cell> cells;
   for (const int joints : {3, 6, 10}) {
     for (const int frames : {100, 600}) {
-      for (const Noise noise : {Noise{1, 0.1}, Noise{3, 0.5}, Noise{5, 1}, Noise{10, 3}, Noise{20, 6}, Noise{40, 12}}) {
+      for (const Noise noise :
+           {Noise{1, 0.1}, Noise{3, 0.5}, Noise{5, 1}, Noise{10, 3}, Noise{20, 6}, Noise{40, 12}}) {
         Cell cell;
-        cell.name = fmt::format("base n={} frames={} {}mm/{}deg", joints, frames, noise.mm, noise.deg);
+        cell.name =
+            fmt::format("base n={} frames={} {}mm/{}deg", joints, frames, noise.mm, noise.deg);
         cell.robot.joints = joints;
         cell.recording.frames = frames;
         cell.recording.sigma_m = 1e-3 * noise.mm;
@@ -212,28 +222,34 @@ std::vector<Cell> stress_cells() {
   std::vector<Cell> cells;
   add_stress(cells, "none", [](Cell&) {});
   for (const double share : {0.02, 0.05, 0.1, 0.2}) {
-    add_stress(cells, fmt::format("flips {}", share), [&](Cell& c) { c.recording.flip_share = share; });
+    add_stress(cells, fmt::format("flips {}", share),
+               [&](Cell& c) { c.recording.flip_share = share; });
     add_stress(cells, fmt::format("flips {} both branches", share), [&](Cell& c) {
       c.recording.flip_share = share;
       c.recording.alternatives = true;
     });
   }
   for (const double scale : {1.05, 1.2, 2.0}) {
-    add_stress(cells, fmt::format("scale {}", scale), [&](Cell& c) { c.recording.channel_scale = scale; });
+    add_stress(cells, fmt::format("scale {}", scale),
+               [&](Cell& c) { c.recording.channel_scale = scale; });
   }
-  add_stress(cells, "ticks and signs", [](Cell& c) { c.recording.ticks = c.recording.random_signs = true; });
+  add_stress(cells, "ticks and signs",
+             [](Cell& c) { c.recording.ticks = c.recording.random_signs = true; });
   add_stress(cells, "degrees", [](Cell& c) { c.recording.channel_scale = 1.0 / kDegree; });
   for (const double coupling : {0.3, 1.0}) {
-    add_stress(cells, fmt::format("coupling {}", coupling), [&](Cell& c) { c.recording.coupling = coupling; });
+    add_stress(cells, fmt::format("coupling {}", coupling),
+               [&](Cell& c) { c.recording.coupling = coupling; });
   }
   for (const double lag : {0.05, 0.2, 0.5, -0.9}) {
     add_stress(cells, fmt::format("lag {}", lag), [&](Cell& c) { c.recording.lag_s = lag; });
   }
   for (const double gap : {3.0, 10.0}) {
-    add_stress(cells, fmt::format("backlash {} deg", gap), [&](Cell& c) { c.recording.backlash_rad = gap * kDegree; });
+    add_stress(cells, fmt::format("backlash {} deg", gap),
+               [&](Cell& c) { c.recording.backlash_rad = gap * kDegree; });
   }
   for (const double amplitude : {0.1, 0.05, 0.02}) {
-    add_stress(cells, fmt::format("amplitude {}", amplitude), [&](Cell& c) { c.recording.amplitude_rad = amplitude; });
+    add_stress(cells, fmt::format("amplitude {}", amplitude),
+               [&](Cell& c) { c.recording.amplitude_rad = amplitude; });
   }
   add_stress(cells, "parallel axes", [](Cell& c) { c.robot.parallel_axes = true; });
   add_stress(cells, "parallel axes 0.1 rad 6 s", [](Cell& c) {
@@ -280,9 +296,12 @@ int run(int trials, const std::string& part, bool verbose) {
   std::vector<Cell> cells = base_cells();
   for (auto& c : stress_cells()) cells.push_back(std::move(c));
   for (auto& c : further_cells()) cells.push_back(std::move(c));
-  fmt::print("Success in %, {} trials a cell, identical recordings. sure: answers with probability >= 0.99.\n", trials);
-  fmt::print("{:44} {:>7} {:>7} {:>9} {:>9} {:>8} {:>10}\n", "cell", "2019", "ours", "2019 ms", "ours ms", "sure %",
-             "sure wrong");
+  fmt::print(
+      "Success in %, {} trials a cell, identical recordings. sure: answers with probability >= "
+      "0.99.\n",
+      trials);
+  fmt::print("{:44} {:>7} {:>7} {:>9} {:>9} {:>8} {:>10}\n", "cell", "2019", "ours", "2019 ms",
+             "ours ms", "sure %", "sure wrong");
   int sure = 0;
   int sure_wrong = 0;
   for (const Cell& cell : cells) {

@@ -14,7 +14,8 @@ namespace {
 
 Eigen::Quaterniond random_rotation(Rng& rng) {
   Eigen::Vector4d v(rng.normal(), rng.normal(), rng.normal(), rng.normal());
-  while (v.norm() < 1e-6) v = Eigen::Vector4d(rng.normal(), rng.normal(), rng.normal(), rng.normal());
+  while (v.norm() < 1e-6)
+    v = Eigen::Vector4d(rng.normal(), rng.normal(), rng.normal(), rng.normal());
   v.normalize();
   return {v(0), v(1), v(2), v(3)};
 }
@@ -23,7 +24,8 @@ std::vector<int> permutation(int count, Rng& rng) {
   std::vector<int> order(static_cast<std::size_t>(count));
   std::iota(order.begin(), order.end(), 0);
   for (int i = count - 1; i > 0; --i) {
-    std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(rng.index(i + 1))]);
+    std::swap(order[static_cast<std::size_t>(i)],
+              order[static_cast<std::size_t>(rng.index(i + 1))]);
   }
   return order;
 }
@@ -61,8 +63,10 @@ class Motions {
  public:
   Motions(const RandomRobot& robot, const RecordingOptions& options, Rng& rng)
       : robot_(robot), options_(options) {
-    for (std::size_t j = 0; j < robot.tree.joints.size(); ++j) motions_.push_back(random_motion(options, rng));
-    for (const auto& [a, b] : options.together) motions_[static_cast<std::size_t>(b)] = motions_[static_cast<std::size_t>(a)];
+    for (std::size_t j = 0; j < robot.tree.joints.size(); ++j)
+      motions_.push_back(random_motion(options, rng));
+    for (const auto& [a, b] : options.together)
+      motions_[static_cast<std::size_t>(b)] = motions_[static_cast<std::size_t>(a)];
     for (const int j : options.still_joints) motions_[static_cast<std::size_t>(j)].amplitude = {};
   }
 
@@ -78,7 +82,8 @@ class Motions {
   [[nodiscard]] Eigen::MatrixXd links(const std::vector<double>& times) const {
     const std::size_t joints = motions_.size();
     Eigen::MatrixXd out(static_cast<Eigen::Index>(times.size()), static_cast<Eigen::Index>(joints));
-    const double gap = options_.amplitude_rad > 0.0 ? options_.backlash_rad / options_.amplitude_rad : 0.0;
+    const double gap =
+        options_.amplitude_rad > 0.0 ? options_.backlash_rad / options_.amplitude_rad : 0.0;
     for (std::size_t j = 0; j < joints; ++j) {
       const auto column = static_cast<Eigen::Index>(j);
       // The play's memory is started a while before the first frame.
@@ -135,7 +140,8 @@ PoseSample sample_of(const Pose& truth, int frame, const RecordingOptions& o, Rn
   return s;
 }
 
-void record_tracks(const RandomRobot& robot, const RecordingOptions& o, Rng& rng, RobotRecording& out) {
+void record_tracks(const RandomRobot& robot, const RecordingOptions& o, Rng& rng,
+                   RobotRecording& out) {
   for (const Marker& marker : robot.tree.markers) out.tracks.tracks.push_back({marker.id, {}});
   for (std::size_t f = 0; f < out.tracks.times_s.size(); ++f) {
     const auto row = static_cast<Eigen::Index>(f);
@@ -151,15 +157,16 @@ void record_tracks(const RandomRobot& robot, const RecordingOptions& o, Rng& rng
   std::ranges::sort(out.tracks.tracks, {}, &PoseTrack::id);
 }
 
-void record_log(const Motions& motions, const RandomRobot& robot, const RecordingOptions& o, Rng& rng,
-                RobotRecording& out) {
+void record_log(const Motions& motions, const RandomRobot& robot, const RecordingOptions& o,
+                Rng& rng, RobotRecording& out) {
   constexpr double kMargin = 1.5;  // s that the log starts before and ends after the frames
   const int joints = static_cast<int>(robot.tree.joints.size());
   const int channels = joints + o.idle_channels;
   const std::vector<int> place =
       o.shuffle_channels ? permutation(channels, rng) : permutation(0, rng);
   const double end = out.tracks.times_s.back() + kMargin;
-  for (double t = -kMargin; t < end; t += 1.0 / o.log_rate_hz) out.log.times_s.push_back(t + o.lag_s);
+  for (double t = -kMargin; t < end; t += 1.0 / o.log_rate_hz)
+    out.log.times_s.push_back(t + o.lag_s);
   out.log.values.resize(static_cast<Eigen::Index>(out.log.size()), channels);
   out.channel_of_joint.resize(static_cast<std::size_t>(joints));
   for (int c = 0; c < channels; ++c) out.log.channels.push_back(fmt::format("ch{}", c));
@@ -176,7 +183,8 @@ void record_log(const Motions& motions, const RandomRobot& robot, const Recordin
     const double size = j < joints ? motions.size(static_cast<std::size_t>(j)) : o.amplitude_rad;
     for (std::size_t i = 0; i < out.log.size(); ++i) {
       const double t = out.log.times_s[i] - o.lag_s;
-      const double motion = j < joints ? motions.encoder(static_cast<std::size_t>(j), t) : idle.at(t);
+      const double motion =
+          j < joints ? motions.encoder(static_cast<std::size_t>(j), t) : idle.at(t);
       double reading = scale * size * motion + zero;
       if (o.ticks) reading = std::round(reading);
       out.log.values(static_cast<Eigen::Index>(i), c) = reading;
@@ -195,14 +203,17 @@ void add_markers(const RandomRobotOptions& options, Rng& rng, KinematicTree& tre
   for (int l = 0; l <= options.joints; ++l) {
     if (is_unmarked(options, l) || (l == 0 && !options.base_marker)) continue;
     for (int m = 0; m < options.markers_per_link; ++m) {
-      tree.markers.push_back(
-          {TagId{0}, LinkId{l}, {random_rotation(rng), options.marker_offset_m * rng.unit3()}, 0.04});
+      tree.markers.push_back({TagId{0},
+                              LinkId{l},
+                              {random_rotation(rng), options.marker_offset_m * rng.unit3()},
+                              0.04});
     }
   }
   const auto count = static_cast<int>(tree.markers.size());
   const std::vector<int> ids = permutation(count, rng);
   for (int m = 0; m < count; ++m) {
-    tree.markers[static_cast<std::size_t>(m)].id = TagId{options.shuffle_ids ? ids[static_cast<std::size_t>(m)] : m};
+    tree.markers[static_cast<std::size_t>(m)].id =
+        TagId{options.shuffle_ids ? ids[static_cast<std::size_t>(m)] : m};
   }
 }
 
@@ -213,26 +224,30 @@ Pose flipped_pose(const Pose& T) {
   Eigen::Vector3d normal = T.rotation * Eigen::Vector3d::UnitZ();
   if (normal.dot(sight) < 0.0) normal = -normal;
   const Eigen::Vector3d mirrored = 2.0 * normal.dot(sight) * sight - normal;
-  return {(Eigen::Quaterniond::FromTwoVectors(normal, mirrored) * T.rotation).normalized(), T.translation};
+  return {(Eigen::Quaterniond::FromTwoVectors(normal, mirrored) * T.rotation).normalized(),
+          T.translation};
 }
 
 RandomRobot random_robot(const RandomRobotOptions& options, Rng& rng) {
   RandomRobot robot;
   robot.tree.links.push_back({"base"});
   const Eigen::Vector3d common = rng.unit3();
-  // Axes that are to be parallel are so when all joints are at zero and all frames keep one orientation.
+  // Axes that are to be parallel are so when all joints are at zero and all frames keep one
+  // orientation.
   for (int j = 0; j < options.joints; ++j) {
     robot.tree.links.push_back({fmt::format("link{}", j + 1)});
     Joint joint;
     joint.name = fmt::format("joint{}", j + 1);
-    joint.type = rng.uniform() < options.prismatic_share ? JointType::kPrismatic : JointType::kRevolute;
+    joint.type =
+        rng.uniform() < options.prismatic_share ? JointType::kPrismatic : JointType::kRevolute;
     joint.parent = LinkId{options.tree ? rng.index(j + 1) : j};
     joint.child = LinkId{j + 1};
     joint.T_parent_joint.translation = options.link_offset_m * rng.unit3();
     if (options.parallel_axes) {
       joint.axis = common;
       const Eigen::Vector3d across = joint.T_parent_joint.translation.cross(common);
-      if (across.norm() > 1e-3) joint.T_parent_joint.translation = options.link_offset_m * across.normalized();
+      if (across.norm() > 1e-3)
+        joint.T_parent_joint.translation = options.link_offset_m * across.normalized();
     } else {
       joint.T_parent_joint.rotation = random_rotation(rng);
       joint.axis = rng.unit3();
@@ -240,8 +255,9 @@ RandomRobot random_robot(const RandomRobotOptions& options, Rng& rng) {
     robot.tree.joints.push_back(std::move(joint));
   }
   add_markers(options, rng, robot.tree);
-  robot.T_camera_base = {random_rotation(rng), Eigen::Vector3d(rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2),
-                                                               rng.uniform(1.3, 2.0))};
+  robot.T_camera_base = {
+      random_rotation(rng),
+      Eigen::Vector3d(rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(1.3, 2.0))};
   return robot;
 }
 
