@@ -27,8 +27,8 @@ struct RandomRobotOptions {
   double marker_offset_m = 0.05;  ///< from the link's frame to its marker
   int markers_per_link = 1;
   bool base_marker = true;
-  std::vector<int> unmarked_links;  ///< links (1 = child of joint 0) that carry no marker
-  bool shuffle_ids = true;          ///< marker ids do not follow the chain
+  std::vector<int> unmarked_links = {};  ///< links (1 = child of joint 0) that carry no marker
+  bool shuffle_ids = true;               ///< marker ids do not follow the chain
 };
 
 /// A robot and where the camera sees it. Joint k's child is link k + 1.
@@ -61,8 +61,9 @@ struct RecordingOptions {
   double backlash_rad = 0.0;    ///< width of the gap between encoder and link
   int idle_channels = 0;        ///< channels that drive nothing
   bool shuffle_channels = true;
-  std::vector<int> still_joints;              ///< joints that do not move
-  std::vector<std::pair<int, int>> together;  ///< (a, b): joint b repeats the motion of joint a
+  std::vector<int> still_joints = {};  ///< joints that do not move
+  std::vector<std::pair<int, int>> together =
+      {};  ///< (a, b): joint b repeats the motion of joint a
 };
 
 /// A recording with its truth.
