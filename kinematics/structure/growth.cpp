@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kinematics/structure/series.h"
 #include "kinematics/structure/several_joints.h"
 
 namespace kinescope::structure_search {
@@ -98,21 +99,23 @@ class Grower {
     return best;
   }
 
-  // What is left of rest is so small that no robot moves by it: corners that err alike from frame
-  // to frame (compression, one light) pass for a slow motion in the statistics, but not in
-  // millimetres.
+  // What is left of rest is so small that no robot moves by it: corners that err alike from frame to frame
+  // (compression, one light) pass for a slow motion in the statistics, but not in millimetres. Medians, so that
+  // views spoilt by an occlusion do not matter.
   bool rests_for_all_practical_purposes(const Body& b, const Attachment& a) const {
-    constexpr double kTurn = 0.015;   // rad
-    constexpr double kShift = 0.004;  // of the distance from the camera
-    double distance = 0.0;
-    int count = 0;
-    for (const Sighting& s : b.at) {
-      if (!s.seen) continue;
-      distance += s.pose.translation.norm();
-      ++count;
+    constexpr double kTurn = 0.01;    // rad
+    constexpr double kShift = 0.003;  // of the distance from the camera
+    if (!a.at_rest()) return false;
+    const LinkPath& path = tree_.links[static_cast<std::size_t>(a.parent)].path;
+    std::vector<double> turn;
+    std::vector<double> shift;
+    for (std::size_t i = 0; i < b.at.size(); ++i) {
+      if (!b.at[i].seen || path.valid[i] == 0) continue;
+      const Pose left = (path.pose[i] * a.fit.model.mount).inverse() * b.at[i].pose;
+      turn.push_back(log_rotation(left.rotation).norm());
+      shift.push_back(left.translation.norm() / std::max(1e-9, b.at[i].pose.translation.norm()));
     }
-    return a.at_rest() && count > 0 && a.fit.rotation_rms < kTurn &&
-           a.fit.translation_rms < kShift * distance / count;
+    return !turn.empty() && median_of(turn) < kTurn && median_of(shift) < kShift;
   }
 
   bool acceptable(std::size_t b, const Attachment& a) const {
@@ -500,9 +503,7 @@ GrownTree refit_tree(const GrownTree& tree, const Series& series, const Readings
 
 double tree_cost(const GrownTree& tree) {
   double sum = 0.0;
-  for (const GrownBody& b : tree.bodies) {
-    sum += b.link < 0 ? b.free_cost : b.attachment.cost(b.attachment.fit.correlation);
-  }
+  for (const GrownBody& b : tree.bodies) sum += b.link < 0 ? b.free_cost : b.attachment.data_cost;
   return sum;
 }
 

@@ -50,7 +50,7 @@ struct GrowthOptions {
 [[nodiscard]] GrownTree refit_tree(const GrownTree& tree, const Series& series,
                                    const Readings& readings);
 
-/// Sum of the bodies' costs.
+/// Sum of the bodies' data costs.
 [[nodiscard]] double tree_cost(const GrownTree& tree);
 
 }  // namespace kinescope::structure_search

@@ -41,11 +41,32 @@ Matrix6d floored(Matrix6d covariance) {
   return covariance;
 }
 
-// Median, component by component, of the neighbours' displacement from `pose`; nothing with too
-// few.
-std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<double>& times_s,
-                                         int f, const Pose& pose) {
-  std::array<std::array<double, 2 * kNeighbours + 1>, 6> parts{};
+// Where the neighbours are as seen from a pose: their median displacement, component by component,
+// and how far from it they lie themselves (median, whitened).
+struct Neighbourhood {
+  Vector6d median = Vector6d::Zero();
+  double spread = 0.0;
+};
+
+using Displacements = std::array<Vector6d, 2 * kNeighbours>;
+
+Vector6d median_displacement(const Displacements& d, std::size_t count) {
+  Vector6d median;
+  std::array<double, 2 * kNeighbours> values{};
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    for (std::size_t k = 0; k < count; ++k) values[k] = d[k](c);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+    median(c) = *middle;
+    if (count % 2 == 0) median(c) = 0.5 * (*middle + *std::max_element(values.begin(), middle));
+  }
+  return median;
+}
+
+// Nothing with too few neighbours.
+std::optional<Neighbourhood> neighbourhood_of(const Body& body, const std::vector<double>& times_s,
+                                              int f, const Pose& pose, const Matrix6d& whitening) {
+  Displacements displacement;
   std::size_t count = 0;
   const Pose inverse = pose.inverse();
   for (int g = std::max(0, f - kNeighbours);
@@ -53,24 +74,20 @@ std::optional<Vector6d> neighbour_median(const Body& body, const std::vector<dou
     const auto at = static_cast<std::size_t>(g);
     const double apart = std::abs(times_s[at] - times_s[static_cast<std::size_t>(f)]);
     if (g == f || !body.at[at].seen || apart > kNeighbourTime) continue;
-    const Vector6d d = fast_log(inverse * body.at[at].pose);
-    for (std::size_t c = 0; c < 6; ++c) parts[c][count] = d(static_cast<Eigen::Index>(c));
-    ++count;
+    displacement[count++] = fast_log(inverse * body.at[at].pose);
   }
   if (count < 3) return std::nullopt;
-  Vector6d median;
-  for (std::size_t c = 0; c < 6; ++c) {
-    const auto first = parts[c].begin();
-    const auto middle = first + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(first, middle, first + static_cast<std::ptrdiff_t>(count));
-    double value = *middle;
-    if (count % 2 == 0) value = 0.5 * (value + *std::max_element(first, middle));
-    median(static_cast<Eigen::Index>(c)) = value;
-  }
-  return median;
+  Neighbourhood out;
+  out.median = median_displacement(displacement, count);
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < count; ++k)
+    lengths.push_back((whitening * (displacement[k] - out.median)).norm());
+  out.spread = median_of(std::move(lengths));
+  return out;
 }
 
 struct Deviations {
+  std::vector<double> spread;  // of the neighbours about their median
   std::vector<double> main;  // whitened length of the displacement, one a frame; NaN where unknown
   std::vector<double> alternative;  // of the other branch
   double median = 0.0;
@@ -82,19 +99,22 @@ Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
   const double unknown = std::nan("");
   out.main.assign(body.at.size(), unknown);
   out.alternative.assign(body.at.size(), unknown);
+  out.spread.assign(body.at.size(), 0.0);
   std::vector<double> known;
   std::vector<double> steps;
   for (std::size_t f = 0; f < body.at.size(); ++f) {
     const Sighting& s = body.at[f];
     if (!s.seen) continue;
-    const auto d = neighbour_median(body, times_s, static_cast<int>(f), s.pose);
+    const auto d = neighbourhood_of(body, times_s, static_cast<int>(f), s.pose, s.whitening);
     if (!d) continue;
-    out.main[f] = (s.whitening * *d).norm();
+    out.main[f] = (s.whitening * d->median).norm();
+    out.spread[f] = d->spread;
     known.push_back(out.main[f]);
-    steps.push_back(d->norm());
+    steps.push_back(d->median.norm());
     if (!s.alternative) continue;
-    const auto other = neighbour_median(body, times_s, static_cast<int>(f), *s.alternative);
-    if (other) out.alternative[f] = (s.whitening * *other).norm();
+    const auto other =
+        neighbourhood_of(body, times_s, static_cast<int>(f), *s.alternative, s.whitening);
+    if (other) out.alternative[f] = (s.whitening * other->median).norm();
   }
   out.median = median_of(std::move(known));
   out.step = median_of(std::move(steps));
@@ -112,8 +132,10 @@ void swap_branch(Sighting& s) {
 
 // Takes the branch that agrees with the neighbours; drops the sighting when none does.
 void clean_in_time(Body& body, const Deviations& d) {
-  const double limit = std::max(kOutlierRatio * d.median, kOutlierFloor);
   for (std::size_t f = 0; f < body.at.size(); ++f) {
+    // The neighbours' own spread allows for fast motion, above all where they lie on one side only.
+    const double limit =
+        std::max({kOutlierRatio * d.median, kOutlierFloor, kOutlierRatio * d.spread[f]});
     if (!body.at[f].seen || std::isnan(d.main[f]) || d.main[f] <= limit) continue;
     if (d.alternative[f] < limit) {
       swap_branch(body.at[f]);

@@ -47,14 +47,14 @@ TimeOffset refine_offset(GrownTree& tree, const Series& series, const JointLog& 
   for (const GrownBody& b : tree.bodies) {
     if (b.link > 0) correlation = std::max(correlation, b.attachment.fit.correlation);
   }
-  for (const double step : {0.04, 0.01}) {
+  for (const double step : {0.05, 0.02, 0.005}) {
     const double left = cost_at(offset.value_s - step);
     const double middle = cost_at(offset.value_s);
     const double right = cost_at(offset.value_s + step);
     const double curvature = (left - 2.0 * middle + right) / (step * step);
     if (!(curvature > 0.0)) break;
     const double shift = 0.5 * (left - right) / (curvature * step);
-    offset.value_s += std::clamp(shift, -3.0 * step, 3.0 * step);
+    offset.value_s += std::clamp(shift, -2.0 * step, 2.0 * step);
     offset.sigma_s = std::sqrt(2.0 * correlation / curvature);
   }
   offset.value_s =

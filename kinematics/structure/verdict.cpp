@@ -296,10 +296,10 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   Verdict verdict;
   verdict.status = StructureStatus::kDetermined;
   const std::vector<Alternative> all = Judge(tree, series, readings, log).alternatives();
-  verdict.link_log_odds.assign(tree.links.size(), kMostLogOdds);
+  verdict.link_log_odds.assign(tree.links.size(), kInfinity);
   verdict.link_runner_up.assign(tree.links.size(), "");
   double odds = 0.0;
-  double least = 2.0 * kMostLogOdds;
+  double least = kInfinity;
   for (const Alternative& a : all) {
     odds += std::exp(-0.5 * a.loss);
     if (a.loss < least) {
@@ -313,7 +313,8 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
     verdict.link_runner_up[static_cast<std::size_t>(a.link)] = a.words;
   }
   verdict.probability = 1.0 / (1.0 + odds);
-  verdict.runner_up_log_odds = 0.5 * least;
+  verdict.runner_up_log_odds = std::min(0.5 * least, kMostLogOdds);
+  for (double& own : verdict.link_log_odds) own = std::min(own, kMostLogOdds);
   if (verdict.runner_up_log_odds < options.min_log_odds)
     verdict.status = StructureStatus::kAmbiguous;
   add_order_doubts(tree, readings, log, options, verdict);
