@@ -297,7 +297,7 @@ void check_markers(const Album& album, const std::vector<std::size_t>& used, con
   if (board.type != BoardType::kCharuco) return;
   double sum = 0.0;
   double square_px = 0.0;
-  double outward = 0.0;  // m
+  double larger = 0.0;  // markers as seen, against declared
   int count = 0;
   for (std::size_t v = 0; v < used.size(); ++v) {
     const Pose& pose = now.fits[v].T_camera_board;
@@ -313,7 +313,7 @@ void check_markers(const Album& album, const std::vector<std::size_t>& used, con
         square_px += per_m * board.square_m;
         const auto centre = project(now.camera, pose * middle);
         if (centre) {
-          outward += ((marker.pixels[i] - *centre).norm() - (*pixel - *centre).norm()) / per_m;
+          larger += (marker.pixels[i] - *centre).norm() / (*pixel - *centre).norm();
         }
         ++count;
       }
@@ -323,10 +323,10 @@ void check_markers(const Album& album, const std::vector<std::size_t>& used, con
   const double rms = std::sqrt(sum / count);
   square_px /= count;
   if (rms <= std::max(1.0, kMaxMarkerMisfit * square_px)) return;
-  const double measured = board.marker_m + 2.0 * outward / count / std::numbers::sqrt2;
+  const double measured = board.marker_m * larger / count;
   throw bad_input(source,
                   fmt::format("the markers' corners miss the declared board by {:.1f} px", rms),
-                  fmt::format("by the images a marker's edge is about {:.2f} mm where squares are "
+                  fmt::format("by the images a marker's edge is about {:.1f} mm where squares are "
                               "{:.2f} mm; check sizes and layout",
                               1e3 * measured, 1e3 * board.square_m));
 }

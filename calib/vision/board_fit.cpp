@@ -27,8 +27,8 @@ Eigen::Matrix<double, 2, 6> pose_jacobian(const Projection& projection, const Po
   return J;
 }
 
-// A start for the pose from undistorted points.
-std::optional<Pose> start_pose(const CameraModel& camera, const BoardSight& view) {
+// Starts for the pose from undistorted points: a plane's picture has two explanations.
+std::vector<Pose> start_poses(const CameraModel& camera, const BoardSight& view) {
   std::vector<cv::Point3d> places;
   std::vector<cv::Point2d> rays;
   for (std::size_t i = 0; i < view.pixels.size(); ++i) {
@@ -37,21 +37,25 @@ std::optional<Pose> start_pose(const CameraModel& camera, const BoardSight& view
     places.emplace_back(view.places_m[i].x(), view.places_m[i].y(), view.places_m[i].z());
     rays.emplace_back(ray->x(), ray->y());
   }
-  if (places.size() < 4) return std::nullopt;
-  cv::Vec3d rotation;
-  cv::Vec3d translation;
+  std::vector<Pose> out;
+  if (places.size() < 4) return out;
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
   try {
-    if (!cv::solvePnP(places, rays, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false,
-                      cv::SOLVEPNP_IPPE)) {
-      return std::nullopt;
-    }
+    cv::solvePnPGeneric(places, rays, cv::Matx33d::eye(), cv::noArray(), rotations, translations,
+                        false, cv::SOLVEPNP_IPPE);
   } catch (const cv::Exception&) {
-    return std::nullopt;
+    return out;
   }
-  Pose pose;
-  pose.rotation = exp_rotation({rotation[0], rotation[1], rotation[2]});
-  pose.translation = {translation[0], translation[1], translation[2]};
-  return pose;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    const cv::Mat& r = rotations[i];
+    const cv::Mat& t = translations[i];
+    Pose pose;
+    pose.rotation = exp_rotation({r.at<double>(0), r.at<double>(1), r.at<double>(2)});
+    pose.translation = {t.at<double>(0), t.at<double>(1), t.at<double>(2)};
+    out.push_back(pose);
+  }
+  return out;
 }
 
 CameraModel from_opencv(const cv::Mat& K, const cv::Mat& distortion, int width, int height,
@@ -121,10 +125,11 @@ std::optional<CameraModel> estimate_intrinsics(const std::vector<BoardSight>& vi
   return from_opencv(K, terms, width, height, options.model);
 }
 
-std::optional<ViewFit> fit_view(const CameraModel& camera, const BoardSight& view) {
-  const std::optional<Pose> start = start_pose(camera, view);
-  if (!start) return std::nullopt;
-  ViewFit fit{*start, {}, 0.0};
+namespace {
+
+std::optional<ViewFit> fit_from(const CameraModel& camera, const BoardSight& view,
+                                const Pose& start) {
+  ViewFit fit{start, {}, 0.0};
   constexpr int kRounds = 20;
   for (int round = 0; round < kRounds; ++round) {
     Matrix6d H = Matrix6d::Zero();
@@ -151,6 +156,17 @@ std::optional<ViewFit> fit_view(const CameraModel& camera, const BoardSight& vie
   }
   fit.rms_px = std::sqrt(sum / static_cast<double>(view.pixels.size()));
   return fit;
+}
+
+}  // namespace
+
+std::optional<ViewFit> fit_view(const CameraModel& camera, const BoardSight& view) {
+  std::optional<ViewFit> best;
+  for (const Pose& start : start_poses(camera, view)) {
+    std::optional<ViewFit> fit = fit_from(camera, view, start);
+    if (fit && (!best || fit->rms_px < best->rms_px)) best = std::move(fit);
+  }
+  return best;
 }
 
 std::vector<int> free_intrinsics(const BoardOptions& options) {

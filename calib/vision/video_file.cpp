@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/video_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -164,6 +166,9 @@ class VideoFileReader final : public VideoReader {
     } else if (container_->duration != AV_NOPTS_VALUE) {
       info_.duration_s = static_cast<double>(container_->duration) / AV_TIME_BASE;
     }
+    if (container_->start_time != AV_NOPTS_VALUE) {
+      start_s_ = static_cast<double>(container_->start_time) / AV_TIME_BASE;
+    }
     if (const auto* matrix = reinterpret_cast<const std::int32_t*>(
             av_stream_get_side_data(&s, AV_PKT_DATA_DISPLAYMATRIX, nullptr))) {
       const double angle = av_display_rotation_get(matrix);  // degrees counterclockwise
@@ -190,6 +195,7 @@ class VideoFileReader final : public VideoReader {
       }
       const std::optional<double> time = stamp();
       if (!time) continue;
+      if (index_ > 0) steps_.push_back(*time - last_time_);
       last_time_ = *time;
       VideoFrame out{index_++, *time, grey()};
       if (!size_known_) {
@@ -284,6 +290,14 @@ class VideoFileReader final : public VideoReader {
     return turned(copy_plane(out->data[0], out->linesize[0], out->width, out->height), quarters_);
   }
 
+  double median_step() const {
+    if (steps_.empty()) return 0.0;
+    std::vector<double> sorted = steps_;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle);
+    return *middle;
+  }
+
   void finish() {
     finished_ = true;
     if (damaged_ > 0) {
@@ -301,8 +315,18 @@ class VideoFileReader final : public VideoReader {
           fmt::format("{}: the stamps of {} frames do not increase; these frames are left out",
                       path_, unordered_));
     }
+    const double step = median_step();
+    const double end = start_s_ + info_.duration_s;
+    constexpr double kSteps = 4.0;
+    const bool short_of_time =
+        info_.duration_s > 0.0 && step > 0.0 && last_time_ + kSteps * step < end;
     const bool short_of_packets = info_.frame_count > 0 && packets_ < info_.frame_count;
-    if (read_error_ || short_of_packets) {
+    const auto gaps = std::ranges::count_if(steps_, [&](double s) { return s > kSteps * step; });
+    if (gaps > 0) {
+      warnings_.push_back(fmt::format("{}: {} gaps between frames, the longest of {:.3f} s", path_,
+                                      gaps, std::ranges::max(steps_)));
+    }
+    if (read_error_ || short_of_packets || short_of_time) {
       const std::string whole =
           info_.frame_count > 0 ? fmt::format(" of {}", info_.frame_count) : std::string();
       warnings_.push_back(
@@ -333,6 +357,8 @@ class VideoFileReader final : public VideoReader {
   int unstamped_ = 0;
   int unordered_ = 0;
   double last_time_ = 0.0;
+  double start_s_ = 0.0;       // stamp of the container's beginning
+  std::vector<double> steps_;  // between frames, s
 };
 
 }  // namespace

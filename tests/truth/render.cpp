@@ -112,10 +112,17 @@ void paint(const CameraModel& camera, const PlacedMarker& marker, const ImageOpt
   std::vector<double> line(static_cast<std::size_t>(sub_columns));
   std::vector<double> across(static_cast<std::size_t>(sub_rows) *
                              static_cast<std::size_t>(columns));
+  // Samples stand at other places in every row and column, so that an edge along them is not
+  // rounded to the grid.
+  const auto jitter = [](int k) {
+    constexpr double kGolden = 0.6180339887498949;
+    const double t = kGolden * k;
+    return t - std::floor(t);
+  };
   for (int j = 0; j < sub_rows; ++j) {
-    const double y = box.y0 + (j + 0.5 - margin) / s;
     for (int i = 0; i < sub_columns; ++i) {
-      const double x = box.x0 + (i + 0.5 - margin) / s;
+      const double x = box.x0 + (i + jitter(j) - margin) / s;
+      const double y = box.y0 + (j + jitter(i) - margin) / s;
       const auto ray = unproject(camera, {x, y});
       line[static_cast<std::size_t>(i)] = ray ? plane.grey(*ray) : options.background;
     }

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/vision/tag_detector.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/aruco.hpp>
+
+#include "calib/vision/refine_corners.h"
+#include "kinematics/core/error.h"
+#include "tests/truth/render.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kCoarse = 2.0;    // px, raw corners of the detectors
+constexpr double kRefined = 0.08;  // px, about 5 sigma at 70 px side and noise 2
+
+CameraModel small_camera() { return pinhole_guess(240, 200, 600.0); }
+
+PlacedMarker upright(MarkerArt art, double side_px = 70.0) {
+  PlacedMarker marker;
+  marker.art = std::move(art);
+  marker.T_camera_tag =
+      pose_showing(small_camera(), {121.3, 98.6}, side_px, marker.size_m, 0.0, 0.0, 0.0);
+  return marker;
+}
+
+// The corners of a marker upright in front of the camera are lb, rb, rt, lt; and refined they are
+// exact.
+void expect_found(const std::string& family, const PlacedMarker& marker, int id) {
+  Rng rng = Rng::from_name(family);
+  const GreyImage image = render_markers(small_camera(), {marker}, {.supersample = 6}, rng);
+  const auto found = make_tag_detector(family)->detect(image.view());
+  ASSERT_EQ(found.size(), 1U) << family;
+  EXPECT_EQ(found[0].id, TagId{id}) << family;
+  const auto truth = true_corners(small_camera(), marker);
+  Corners start;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_LT((found[0].corners_px[i] - truth[i]).norm(), kCoarse) << family << " corner " << i;
+    start[i] = found[0].corners_px[i];
+  }
+  EXPECT_LT(truth[0].x(), truth[1].x());  // lb left of rb
+  EXPECT_GT(truth[0].y(), truth[3].y());  // lb below lt
+  const RefinedCorners refined = refine_corners(image.view(), start, tag_layout(family));
+  ASSERT_EQ(refined.status, RefineStatus::kDone) << family;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_LT((refined.corners_px[i] - truth[i]).norm(), kRefined) << family << " corner " << i;
+  }
+}
+
+TEST(TagDetector, EveryAprilTagFamilyIsReadBack) {
+  for (const char* family :
+       {"tag36h11", "tag25h9", "tag16h5", "tagStandard41h12", "tagStandard52h13", "tagCircle21h7",
+        "tagCircle49h12", "tagCustom48h12"}) {
+    expect_found(family, upright(apriltag_art(family, 7)), 7);
+  }
+}
+
+TEST(TagDetector, EveryArucoDictionaryIsReadBackWithAprilTagsCorners) {
+  const std::vector<std::pair<std::string, int>> dictionaries = {
+      {"DICT_4X4_50", cv::aruco::DICT_4X4_50},
+      {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
+      {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
+      {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
+      {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
+      {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL}};
+  for (const auto& [name, value] : dictionaries) {
+    expect_found(name, upright(aruco_art(value, 11)), 11);
+  }
+}
+
+TEST(TagDetector, OpenCvsNamesOfAprilTagsGoToTheAprilTagLibrary) {
+  expect_found("DICT_APRILTAG_36h11", upright(apriltag_art("tag36h11", 3)), 3);
+}
+
+TEST(TagDetector, MarkersTurnedInTheImageKeepTheirCorners) {
+  for (const double turn : {0.4, 1.9, 3.1, -1.2}) {
+    for (const bool aruco : {false, true}) {
+      PlacedMarker marker =
+          upright(aruco ? aruco_art(cv::aruco::DICT_6X6_250, 5) : apriltag_art("tag36h11", 5));
+      marker.T_camera_tag =
+          pose_showing(small_camera(), {120.0, 100.0}, 80.0, marker.size_m, 0.5, 0.7, turn);
+      Rng rng = Rng::from_name("turned");
+      const GreyImage image = render_markers(small_camera(), {marker}, {.supersample = 6}, rng);
+      const auto found =
+          make_tag_detector(aruco ? "DICT_6X6_250" : "tag36h11")->detect(image.view());
+      ASSERT_EQ(found.size(), 1U);
+      const auto truth = true_corners(small_camera(), marker);
+      for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_LT((found[0].corners_px[i] - truth[i]).norm(), kCoarse) << aruco << turn << i;
+      }
+    }
+  }
+}
+
+TEST(TagDetector, KnowsItsFamiliesAndRefusesOthers) {
+  for (const std::string& family : known_families()) {
+    EXPECT_GE(tag_layout(family).cells, 5) << family;
+  }
+  try {
+    (void)make_tag_detector("tag99h1");
+    FAIL() << "took an unknown family";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadRequest);
+    EXPECT_NE(std::string(error.what()).find("tagStandard41h12"), std::string::npos);
+  }
+  EXPECT_THROW((void)tag_layout(""), Error);
+  EXPECT_THROW((void)make_tag_detector("tag36h11", {.decimate = 0.5}), Error);
+  EXPECT_THROW((void)make_tag_detector("tag36h11", {.decimate = std::nan("")}), Error);
+  EXPECT_THROW((void)make_tag_detector("tagCircle49h12", {.max_hamming = 2}), Error);
+}
+
+TEST(TagDetector, NothingInAnEmptyImage) {
+  GreyImage image{100, 80, std::vector<std::uint8_t>(8000, 128)};
+  EXPECT_TRUE(make_tag_detector("tag36h11")->detect(image.view()).empty());
+  EXPECT_TRUE(make_tag_detector("DICT_4X4_50")->detect(image.view()).empty());
+}
+
+}  // namespace
+}  // namespace kinescope
