@@ -215,6 +215,22 @@ CameraModel choose_camera(const Recording& recording, const TagObservations& tag
                          (recording.folder / "camera.yaml").string());
 }
 
+Structure find_robot(const Recording& recording, const PoseTracks& tracks,
+                     const CalibrateOptions& options, std::optional<double> time_offset_s) {
+  if (recording.entry == RecordingEntry::kPoints) {
+    throw bad_request("points.csv", "points alone do not show a structure",
+                      "give a nominal robot with --nominal robot.urdf");
+  }
+  StructureOptions structure_options;
+  structure_options.scan_time_offset = options.estimate_time_offset && !time_offset_s;
+  if (!time_offset_s) return find_structure(tracks, recording.log, structure_options);
+  JointLog shifted = recording.log;
+  for (double& t : shifted.times_s) t -= *time_offset_s;
+  Structure structure = find_structure(tracks, shifted, structure_options);
+  structure.time_offset_s += *time_offset_s;
+  return structure;
+}
+
 CalibrationStart start_from_structure(const Structure& structure, const Recording& recording,
                                       const CameraModel& camera) {
   CalibrationStart start;

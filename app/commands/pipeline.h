@@ -17,12 +17,13 @@ namespace kinescope {
 /// What the recording shows, whichever way it enters, and how it was seen.
 struct Observed {
   Measurements measurements;
-  TagObservations tags;                ///< empty unless the recording enters by video or corners
+  TagObservations tags;  ///< empty unless the recording enters by video or corners
   std::vector<std::string> warnings;
 };
 
-/// Detects the markers of the video (or takes them from `cached`), or reads corners, poses or points.
-/// Throws bad_input when there is no marker, or none with a size; when video and log do not overlap in time.
+/// Detects the markers of the video (or takes them from `cached`), or reads corners, poses or
+/// points. Throws bad_input when there is no marker, or none with a size; when video and log do not
+/// overlap in time.
 [[nodiscard]] Observed observe(const Recording& recording, const RunOptions& options,
                                const std::optional<TagObservations>& cached,
                                const Progress& progress);
@@ -30,21 +31,29 @@ struct Observed {
 /// The declared camera, checked against the image size, or a guess from the markers' shapes.
 [[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
 
-/// A start from the found structure: units of the channels recognised, the base frame placed on the first tag at
-/// rest (its normal up; without one at the camera, upright), or level when gravity is declared.
+/// The structure, with the clocks' offset scanned for, or held at a known one. Throws bad_request
+/// for points, which show no structure.
+[[nodiscard]] Structure find_robot(const Recording& recording, const PoseTracks& tracks,
+                                   const CalibrateOptions& options,
+                                   std::optional<double> time_offset_s);
+
+/// A start from the found structure: units of the channels recognised, the base frame placed on the
+/// first tag at rest (its normal up; without one at the camera, upright), or level when gravity is
+/// declared.
 [[nodiscard]] CalibrationStart start_from_structure(const Structure& structure,
                                                     const Recording& recording,
                                                     const CameraModel& camera);
 
-/// A start from a nominal robot: channels matched by name (or by order, with a warning), markers placed.
-/// `warnings` receives what was assumed.
+/// A start from a nominal robot: channels matched by name (or by order, with a warning), markers
+/// placed. `warnings` receives what was assumed.
 [[nodiscard]] CalibrationStart start_from_nominal(const Recording& recording,
                                                   const Measurements& measurements,
                                                   const PoseTracks& tracks,
                                                   const CameraModel& camera,
                                                   std::vector<std::string>& warnings);
 
-/// Throws undetermined with the first doubt's words and remedy when the structure is not determined.
+/// Throws undetermined with the first doubt's words and remedy when the structure is not
+/// determined.
 void require_determined(const Structure& structure);
 
 /// Counts and sizes of what was seen of each marker.

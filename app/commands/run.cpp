@@ -2,6 +2,7 @@
 //
 // `kinescope run`: every arrow of the data's path on one page.
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -20,6 +21,9 @@
 
 namespace kinescope {
 namespace {
+
+// Offsets of the clocks closer than this (s) give the same structure.
+constexpr double kSameOffset = 0.003;
 
 // Wall-clock times of the stages, for the report.
 class Stopwatch {
@@ -92,27 +96,33 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!run.tracks.tracks.empty()) folder.write("tracks.csv", tracks_csv(run.tracks));
   clock.lap("track", run.times);
 
-  CalibrationStart start;
-  if (recording.nominal) {
-    start = start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
-  } else {
-    if (recording.entry == RecordingEntry::kPoints) {
-      throw bad_request("points.csv", "points alone do not show a structure",
-                        "give a nominal robot with --nominal robot.urdf");
-    }
-    StructureOptions structure_options;
-    structure_options.scan_time_offset = options.calibrate.estimate_time_offset;
-    run.structure = find_structure(run.tracks, recording.log, structure_options);
-    folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
-    require_determined(*run.structure);
-    start = start_from_structure(*run.structure, recording, camera);
-  }
-  clock.lap("structure", run.times);
-
   CalibrateOptions calibrate_options = options.calibrate;
   calibrate_options.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
-  run.calibration = calibrate(observed.measurements, recording.markers, recording.log, start,
-                              calibrate_options, console.progress);
+  const auto calibrate_from = [&](const CalibrationStart& start) {
+    return calibrate(observed.measurements, recording.markers, recording.log, start,
+                     calibrate_options, console.progress);
+  };
+  if (recording.nominal) {
+    const CalibrationStart start =
+        start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
+    clock.lap("structure", run.times);
+    run.calibration = calibrate_from(start);
+  } else {
+    const auto find = [&](std::optional<double> time_offset_s) {
+      run.structure = find_robot(recording, run.tracks, options.calibrate, time_offset_s);
+      folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
+      require_determined(*run.structure);
+    };
+    find(std::nullopt);
+    clock.lap("structure", run.times);
+    run.calibration = calibrate_from(start_from_structure(*run.structure, recording, camera));
+    // Corners see the clocks' offset far better than poses do: where the two differ, the structure
+    // is judged again at the offset that the corners show.
+    if (std::abs(run.calibration.time_offset_s - run.structure->time_offset_s) > kSameOffset) {
+      find(run.calibration.time_offset_s);
+      run.calibration = calibrate_from(start_from_structure(*run.structure, recording, camera));
+    }
+  }
   run.errors = summarise_errors(run.calibration);
   clock.lap("calibrate", run.times);
 
