@@ -70,6 +70,11 @@ double nearest_unit(JointType type, double scale) {
   return scale;
 }
 
+std::size_t driven_joints(const Structure& structure) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      structure.joints, [](const StructureJoint& joint) { return joint.channel.has_value(); }));
+}
+
 // The base frame seen from the frame the structure stands in (the camera's).
 Pose base_frame(const KinematicTree& tree, const std::optional<Eigen::Vector3d>& gravity) {
   Pose T_camera_base;
@@ -223,7 +228,17 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   }
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset && !time_offset_s;
-  if (!time_offset_s) return find_structure(tracks, recording.log, structure_options);
+  if (!time_offset_s) {
+    Structure scanned = find_structure(tracks, recording.log, structure_options);
+    // A scan may settle on an offset at which the channels fit by chance: clocks that agree are the first guess
+    // of all, and win when they explain more joints.
+    structure_options.scan_time_offset = false;
+    if (!options.estimate_time_offset || driven_joints(scanned) == scanned.joints.size()) {
+      return scanned;
+    }
+    Structure agreeing = find_structure(tracks, recording.log, structure_options);
+    return driven_joints(agreeing) > driven_joints(scanned) ? agreeing : scanned;
+  }
   JointLog shifted = recording.log;
   for (double& t : shifted.times_s) t -= *time_offset_s;
   Structure structure = find_structure(tracks, shifted, structure_options);

@@ -2,6 +2,7 @@
 #include "kinematics/structure/growth.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +13,8 @@ namespace kinescope::structure_search {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Added to the cost of a free body that is seen to rest.
+constexpr double kNeverFree = 1e6;
 // Rounds in which bodies may change places.
 constexpr int kMostRounds = 4;
 
@@ -68,12 +71,57 @@ class Grower {
     }
     auto found = find_attachments(body(b), link, tree_.links[static_cast<std::size_t>(link)].path,
                                   readings_, usable_, options);
-    const bool rests = std::ranges::any_of(
-        found, [&](const Attachment& a) { return rests_for_all_practical_purposes(body(b), a); });
+    const auto rest = practical_rest(b, link);
     for (Attachment& a : found) {
-      if (rests && !a.at_rest() && !a.driven()) continue;
+      if (rest && !a.driven()) continue;
       g.alternatives.push_back(std::move(a));
     }
+    if (!rest) return;
+    g.rests_on = link;
+    // Nothing that moves freely stays where it is.
+    g.free_cost = std::max(g.free_cost, rest->data_cost + kNeverFree);
+    g.alternatives.push_back(*rest);
+  }
+
+  // The body at rest on a link, where what is left of it is so small that no robot moves by it: corners that err
+  // alike from frame to frame (compression, one light) pass for a slow motion in the statistics, but not in
+  // millimetres. Medians, so that views spoilt by an occlusion do not matter.
+  std::optional<Attachment> practical_rest(std::size_t b, int link) const {
+    constexpr double kTurn = 0.01;    // rad
+    constexpr double kShift = 0.003;  // of the distance from the camera
+    const RelativeMotion relative =
+        relative_motion(body(b), tree_.links[static_cast<std::size_t>(link)].path, readings_);
+    if (relative.motion.size() < 5) return std::nullopt;
+    const Pose reference = relative.motion[relative.motion.size() / 2].pose;
+    std::array<std::vector<double>, 6> moves;
+    for (const MotionSample& sample : relative.motion) {
+      const Pose move = reference.inverse() * sample.pose;
+      const Eigen::Vector3d turn = log_rotation(move.rotation);
+      for (std::size_t i = 0; i < 3; ++i) {
+        moves[i].push_back(turn[static_cast<Eigen::Index>(i)]);
+        moves[i + 3].push_back(move.translation[static_cast<Eigen::Index>(i)]);
+      }
+    }
+    Vector6d middle;
+    for (std::size_t i = 0; i < 6; ++i) middle[static_cast<Eigen::Index>(i)] = median_of(moves[i]);
+    ChainModel model;
+    model.mount = reference * Pose{exp_rotation(middle.head<3>()), middle.tail<3>()};
+    std::vector<double> turn;
+    std::vector<double> shift;
+    for (const MotionSample& sample : relative.motion) {
+      const Pose left = model.mount.inverse() * sample.pose;
+      turn.push_back(log_rotation(left.rotation).norm());
+      shift.push_back(left.translation.norm());
+    }
+    std::vector<double> distance;
+    for (const Sighting& s : body(b).at) {
+      if (s.seen) distance.push_back(s.pose.translation.norm());
+    }
+    if (median_of(turn) > kTurn || median_of(shift) > kShift * median_of(distance)) {
+      return std::nullopt;
+    }
+    return attachment_from(fit_chain(relative.motion, readings_.value, model), link, relative,
+                           body(b), readings_);
   }
 
   // Link `link` hangs (at any depth) on body b's own link.
@@ -99,27 +147,8 @@ class Grower {
     return best;
   }
 
-  // What is left of rest is so small that no robot moves by it: corners that err alike from frame to frame
-  // (compression, one light) pass for a slow motion in the statistics, but not in millimetres. Medians, so that
-  // views spoilt by an occlusion do not matter.
-  bool rests_for_all_practical_purposes(const Body& b, const Attachment& a) const {
-    constexpr double kTurn = 0.01;    // rad
-    constexpr double kShift = 0.003;  // of the distance from the camera
-    if (!a.at_rest()) return false;
-    const LinkPath& path = tree_.links[static_cast<std::size_t>(a.parent)].path;
-    std::vector<double> turn;
-    std::vector<double> shift;
-    for (std::size_t i = 0; i < b.at.size(); ++i) {
-      if (!b.at[i].seen || path.valid[i] == 0) continue;
-      const Pose left = (path.pose[i] * a.fit.model.mount).inverse() * b.at[i].pose;
-      turn.push_back(log_rotation(left.rotation).norm());
-      shift.push_back(left.translation.norm() / std::max(1e-9, b.at[i].pose.translation.norm()));
-    }
-    return !turn.empty() && median_of(turn) < kTurn && median_of(shift) < kShift;
-  }
-
   bool acceptable(std::size_t b, const Attachment& a) const {
-    if (rests_for_all_practical_purposes(body(b), a)) return true;
+    if (a.at_rest() && tree_.bodies[b].rests_on == a.parent) return true;
     const GrownBody& g = tree_.bodies[b];
     if (a.data_cost >= g.free_cost) return false;
     const double ratio = a.explained_ratio();
