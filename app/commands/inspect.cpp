@@ -204,7 +204,11 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
   inspection.recording = std::move(attempt.recording);
   const Recording& recording = inspection.recording;
   std::vector<Finding>& findings = inspection.findings;
-  for (const Error& error : attempt.errors) findings.push_back({true, error.what()});
+  for (const Error& error : attempt.errors) {
+    // Not the recording but the command line is wrong.
+    if (error.code() == ExitCode::kBadRequest) throw Error(error);
+    findings.push_back({true, error.what()});
+  }
   for (const std::string& warning : recording.warnings) findings.push_back({false, warning});
   if (recording.files.empty()) return inspection;
   if (!recording.log.empty())

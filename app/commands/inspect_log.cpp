@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr double kLongGapS = 0.5;       ///< longer gaps are not bridged by the interpolation
 constexpr double kLittleMotion = 0.01;  ///< rad or m; an axis seen over less is hardly determined
-constexpr double kUnevenShare = 0.5;    ///< of the median step
+constexpr double kUnevenShare = 0.5;    ///< of the mean step
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -69,11 +70,13 @@ void look_at_steps(const JointLog& log, LogFacts& facts, std::vector<Finding>& f
     facts.longest_gap_s = steps.back();
     facts.longest_gap_at_s = log.times_s[i - 1];
   }
-  const double step = median(steps);
-  std::vector<double> deviations;
-  for (const double other : steps) deviations.push_back(std::abs(other - step));
+  // Gaps are told apart from the steps, or one of them would be all the jitter.
+  const double longest_step_s = std::max(kLongGapS, 3.0 * median(steps));
+  std::erase_if(steps, [&](double step) { return step > longest_step_s; });
+  const auto count = static_cast<double>(steps.size());
+  const double step = std::accumulate(steps.begin(), steps.end(), 0.0) / count;
   facts.rate_hz = 1.0 / step;
-  facts.jitter_s = median(deviations);
+  for (const double other : steps) facts.jitter_s += std::abs(other - step) / count;
   if (facts.jitter_s > kUnevenShare * step) {
     findings.push_back(
         {false, fmt::format("the log's steps are uneven ({:.1f} ms around {:.1f} ms): are "

@@ -227,6 +227,7 @@ VideoFacts look_at_video(const Recording& recording, const Progress& progress,
     if (seen.empty() && facts.frames_searched % 9 == 0) kept.push_back(std::move(frame->image));
     ++facts.frames_searched;
   }
+  report(progress, "inspect", expected, expected);
   for (const std::string& warning : video->warnings()) findings.push_back({false, warning});
   facts.markers = summarise(seen, recording.markers);
   if (recording.camera) {

@@ -57,8 +57,8 @@ struct LogFacts {
   int samples = 0;
   double first_s = 0.0;
   double last_s = 0.0;
-  double rate_hz = 0.0;   ///< from the median step
-  double jitter_s = 0.0;  ///< median deviation of a step from the median step
+  double rate_hz = 0.0;   ///< from the mean step, gaps left out
+  double jitter_s = 0.0;  ///< mean deviation of a step from the mean step
   double longest_gap_s = 0.0;
   double longest_gap_at_s = 0.0;
   std::vector<ChannelFacts> channels;
@@ -73,6 +73,7 @@ struct Inspection {
   [[nodiscard]] bool ready() const;
 };
 
+/// Throws bad_request when the paths contradict each other; a bad recording is findings.
 [[nodiscard]] Inspection inspect_recording(const RecordingPaths& paths,
                                            const Progress& progress = {});
 

@@ -41,7 +41,7 @@ void ProgressLine::update(std::string_view stage, int done, int total) {
     end_stage();
     stage_ = stage;
     begin_s_ = clock_();
-    shown_s_ = begin_s_ - kSecondsBetweenRewrites;
+    shown_s_ = begin_s_ - 2.0 * kSecondsBetweenRewrites;
   }
   done_ = done;
   total_ = total;

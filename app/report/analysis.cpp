@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr int kDependenceBins = 10;
 constexpr int kMinPerBin = 5;
+constexpr int kFewestGroups = 3;
 constexpr std::array<int, 2> kCoverageGrid = {8, 6};
 
 /// Mean time from one frame to the next, s; 0 where there is one frame or none.
@@ -81,6 +83,7 @@ std::vector<JointError> joint_error_series(const Calibration& calibration,
   for (const auto& [frame, sum] : sums) {
     if (sum.denominator <= kLeastLever * largest || largest <= 0.0) continue;
     const double value = calibration.joint_values(frame, static_cast<Eigen::Index>(joint));
+    if (!std::isfinite(value)) continue;
     series.push_back({.frame = frame, .value = value, .error = sum.numerator / sum.denominator});
   }
   return series;
@@ -104,8 +107,7 @@ void add_joint_dependence(const RunSummary& run, Analysis& analysis) {
     analysis.joint_errors[j] = joint_error_series(calibration, predictor, j);
     std::vector<std::pair<double, double>> pairs;
     for (const JointError& one : analysis.joint_errors[j]) pairs.emplace_back(one.value, one.error);
-    const double independent = static_cast<double>(pairs.size()) / frames_alike(calibration);
-    const std::optional<double> share = explained_share(pairs, independent, kDependenceBins);
+    const std::optional<double> share = share_of_value(pairs, kDependenceBins);
     if (!share) continue;
     analysis.dependence.push_back(
         {.on = joint.name,
@@ -143,8 +145,7 @@ void add_time_dependence(const RunSummary& run, Analysis& analysis) {
   double weight = 0.0, share = 0.0, half_range = 0.0;
   int frames = 0;
   for (const auto& [key, pairs] : time_series(run.calibration)) {
-    const double independent = static_cast<double>(pairs.size()) / frames_alike(run.calibration);
-    const std::optional<double> one = explained_share(pairs, independent, kDependenceBins);
+    const std::optional<double> one = share_of_time(pairs, kDependenceBins);
     if (!one) continue;
     double squares = 0.0;
     for (const auto& [time, residual] : pairs) squares += residual * residual;
@@ -192,6 +193,81 @@ double image_coverage(const Analysis& analysis, const CameraModel& camera) {
   return static_cast<double>(cells.size()) / (kCoverageGrid[0] * kCoverageGrid[1]);
 }
 
+/// Samples sorted into groups of equal count by their first; how much of the second's variance the
+/// groups carry.
+class Binning {
+ public:
+  Binning(const std::vector<std::pair<double, double>>& pairs, int bins) : pairs_(pairs) {
+    std::vector<std::size_t> order(pairs.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return pairs[i].first; });
+    groups_ = std::min(bins, static_cast<int>(pairs.size()) / kMinPerBin);
+    group_.resize(pairs.size());
+    for (std::size_t rank = 0; rank < order.size() && groups_ > 0; ++rank) {
+      group_[order[rank]] = rank * static_cast<std::size_t>(groups_) / order.size();
+    }
+  }
+
+  [[nodiscard]] int groups() const { return groups_; }
+
+  /// Share of the variance between the groups when sample i + shift is put in the place of sample
+  /// i.
+  [[nodiscard]] double explained(std::size_t shift) const {
+    const std::vector<double> means = group_means(shift);
+    double mean = 0.0, total = 0.0, within = 0.0;
+    for (const auto& [variable, value] : pairs_) mean += value;
+    mean /= static_cast<double>(pairs_.size());
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const double value = pairs_[(i + shift) % pairs_.size()].second;
+      total += (value - mean) * (value - mean);
+      within += (value - means[group_[i]]) * (value - means[group_[i]]);
+    }
+    return total > 0.0 ? 1.0 - within / total : 0.0;
+  }
+
+  /// What the groups leave, in the order of the pairs.
+  [[nodiscard]] std::vector<double> left() const {
+    const std::vector<double> means = group_means(0);
+    std::vector<double> rest;
+    for (std::size_t i = 0; i < pairs_.size() && groups_ > 0; ++i) {
+      rest.push_back(pairs_[i].second - means[group_[i]]);
+    }
+    return rest;
+  }
+
+ private:
+  [[nodiscard]] std::vector<double> group_means(std::size_t shift) const {
+    std::vector<double> sums(static_cast<std::size_t>(std::max(1, groups_)), 0.0);
+    std::vector<double> counts(sums.size(), 0.0);
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      sums[group_[i]] += pairs_[(i + shift) % pairs_.size()].second;
+      counts[group_[i]] += 1.0;
+    }
+    for (std::size_t g = 0; g < sums.size(); ++g) sums[g] /= std::max(1.0, counts[g]);
+    return sums;
+  }
+
+  const std::vector<std::pair<double, double>>& pairs_;
+  std::vector<std::size_t> group_;
+  int groups_ = 0;
+};
+
+/// Samples that count as one: 1 + 2 sum of the autocorrelation up to its first value that is not
+/// positive.
+double correlation_length(const std::vector<double>& series) {
+  double variance = 0.0;
+  for (const double value : series) variance += value * value;
+  if (variance <= 0.0) return 1.0;
+  double length = 1.0;
+  for (std::size_t lag = 1; lag < series.size() / 2; ++lag) {
+    double product = 0.0;
+    for (std::size_t i = lag; i < series.size(); ++i) product += series[i] * series[i - lag];
+    if (product <= 0.0) break;
+    length += 2.0 * product / variance;
+  }
+  return length;
+}
+
 }  // namespace
 
 std::vector<Bin> quantile_bins(std::vector<std::pair<double, double>> pairs, int bins) {
@@ -224,26 +300,30 @@ std::vector<Bin> quantile_bins(std::vector<std::pair<double, double>> pairs, int
   return result;
 }
 
-std::optional<double> explained_share(const std::vector<std::pair<double, double>>& pairs,
-                                      double independent, int bins) {
-  const std::vector<Bin> binned = quantile_bins(pairs, bins);
-  const auto groups = static_cast<double>(binned.size());
-  if (groups < 3.0 || independent <= 2.0 * groups) return std::nullopt;
-  double mean = 0.0, count = 0.0, total = 0.0, between = 0.0;
-  for (const auto& [variable, value] : pairs) {
-    if (!std::isfinite(variable) || !std::isfinite(value)) continue;
-    mean += value;
-    count += 1.0;
+std::optional<double> share_of_value(const std::vector<std::pair<double, double>>& pairs,
+                                     int bins) {
+  const Binning binning(pairs, bins);
+  if (binning.groups() < kFewestGroups) return std::nullopt;
+  constexpr int kShifts = 24;
+  const auto count = static_cast<int>(pairs.size());
+  double chance = 0.0;
+  for (int k = 1; k <= kShifts; ++k) {
+    chance += binning.explained(static_cast<std::size_t>(count) * static_cast<std::size_t>(k) /
+                                (kShifts + 1)) /
+              kShifts;
   }
-  mean /= count;
-  for (const auto& [variable, value] : pairs) {
-    if (!std::isfinite(variable) || !std::isfinite(value)) continue;
-    total += (value - mean) * (value - mean);
-  }
-  for (const Bin& bin : binned) between += bin.count * (bin.mean - mean) * (bin.mean - mean);
-  if (total <= 0.0) return 0.0;
+  if (chance >= 1.0) return 0.0;
+  return std::clamp((binning.explained(0) - chance) / (1.0 - chance), 0.0, 1.0);
+}
+
+std::optional<double> share_of_time(const std::vector<std::pair<double, double>>& pairs, int bins) {
+  const Binning binning(pairs, bins);
+  const double groups = binning.groups();
+  const double independent = static_cast<double>(pairs.size()) / correlation_length(binning.left());
+  if (groups < kFewestGroups || independent <= 2.0 * groups) return std::nullopt;
   // Adjusted coefficient of determination at the effective sample size.
-  const double share = 1.0 - (1.0 - between / total) * (independent - 1.0) / (independent - groups);
+  const double share =
+      1.0 - (1.0 - binning.explained(0)) * (independent - 1.0) / (independent - groups);
   return std::clamp(share, 0.0, 1.0);
 }
 

@@ -8,8 +8,9 @@
 // Method  error of a joint: the least-squares step of that joint over the sightings of one frame,
 // from
 //         the derivative of the prediction. Share of the residual that follows a variable:
-//         explained variance over quantile bins, less what chance gives at the effective number of
-//         independent frames (frames over the residuals' correlation time).
+//         explained variance over quantile bins, less what chance gives. Residuals are alike over
+//         time, so chance is measured: for a joint value by shifting the residuals against it in
+//         time, for the time itself from the correlation of what the bins leave.
 #pragma once
 
 #include <optional>
@@ -72,10 +73,16 @@ struct Analysis {
 [[nodiscard]] std::vector<Bin> quantile_bins(std::vector<std::pair<double, double>> pairs,
                                              int bins);
 
-/// Share of the variance of `pairs`' second that follows the first, chance at `independent` samples
-/// taken off; nothing when there are too few.
-[[nodiscard]] std::optional<double> explained_share(
-    const std::vector<std::pair<double, double>>& pairs, double independent, int bins);
+/// Pairs in the order of time: share of the variance of the second that follows the first. Chance
+/// is the mean share over circular shifts of the second against the first, which keep the
+/// correlation of both. Nothing when there are too few pairs. O(pairs log pairs).
+[[nodiscard]] std::optional<double> share_of_value(
+    const std::vector<std::pair<double, double>>& pairs, int bins);
+
+/// The same where the first is the time. Chance is that of as many independent samples as the
+/// correlation of what the bins leave allows.
+[[nodiscard]] std::optional<double> share_of_time(
+    const std::vector<std::pair<double, double>>& pairs, int bins);
 
 /// The residual components of a sighting that a plot shows: px for corners (u and v of every
 /// corner), m else.

@@ -22,10 +22,10 @@ constexpr double kAdvice = 10.0;
 
 constexpr double kFewIndependentFrames = 30.0;
 constexpr double kNoiseLimit = 1.5;
-constexpr double kSmallTurn = 0.35;      ///< rad: below, an axis is poorly placed by its own motion
-constexpr double kRarelySeen = 0.3;      ///< share of the frames
-constexpr double kSmallMarker = 25.0;    ///< px: below, tilt and depth are poorly seen
-constexpr double kOftenRejected = 0.05;  ///< share of the sightings of one marker
+constexpr double kSmallTurn = 0.35;     ///< rad: below, an axis is poorly placed by its own motion
+constexpr double kRarelySeen = 0.3;     ///< share of the frames
+constexpr double kSmallMarker = 25.0;   ///< px: below, tilt and depth are poorly seen
+constexpr double kOftenRejected = 0.1;  ///< share of the sightings of one marker
 
 /// A sentence of other rooms, closed with a full stop.
 std::string sentence(std::string text) {

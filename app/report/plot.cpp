@@ -62,7 +62,11 @@ std::string series_class(std::size_t series) {
 
 std::vector<double> nice_ticks(double lower, double upper, int count) {
   if (!(upper > lower) || !std::isfinite(upper - lower)) return {};
-  const double step = nice_step(upper - lower, count);
+  double step = nice_step(upper - lower, count);
+  // A range that straddles one round number only would have one tick: take the finer step then.
+  if (std::floor(upper / step) - std::ceil(lower / step) < 2.0) {
+    step = nice_step(upper - lower, 2 * count);
+  }
   std::vector<double> ticks;
   for (double k = std::ceil(lower / step - 1e-9); k * step <= upper + 1e-9 * step; k += 1.0) {
     ticks.push_back(k * step);

@@ -7,6 +7,12 @@
 
 namespace kinescope::report {
 
+bool base_is_camera(const Calibration& calibration) {
+  constexpr double kSame = 1e-9;  // m and rad
+  return calibration.T_camera_base.translation.norm() < kSame &&
+         log_rotation(calibration.T_camera_base.rotation).norm() < kSame;
+}
+
 Predictor::Predictor(const Calibration& calibration) : calibration_(calibration) {
   const KinematicTree& tree = calibration.tree;
   const auto joints = static_cast<Eigen::Index>(tree.joints.size());

@@ -12,6 +12,9 @@
 
 namespace kinescope::report {
 
+/// True where the base frame is the camera's own: nothing of the robot is at its origin.
+[[nodiscard]] bool base_is_camera(const Calibration& calibration);
+
 /// One residual component and how the prediction of it grows with a joint's value.
 struct ResidualAndRate {
   double residual = 0.0;

@@ -57,13 +57,18 @@ int middle_frame(const Predictor& predictor, std::size_t frames) {
   return known.empty() ? -1 : known[known.size() / 2];
 }
 
-void draw_links(const KinematicTree& tree, const std::vector<Pose>& links, Drawing& drawing) {
-  for (const Joint& joint : tree.joints) {
+/// Bones from link to link and stems to the markers. A base that is the camera's frame is no part
+/// of the robot.
+void draw_links(const Calibration& calibration, const std::vector<Pose>& links, Drawing& drawing) {
+  const bool no_base = base_is_camera(calibration);
+  for (const Joint& joint : calibration.tree.joints) {
+    if (no_base && joint.parent.value == 0) continue;
     drawing.strokes.push_back(
         {{links[joint.parent.index()].translation, links[joint.child.index()].translation},
          "bone"});
   }
-  for (const Marker& marker : tree.markers) {
+  for (const Marker& marker : calibration.tree.markers) {
+    if (no_base && marker.link.value == 0) continue;
     const Pose T = links[marker.link.index()] * marker.T_link_marker;
     drawing.strokes.push_back({{links[marker.link.index()].translation, T.translation}, "stem"});
   }
@@ -114,13 +119,16 @@ void draw_camera(const Calibration& calibration, double depth, Drawing& drawing)
   drawing.labels.push_back({T.translation, "camera", "tick"});
 }
 
-/// Largest distance between what the robot itself spans.
-double robot_extent(const KinematicTree& tree, const std::vector<Pose>& links) {
+/// Diagonal of what the robot itself spans.
+double robot_extent(const Calibration& calibration, const std::vector<Pose>& links) {
   std::vector<Eigen::Vector3d> points;
-  for (const Pose& link : links) points.push_back(link.translation);
-  for (const Marker& marker : tree.markers) {
+  for (std::size_t k = base_is_camera(calibration) ? 1 : 0; k < links.size(); ++k) {
+    points.push_back(links[k].translation);
+  }
+  for (const Marker& marker : calibration.tree.markers) {
     points.push_back(links[marker.link.index()] * marker.T_link_marker.translation);
   }
+  if (points.empty()) return 1.0;
   Eigen::Vector3d low = points.front(), high = points.front();
   for (const Eigen::Vector3d& point : points) {
     low = low.cwiseMin(point);
@@ -253,9 +261,9 @@ std::string robot_views(const Facts& facts) {
   if (frame < 0)
     return paragraph("No posture of the recording is known: the robot is not drawn.", "note");
   const std::vector<Pose>& links = predictor.links(frame);
-  const double extent = robot_extent(calibration.tree, links);
+  const double extent = robot_extent(calibration, links);
   Drawing drawing;
-  draw_links(calibration.tree, links, drawing);
+  draw_links(calibration, links, drawing);
   draw_joints(calibration.tree, links, kAxisShare * extent, drawing);
   draw_markers(calibration.tree, links, 0.02 * extent, drawing);
   // In the frame of the views: x right, y up, z towards the reader.

@@ -302,7 +302,7 @@ std::string dependence_table(const Facts& facts) {
     table.number(at + "/frames", Quantity::kCount);
   }
   return table.str() + paragraph(
-                           "Chance at the number of independent frames is taken off. Variables "
+                           "What chance gives is taken off. Variables "
                            "that move together share what they "
                            "explain: this points to a place to look, it does not prove a cause.",
                            "note");

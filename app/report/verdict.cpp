@@ -3,6 +3,7 @@
 // The verdict: sentences that say no more than the numbers do.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -148,37 +149,61 @@ std::string prediction_words(const RunSummary& run) {
   return text + ".";
 }
 
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+/// "0.028° in direction and 0.080 mm in position" of two standard uncertainties.
+std::string axis_uncertainty(double direction, std::optional<double> position) {
+  std::string text =
+      uncertainty_text(kCoverageFactor * direction, Quantity::kAngle) + "° in direction";
+  if (position) {
+    text += fmt::format(" and {} mm in position",
+                        uncertainty_text(kCoverageFactor * *position, Quantity::kLength));
+  }
+  return text;
+}
+
 std::string axis_words(const Calibration& calibration) {
-  double direction = 0.0, position = 0.0;
-  std::string worst;
+  std::vector<double> directions, positions;
   std::vector<std::string> unknown;
+  const JointEstimate* worst = nullptr;
+  std::string worst_name;
   for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
        ++j) {
-    const Joint& joint = calibration.tree.joints[j];
     const JointEstimate& estimate = calibration.joints[j];
-    if (joint.type == JointType::kFixed) continue;
+    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
     if (!estimate.direction_sigma_rad) {
-      unknown.push_back(joint.name);
+      unknown.push_back(calibration.tree.joints[j].name);
       continue;
     }
-    if (*estimate.direction_sigma_rad > direction) {
-      direction = *estimate.direction_sigma_rad;
-      worst = joint.name;
+    directions.push_back(*estimate.direction_sigma_rad);
+    if (estimate.position_sigma_m) positions.push_back(*estimate.position_sigma_m);
+    if (worst == nullptr || *estimate.direction_sigma_rad > *worst->direction_sigma_rad) {
+      worst = &estimate;
+      worst_name = calibration.tree.joints[j].name;
     }
-    if (estimate.position_sigma_m) position = std::max(position, *estimate.position_sigma_m);
   }
   std::string text;
-  if (direction > 0.0) {
-    text = fmt::format(" Joint axes are known to {}° in direction",
-                       uncertainty_text(kCoverageFactor * direction, Quantity::kAngle));
-    if (position > 0.0) {
-      text += fmt::format(" and {} mm in position",
-                          uncertainty_text(kCoverageFactor * position, Quantity::kLength));
-    }
-    text += fmt::format(" or better (expanded uncertainty, k = 2; least certain: {}).", worst);
+  if (directions.size() == 1) {
+    text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).", worst_name,
+                       axis_uncertainty(*worst->direction_sigma_rad, worst->position_sigma_m));
+  } else if (worst != nullptr) {
+    std::optional<double> position;
+    if (!positions.empty()) position.emplace(median(positions));
+    text = fmt::format(
+        " Joint axes are known to {} (median, expanded uncertainty, k = 2); least certain is {} "
+        "with {}.",
+        axis_uncertainty(median(directions), position), worst_name,
+        axis_uncertainty(*worst->direction_sigma_rad, worst->position_sigma_m));
   }
   if (!unknown.empty()) {
-    text += fmt::format(" No uncertainty can be given for the axis of {}.", joined(unknown));
+    text += fmt::format(
+        " No uncertainty can be given for the axis of {}: it was held, or the data do not "
+        "determine it.",
+        joined(unknown));
   }
   return text;
 }

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "app/report/html.h"
+#include "app/report/prediction.h"
 #include "app/report/sections.h"
 
 namespace kinescope::report {
@@ -136,11 +137,12 @@ std::string viewer_data(const Facts& facts) {
     arrows += fmt::format("{}[{}]", arrows.empty() ? "" : ",", residuals[static_cast<int>(frame)]);
   }
   return fmt::format(
-      "{{\"kind\":\"{}\",\"stride\":{},\"links\":{},\"joints\":{},\"markers\":{},\"camera\":{},"
+      "{{\"kind\":\"{}\",\"baseIsCamera\":{},\"stride\":{},\"links\":{},\"joints\":{},\"markers\":{"
+      "},\"camera\":{},"
       "\"times\":{},\"values\":[{}],\"residuals\":[{}]}}",
-      to_string(calibration.kind), stride, calibration.tree.links.size(),
-      joints_text(calibration.tree), markers_text(calibration.tree), camera_text(calibration),
-      list(times, 4), values, arrows);
+      to_string(calibration.kind), base_is_camera(calibration), stride,
+      calibration.tree.links.size(), joints_text(calibration.tree), markers_text(calibration.tree),
+      camera_text(calibration), list(times, 4), values, arrows);
 }
 
 std::string view_section(const Facts& facts) {

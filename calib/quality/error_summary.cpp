@@ -23,16 +23,45 @@ void add_pixels(const std::vector<Eigen::Vector2d>& corners, std::vector<double>
   for (const Eigen::Vector2d& corner : corners) lengths.push_back(corner.norm());
 }
 
+/// The direction from the camera to every sighting, in the camera's axes.
+class LinesOfSight {
+ public:
+  explicit LinesOfSight(const Calibration& calibration) : calibration_(calibration) {}
+
+  /// The optical axis where the posture is not known.
+  [[nodiscard]] Eigen::Vector3d to(const SightingResidual& sighting) {
+    const Marker* marker = calibration_.tree.marker(sighting.id);
+    const Eigen::MatrixXd& values = calibration_.joint_values;
+    if (marker == nullptr || sighting.frame < 0 || sighting.frame >= values.rows() ||
+        !values.row(sighting.frame).allFinite()) {
+      return Eigen::Vector3d::UnitZ();
+    }
+    if (sighting.frame != frame_) {
+      frame_ = sighting.frame;
+      links_ = forward_kinematics(calibration_.tree, values.row(frame_).transpose());
+    }
+    const Pose T_base_marker = links_[marker->link.index()] * marker->T_link_marker;
+    const Eigen::Vector3d place = calibration_.T_camera_base * T_base_marker.translation;
+    return place.norm() > 0.0 ? Eigen::Vector3d(place.normalized()) : Eigen::Vector3d::UnitZ();
+  }
+
+ private:
+  const Calibration& calibration_;
+  int frame_ = -1;
+  std::vector<Pose> links_;  ///< of frame_
+};
+
 /// One displacement (rad, m): whole lengths for poses and points; for corners what one camera sees
 /// well, the shift across its line of sight and the turn about it.
 void add_displacement(MeasurementKind kind, const Vector6d& displacement,
-                      std::vector<double>& metres, std::vector<double>& radians) {
+                      const Eigen::Vector3d& sight, std::vector<double>& metres,
+                      std::vector<double>& radians) {
   const Eigen::Vector3d turn = displacement.head<3>();
   const Eigen::Vector3d shift = displacement.tail<3>();
   switch (kind) {
     case MeasurementKind::kCorners:
-      metres.push_back(shift.head<2>().norm());
-      radians.push_back(std::abs(turn.z()));
+      metres.push_back((shift - shift.dot(sight) * sight).norm());
+      radians.push_back(std::abs(turn.dot(sight)));
       break;
     case MeasurementKind::kPose:
       metres.push_back(shift.norm());
@@ -44,19 +73,21 @@ void add_displacement(MeasurementKind kind, const Vector6d& displacement,
   }
 }
 
-void add_sighting(MeasurementKind kind, const SightingResidual& sighting, Lengths& lengths) {
+void add_sighting(MeasurementKind kind, const SightingResidual& sighting,
+                  const Eigen::Vector3d& sight, Lengths& lengths) {
   // A displacement of exactly zero was never filled: no model was asked about this sighting.
   const bool was_before = !sighting.before_displacement.isZero(0.0);
   const bool was_held_out = !sighting.held_out_displacement.isZero(0.0);
   add_pixels(sighting.before_px, lengths.before_px);
   add_pixels(sighting.corners_px, lengths.training_px);
   add_pixels(sighting.held_out_px, lengths.held_out_px);
-  add_displacement(kind, sighting.displacement, lengths.training_m, lengths.training_rad);
+  add_displacement(kind, sighting.displacement, sight, lengths.training_m, lengths.training_rad);
   if (was_before) {
-    add_displacement(kind, sighting.before_displacement, lengths.before_m, lengths.before_rad);
+    add_displacement(kind, sighting.before_displacement, sight, lengths.before_m,
+                     lengths.before_rad);
   }
   if (was_held_out) {
-    add_displacement(kind, sighting.held_out_displacement, lengths.held_out_m,
+    add_displacement(kind, sighting.held_out_displacement, sight, lengths.held_out_m,
                      lengths.held_out_rad);
   }
 }
@@ -101,12 +132,14 @@ ErrorSummary summarise_errors(const Calibration& calibration) {
   Lengths all;
   std::map<LinkId, Lengths> by_link;
   std::map<TagId, Lengths> by_marker;
+  LinesOfSight lines(calibration);
   for (const SightingResidual& sighting : calibration.residuals) {
     if (!sighting.used) continue;
-    add_sighting(calibration.kind, sighting, all);
-    add_sighting(calibration.kind, sighting, by_marker[sighting.id]);
+    const Eigen::Vector3d sight = lines.to(sighting);
+    add_sighting(calibration.kind, sighting, sight, all);
+    add_sighting(calibration.kind, sighting, sight, by_marker[sighting.id]);
     if (const Marker* marker = calibration.tree.marker(sighting.id)) {
-      add_sighting(calibration.kind, sighting, by_link[marker->link]);
+      add_sighting(calibration.kind, sighting, sight, by_link[marker->link]);
     }
   }
   ErrorSummary summary;

@@ -61,7 +61,8 @@ export class RobotScene {
     for (let f = 0; f < this.model.values.length; f += step) {
       const links = forwardKinematics(this.model, this.model.values[f]);
       if (links === null) continue;
-      const points = links.map((link) => link.t);
+      // A base that is the camera's frame is no part of the robot.
+      const points = links.slice(this.model.baseIsCamera ? 1 : 0).map((link) => link.t);
       for (const marker of this.model.markers) points.push(apply(links[marker.link], marker.mount.slice(4, 7)));
       for (const point of points) {
         for (let k = 0; k < 3; ++k) {
@@ -194,23 +195,27 @@ export class RobotScene {
     if (!shown) return false;
     this.model.joints.forEach((joint, j) => {
       setPose(this.jointMeshes[j], shown[joint.child]);
-      this.stretch(this.bones[j], shown[joint.parent].t, shown[joint.child].t);
+      this.stretch(this.bones[j], shown[joint.parent].t, shown[joint.child].t, this.isPart(joint.parent));
     });
     this.model.markers.forEach((marker, m) => {
       const pose = compose(shown[marker.link], poseFromList(marker.mount));
       setPose(this.markerMeshes[m], pose);
-      this.stretch(this.stems[m], shown[marker.link].t, pose.t);
+      this.stretch(this.stems[m], shown[marker.link].t, pose.t, this.isPart(marker.link));
     });
     this.setArrows(links ? residualArrows(this.model, links, this.model.residuals[frame]) : [], arrowScale);
     this.draw();
     return links !== null;
   }
 
-  stretch(bone, from, to) {
+  isPart(link) {
+    return link !== 0 || !this.model.baseIsCamera;
+  }
+
+  stretch(bone, from, to, isPart) {
     const a = new Vector3(from[0], from[1], from[2]);
     const run = new Vector3(to[0], to[1], to[2]).sub(a);
     const length = run.length();
-    bone.visible = length > 1e-6 * this.extent;
+    bone.visible = isPart && length > 1e-6 * this.extent;
     if (!bone.visible) return;
     bone.scale.set(1, length, 1);
     bone.position.copy(a).addScaledVector(run, 0.5);

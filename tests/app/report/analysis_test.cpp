@@ -24,7 +24,7 @@ TEST(QuantileBins, HaveEqualCountsAndRightMeans) {
   EXPECT_TRUE(quantile_bins({{1.0, 1.0}}, 10).empty());
 }
 
-TEST(ExplainedShare, IsZeroForNoiseAndOneForACurve) {
+TEST(Share, IsZeroForNoiseAndOneForACurve) {
   Rng rng = Rng::from_name("explained share");
   std::vector<std::pair<double, double>> noise, curve, half;
   for (int k = 0; k < 2000; ++k) {
@@ -35,10 +35,54 @@ TEST(ExplainedShare, IsZeroForNoiseAndOneForACurve) {
     half.emplace_back(x, (x < 0.5 ? 1.0 : -1.0) + e);
   }
   constexpr double kChance = 0.02;  // three standard deviations of the share at 2000 samples
-  EXPECT_NEAR(*explained_share(noise, 2000, 10), 0.0, kChance);
-  EXPECT_GT(*explained_share(curve, 2000, 10), 0.95);
-  EXPECT_NEAR(*explained_share(half, 2000, 10), 0.5, 0.05);
-  EXPECT_FALSE(explained_share(noise, 15.0, 10).has_value());
+  EXPECT_NEAR(*share_of_value(noise, 10), 0.0, kChance);
+  EXPECT_GT(*share_of_value(curve, 10), 0.95);
+  EXPECT_NEAR(*share_of_value(half, 10), 0.5, 0.05);
+  EXPECT_FALSE(share_of_value({{0.0, 1.0}, {1.0, 2.0}}, 10).has_value());
+}
+
+TEST(Share, IsNotFooledByNoiseThatIsAlikeOverTime) {
+  // A joint that swings, and a residual that wanders on its own: binned, the plain share is far
+  // from zero.
+  double largest = 0.0, sum = 0.0;
+  constexpr int kRepeats = 40;
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    Rng rng = Rng::from_name("wandering residual", static_cast<std::uint64_t>(repeat));
+    std::vector<std::pair<double, double>> pairs;
+    double wander = 0.0;
+    for (int k = 0; k < 330; ++k) {
+      wander = 0.94 * wander + rng.normal();
+      pairs.emplace_back(std::sin(0.031 * k) + 0.6 * std::sin(0.017 * k + 1.0), wander);
+    }
+    const double share = *share_of_value(pairs, 10);
+    largest = std::max(largest, share);
+    sum += share;
+  }
+  EXPECT_LT(sum / kRepeats, 0.12);
+  EXPECT_LT(largest, 0.6);
+}
+
+TEST(Share, FindsASmoothErrorOfASwingingJoint) {
+  // The error itself makes the residual alike over time; that must not hide it.
+  Rng rng = Rng::from_name("smooth error");
+  std::vector<std::pair<double, double>> pairs;
+  for (int k = 0; k < 330; ++k) {
+    const double q = std::sin(0.031 * k) + 0.6 * std::sin(0.017 * k + 1.0);
+    pairs.emplace_back(q, std::sin(3.0 * q) + rng.normal(0.1));
+  }
+  EXPECT_GT(*share_of_value(pairs, 10), 0.7);
+}
+
+TEST(Share, OfTimeSeesADrift) {
+  Rng rng = Rng::from_name("drift");
+  std::vector<std::pair<double, double>> still, drift;
+  for (int k = 0; k < 400; ++k) {
+    const double e = rng.normal();
+    still.emplace_back(k / 30.0, e);
+    drift.emplace_back(k / 30.0, e + 0.01 * k);
+  }
+  EXPECT_LT(*share_of_time(still, 10), 0.06);
+  EXPECT_NEAR(*share_of_time(drift, 10), 0.57, 0.1);  // 4^2 / 12 over 4^2 / 12 + 1
 }
 
 TEST(Predictor, RatesAreTheDerivativeOfThePrediction) {

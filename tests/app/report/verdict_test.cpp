@@ -20,7 +20,8 @@ TEST(Verdict, OfAVideoWithALog) {
   EXPECT_TRUE(has(verdict.found, "0.999930")) << verdict.found;
   EXPECT_TRUE(has(verdict.accurate, "at postures that the fit has not seen")) << verdict.accurate;
   EXPECT_TRUE(has(verdict.accurate, " px, or ")) << verdict.accurate;
-  EXPECT_TRUE(has(verdict.accurate, "least certain: q3")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, "least certain is q3 with 0.028° in direction."))
+      << verdict.accurate;
   EXPECT_TRUE(has(verdict.accurate, "frame time + (12.30 ± 0.42) ms")) << verdict.accurate;
   EXPECT_TRUE(has(verdict.limits, "noise of the measurement limits")) << verdict.limits;
   EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;

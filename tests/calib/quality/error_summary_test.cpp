@@ -94,6 +94,31 @@ TEST(SummariseErrors, CornersAreLengthsAndGroupedByLinkAndMarker) {
   EXPECT_EQ(summary.markers[1].name, "tag_5");
 }
 
+TEST(SummariseErrors, CornersAreJudgedAcrossTheirOwnLineOfSight) {
+  // A marker at 45 degrees: a displacement along the ray to it is depth, and counts for nothing.
+  Calibration calibration = two_links(MeasurementKind::kCorners);
+  calibration.tree.joints.push_back({.name = "slide",
+                                     .type = JointType::kPrismatic,
+                                     .parent = LinkId{0},
+                                     .child = LinkId{1},
+                                     .T_parent_joint = {},
+                                     .channel = "",
+                                     .limits = {}});
+  calibration.tree.joints[0].axis = Eigen::Vector3d::UnitX();
+  calibration.T_camera_base.translation = {0.0, 0.0, 2.0};
+  calibration.joint_values =
+      Eigen::MatrixXd::Constant(1, 1, 2.0);  // the marker stands at (2, 0, 2)
+  SightingResidual along = sighting_of(0, 5);
+  along.corners_px = {{1, 0}};
+  along.displacement = twist(0.1, 0, 0.1, 0.5, 0, 0.5);
+  calibration.residuals = {along};
+  EXPECT_NEAR(summarise_errors(calibration).all.training_m.max, 0.0, kExact);
+  EXPECT_NEAR(summarise_errors(calibration).all.training_rad.max, 0.1 * std::sqrt(2.0), kExact);
+  calibration.residuals[0].displacement = twist(-0.1, 0, 0.1, 0.5, 0.2, -0.5);
+  EXPECT_NEAR(summarise_errors(calibration).all.training_m.max, std::sqrt(0.54), kExact);
+  EXPECT_NEAR(summarise_errors(calibration).all.training_rad.max, 0.0, kExact);
+}
+
 TEST(SummariseErrors, RejectedSightingsAreInNoFigure) {
   Calibration calibration = two_links(MeasurementKind::kCorners);
   SightingResidual good = sighting_of(0, 5);

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The program as a function: exit codes, one line for an error, help that a newcomer can use.
+#include "app/commands/cli.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/app/io/recording_folder.h"
+
+namespace kinescope {
+namespace {
+
+struct Outcome {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+Outcome run(std::vector<std::string> words) {
+  words.insert(words.begin(), "kinescope");
+  std::vector<const char*> argv;
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  argv.push_back(nullptr);
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  Outcome outcome;
+  outcome.code = run_program(static_cast<int>(words.size()), argv.data());
+  outcome.out = testing::internal::GetCapturedStdout();
+  outcome.err = testing::internal::GetCapturedStderr();
+  return outcome;
+}
+
+/// The exit code and one line "kinescope: .." on standard error, nothing else.
+void expect_refusal(const std::vector<std::string>& words, ExitCode code, const std::string& part) {
+  const Outcome outcome = run(words);
+  EXPECT_EQ(outcome.code, static_cast<int>(code)) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_TRUE(outcome.err.starts_with("kinescope: ")) << outcome.err;
+  EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+  EXPECT_TRUE(outcome.err.ends_with(")\n")) << "a remedy: " << outcome.err;
+  EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+}
+
+TEST(Cli, VersionAndHelp) {
+  const Outcome version = run({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(version.out.starts_with("kinescope ")) << version.out;
+  for (const std::string command : {"run", "inspect", "camera"}) {
+    const Outcome help = run({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("Example:\n  kinescope " + command), std::string::npos) << help.out;
+    EXPECT_NE(help.out.find("Exit codes:"), std::string::npos);
+    EXPECT_EQ(help.err, "");
+  }
+  EXPECT_NE(run({"--help"}).out.find("inspect"), std::string::npos);
+}
+
+TEST(Cli, WrongCommandLines) {
+  const ExitCode code = ExitCode::kBadRequest;
+  expect_refusal({}, code, "name a command");
+  expect_refusal({"rnu"}, code, "'rnu' is no command (did you mean 'run'?");
+  expect_refusal({"--frobnicate"}, code, "name a command");
+  expect_refusal({"run"}, code, "RECORDING");
+  expect_refusal({"run", "x", "--outptu", "y"}, code,
+                 "--outptu is no option of run (did you mean '--output'?");
+  expect_refusal({"run", "x", "y"}, code, "see kinescope run --help");
+  expect_refusal({"run", "x", "--free", "everything"}, code, "'everything' is not known");
+  expect_refusal({"run", "x", "--threads", "0"}, code, "'0' is not a number from 1 to 256");
+  expect_refusal({"run", "x", "--decimate", "nan"}, code, "'nan' is not a number");
+  expect_refusal({"run", "x", "--folds", "many"}, code, "'many'");
+  expect_refusal({"camera", "x"}, code, "--board");
+  expect_refusal(
+      {"camera", "x", "--board", "chessboard", "--columns", "9", "--rows", "6", "--square", "25"},
+      code, "'25' is no length in m");
+  expect_refusal(
+      {"camera", "x", "--board", "chess", "--columns", "9", "--rows", "6", "--square", "0.025"},
+      code, "'chess' is not known");
+}
+
+TEST(Cli, ErrorsOfCommandsGiveTheirCode) {
+  expect_refusal({"run", "no/such/folder"}, ExitCode::kBadInput, "no/such/folder: no such folder");
+  expect_refusal({"run", "no/such/folder", "--video", "a", "--poses", "b"}, ExitCode::kBadInput,
+                 "no such folder");
+  expect_refusal({"camera", "no/such/images", "--board", "chessboard", "--columns", "9", "--rows",
+                  "6", "--square", "0.025"},
+                 ExitCode::kBadInput, "no/such/images");
+}
+
+TEST(Cli, InspectEndsWithThreeAndNamesTheProblem) {
+  const Outcome outcome = run({"inspect", "no/such/folder", "--quiet"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.out.find("no such folder"), std::string::npos);
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST(Cli, NothingIsWrittenForABadRecording) {
+  const RecordingFolder folder;
+  folder.write("video.mp4", "no video").write("tags.yaml", "default_size: -1\n");
+  const std::filesystem::path output = folder.path() / "out";
+  expect_refusal({"run", folder.path().string(), "--output", output.string(), "--quiet"},
+                 ExitCode::kBadInput, "tags.yaml:1: default_size is -1");
+  EXPECT_FALSE(std::filesystem::exists(output));
+}
+
+}  // namespace
+}  // namespace kinescope
