@@ -17,7 +17,8 @@
 namespace kinescope {
 namespace {
 
-// A channel whose slope is this near to a known unit is in that unit; what is left is an effect of the robot.
+// A channel whose slope is this near to a known unit is in that unit; what is left is an effect of
+// the robot.
 constexpr double kUnitTolerance = 0.05;
 
 void require_overlap(const Recording& recording, const std::vector<double>& times_s) {
@@ -25,10 +26,11 @@ void require_overlap(const Recording& recording, const std::vector<double>& time
   const double begin = recording.log.times_s.front();
   const double end = recording.log.times_s.back();
   if (times_s.back() >= begin && times_s.front() <= end) return;
-  throw bad_input(recording.log.source,
-                  fmt::format("covers {:.3f} to {:.3f} s, the frames {:.3f} to {:.3f} s: no overlap",
-                              begin, end, times_s.front(), times_s.back()),
-                  "give the video's start on the log's clock as video_start in recording.yaml");
+  throw bad_input(
+      recording.log.source,
+      fmt::format("covers {:.3f} to {:.3f} s, the frames {:.3f} to {:.3f} s: no overlap", begin,
+                  end, times_s.front(), times_s.back()),
+      "give the video's start on the log's clock as video_start in recording.yaml");
 }
 
 void require_markers(const Recording& recording, const TagObservations& tags) {
@@ -54,9 +56,10 @@ void require_markers(const Recording& recording, const TagObservations& tags) {
     }
   }
   if (!unsized.empty()) {
-    throw bad_input((recording.folder / "tags.yaml").string(),
-                    fmt::format("no size for the markers seen with id {}", fmt::join(unsized, ", ")),
-                    "give default_size, or the size of each, in metres");
+    throw bad_input(
+        (recording.folder / "tags.yaml").string(),
+        fmt::format("no size for the markers seen with id {}", fmt::join(unsized, ", ")),
+        "give default_size, or the size of each, in metres");
   }
 }
 
@@ -68,6 +71,24 @@ double nearest_unit(JointType type, double scale) {
     if (std::abs(scale / unit - 1.0) < kUnitTolerance) return unit;
   }
   return scale;
+}
+
+// Couplings by design: a counter-commanded joint follows another one to one. What is smaller than the
+// tolerance of a unit is an effect of the robot and not part of the start.
+std::vector<std::vector<ChannelShare>> couplings_of(const Structure& structure,
+                                                    const JointLog& log) {
+  std::vector<std::vector<ChannelShare>> out;
+  for (const StructureJoint& joint : structure.joints) {
+    std::vector<ChannelShare>& shares = out.emplace_back();
+    if (!joint.channel) continue;
+    for (const ChannelTerm& term : joint.couplings) {
+      double ratio = term.scale / joint.channel->scale;
+      if (std::abs(ratio) < kUnitTolerance) continue;
+      if (std::abs(std::abs(ratio) - 1.0) < kUnitTolerance) ratio = std::copysign(1.0, ratio);
+      shares.push_back({log.channels[static_cast<std::size_t>(term.channel)], ratio});
+    }
+  }
+  return out;
 }
 
 std::size_t driven_joints(const Structure& structure) {
@@ -129,16 +150,16 @@ void match_channels(const Recording& recording, KinematicTree& tree,
   std::vector<std::string> names;
   for (const std::size_t j : movable) names.push_back(tree.joints[j].name);
   if (movable.size() != recording.log.channels.size()) {
-    throw bad_input(recording.log.source,
-                    "no column is named like a joint of the nominal robot",
+    throw bad_input(recording.log.source, "no column is named like a joint of the nominal robot",
                     fmt::format("name the columns {}", fmt::join(names, ", ")));
   }
   for (std::size_t k = 0; k < movable.size(); ++k) {
     tree.joints[movable[k]].channel = recording.log.channels[k];
   }
-  warnings.push_back(fmt::format(
-      "no column of {} is named like a joint of the nominal robot: taken in order ({} drives {}, ..)",
-      recording.log.source, recording.log.channels.front(), names.front()));
+  warnings.push_back(
+      fmt::format("no column of {} is named like a joint of the nominal robot: taken in order ({} "
+                  "drives {}, ..)",
+                  recording.log.source, recording.log.channels.front(), names.front()));
 }
 
 Eigen::MatrixXd nominal_values(const Recording& recording, const KinematicTree& tree,
@@ -252,6 +273,7 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   start.tree = structure_tree(structure, recording.log);
   start.tree.name = recording.settings.name;
   for (Joint& joint : start.tree.joints) joint.scale = nearest_unit(joint.type, joint.scale);
+  start.couplings = couplings_of(structure, recording.log);
   for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
   start.T_camera_base = base_frame(start.tree, recording.settings.gravity);
   move_base(start.tree, start.T_camera_base);

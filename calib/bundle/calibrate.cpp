@@ -92,38 +92,82 @@ std::vector<std::optional<Prediction>> predict_all(const Spec& spec, const State
   return out;
 }
 
-// Cross-validation: each fold's frames are predicted by a model that has not seen them.
+// Sockets that only the held-out frames know stand where those frames put them on average.
+void place_unseen_targets(const Spec& spec, const std::vector<int>& seen,
+                          const std::vector<int>& unseen, State& state) {
+  std::vector<bool> known(spec.targets.size(), false);
+  for (const int index : seen) {
+    const int target = spec.sightings[static_cast<std::size_t>(index)].target;
+    if (target >= 0) known[static_cast<std::size_t>(target)] = true;
+  }
+  if (std::ranges::all_of(known, [](bool k) { return k; })) return;
+  const State solved = state;
+  bundle::guess_targets(spec, unseen, state);
+  for (std::size_t t = 0; t < known.size(); ++t) {
+    if (known[t]) state.targets[t] = solved.targets[t];
+  }
+}
+
+// The sightings of one fold, and those that its model is made from.
+struct Split {
+  std::vector<int> seen;      // used, in other folds
+  std::vector<int> unseen;    // used, in this fold
+  std::vector<int> rejected;  // outliers in this fold
+};
+
+Split split_at(int fold, const RobustSolution& robust, const std::map<int, std::size_t>& slot,
+               const Calibration& out) {
+  Split split;
+  for (const int index : robust.used) {
+    const bool left_out = out.residuals[slot.at(index)].fold == fold;
+    (left_out ? split.unseen : split.seen).push_back(index);
+  }
+  for (const int index : robust.rejected) {
+    if (out.residuals[slot.at(index)].fold == fold) split.rejected.push_back(index);
+  }
+  return split;
+}
+
+// The model that has not seen a fold.
+State solve_without(const Spec& spec, const State& solution, const Split& split,
+                    int max_iterations) {
+  State state = solution;
+  static_cast<void>(bundle::solve(spec, state, split.seen, {}, max_iterations));
+  if (std::ranges::any_of(spec.free_value, [](bool f) { return f; })) {
+    static_cast<void>(
+        bundle::solve(spec, state, split.unseen, {std::nullopt, true}, max_iterations));
+  }
+  place_unseen_targets(spec, split.seen, split.unseen, state);
+  return state;
+}
+
+// Cross-validation: each fold's frames are predicted by a model that has not seen them. Outliers are
+// predicted too, and counted nowhere.
 void validate(const Spec& spec, const State& solution, const RobustSolution& robust, int folds,
               const std::map<int, std::size_t>& slot, Calibration& out, int max_iterations,
               const Progress& progress) {
   Rms training;
   Rms held_out;
-  for (int fold = 0; fold < folds; ++fold) {
-    report(progress, "validate", fold, folds);
-    std::vector<int> seen;
-    std::vector<int> unseen;
-    for (const int index : robust.used) {
-      const bool left_out = out.residuals[slot.at(index)].fold == fold;
-      (left_out ? unseen : seen).push_back(index);
-    }
-    if (seen.empty() || unseen.empty()) continue;
-    State state = solution;
-    static_cast<void>(bundle::solve(spec, state, seen, {}, max_iterations));
-    const bool values_unknown = std::ranges::any_of(spec.free_value, [](bool f) { return f; });
-    if (values_unknown) {
-      static_cast<void>(bundle::solve(spec, state, unseen, {std::nullopt, true}, max_iterations));
-    }
-    for (const auto& prediction : predict_all(spec, state, seen)) {
-      if (prediction) training.add(spec.kind, *prediction);
-    }
-    const auto predictions = predict_all(spec, state, unseen);
-    for (std::size_t i = 0; i < unseen.size(); ++i) {
+  const auto keep = [&](const State& state, const std::vector<int>& indices, Rms* rms) {
+    const auto predictions = predict_all(spec, state, indices);
+    for (std::size_t i = 0; i < indices.size(); ++i) {
       if (!predictions[i]) continue;
-      SightingResidual& residual = out.residuals[slot.at(unseen[i])];
+      SightingResidual& residual = out.residuals[slot.at(indices[i])];
       residual.held_out_px = predictions[i]->corners_px;
       residual.held_out_displacement = predictions[i]->displacement;
-      held_out.add(spec.kind, *predictions[i]);
+      if (rms != nullptr) rms->add(spec.kind, *predictions[i]);
     }
+  };
+  for (int fold = 0; fold < folds; ++fold) {
+    report(progress, "validate", fold, folds);
+    const Split split = split_at(fold, robust, slot, out);
+    if (split.seen.empty() || split.unseen.empty()) continue;
+    const State state = solve_without(spec, solution, split, max_iterations);
+    for (const auto& prediction : predict_all(spec, state, split.seen)) {
+      if (prediction) training.add(spec.kind, *prediction);
+    }
+    keep(state, split.unseen, &held_out);
+    keep(state, split.rejected, nullptr);
   }
   report(progress, "validate", folds, folds);
   out.folds = folds;
@@ -133,10 +177,9 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
   out.held_out_rotation_rms_rad = held_out.rotation();
 }
 
-// A fold for every sighting: by posture, or by time where joint values are unknown. Targets are
-// compared within a fold only where every target is seen in several.
+// A fold for every frame: by posture, or by time where joint values are unknown; or by lot.
 std::vector<int> folds_of(const Spec& spec, const State& state, const std::vector<int>& usable,
-                          int folds) {
+                          int folds, bool by_lot) {
   const Readings readings(spec, state.time_offset[0]);
   std::vector<int> frames;
   for (const int index : usable) {
@@ -155,7 +198,8 @@ std::vector<int> folds_of(const Spec& spec, const State& state, const std::vecto
           readings.value(frames[f], driven[d]);
     }
   }
-  const std::vector<int> fold = bundle::assign_folds(features, folds);
+  const std::vector<int> fold = by_lot ? bundle::deal_folds(frames.size(), folds)
+                                       : bundle::assign_folds(features, folds);
   std::vector<int> by_frame(spec.times_s.size(), -1);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     by_frame[static_cast<std::size_t>(frames[f])] = fold[f];
@@ -166,7 +210,7 @@ std::vector<int> folds_of(const Spec& spec, const State& state, const std::vecto
 // Parameters and state that the start stands for: the nominal robot is compared once it is placed.
 State start_state(Spec& spec, const CalibrationStart& start, const CalibrateOptions& options) {
   State state = bundle::initial_state(spec, start);
-  bundle::guess_targets(spec, state);
+  bundle::guess_targets(spec, bundle::usable_sightings(spec, state), state);
   if (!start.nominal) return state;
   Spec placement = spec;
   for (auto& mask : placement.free_joint) mask.fill(false);
@@ -252,7 +296,8 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
 
   const int frames_used = bundle::count_frames(spec, robust.used);
   const int folds = options.folds < 2 || frames_used < 4 ? 0 : std::min(options.folds, frames_used);
-  const std::vector<int> fold_of_frame = folds_of(spec, state, usable, std::max(1, folds));
+  const std::vector<int> fold_of_frame = folds_of(spec, state, usable, std::max(1, folds),
+                                                  options.folds_by_lot);
   std::map<int, std::size_t> slot;
   const auto now = predict_all(spec, state, usable);
   const auto then = predict_all(spec, before, usable);

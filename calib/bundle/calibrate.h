@@ -26,6 +26,12 @@ enum class FreeGeometry {
   kGeometry    ///< + axes: direction and place
 };
 
+/// A further channel that moves a joint: value = scale * (reading + ratio * its reading + ..) + offset.
+struct ChannelShare {
+  std::string channel;
+  double ratio = 0.0;
+};
+
 /// Where the search starts, and what is held.
 struct CalibrationStart {
   KinematicTree tree;
@@ -35,6 +41,7 @@ struct CalibrationStart {
   Eigen::MatrixXd joint_values;  ///< frames x joints for joints no channel drives; else empty
   bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
   bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
+  std::vector<std::vector<ChannelShare>> couplings;  ///< of every joint; empty: none at all
 };
 
 struct CalibrateOptions {
@@ -46,6 +53,8 @@ struct CalibrateOptions {
   double nominal_sigma_rad = 0.01;
   double reject_sigma = 4.5;  ///< sightings beyond this many standard deviations are left out
   int folds = 5;              ///< of the cross-validation; 0: none
+  bool folds_by_lot = false;  ///< frames dealt out at random instead of by posture: an easier test,
+                              ///< as others report it
   int max_iterations = 100;
 };
 

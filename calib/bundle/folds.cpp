@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "kinematics/core/rng.h"
+
 namespace kinescope::bundle {
 namespace {
 
@@ -65,6 +67,19 @@ std::vector<int> assign_folds(const Eigen::MatrixXd& features, int folds) {
   cut(space, frames, std::min<int>(kBoxesPerFold * folds, static_cast<int>(count)), boxes);
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     for (const int f : boxes[b]) fold[static_cast<std::size_t>(f)] = static_cast<int>(b) % folds;
+  }
+  return fold;
+}
+
+std::vector<int> deal_folds(std::size_t frames, int folds) {
+  std::vector<int> fold(frames, 0);
+  if (folds < 2) return fold;
+  for (std::size_t f = 0; f < frames; ++f) {
+    fold[f] = static_cast<int>(f % static_cast<std::size_t>(folds));
+  }
+  Rng rng = Rng::from_name("folds by lot", frames);
+  for (std::size_t f = frames; f > 1; --f) {
+    std::swap(fold[f - 1], fold[static_cast<std::size_t>(rng.index(static_cast<int>(f)))]);
   }
   return fold;
 }

@@ -12,5 +12,7 @@ namespace kinescope::bundle {
 /// frames x values, any units. Without features the frames are cut into stretches of time. Returns
 /// a fold for every frame.
 [[nodiscard]] std::vector<int> assign_folds(const Eigen::MatrixXd& features, int folds);
+/// The same by lot: folds of equal count, frames dealt out by a seeded shuffle.
+[[nodiscard]] std::vector<int> deal_folds(std::size_t frames, int folds);
 
 }  // namespace kinescope::bundle

@@ -153,6 +153,17 @@ void free_frames(const CalibrationStart& start, Spec& spec) {
   spec.free_camera = base_is_seen ? kAllFree : kHeld;
 }
 
+void add_couplings(const CalibrationStart& start, const JointLog& log, Spec& spec) {
+  spec.couplings.resize(spec.tree.joints.size());
+  for (std::size_t j = 0; j < start.couplings.size(); ++j) {
+    for (const ChannelShare& share : start.couplings[j]) {
+      const auto channel = log.channel(share.channel);
+      KINESCOPE_CHECK(channel.has_value(), "a coupled channel is in the log");
+      spec.couplings[j].emplace_back(*channel, share.ratio);
+    }
+  }
+}
+
 void check_something_seen(const Spec& spec) {
   if (!spec.sightings.empty()) return;
   throw undetermined("calibration", "none of the markers seen belongs to the robot's structure",
@@ -174,6 +185,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
         joint.type == JointType::kFixed ? std::nullopt : log.channel(joint.channel);
     spec.channel.push_back(channel.value_or(-1));
   }
+  add_couplings(start, log, spec);
   for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
     std::vector<int> path;
     for (const JointId id : spec.tree.path_to(LinkId{static_cast<int>(l)}))
@@ -211,12 +223,13 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   return spec;
 }
 
-void guess_targets(const Spec& spec, State& state) {
+void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& state) {
   if (spec.targets.empty()) return;
   const Readings readings(spec, state.time_offset[0]);
   std::vector<Eigen::Vector3d> sum(spec.targets.size(), Eigen::Vector3d::Zero());
   std::vector<int> count(spec.targets.size(), 0);
-  for (const Sighting& sighting : spec.sightings) {
+  for (const int index : sightings) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
     if (sighting.target < 0) continue;
     const auto t = static_cast<std::size_t>(sighting.target);
     sum[t] += predict(spec, state, readings, sighting).translation;

@@ -11,8 +11,8 @@ namespace kinescope::bundle {
                              const JointLog& log, const CalibrationStart& start,
                              const CalibrateOptions& options);
 
-/// Puts every target where its points are on average. Needs marker mounts.
-void guess_targets(const Spec& spec, State& state);
+/// Puts every target where its points (of the sightings given) are on average. Needs marker mounts.
+void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& state);
 
 [[nodiscard]] int count_frames(const Spec& spec, const std::vector<int>& sightings);
 

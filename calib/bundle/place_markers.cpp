@@ -99,6 +99,11 @@ std::vector<PosePair> pairs_for(const KinematicTree& nominal, const Eigen::Matri
   return pairs;
 }
 
+// A marker on an inner link misses by the motion of the joints behind that link, which is large; errors
+// of the nominal robot alone can make an inner link fit a little better. So the outermost link stays
+// unless another one's misfit is below this share of its own.
+constexpr double kClearlyBetter = 0.8;
+
 // One length for a misfit in m and rad: at arm's length (1 m) a radian moves a point by a metre.
 double misfit(const HandEye& fit) { return std::hypot(fit.rms_m, fit.rms_rad); }
 
@@ -143,9 +148,7 @@ Placement place_markers(const KinematicTree& nominal, const Eigen::MatrixXd& joi
       const auto pairs = pairs_for(nominal, joint_values, track, LinkId{static_cast<int>(l)});
       if (pairs.size() < 3 || excursion(pairs) < kMinTurn) continue;
       const auto fit = hand_eye(pairs);
-      // Links behind a joint that does not move fit alike: the outermost stays unless another is
-      // better.
-      if (fit && (!best || misfit(*fit) < 0.999 * misfit(*best))) best = fit;
+      if (fit && (!best || misfit(*fit) < kClearlyBetter * misfit(*best))) best = fit;
     }
   }
   if (!best) {
@@ -161,7 +164,7 @@ Placement place_markers(const KinematicTree& nominal, const Eigen::MatrixXd& joi
       const auto pairs = pairs_for(nominal, joint_values, track, LinkId{static_cast<int>(l)});
       if (pairs.empty()) continue;
       const auto [mount, spread] = mount_for(pairs, out.T_camera_base);
-      if (spread < 0.999 * least) {
+      if (spread < kClearlyBetter * least) {
         least = spread;
         marker.link = LinkId{static_cast<int>(l)};
         marker.T_link_marker = mount;
@@ -217,9 +220,57 @@ struct PointFit {
   double rms_m = std::numeric_limits<double>::infinity();
 };
 
-// Alternates the base's pose with the point's place on its link until neither moves.
+// Root mean square distance between where the point was measured and where it should be.
+double point_rms(const PointFit& fit, const std::vector<PointPair>& pairs) {
+  double sum = 0.0;
+  for (const PointPair& pair : pairs) {
+    sum += (fit.T_camera_base * (pair.T_base_link * fit.point) - *pair.observation->position_m)
+               .squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(pairs.size()));
+}
+
+// One step of Levenberg and Marquardt on the base's pose and the point together.
+PointFit step(const PointFit& fit, const std::vector<PointPair>& pairs, double damping) {
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
+  const Eigen::Matrix3d R = fit.T_camera_base.matrix3();
+  for (const PointPair& pair : pairs) {
+    const Eigen::Vector3d p_base = pair.T_base_link * fit.point;
+    Eigen::Matrix<double, 3, 9> J;
+    J << -R * skew(p_base), R, R * pair.T_base_link.matrix3();
+    const Eigen::Vector3d missing = *pair.observation->position_m - fit.T_camera_base * p_base;
+    normal += J.transpose() * J;
+    right += J.transpose() * missing;
+  }
+  normal.diagonal() *= 1.0 + damping;
+  const Eigen::Matrix<double, 9, 1> d = normal.ldlt().solve(right);
+  return {fit.T_camera_base * exp_pose(d.head<6>()), fit.point + d.tail<3>(), 0.0};
+}
+
+// A tool that keeps its orientation hardly shows where the point is on its link, and alternation all but
+// stops long before the best fit.
+PointFit refine(PointFit fit, const std::vector<PointPair>& pairs) {
+  constexpr int kMaxSteps = 50;
+  double damping = 1e-4;
+  for (int i = 0; i < kMaxSteps; ++i) {
+    PointFit next = step(fit, pairs, damping);
+    next.rms_m = point_rms(next, pairs);
+    if (!(next.rms_m < fit.rms_m)) {
+      damping *= 10.0;
+      continue;
+    }
+    const bool settled = fit.rms_m - next.rms_m < 1e-9;
+    fit = next;
+    damping *= 0.1;
+    if (settled) break;
+  }
+  return fit;
+}
+
+// Alternates the base's pose with the point's place on its link until neither moves much, then refines both.
 PointFit fit_point(const std::vector<PointPair>& pairs) {
-  constexpr int kMaxRounds = 500;
+  constexpr int kMaxRounds = 100;
   PointFit fit;
   for (int round = 0; round < kMaxRounds; ++round) {
     fit.T_camera_base = absolute_orientation(pairs, fit.point);
@@ -229,18 +280,12 @@ PointFit fit_point(const std::vector<PointPair>& pairs) {
       place += T_camera_link.inverse() * *pair.observation->position_m /
                static_cast<double>(pairs.size());
     }
-    double sum = 0.0;
-    for (const PointPair& pair : pairs) {
-      sum += (fit.T_camera_base * (pair.T_base_link * place) - *pair.observation->position_m)
-                 .squaredNorm();
-    }
-    const double rms = std::sqrt(sum / static_cast<double>(pairs.size()));
-    const bool settled = fit.rms_m - rms < 1e-9;
+    const double before = fit.rms_m;
     fit.point = place;
-    fit.rms_m = rms;
-    if (settled && round > 10) break;
+    fit.rms_m = point_rms(fit, pairs);
+    if (before - fit.rms_m < 1e-9 && round > 10) break;
   }
-  return fit;
+  return refine(fit, pairs);
 }
 
 std::vector<PointPair> point_pairs(const KinematicTree& nominal,
@@ -291,7 +336,7 @@ Placement place_points(const KinematicTree& nominal, const Eigen::MatrixXd& join
       } else {
         std::tie(fit.point, fit.rms_m) = point_in_targets(pairs);
       }
-      if (fit.rms_m >= 0.999 * least) continue;
+      if (fit.rms_m >= kClearlyBetter * least) continue;
       least = fit.rms_m;
       marker.link = link;
       marker.T_link_marker.translation = fit.point;

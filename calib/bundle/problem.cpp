@@ -30,6 +30,18 @@ class ReadingsCallback final : public ceres::EvaluationCallback {
   const double* time_offset_;
 };
 
+// What drives a joint at a time: its channel, and the others that move it too.
+std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
+  auto sum = interpolate(spec.log, spec.channel[joint], time_s, spec.max_gap_s);
+  for (const auto& [channel, ratio] : spec.couplings[joint]) {
+    const auto other = interpolate(spec.log, channel, time_s, spec.max_gap_s);
+    if (!sum || !other) return std::nullopt;
+    sum->value += ratio * other->value;
+    sum->rate += ratio * other->rate;
+  }
+  return sum;
+}
+
 }  // namespace
 
 State initial_state(const Spec& spec, const CalibrationStart& start) {
@@ -83,7 +95,7 @@ void Readings::update(double time_offset_s) {
       // Where the offset moves a frame past the log's end while solving, the end's value stays.
       const double inside_s =
           std::clamp(time_s, spec_->log.times_s.front(), spec_->log.times_s.back());
-      const auto sample = interpolate(spec_->log, spec_->channel[j], inside_s, spec_->max_gap_s);
+      const auto sample = reading(*spec_, j, inside_s);
       known_(row, column) = sample.has_value() && inside_s == time_s;
       if (!sample) continue;
       value_(row, column) = sample->value;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ceres/evaluation_callback.h>
@@ -51,6 +52,8 @@ struct Spec {
   bool postures = false;  ///< stamps of log and measurements agree: nothing to interpolate
   double max_gap_s = 0.5;
   std::vector<int> channel;  ///< of every joint; -1: none (value unknown, or a fixed joint)
+  std::vector<std::vector<std::pair<int, double>>>
+      couplings;                       ///< of every joint: further channels and their ratios
   std::vector<std::vector<int>> path;  ///< joints from the base to each link
   std::vector<Sighting> sightings;     ///< by frame, then marker
   std::vector<std::string> targets;
