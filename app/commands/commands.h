@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every subcommand is a function from its options to the program's exit code, so that tests call it without a
-// process. Commands throw Error; only run_program() catches.
+// Every subcommand is a function from its options to the program's exit code, so that tests call it
+// without a process. Commands throw Error; only run_program() catches.
 #pragma once
 
 #include <filesystem>
@@ -27,13 +27,15 @@ struct Console {
 
 struct RunOptions {
   RecordingPaths recording;
-  std::filesystem::path output;   ///< the run folder; default: <recording's name>_run in the current folder
+  std::filesystem::path
+      output;  ///< the run folder; default: <recording's name>_run in the current folder
   DetectOptions detect;
   CalibrateOptions calibrate;
   bool estimate_intrinsics = false;
-  bool force = false;             ///< run every stage again, also where nothing changed
-  std::vector<std::string> fail_on;  ///< limits such as "held_out_px>0.2" that turn the exit code to 5
-  std::string command_line;       ///< for the report
+  bool force = false;  ///< run every stage again, also where nothing changed
+  std::vector<std::string>
+      fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5
+  std::string command_line;  ///< for the report
 };
 
 [[nodiscard]] ExitCode run_command(const RunOptions& options, const Console& console);
@@ -45,7 +47,7 @@ struct InspectOptions {
 [[nodiscard]] ExitCode inspect_command(const InspectOptions& options, const Console& console);
 
 struct CameraOptions {
-  std::filesystem::path source;   ///< folder of images, or a video
+  std::filesystem::path source;  ///< folder of images, or a video
   BoardSpec board;
   BoardOptions calibration;
   std::filesystem::path output = "camera.yaml";

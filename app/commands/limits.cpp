@@ -25,15 +25,18 @@ constexpr double kMillimetre = 1e3;
 constexpr double kDegree = 57.29577951308232;
 
 const std::array kQuantities{
-    Quantity{"held_out_px", [](const RunSummary& r) {
+    Quantity{"held_out_px",
+             [](const RunSummary& r) {
                return r.calibration.kind == MeasurementKind::kCorners ? r.calibration.held_out_rms
                                                                       : kUnknown;
              }},
-    Quantity{"training_px", [](const RunSummary& r) {
+    Quantity{"training_px",
+             [](const RunSummary& r) {
                return r.calibration.kind == MeasurementKind::kCorners ? r.calibration.training_rms
                                                                       : kUnknown;
              }},
-    Quantity{"held_out_ratio", [](const RunSummary& r) {
+    Quantity{"held_out_ratio",
+             [](const RunSummary& r) {
                return r.calibration.held_out_rms / r.calibration.training_rms;
              }},
     Quantity{"held_out_mm",
@@ -88,7 +91,8 @@ bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
     const auto quantity = std::ranges::find(kQuantities, limit.quantity, &Quantity::name);
     const double value = quantity->value(run);
     // What is not known is not within a limit.
-    const bool outside = limit.comparison == '>' ? !(value <= limit.value) : !(value >= limit.value);
+    const bool outside =
+        limit.comparison == '>' ? !(value <= limit.value) : !(value >= limit.value);
     if (!outside) continue;
     within = false;
     fmt::print(stderr, "kinescope: outside the limit {}{}{}: {:.4g}\n", limit.quantity,
@@ -105,12 +109,12 @@ void require_answer(const RunSummary& run) {
   }
   if (run.structure && run.structure->status == StructureStatus::kAmbiguous) {
     const bool known = !run.structure->doubts.empty();
-    throw undetermined("structure",
-                       known ? run.structure->doubts.front().what
-                             : "another structure explains the recording as well: " +
-                                   run.structure->runner_up,
-                       known ? run.structure->doubts.front().remedy
-                             : std::string("record every joint moving at its own time"));
+    throw undetermined(
+        "structure",
+        known ? run.structure->doubts.front().what
+              : "another structure explains the recording as well: " + run.structure->runner_up,
+        known ? run.structure->doubts.front().remedy
+              : std::string("record every joint moving at its own time"));
   }
 }
 

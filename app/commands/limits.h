@@ -16,14 +16,15 @@ struct Limit {
   double value = 0.0;
 };
 
-/// Throws bad_request for a quantity we do not know (and names those we do) or a text that is no limit.
+/// Throws bad_request for a quantity we do not know (and names those we do) or a text that is no
+/// limit.
 [[nodiscard]] std::vector<Limit> parse_limits(const std::vector<std::string>& texts);
 
 /// Prints one line to standard error for every limit that is passed.
 [[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits);
 
-/// Throws undetermined when the answer must not be trusted: an axis that is not determined, a structure with
-/// another one as probable. Called once everything is written.
+/// Throws undetermined when the answer must not be trusted: an axis that is not determined, a
+/// structure with another one as probable. Called once everything is written.
 void require_answer(const RunSummary& run);
 
 }  // namespace kinescope

@@ -73,8 +73,8 @@ double nearest_unit(JointType type, double scale) {
   return scale;
 }
 
-// Couplings by design: a counter-commanded joint follows another one to one. What is smaller than the
-// tolerance of a unit is an effect of the robot and not part of the start.
+// Couplings by design: a counter-commanded joint follows another one to one. What is smaller than
+// the tolerance of a unit is an effect of the robot and not part of the start.
 std::vector<std::vector<ChannelShare>> couplings_of(const Structure& structure,
                                                     const JointLog& log) {
   std::vector<std::vector<ChannelShare>> out;
@@ -251,8 +251,8 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   structure_options.scan_time_offset = options.estimate_time_offset && !time_offset_s;
   if (!time_offset_s) {
     Structure scanned = find_structure(tracks, recording.log, structure_options);
-    // A scan may settle on an offset at which the channels fit by chance: clocks that agree are the first guess
-    // of all, and win when they explain more joints.
+    // A scan may settle on an offset at which the channels fit by chance: clocks that agree are the
+    // first guess of all, and win when they explain more joints.
     structure_options.scan_time_offset = false;
     if (!options.estimate_time_offset || driven_joints(scanned) == scanned.joints.size()) {
       return scanned;

@@ -66,7 +66,8 @@ void RunFolder::write(std::string_view name, std::string_view content) const {
 
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
-      "kinescope {} video {} decimate {} blur {} refine {} hamming {} margin {} sightings {} start {}",
+      "kinescope {} video {} decimate {} blur {} refine {} hamming {} margin {} sightings {} start "
+      "{}",
       program_version(), sha256_of_path(recording.video), detect_.detector.decimate,
       detect_.detector.blur_sigma, detect_.detector.refine_edges, detect_.detector.max_hamming,
       detect_.detector.min_margin, detect_.min_sightings, recording.settings.video_start_s);
@@ -83,7 +84,8 @@ std::optional<TagObservations> RunFolder::cached_observations(const Recording& r
   if (!kept.is_object() || kept.value("key", "") != detection_key(recording)) return std::nullopt;
   if (kept.value("sha256", "") != sha256_of_file(file(kObservations))) return std::nullopt;
   TagObservations observations = read_corners(file(kObservations), recording.markers);
-  // The table holds only frames with a marker; the times of all frames and what was rejected stand here.
+  // The table holds only frames with a marker; the times of all frames and what was rejected stand
+  // here.
   const std::vector<double> times = kept.at("times_s").get<std::vector<double>>();
   std::size_t next = 0;
   for (TagObservation& seen : observations.observations) {
@@ -110,12 +112,10 @@ void RunFolder::keep_observations(const Recording& recording,
   for (const RejectedTag& tag : observations.rejected) {
     rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
   }
-  const json kept{{"key", detection_key(recording)},
-                  {"sha256", sha256_of_file(file(kObservations))},
-                  {"width", observations.width},
-                  {"height", observations.height},
-                  {"times_s", observations.times_s},
-                  {"rejected", std::move(rejected)}};
+  const json kept{
+      {"key", detection_key(recording)}, {"sha256", sha256_of_file(file(kObservations))},
+      {"width", observations.width},     {"height", observations.height},
+      {"times_s", observations.times_s}, {"rejected", std::move(rejected)}};
   write(kObservationsKey, kept.dump(1) + "\n");
 }
 
@@ -140,8 +140,7 @@ std::vector<InputFile> hash_inputs(const Recording& recording) {
   for (const fs::path& path : recording.files) {
     const fs::path relative = path.lexically_relative(recording.folder);
     const bool inside = !relative.empty() && *relative.begin() != "..";
-    inputs.push_back({inside ? relative.string() : path.filename().string(),
-                      sha256_of_path(path)});
+    inputs.push_back({inside ? relative.string() : path.filename().string(), sha256_of_path(path)});
   }
   return inputs;
 }
@@ -174,9 +173,9 @@ json run_json(const RunSummary& run) {
   for (const StageTime& time : run.times) {
     times.push_back({{"stage", time.stage}, {"seconds", time.seconds}});
   }
-  return {{"schema", "kinescope.run"}, {"schema_version", 1},     {"program", "kinescope"},
-          {"version", run.version},    {"command", run.command},  {"recording", run.recording},
-          {"entry", run.entry},        {"inputs", inputs},        {"options", options},
+  return {{"schema", "kinescope.run"}, {"schema_version", 1},       {"program", "kinescope"},
+          {"version", run.version},    {"command", run.command},    {"recording", run.recording},
+          {"entry", run.entry},        {"inputs", inputs},          {"options", options},
           {"seed", nullptr},           {"stages", std::move(times)}};
 }
 

@@ -25,7 +25,8 @@ class RunFolder {
   void write(std::string_view name, std::string_view content) const;
 
   /// The observations of an earlier run with the same video, tags and detection options.
-  [[nodiscard]] std::optional<TagObservations> cached_observations(const Recording& recording) const;
+  [[nodiscard]] std::optional<TagObservations> cached_observations(
+      const Recording& recording) const;
   void keep_observations(const Recording& recording, const TagObservations& observations) const;
 
  private:

@@ -92,7 +92,9 @@ json structure_joint_json(const StructureJoint& joint, const std::string& name,
 }
 
 json tree_json(const KinematicTree& tree) {
-  json out{{"name", tree.name}, {"links", json::array()}, {"joints", json::array()},
+  json out{{"name", tree.name},
+           {"links", json::array()},
+           {"joints", json::array()},
            {"markers", json::array()}};
   for (const Link& link : tree.links) out["links"].push_back(link.name);
   for (const Joint& joint : tree.joints) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The products of the run folder as text: observations.csv, tracks.csv, structure.json, calibration.json,
-// residuals.csv. Numbers are printed so that they read back the same; the same value gives the same bytes.
+// The products of the run folder as text: observations.csv, tracks.csv, structure.json,
+// calibration.json, residuals.csv. Numbers are printed so that they read back the same; the same
+// value gives the same bytes.
 #pragma once
 
 #include <string>
@@ -22,7 +23,8 @@ namespace kinescope {
 [[nodiscard]] std::string tracks_csv(const PoseTracks& tracks);
 /// One row a corner (or sighting): t,tag,corner,used,fold,residuals final, held out, before.
 [[nodiscard]] std::string residuals_csv(const Calibration& calibration);
-/// For each joint type, parent, child, channel, scale; for each tag its link; the probability of the whole.
+/// For each joint type, parent, child, channel, scale; for each tag its link; the probability of
+/// the whole.
 [[nodiscard]] nlohmann::json structure_json(const Structure& structure, const JointLog& log);
 /// Everything needed to predict: tree, camera, clock; parameters with sigma; covariance.
 [[nodiscard]] nlohmann::json calibration_json(const Calibration& calibration);

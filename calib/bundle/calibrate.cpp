@@ -141,8 +141,8 @@ State solve_without(const Spec& spec, const State& solution, const Split& split,
   return state;
 }
 
-// Cross-validation: each fold's frames are predicted by a model that has not seen them. Outliers are
-// predicted too, and counted nowhere.
+// Cross-validation: each fold's frames are predicted by a model that has not seen them. Outliers
+// are predicted too, and counted nowhere.
 void validate(const Spec& spec, const State& solution, const RobustSolution& robust, int folds,
               const std::map<int, std::size_t>& slot, Calibration& out, int max_iterations,
               const Progress& progress) {
@@ -198,8 +198,8 @@ std::vector<int> folds_of(const Spec& spec, const State& state, const std::vecto
           readings.value(frames[f], driven[d]);
     }
   }
-  const std::vector<int> fold = by_lot ? bundle::deal_folds(frames.size(), folds)
-                                       : bundle::assign_folds(features, folds);
+  const std::vector<int> fold =
+      by_lot ? bundle::deal_folds(frames.size(), folds) : bundle::assign_folds(features, folds);
   std::vector<int> by_frame(spec.times_s.size(), -1);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     by_frame[static_cast<std::size_t>(frames[f])] = fold[f];
@@ -296,8 +296,8 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
 
   const int frames_used = bundle::count_frames(spec, robust.used);
   const int folds = options.folds < 2 || frames_used < 4 ? 0 : std::min(options.folds, frames_used);
-  const std::vector<int> fold_of_frame = folds_of(spec, state, usable, std::max(1, folds),
-                                                  options.folds_by_lot);
+  const std::vector<int> fold_of_frame =
+      folds_of(spec, state, usable, std::max(1, folds), options.folds_by_lot);
   std::map<int, std::size_t> slot;
   const auto now = predict_all(spec, state, usable);
   const auto then = predict_all(spec, before, usable);

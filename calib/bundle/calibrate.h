@@ -26,7 +26,8 @@ enum class FreeGeometry {
   kGeometry    ///< + axes: direction and place
 };
 
-/// A further channel that moves a joint: value = scale * (reading + ratio * its reading + ..) + offset.
+/// A further channel that moves a joint: value = scale * (reading + ratio * its reading + ..) +
+/// offset.
 struct ChannelShare {
   std::string channel;
   double ratio = 0.0;

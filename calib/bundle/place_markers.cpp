@@ -99,9 +99,9 @@ std::vector<PosePair> pairs_for(const KinematicTree& nominal, const Eigen::Matri
   return pairs;
 }
 
-// A marker on an inner link misses by the motion of the joints behind that link, which is large; errors
-// of the nominal robot alone can make an inner link fit a little better. So the outermost link stays
-// unless another one's misfit is below this share of its own.
+// A marker on an inner link misses by the motion of the joints behind that link, which is large;
+// errors of the nominal robot alone can make an inner link fit a little better. So the outermost
+// link stays unless another one's misfit is below this share of its own.
 constexpr double kClearlyBetter = 0.8;
 
 // One length for a misfit in m and rad: at arm's length (1 m) a radian moves a point by a metre.
@@ -248,8 +248,8 @@ PointFit step(const PointFit& fit, const std::vector<PointPair>& pairs, double d
   return {fit.T_camera_base * exp_pose(d.head<6>()), fit.point + d.tail<3>(), 0.0};
 }
 
-// A tool that keeps its orientation hardly shows where the point is on its link, and alternation all but
-// stops long before the best fit.
+// A tool that keeps its orientation hardly shows where the point is on its link, and alternation
+// all but stops long before the best fit.
 PointFit refine(PointFit fit, const std::vector<PointPair>& pairs) {
   constexpr int kMaxSteps = 50;
   double damping = 1e-4;
@@ -268,7 +268,8 @@ PointFit refine(PointFit fit, const std::vector<PointPair>& pairs) {
   return fit;
 }
 
-// Alternates the base's pose with the point's place on its link until neither moves much, then refines both.
+// Alternates the base's pose with the point's place on its link until neither moves much, then
+// refines both.
 PointFit fit_point(const std::vector<PointPair>& pairs) {
   constexpr int kMaxRounds = 100;
   PointFit fit;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Intrinsics files. Read: ROS camera_info YAML, Kalibr camchain YAML (pinhole radtan / equi), OpenCV
-// FileStorage YAML or XML. Written: ROS camera_info.
+// Intrinsics files. Read: ROS camera_info YAML, Kalibr camchain YAML (pinhole radtan / equi),
+// OpenCV FileStorage YAML or XML. Written: ROS camera_info.
 #pragma once
 
 #include <filesystem>
@@ -11,12 +11,14 @@
 
 namespace kinescope {
 
-/// Throws bad_input naming file, key and remedy: not YAML/XML, a missing key, a model we do not know, a
-/// wrong number of distortion terms, sizes or focal lengths that are not positive, NaN. Files without an
-/// image size (OpenCV) give width = height = 0 only when `image_width` is nowhere to be found.
+/// Throws bad_input naming file, key and remedy: not YAML/XML, a missing key, a model we do not
+/// know, a wrong number of distortion terms, sizes or focal lengths that are not positive, NaN.
+/// Files without an image size (OpenCV) give width = height = 0 only when `image_width` is nowhere
+/// to be found.
 [[nodiscard]] CameraModel read_camera(const std::filesystem::path& path);
 
-/// Throws bad_input when the image size differs from the camera's; a camera without a size takes this one.
+/// Throws bad_input when the image size differs from the camera's; a camera without a size takes
+/// this one.
 [[nodiscard]] CameraModel with_image_size(CameraModel camera, int width, int height,
                                           const std::string& source);
 

@@ -22,11 +22,12 @@ enum class DistortionModel { kPlumbBob, kRationalPolynomial, kEquidistant };
 
 struct CameraModel {
   std::string name = "camera";
-  int width = 0;   ///< px
-  int height = 0;  ///< px
+  int width = 0;                                  ///< px
+  int height = 0;                                 ///< px
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< px
   DistortionModel model = DistortionModel::kPlumbBob;
-  /// plumb_bob: k1 k2 p1 p2 k3; rational_polynomial: k1 k2 p1 p2 k3 k4 k5 k6; equidistant: k1 k2 k3 k4.
+  /// plumb_bob: k1 k2 p1 p2 k3; rational_polynomial: k1 k2 p1 p2 k3 k4 k5 k6; equidistant: k1 k2 k3
+  /// k4.
   std::array<double, 8> distortion{};
 
   bool operator==(const CameraModel&) const = default;
@@ -48,11 +49,11 @@ struct Projection {
 [[nodiscard]] std::optional<Eigen::Vector2d> project(const CameraModel& camera,
                                                      const Eigen::Vector3d& point_camera);
 /// The same with derivatives.
-[[nodiscard]] std::optional<Projection> project_with_derivatives(const CameraModel& camera,
-                                                                 const Eigen::Vector3d& point_camera);
+[[nodiscard]] std::optional<Projection> project_with_derivatives(
+    const CameraModel& camera, const Eigen::Vector3d& point_camera);
 
-/// Normalised image coordinates (x/z, y/z) of a pixel: the distortion undone by Newton's method. Nothing
-/// where the model cannot be inverted (outside its valid field).
+/// Normalised image coordinates (x/z, y/z) of a pixel: the distortion undone by Newton's method.
+/// Nothing where the model cannot be inverted (outside its valid field).
 [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const CameraModel& camera,
                                                        const Eigen::Vector2d& pixel);
 

@@ -22,8 +22,9 @@ namespace kinescope {
 
 /// tags.yaml as a value.
 struct MarkerSet {
-  std::string family = "tag36h11";  ///< AprilTag family, or an OpenCV dictionary such as DICT_6X6_250
-  double default_size_m = 0.0;      ///< 0: only the ids in `sizes_m` are known
+  std::string family =
+      "tag36h11";               ///< AprilTag family, or an OpenCV dictionary such as DICT_6X6_250
+  double default_size_m = 0.0;  ///< 0: only the ids in `sizes_m` are known
   std::map<TagId, double> sizes_m;  ///< edge of the black square where it is not the default
   bool only_listed = false;         ///< true: ids that are not in `sizes_m` are ghosts
   /// Flat targets with other corners than a square's (a chessboard as one marker), by id.

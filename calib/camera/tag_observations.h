@@ -14,12 +14,13 @@ namespace kinescope {
 
 /// One marker in one frame.
 struct TagObservation {
-  int frame = 0;                          ///< index into TagObservations::times_s
+  int frame = 0;  ///< index into TagObservations::times_s
   TagId id;
-  std::vector<Eigen::Vector2d> corners_px;  ///< in the order of MarkerSet::corners_m; centre of pixel at 0
-  double sigma_px = 0.1;                  ///< standard deviation of one coordinate of one corner
-  int hamming = 0;                        ///< bits corrected
-  double decision_margin = 0.0;           ///< contrast of the decoding; 0 where unknown
+  std::vector<Eigen::Vector2d>
+      corners_px;                ///< in the order of MarkerSet::corners_m; centre of pixel at 0
+  double sigma_px = 0.1;         ///< standard deviation of one coordinate of one corner
+  int hamming = 0;               ///< bits corrected
+  double decision_margin = 0.0;  ///< contrast of the decoding; 0 where unknown
 };
 
 /// A detection that was seen and not believed.

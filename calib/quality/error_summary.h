@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a Calibration.
-// Gives   its errors in px, m and rad: before, training and held out apart; overall, per link, per marker.
+// Gives   its errors in px, m and rad: before, training and held out apart; overall, per link, per
+// marker.
 #pragma once
 
 #include <string>
@@ -26,13 +27,14 @@ struct ErrorStatistics {
 struct ErrorRow {
   std::string name;  ///< "all", a link's name, "tag_12"
   ErrorStatistics before_px, training_px, held_out_px;
-  ErrorStatistics before_m, training_m, held_out_m;        ///< displacement of the marker, across the line of sight for corners
+  ErrorStatistics before_m, training_m,
+      held_out_m;  ///< displacement of the marker, across the line of sight for corners
   ErrorStatistics before_rad, training_rad, held_out_rad;  ///< turn of the marker
 };
 
 struct ErrorSummary {
   ErrorRow all;
-  std::vector<ErrorRow> links;    ///< links that carry a marker
+  std::vector<ErrorRow> links;  ///< links that carry a marker
   std::vector<ErrorRow> markers;
 };
 

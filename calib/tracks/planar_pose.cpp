@@ -15,8 +15,8 @@ constexpr int kMaxIterations = 20;
 // Two refined branches closer than this (rad) are one pose.
 constexpr double kSameBranch = 1e-3;
 
-// Homography from plane to normalised image coordinates by the direct linear transform; coordinates are
-// of order one already. Nothing when the corners do not span the plane.
+// Homography from plane to normalised image coordinates by the direct linear transform; coordinates
+// are of order one already. Nothing when the corners do not span the plane.
 std::optional<Eigen::Matrix3d> homography(std::span<const Eigen::Vector2d> plane,
                                           std::span<const Eigen::Vector2d> image) {
   const auto n = static_cast<Eigen::Index>(plane.size());

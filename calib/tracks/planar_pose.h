@@ -2,7 +2,8 @@
 //
 // Takes   the corners of one flat marker, its geometry and the camera.
 // Gives   its pose, both planar branches with their reprojection costs, and the covariance.
-// Method  homography, IPPE (Collins and Bartoli, IJCV 2014), Gauss-Newton on the corners from each branch.
+// Method  homography, IPPE (Collins and Bartoli, IJCV 2014), Gauss-Newton on the corners from each
+// branch.
 #pragma once
 
 #include <optional>
@@ -17,7 +18,7 @@ namespace kinescope {
 
 struct PlanarBranch {
   Pose T_camera_marker;
-  double chi_square = 0.0;  ///< sum of squared residuals / sigma^2
+  double chi_square = 0.0;                     ///< sum of squared residuals / sigma^2
   Matrix6d covariance = Matrix6d::Identity();  ///< of a right perturbation
 };
 
@@ -26,7 +27,8 @@ struct PlanarPose {
   std::optional<PlanarBranch> other;  ///< the mirrored branch, where it is another pose
 };
 
-/// Nothing when the corners are degenerate (no homography, behind the camera, outside the lens model).
+/// Nothing when the corners are degenerate (no homography, behind the camera, outside the lens
+/// model).
 [[nodiscard]] std::optional<PlanarPose> estimate_planar_pose(
     const CameraModel& camera, std::span<const Eigen::Vector3d> corners_m,
     std::span<const Eigen::Vector2d> corners_px, double sigma_px);

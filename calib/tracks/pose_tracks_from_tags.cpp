@@ -12,8 +12,8 @@
 namespace kinescope {
 namespace {
 
-// How fast a marker may plausibly turn (rad/s, one standard deviation) and how much it may turn between
-// frames on top of that: the branch that would need more is the wrong one.
+// How fast a marker may plausibly turn (rad/s, one standard deviation) and how much it may turn
+// between frames on top of that: the branch that would need more is the wrong one.
 constexpr double kTurnRate = 2.0;
 constexpr double kTurnFloor = 0.05;
 // No single step may count for more than this (chi-square): a real jump must stay possible.
@@ -30,8 +30,8 @@ struct Candidate {
 
 double step_cost(const PlanarBranch& a, const PlanarBranch& b, double dt_s) {
   const double angle = angle_between(a.T_camera_marker.rotation, b.T_camera_marker.rotation);
-  const double noise = a.covariance.topLeftCorner<3, 3>().trace() +
-                       b.covariance.topLeftCorner<3, 3>().trace();
+  const double noise =
+      a.covariance.topLeftCorner<3, 3>().trace() + b.covariance.topLeftCorner<3, 3>().trace();
   const double spread = kTurnFloor + kTurnRate * dt_s;
   return std::min(kMaxStepCost, angle * angle / (spread * spread + noise));
 }
@@ -106,8 +106,8 @@ double focal_cost(const CameraModel& camera, const std::vector<const TagObservat
   constexpr double kCap = 1e4;  // a view that does not fit at any focal length must not decide
   double sum = 0.0;
   for (const TagObservation* view : views) {
-    const auto pose = estimate_planar_pose(camera, markers.corners_m(view->id), view->corners_px,
-                                           view->sigma_px);
+    const auto pose =
+        estimate_planar_pose(camera, markers.corners_m(view->id), view->corners_px, view->sigma_px);
     sum += pose ? std::min(kCap, pose->best.chi_square) : kCap;
   }
   return sum;
@@ -155,8 +155,7 @@ double focal_from_tags(const TagObservations& observations, const MarkerSet& mar
     if (costs.back() < costs[static_cast<std::size_t>(best)]) best = i;
   }
   if (best == 0 || best == kGrid) {
-    throw undetermined("camera",
-                       "the focal length cannot be seen in the markers' shapes",
+    throw undetermined("camera", "the focal length cannot be seen in the markers' shapes",
                        "give a camera.yaml (kinescope camera makes one), or film the markers "
                        "larger and more tilted");
   }

@@ -35,12 +35,13 @@ struct CsvTable {
   [[nodiscard]] int integer(std::size_t row, std::size_t column) const;
 };
 
-/// Parses text. Throws bad_input for: nothing in it, another delimiter than the comma, two columns of
-/// one name, an unnamed column, a row shorter or longer than the header, a NUL byte.
+/// Parses text. Throws bad_input for: nothing in it, another delimiter than the comma, two columns
+/// of one name, an unnamed column, a row shorter or longer than the header, a NUL byte.
 [[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source);
 [[nodiscard]] CsvTable read_csv(const std::filesystem::path& path);
 
-/// The whole of the text as a number ("1.5", "-2e-3"), or nothing. NaN and infinities are numbers here.
+/// The whole of the text as a number ("1.5", "-2e-3"), or nothing. NaN and infinities are numbers
+/// here.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
 }  // namespace kinescope

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How things go wrong. `Error` is for the user's input: one line that names the file, the place in it
-// and the remedy, and the exit code the program ends with. `KINESCOPE_CHECK` is for our own mistakes.
+// How things go wrong. `Error` is for the user's input: one line that names the file, the place in
+// it and the remedy, and the exit code the program ends with. `KINESCOPE_CHECK` is for our own
+// mistakes.
 #pragma once
 
 #include <source_location>
@@ -49,9 +50,8 @@ namespace internal {
 }  // namespace kinescope
 
 /// An invariant of our own code; always on. Throws std::logic_error with the place.
-#define KINESCOPE_CHECK(condition, message)                                             \
-  do {                                                                                  \
-    if (!(condition))                                                                   \
-      ::kinescope::internal::check_failed(#condition, message,                          \
-                                          std::source_location::current());             \
+#define KINESCOPE_CHECK(condition, message)                                                      \
+  do {                                                                                           \
+    if (!(condition))                                                                            \
+      ::kinescope::internal::check_failed(#condition, message, std::source_location::current()); \
   } while (false)

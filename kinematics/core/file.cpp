@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/core/file.h"
 
-#include <unistd.h>
-
 #include <cstdio>
 #include <fstream>
 #include <sstream>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "kinematics/core/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Whole files, in and out. A product is written to a temporary name beside its place and renamed, so
-// that a run that is cut off leaves nothing half-written.
+// Whole files, in and out. A product is written to a temporary name beside its place and renamed,
+// so that a run that is cut off leaves nothing half-written.
 #pragma once
 
 #include <filesystem>

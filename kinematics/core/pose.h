@@ -29,7 +29,8 @@ struct Pose {
 [[nodiscard]] Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
 [[nodiscard]] Eigen::Vector3d operator*(const Pose& T_a_b, const Eigen::Vector3d& p_b);
 
-/// A pose from a 4x4 (or the upper 3x4 of a) homogeneous matrix; the rotation part is made orthonormal.
+/// A pose from a 4x4 (or the upper 3x4 of a) homogeneous matrix; the rotation part is made
+/// orthonormal.
 [[nodiscard]] Pose pose_from_matrix(const Eigen::Matrix4d& T);
 
 /// [v]x, so that [v]x w = v x w.

@@ -6,8 +6,8 @@
 
 namespace kinescope {
 
-/// Called by long stages: what is done, how many of how many (total 0: not known). Rooms below `app`
-/// print nothing; they call this. May be empty.
+/// Called by long stages: what is done, how many of how many (total 0: not known). Rooms below
+/// `app` print nothing; they call this. May be empty.
 using Progress = std::function<void(std::string_view stage, int done, int total)>;
 
 inline void report(const Progress& progress, std::string_view stage, int done, int total) {

@@ -19,14 +19,15 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
   std::vector<std::size_t> columns;
   for (std::size_t c = 0; c < table.header.size(); ++c) {
     const std::string& name = table.header[c];
-    const bool torque =
-        name.starts_with("tau") || std::ranges::find(torque_channels, name) != torque_channels.end();
+    const bool torque = name.starts_with("tau") ||
+                        std::ranges::find(torque_channels, name) != torque_channels.end();
     if (c == time_column || torque) continue;
     columns.push_back(c);
     log.channels.push_back(name);
   }
   if (columns.empty()) {
-    throw bad_input(fmt::format("{}:{}", table.source, table.header_line), "no joint channel beside 't'",
+    throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
+                    "no joint channel beside 't'",
                     "add one column a joint with its value in rad, m or ticks");
   }
   const auto rows = static_cast<Eigen::Index>(table.rows.size());
@@ -34,10 +35,10 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const double time_s = table.number(r, time_column);
     if (!log.times_s.empty() && time_s <= log.times_s.back()) {
-      throw bad_input(table.place(r),
-                      fmt::format("time {:.6f} s does not come after {:.6f} s", time_s,
-                                  log.times_s.back()),
-                      "sort the rows by time and remove repeated stamps");
+      throw bad_input(
+          table.place(r),
+          fmt::format("time {:.6f} s does not come after {:.6f} s", time_s, log.times_s.back()),
+          "sort the rows by time and remove repeated stamps");
     }
     log.times_s.push_back(time_s);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -51,7 +52,9 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
 // Slope at sample i from its neighbours (parabola through three points; one-sided at the ends).
 double slope(const JointLog& log, int channel, std::size_t i) {
   const std::size_t n = log.size();
-  const auto value = [&](std::size_t k) { return log.values(static_cast<Eigen::Index>(k), channel); };
+  const auto value = [&](std::size_t k) {
+    return log.values(static_cast<Eigen::Index>(k), channel);
+  };
   const auto secant = [&](std::size_t k) {
     return (value(k + 1) - value(k)) / (log.times_s[k + 1] - log.times_s[k]);
   };
@@ -84,8 +87,9 @@ enum class Quantity { kValue, kRate };
 Eigen::MatrixXd resample_quantity(const JointLog& log, const std::vector<double>& times_s,
                                   double time_offset_s, double max_gap_s, Quantity quantity) {
   const auto channels = static_cast<Eigen::Index>(log.channels.size());
-  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(times_s.size()), channels,
-                                                  std::numeric_limits<double>::quiet_NaN());
+  Eigen::MatrixXd out =
+      Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(times_s.size()), channels,
+                                std::numeric_limits<double>::quiet_NaN());
   for (std::size_t f = 0; f < times_s.size(); ++f) {
     for (Eigen::Index c = 0; c < channels; ++c) {
       const auto sample =
@@ -125,7 +129,8 @@ std::optional<ChannelValue> interpolate(const JointLog& log, int channel, double
   const auto before = static_cast<std::size_t>(after - log.times_s.begin()) - 1;
   if (log.times_s[before] == time_s) {
     const auto row = static_cast<Eigen::Index>(before);
-    return ChannelValue{log.values(row, channel), log.size() > 1 ? slope(log, channel, before) : 0.0};
+    return ChannelValue{log.values(row, channel),
+                        log.size() > 1 ? slope(log, channel, before) : 0.0};
   }
   if (log.times_s[before + 1] - log.times_s[before] > max_gap_s) return std::nullopt;
   return hermite(log, channel, before, time_s);
@@ -142,8 +147,8 @@ Eigen::MatrixXd resample_rates(const JointLog& log, const std::vector<double>& t
 }
 
 bool is_posture_log(const JointLog& log, const std::vector<double>& times_s) {
-  return std::ranges::all_of(
-      times_s, [&](double t) { return std::ranges::binary_search(log.times_s, t); });
+  return std::ranges::all_of(times_s,
+                             [&](double t) { return std::ranges::binary_search(log.times_s, t); });
 }
 
 }  // namespace kinescope

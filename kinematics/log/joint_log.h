@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   joints.csv: `t` in s, then one column a channel (rad, m or raw ticks), any order and name.
-// Gives   JointLog: named channels over their own clock, and their values between the samples.
-// Method  cubic Hermite interpolation with three-point slopes (Catmull-Rom for uneven steps).
-// Not here: which channel drives what (kinematics/structure), torques (dynamics).
+// Takes   joints.csv: `t` in s, then one column a channel (rad, m or raw ticks), any order and
+// name. Gives   JointLog: named channels over their own clock, and their values between the
+// samples. Method  cubic Hermite interpolation with three-point slopes (Catmull-Rom for uneven
+// steps). Not here: which channel drives what (kinematics/structure), torques (dynamics).
 #pragma once
 
 #include <filesystem>
@@ -35,15 +35,15 @@ struct ChannelValue {
 };
 
 /// Reads joints.csv. `torque_channels` and columns that begin with "tau" are left out.
-/// Throws bad_input: missing or empty file, no column `t`, a cell that is no finite number, stamps that
-/// do not increase, no channel. Each names file, line and remedy.
+/// Throws bad_input: missing or empty file, no column `t`, a cell that is no finite number, stamps
+/// that do not increase, no channel. Each names file, line and remedy.
 [[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
                                       const std::vector<std::string>& torque_channels = {});
 [[nodiscard]] JointLog parse_joint_log(std::string_view text, const std::string& source,
                                        const std::vector<std::string>& torque_channels = {});
 
-/// The channel at `time_s`, or nothing before the first, after the last sample, or inside a gap longer
-/// than `max_gap_s`. O(log samples).
+/// The channel at `time_s`, or nothing before the first, after the last sample, or inside a gap
+/// longer than `max_gap_s`. O(log samples).
 [[nodiscard]] std::optional<ChannelValue> interpolate(const JointLog& log, int channel,
                                                       double time_s, double max_gap_s = 0.5);
 

@@ -114,8 +114,7 @@ std::vector<Pose> forward_kinematics(const KinematicTree& tree, const Eigen::Vec
 }
 
 Eigen::Matrix<double, 6, Eigen::Dynamic> body_jacobian(const KinematicTree& tree,
-                                                       const Eigen::VectorXd& values,
-                                                       LinkId link) {
+                                                       const Eigen::VectorXd& values, LinkId link) {
   const std::vector<Pose> T_base_link = forward_kinematics(tree, values);
   const Pose T_link_base = T_base_link[link.index()].inverse();
   Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian =
@@ -130,8 +129,8 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> body_jacobian(const KinematicTree& tree
 
 KinematicTree with_z_axes(const KinematicTree& tree) {
   KinematicTree out = tree;
-  // T_old_new of every link frame: the frame moves with the joint, so it must commute with the motion
-  // up to the change of axis; moving along the axis does.
+  // T_old_new of every link frame: the frame moves with the joint, so it must commute with the
+  // motion up to the change of axis; moving along the axis does.
   std::vector<Pose> T_old_new(tree.links.size());
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const Joint& joint = tree.joints[j];

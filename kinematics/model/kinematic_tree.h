@@ -38,11 +38,11 @@ struct Joint {
   JointType type = JointType::kFixed;
   LinkId parent;
   LinkId child;
-  Pose T_parent_joint;                                ///< where the joint sits on its parent
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();    ///< unit, in the joint frame
-  std::string channel;                                ///< log channel that drives it; may be empty
-  double scale = 1.0;                                 ///< rad (or m) per unit of the channel
-  double offset = 0.0;                                ///< value = scale * reading + offset
+  Pose T_parent_joint;                              ///< where the joint sits on its parent
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit, in the joint frame
+  std::string channel;                              ///< log channel that drives it; may be empty
+  double scale = 1.0;                               ///< rad (or m) per unit of the channel
+  double offset = 0.0;                              ///< value = scale * reading + offset
   std::optional<JointLimits> limits;
 };
 
@@ -73,8 +73,8 @@ struct KinematicTree {
   [[nodiscard]] std::vector<JointId> path_to(LinkId link) const;
 };
 
-/// Throws std::logic_error unless the tree is one: every link but the first has one parent joint, parents
-/// stand before children, axes are unit vectors, names are unique.
+/// Throws std::logic_error unless the tree is one: every link but the first has one parent joint,
+/// parents stand before children, axes are unit vectors, names are unique.
 void check_tree(const KinematicTree& tree);
 
 /// The motion of a joint: exp(axis * value); identity for a fixed one.
@@ -84,15 +84,15 @@ void check_tree(const KinematicTree& tree);
 [[nodiscard]] std::vector<Pose> forward_kinematics(const KinematicTree& tree,
                                                    const Eigen::VectorXd& values);
 
-/// Body Jacobian of a link, 6 x joints (rotation, then translation, in the link's frame, per rad or m):
-/// T(q + d) = T(q) exp(J d) to first order. Murray, Li, Sastry 1994, eq. 3.56.
+/// Body Jacobian of a link, 6 x joints (rotation, then translation, in the link's frame, per rad or
+/// m): T(q + d) = T(q) exp(J d) to first order. Murray, Li, Sastry 1994, eq. 3.56.
 [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> body_jacobian(const KinematicTree& tree,
                                                                      const Eigen::VectorXd& values,
                                                                      LinkId link);
 
-/// The same robot with every joint's frame turned so that its axis is z and (for a revolute joint) moved
-/// along the axis to the point closest to the parent's frame. Marker and joint poses follow; forward
-/// kinematics of the markers is unchanged.
+/// The same robot with every joint's frame turned so that its axis is z and (for a revolute joint)
+/// moved along the axis to the point closest to the parent's frame. Marker and joint poses follow;
+/// forward kinematics of the markers is unchanged.
 [[nodiscard]] KinematicTree with_z_axes(const KinematicTree& tree);
 
 }  // namespace kinescope

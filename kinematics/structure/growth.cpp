@@ -83,9 +83,10 @@ class Grower {
     g.alternatives.push_back(*rest);
   }
 
-  // The body at rest on a link, where what is left of it is so small that no robot moves by it: corners that err
-  // alike from frame to frame (compression, one light) pass for a slow motion in the statistics, but not in
-  // millimetres. Medians, so that views spoilt by an occlusion do not matter.
+  // The body at rest on a link, where what is left of it is so small that no robot moves by it:
+  // corners that err alike from frame to frame (compression, one light) pass for a slow motion in
+  // the statistics, but not in millimetres. Medians, so that views spoilt by an occlusion do not
+  // matter.
   std::optional<Attachment> practical_rest(std::size_t b, int link) const {
     constexpr double kTurn = 0.01;    // rad
     constexpr double kShift = 0.003;  // of the distance from the camera

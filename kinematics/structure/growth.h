@@ -29,7 +29,7 @@ struct GrownBody {
   Attachment attachment;                 ///< on `link` at rest, or the founder's
   std::vector<Attachment> alternatives;  ///< all looked at (against all links), without paths
   double free_cost = 0.0;
-  int rests_on = -1;                    ///< link on which it plainly rests; -1: on none
+  int rests_on = -1;  ///< link on which it plainly rests; -1: on none
 };
 
 struct GrownTree {

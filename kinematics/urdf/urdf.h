@@ -15,16 +15,18 @@
 
 namespace kinescope {
 
-/// Parses URDF text. Fixed links named tag_<id> become markers of their parent. Continuous joints become
-/// revolute ones without limits. Throws bad_input with `source`, and the line or element where known, for
-/// text that is no URDF, a loop, two roots, joint types we do not know (planar, floating), NaN.
+/// Parses URDF text. Fixed links named tag_<id> become markers of their parent. Continuous joints
+/// become revolute ones without limits. Throws bad_input with `source`, and the line or element
+/// where known, for text that is no URDF, a loop, two roots, joint types we do not know (planar,
+/// floating), NaN.
 [[nodiscard]] KinematicTree parse_urdf(std::string_view text, const std::string& source);
 [[nodiscard]] KinematicTree read_urdf(const std::filesystem::path& path);
 
-/// URDF text: names, origins, axes, limits, simple visuals (cylinders along the links, spheres or boxes at
-/// the joints, thin plates for the markers), markers as fixed links. Deterministic; numbers with 17
-/// significant digits where needed to read back the same pose to 1e-12. A joint with a scale other than 1
-/// or an offset keeps its SI value as the joint value. Throws std::logic_error for an invalid tree.
+/// URDF text: names, origins, axes, limits, simple visuals (cylinders along the links, spheres or
+/// boxes at the joints, thin plates for the markers), markers as fixed links. Deterministic;
+/// numbers with 17 significant digits where needed to read back the same pose to 1e-12. A joint
+/// with a scale other than 1 or an offset keeps its SI value as the joint value. Throws
+/// std::logic_error for an invalid tree.
 [[nodiscard]] std::string write_urdf(const KinematicTree& tree);
 
 }  // namespace kinescope

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The program on measured recordings of others, beside the first fits that were made of them by other means.
-// Usage: real_data [SET...]; without names all. The recordings are read from $KINESCOPE_SHARED_DATA/vision (or
+// The program on measured recordings of others, beside the first fits that were made of them by
+// other means. Usage: real_data [SET...]; without names all. The recordings are read from
+// $KINESCOPE_SHARED_DATA/vision (or
 // ../shared/data/vision beside the sources); the folders of the runs are temporary.
 #include <algorithm>
 #include <cctype>
@@ -59,16 +60,17 @@ void print_details(const std::string& name, const Outcome& o) {
     fmt::print("   structure {}, probability {:.4f}: {} [{}]\n", o.status, o.probability, o.types(),
                o.order());
     for (const FoundJoint& joint : o.joints) {
-      fmt::print("   {} {} -> {} {} x {:.5f}\n", joint.type, joint.parent, joint.child, joint.channel,
-                 joint.scale);
+      fmt::print("   {} {} -> {} {} x {:.5f}\n", joint.type, joint.parent, joint.child,
+                 joint.channel, joint.scale);
     }
   }
   for (const std::string& doubt : o.doubts) fmt::print("   doubt: {}\n", doubt);
   if (o.calibrated) {
-    fmt::print("   before {}; fit {}; held out {} (median {}; outliers counted in {}; {:.3f} px); "
-               "{} sightings, {} rejected\n",
-               text(e.before), text(e.fit), text(e.held_out), text(e.held_out_median),
-               text(e.held_out_all), e.held_out_px, e.sightings, e.rejected);
+    fmt::print(
+        "   before {}; fit {}; held out {} (median {}; outliers counted in {}; {:.3f} px); "
+        "{} sightings, {} rejected\n",
+        text(e.before), text(e.fit), text(e.held_out), text(e.held_out_median),
+        text(e.held_out_all), e.held_out_px, e.sightings, e.rejected);
   }
   fmt::print("   {:.1f} s\n", o.seconds);
   std::fflush(stdout);
@@ -109,7 +111,8 @@ Line judge_structure(const std::string& name, const RecordingPaths& paths, const
   const Outcome lot = run_recording(paths, run / "lot", options_for(FreeGeometry::kGeometry, true));
   print_details(name + ", folds by lot", lot);
   const bool structure = o.types() == types && o.order() == order;
-  const bool accurate = within(o.errors.held_out, first_fit) || within(lot.errors.held_out_all, first_fit);
+  const bool accurate =
+      within(o.errors.held_out, first_fit) || within(lot.errors.held_out_all, first_fit);
   const bool fitted = within(o.errors.fit, first_fit);
   return {name,
           structure_text(o),
@@ -125,21 +128,21 @@ Line judge_structure(const std::string& name, const RecordingPaths& paths, const
 }
 
 std::vector<Line> judge_positioner(const Folders& f) {
-  return {judge_structure("positioner_2r", positioner(f.data, f.recording), f.run, "revolute revolute",
-                          "joint_1 joint_2", {0.40, 0.053})};
+  return {judge_structure("positioner_2r", positioner(f.data, f.recording), f.run,
+                          "revolute revolute", "joint_1 joint_2", {0.40, 0.053})};
 }
 
 std::vector<Line> judge_sweeps(const Folders& f) {
   return {judge_structure("laser_sweeps", laser_sweeps(f.data, f.recording), f.run,
-                          "revolute revolute revolute revolute revolute revolute", "j1 j2 j3 j4 j5 j6",
-                          {0.04, 0.0})};
+                          "revolute revolute revolute revolute revolute revolute",
+                          "j1 j2 j3 j4 j5 j6", {0.04, 0.0})};
 }
 
 std::vector<Line> judge_door(const Folders& f) {
-  return {judge_structure("door (poses)", door_poses(f.data, f.recording / "poses"), f.run / "poses",
-                          "revolute", "", {0.87, 0.57}),
-          judge_structure("door (video)", door_video(f.data, f.recording / "video"), f.run / "video",
-                          "revolute", "", {})};
+  return {judge_structure("door (poses)", door_poses(f.data, f.recording / "poses"),
+                          f.run / "poses", "revolute", "", {0.87, 0.57}),
+          judge_structure("door (video)", door_video(f.data, f.recording / "video"),
+                          f.run / "video", "revolute", "", {})};
 }
 
 std::vector<Line> judge_kuka(const Folders& f) {
@@ -151,11 +154,13 @@ std::vector<Line> judge_kuka(const Folders& f) {
   fmt::print("== kuka: fx {:.2f} fy {:.2f} cx {:.2f} cy {:.2f}, {:.3f} px, {:.3f} px held out\n",
              intrinsics.camera.fx, intrinsics.camera.fy, intrinsics.camera.cx, intrinsics.camera.cy,
              intrinsics.rms_px, intrinsics.held_out_rms_px);
-  return {judge_structure("kuka_chessboard", kuka_chessboard(f.data, f.recording, intrinsics.camera),
-                          f.run, "prismatic prismatic", "flange_y flange_z", {})};
+  return {judge_structure("kuka_chessboard",
+                          kuka_chessboard(f.data, f.recording, intrinsics.camera), f.run,
+                          "prismatic prismatic", "flange_y flange_z", {})};
 }
 
-std::vector<Line> judge_tagslam(const std::string& name, const std::string& topic, const Folders& f) {
+std::vector<Line> judge_tagslam(const std::string& name, const std::string& topic,
+                                const Folders& f) {
   const Outcome o = run_recording(tagslam(f.data, f.recording, topic), f.run);
   print_details(name, o);
   for (const auto& link : o.links) {
@@ -171,12 +176,14 @@ std::vector<Line> judge_tagslam(const std::string& name, const std::string& topi
     const auto bodies = tagslam_bodies(f.data);
     std::size_t owners = 0;
     for (const TagBody& body : bodies) {
-      if (std::ranges::any_of(link, [&](int tag) { return std::ranges::count(body.tags, tag) > 0; }))
+      if (std::ranges::any_of(link,
+                              [&](int tag) { return std::ranges::count(body.tags, tag) > 0; }))
         ++owners;
     }
     mixed = mixed || owners > 1;
   }
-  const bool joint = std::ranges::any_of(o.joints, [](const FoundJoint& j) { return j.type != "fixed"; });
+  const bool joint =
+      std::ranges::any_of(o.joints, [](const FoundJoint& j) { return j.type != "fixed"; });
   const bool ran = !o.status.empty();
   return {{name, structure_text(o), "", "", "", "none",
            ran && !joint && !mixed ? "structure yes" : "structure no"}};
@@ -188,8 +195,8 @@ struct Level {
   Length first_fit;
 };
 
-std::vector<Line> judge_levels(const std::string& name, const RecordingPaths& paths, const fs::path& run,
-                               const std::vector<Level>& levels) {
+std::vector<Line> judge_levels(const std::string& name, const RecordingPaths& paths,
+                               const fs::path& run, const std::vector<Level>& levels) {
   std::vector<Line> lines;
   for (const Level& l : levels) {
     const Outcome o = run_recording(paths, run / l.name, options_for(l.free, false));
@@ -201,11 +208,11 @@ std::vector<Line> judge_levels(const std::string& name, const RecordingPaths& pa
     lines.push_back({name, l.name, text(o.errors.fit), held_out_text(o.errors),
                      text(lot.errors.held_out_all),
                      l.first_fit.mm > 0.0 ? text(l.first_fit) : "none",
-                     !o.calibrated             ? "did not run"
-                     : l.first_fit.mm == 0.0   ? ""
-                     : by_posture              ? "yes"
-                     : by_lot                  ? "yes, by lot"
-                                               : "no"});
+                     !o.calibrated           ? "did not run"
+                     : l.first_fit.mm == 0.0 ? ""
+                     : by_posture            ? "yes"
+                     : by_lot                ? "yes, by lot"
+                                             : "no"});
   }
   return lines;
 }
@@ -228,8 +235,8 @@ std::vector<Set> all_sets() {
                   }});
   const auto balls = [&](const std::string& stem, double offsets_mm) {
     sets.push_back({"mukca_" + stem, "mukca_ball_socket", [stem, offsets_mm](const Folders& f) {
-                      return judge_levels("mukca_" + stem, ball_socket(f.data, f.recording, stem + ".csv"),
-                                          f.run,
+                      return judge_levels("mukca_" + stem,
+                                          ball_socket(f.data, f.recording, stem + ".csv"), f.run,
                                           {{kPlacement, "placement", {0.0, 0.0}},
                                            {kOffsets, "offsets", {offsets_mm, 0.0}},
                                            {kGeometry, "geometry", {offsets_mm, 0.0}}});
@@ -274,8 +281,8 @@ int run(const std::vector<std::string>& wanted) {
       table.push_back({set.name, "not on this machine", "", "", "", "", "no data"});
       continue;
     }
-    for (Line& line :
-         set.judge({*data, scratch.path() / set.name / "recording", scratch.path() / set.name / "run"})) {
+    for (Line& line : set.judge(
+             {*data, scratch.path() / set.name / "recording", scratch.path() / set.name / "run"})) {
       table.push_back(std::move(line));
     }
   }
@@ -283,9 +290,11 @@ int run(const std::vector<std::string>& wanted) {
     fmt::print("{:<22} {:<36} {:<20} {:<29} {:<20} {:<20} {}\n", l.set, l.found, l.fit, l.postures,
                l.lot, l.first_fit, l.reached);
   };
-  fmt::print("\nRms lengths of the errors. Held out: postures unlike those seen (without outliers, of "
-             "which -n/N), and postures drawn by lot (all of them).\n");
-  row({"set", "found", "fit", "held out, unseen postures", "held out, by lot", "first fit", "reached"});
+  fmt::print(
+      "\nRms lengths of the errors. Held out: postures unlike those seen (without outliers, of "
+      "which -n/N), and postures drawn by lot (all of them).\n");
+  row({"set", "found", "fit", "held out, unseen postures", "held out, by lot", "first fit",
+       "reached"});
   for (const Line& line : table) row(line);
   return 0;
 }

@@ -67,8 +67,8 @@ void write_joints(const fs::path& folder, const std::vector<double>& times_s,
 void write_camera(const fs::path& folder, const CameraModel& camera) {
   std::string distortion;
   for (int i = 0; i < distortion_count(camera.model); ++i) {
-    distortion += fmt::format("{}{}", i == 0 ? "" : ", ",
-                              camera.distortion[static_cast<std::size_t>(i)]);
+    distortion +=
+        fmt::format("{}{}", i == 0 ? "" : ", ", camera.distortion[static_cast<std::size_t>(i)]);
   }
   write_text(folder, "camera.yaml",
              fmt::format("image_width: {}\nimage_height: {}\ncamera_name: camera\n"

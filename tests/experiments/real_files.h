@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writing the files of a recording (app/io/recording.h) from values: what the converters of the measured sets
-// have in common.
+// Writing the files of a recording (app/io/recording.h) from values: what the converters of the
+// measured sets have in common.
 #pragma once
 
 #include <filesystem>
@@ -57,7 +57,8 @@ void write_joints(const std::filesystem::path& folder, const std::vector<double>
                   const std::vector<std::string>& names, const Eigen::MatrixXd& values);
 void write_camera(const std::filesystem::path& folder, const CameraModel& camera);
 void write_nominal(const std::filesystem::path& folder, const KinematicTree& tree);
-void write_text(const std::filesystem::path& folder, const std::string& name, const std::string& text);
+void write_text(const std::filesystem::path& folder, const std::string& name,
+                const std::string& text);
 
 /// Cells of a table by column name.
 class Columns {

@@ -95,8 +95,8 @@ RecordingPaths motoman_tracker(const fs::path& data, const fs::path& into) {
   const auto model = nlohmann::json::parse(read_text_file(data / "nominal_model.json"));
   std::vector<DhRow> rows;
   for (const auto& row : model["left_arm_TT_S_L_U_R_B_T"]) {
-    rows.push_back({row[0].get<double>(), row[1].get<double>(), row[2].get<double>(),
-                    row[3].get<double>()});
+    rows.push_back(
+        {row[0].get<double>(), row[1].get<double>(), row[2].get<double>(), row[3].get<double>()});
   }
   rows.front().alpha = 15.0 * kDegree;  // "same as left with alpha of the first row +15 deg"
   write_nominal(into, classic_dh("motoman_right", rows, joints));
@@ -114,8 +114,9 @@ RecordingPaths ur10_chessboard(const fs::path& data, const fs::path& into) {
     poses.push_back({static_cast<double>(r), 0, {rotation, table.vector3(r, "")}, 0.0, 0.0});
   }
   write_poses(into, poses);
-  const std::vector<std::string> joints{"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
-                                        "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
+  const std::vector<std::string> joints{"shoulder_pan_joint", "shoulder_lift_joint",
+                                        "elbow_joint",        "wrist_1_joint",
+                                        "wrist_2_joint",      "wrist_3_joint"};
   write_joints(into, count_up(table.rows()), joints, table.matrix(with_suffix(joints, "_rad")));
   write_nominal(into, ur10(joints));
   return in_folder(into);

@@ -21,7 +21,8 @@ struct DhRow {
 /// Classic convention (Denavit and Hartenberg 1955): T = Rz(theta) Tz(d) Tx(a) Rx(alpha).
 [[nodiscard]] KinematicTree classic_dh(const std::string& name, const std::vector<DhRow>& rows,
                                        const std::vector<std::string>& joints);
-/// Modified convention (Craig 1986): T = Rx(alpha) Tx(a) Rz(theta) Tz(d); `flange_d` beyond the last joint.
+/// Modified convention (Craig 1986): T = Rx(alpha) Tx(a) Rz(theta) Tz(d); `flange_d` beyond the
+/// last joint.
 [[nodiscard]] KinematicTree modified_dh(const std::string& name, const std::vector<DhRow>& rows,
                                         const std::vector<std::string>& joints, double flange_d);
 /// Parallel or crossing axes in the base frame at zero: direction and a point of each.

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/experiments/real_run.h"
 
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <exception>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
@@ -55,13 +54,15 @@ Length held_out_of_all(const fs::path& file) {
 void read_structure(const json& structure, Outcome& out) {
   if (structure.is_null()) return;
   out.status = structure["status"].get<std::string>();
-  out.probability = structure["probability"].is_number() ? structure["probability"].get<double>() : 0.0;
+  out.probability =
+      structure["probability"].is_number() ? structure["probability"].get<double>() : 0.0;
   for (const json& joint : structure["joints"]) {
     out.joints.push_back({joint["type"], joint["parent"], joint["child"],
                           joint["channel"].is_string() ? joint["channel"].get<std::string>() : "",
                           value_or_zero(joint, "scale")});
   }
-  for (const json& link : structure["links"]) out.links.push_back(link["tags"].get<std::vector<int>>());
+  for (const json& link : structure["links"])
+    out.links.push_back(link["tags"].get<std::vector<int>>());
   out.free_tags = structure["free_markers"].get<std::vector<int>>();
   for (const json& doubt : structure["doubts"]) {
     out.doubts.push_back(fmt::format("{} ({})", doubt["what"].get<std::string>(),

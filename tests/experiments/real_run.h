@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a recording and what to free.
-// Gives   Outcome: what `kinescope run` left in its folder, in the figures that the sets are judged by.
+// Gives   Outcome: what `kinescope run` left in its folder, in the figures that the sets are judged
+// by.
 #pragma once
 
 #include <filesystem>
@@ -41,10 +42,11 @@ struct Errors {
 
 struct Outcome {
   ExitCode code = ExitCode::kInternalError;
-  std::string message;            ///< the error's line, where there was one
-  std::string status;             ///< of the structure; empty with a nominal robot
-  double probability = 0.0;       ///< of the structure
-  std::vector<FoundJoint> joints; ///< of the structure, or of the nominal robot; parents before children
+  std::string message;       ///< the error's line, where there was one
+  std::string status;        ///< of the structure; empty with a nominal robot
+  double probability = 0.0;  ///< of the structure
+  std::vector<FoundJoint>
+      joints;  ///< of the structure, or of the nominal robot; parents before children
   std::vector<std::vector<int>> links;  ///< tags of each link of the structure, the camera's first
   std::vector<int> free_tags;
   std::vector<std::string> doubts;
@@ -60,7 +62,8 @@ struct Outcome {
 };
 
 /// Runs the whole pipeline into `output`; an error ends up in the outcome.
-[[nodiscard]] Outcome run_recording(const RecordingPaths& paths, const std::filesystem::path& output,
+[[nodiscard]] Outcome run_recording(const RecordingPaths& paths,
+                                    const std::filesystem::path& output,
                                     const CalibrateOptions& options = {});
 
 /// A folder below the system's temporary one that is gone when this is.

@@ -25,7 +25,8 @@ namespace kinescope::real {
                                         const std::filesystem::path& into);
 [[nodiscard]] RecordingPaths door_poses(const std::filesystem::path& data,
                                         const std::filesystem::path& into);
-/// A chessboard seen from a flange that only shifts (poses 0 to 10); the controller's y and z as log.
+/// A chessboard seen from a flange that only shifts (poses 0 to 10); the controller's y and z as
+/// log.
 [[nodiscard]] RecordingPaths kuka_chessboard(const std::filesystem::path& data,
                                              const std::filesystem::path& into,
                                              const CameraModel& camera);
@@ -35,14 +36,16 @@ struct TagBody {
   std::string name;
   std::vector<int> tags;
 };
-/// One camera of a TagSLAM recording: the detector's corners, sizes and camera as declared. No joint log.
+/// One camera of a TagSLAM recording: the detector's corners, sizes and camera as declared. No
+/// joint log.
 [[nodiscard]] RecordingPaths tagslam(const std::filesystem::path& data,
                                      const std::filesystem::path& into, const std::string& topic);
 [[nodiscard]] std::vector<TagBody> tagslam_bodies(const std::filesystem::path& data);
 
 /// A ball at the flange held in sockets 50 mm apart. `file` such as "panda_2.csv".
 [[nodiscard]] RecordingPaths ball_socket(const std::filesystem::path& data,
-                                         const std::filesystem::path& into, const std::string& file);
+                                         const std::filesystem::path& into,
+                                         const std::string& file);
 /// Camera on the flange of an FR3: its poses in the board's frame.
 [[nodiscard]] RecordingPaths franka_fr3(const std::filesystem::path& data,
                                         const std::filesystem::path& into);

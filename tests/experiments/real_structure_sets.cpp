@@ -25,7 +25,8 @@ std::vector<double> times_of(const std::vector<PoseRow>& rows) {
   return times;
 }
 
-// Three points that keep their distances: the frame in their middle, x to the first, z their normal.
+// Three points that keep their distances: the frame in their middle, x to the first, z their
+// normal.
 Pose frame_of_points(const Eigen::Matrix3d& points) {
   const Eigen::Vector3d middle = points.rowwise().mean();
   const Eigen::Vector3d x = (points.col(0) - middle).normalized();
@@ -69,7 +70,8 @@ RecordingPaths positioner(const fs::path& data, const fs::path& into) {
 }
 
 RecordingPaths laser_sweeps(const fs::path& data, const fs::path& into) {
-  constexpr double kPointSigma = 0.04 * kMillimetre;  // instrument, from the constancy of the distances
+  constexpr double kPointSigma =
+      0.04 * kMillimetre;  // instrument, from the constancy of the distances
   const Columns table(data / "sweeps.csv");
   std::vector<Eigen::Matrix3d> triangles;
   for (std::size_t r = 0; r < table.rows(); ++r) {
@@ -82,8 +84,8 @@ RecordingPaths laser_sweeps(const fs::path& data, const fs::path& into) {
     }
     triangles.push_back(points);
   }
-  // Of the middle of three points, and of a turn averaged over the axes: the sum of the squared arms about an
-  // axis is two thirds of the sum of the squared distances from the middle.
+  // Of the middle of three points, and of a turn averaged over the axes: the sum of the squared
+  // arms about an axis is two thirds of the sum of the squared distances from the middle.
   const Eigen::Matrix3d& points = triangles.front();
   const double arms = (points.colwise() - points.rowwise().mean()).squaredNorm();
   const double sigma_m = kPointSigma / std::sqrt(3.0);
@@ -126,7 +128,8 @@ RecordingPaths kuka_chessboard(const fs::path& data, const fs::path& into,
   for (std::size_t r = 0; r < corners.rows(); ++r) {
     const int index = static_cast<int>(corners.number(r, "index"));
     if (index > kLast) continue;
-    if (rows.empty() || rows.back().time_s != index) rows.push_back({static_cast<double>(index), 0, {}});
+    if (rows.empty() || rows.back().time_s != index)
+      rows.push_back({static_cast<double>(index), 0, {}});
     rows.back().corners_px.emplace_back(corners.number(r, "u_px"), corners.number(r, "v_px"));
   }
   write_corners(into, rows);
@@ -147,7 +150,8 @@ RecordingPaths tagslam(const fs::path& data, const fs::path& into, const std::st
   const double begin = table.number(0, "stamp_s");
   for (std::size_t r = 0; r < table.rows(); ++r) {
     if (table.text(r, "topic") != topic) continue;
-    CornersRow row{table.number(r, "stamp_s") - begin, static_cast<int>(table.number(r, "tag_id")), {}};
+    CornersRow row{
+        table.number(r, "stamp_s") - begin, static_cast<int>(table.number(r, "tag_id")), {}};
     for (int c = 0; c < 4; ++c) {
       row.corners_px.emplace_back(table.number(r, fmt::format("u{}", c)) - kHalfPixel,
                                   table.number(r, fmt::format("v{}", c)) - kHalfPixel);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where the recordings of others lie. They are not part of the project; tests that want them skip where
-// they are absent.
+// Where the recordings of others lie. They are not part of the project; tests that want them skip
+// where they are absent.
 #pragma once
 
 #include <cstdlib>

@@ -101,8 +101,8 @@ TEST(PlanarPose, RefusesCornersThatAreNoSquare) {
 }
 
 TEST(PoseTracks, TimeChoosesTheBranchThatMovesSmoothly) {
-  // Noise as strong as the difference between the branches: single views pick wrong often, the track must
-  // not.
+  // Noise as strong as the difference between the branches: single views pick wrong often, the
+  // track must not.
   constexpr double kSigma = 0.15;
   Rng rng = Rng::from_name("planar pose time");
   MarkerSet markers;
@@ -125,8 +125,8 @@ TEST(PoseTracks, TimeChoosesTheBranchThatMovesSmoothly) {
     seen.sigma_px = kSigma;
     seen.corners_px = images(camera_720p(), pose, markers.corners_m(seen.id));
     for (auto& p : seen.corners_px) p += Eigen::Vector2d(rng.normal(kSigma), rng.normal(kSigma));
-    const auto alone = estimate_planar_pose(camera_720p(), markers.corners_m(seen.id),
-                                            seen.corners_px, kSigma);
+    const auto alone =
+        estimate_planar_pose(camera_720p(), markers.corners_m(seen.id), seen.corners_px, kSigma);
     ASSERT_TRUE(alone);
     if (angle_between(alone->best.T_camera_marker.rotation, pose.rotation) > 0.5) ++wrong_alone;
     observations.observations.push_back(seen);
