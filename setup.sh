@@ -14,7 +14,7 @@ packages=(
 if [[ "${1:-}" == tests ]]; then
   packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev chromium)
   # Not in every release; the tests that want them say so and skip.
-  optional=(libmujoco-dev)
+  optional=(libmujoco-dev clang-format-19)
 else
   optional=()
 fi
