@@ -12,16 +12,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calib/camera/marker_set.h"
-#include "calib/vision/refine_corners.h"
-#include "calib/vision/tag_detector.h"
+#include "calib/vision/board_markers.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
-
-// Marker corners may miss the plane by this share of a square (lens distortion bends the plane's
-// homography); another layout misses by about half a square.
-constexpr double kMaxMisfit = 0.15;
 
 cv::Mat as_mat(const ImageView& image) {  // OpenCV's detectors only read
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
@@ -30,25 +25,6 @@ cv::Mat as_mat(const ImageView& image) {  // OpenCV's detectors only read
 
 cv::TermCriteria subpixel_criteria() {
   return {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 60, 1e-4};
-}
-
-std::vector<BoardMarker> find_markers(TagDetector& detector, const TagLayout& layout,
-                                      const ImageView& image) {
-  std::vector<BoardMarker> out;
-  for (const TagObservation& tag : detector.detect(image)) {
-    Corners start;
-    std::ranges::copy(tag.corners_px, start.begin());
-    const RefinedCorners refined = refine_corners(image, start, layout);
-    out.push_back({tag.id.value,
-                   {refined.corners_px.begin(), refined.corners_px.end()},
-                   refined.status == RefineStatus::kDone});
-  }
-  // An id that is there twice says nothing.
-  std::vector<BoardMarker> unique;
-  for (const BoardMarker& marker : out) {
-    if (std::ranges::count(out, marker.id, &BoardMarker::id) == 1) unique.push_back(marker);
-  }
-  return unique;
 }
 
 class ChessboardFinder final : public BoardFinder {
@@ -138,7 +114,7 @@ class CharucoFinder final : public BoardFinder {
 
   BoardSight find(const ImageView& image) override {
     BoardSight sight;
-    sight.markers = find_markers(*detector_, layout_, image);
+    sight.markers = find_board_markers(*detector_, layout_, image);
     std::erase_if(sight.markers, [&](const BoardMarker& marker) {
       return !charuco_marker_places(board_, board_.legacy_charuco, marker.id);
     });
@@ -261,92 +237,6 @@ class CharucoFinder final : public BoardFinder {
 
 // Kalibr's boards have two black cells around the code, other makers' one; how the tags are
 // numbered and turned on the board also differs. What fits is taken; nothing fits: refused.
-class AprilGridFinder final : public BoardFinder {
- public:
-  explicit AprilGridFinder(const BoardSpec& board) : board_(board) {
-    const std::string family = board.dictionary.empty() ? "tag36h11" : board.dictionary;
-    families_ = {family};
-    if (family == "tag36h11") families_.emplace_back("tag36h11b2");
-    for (const std::string& name : families_) {
-      detectors_.push_back(make_tag_detector(name));
-      layouts_.push_back(tag_layout(name));
-    }
-  }
-
-  BoardSight find(const ImageView& image) override {
-    BoardSight sight;
-    for (std::size_t i = 0; i < detectors_.size(); ++i) {
-      std::vector<BoardMarker> markers = find_markers(*detectors_[i], layouts_[i], image);
-      std::erase_if(markers, [&](const BoardMarker& marker) {
-        return marker.id >= board_.columns * board_.rows || !marker.refined;
-      });
-      if (markers.size() > sight.markers.size()) sight.markers = std::move(markers);
-    }
-    return sight;
-  }
-
-  void settle(std::vector<BoardSight>& sights, const std::string& source) const override {
-    double best = std::numeric_limits<double>::infinity();
-    int best_turn = 0;
-    bool best_up = true;
-    for (const bool upward : {true, false}) {
-      for (int turn = 0; turn < 4; ++turn) {
-        const double share = misfit(sights, upward, turn);
-        if (share < best) best = share, best_turn = turn, best_up = upward;
-      }
-    }
-    if (!(best <= kMaxMisfit)) {
-      throw bad_input(
-          source,
-          fmt::format("the tags miss the declared grid by {:.0f} % of a tag's edge", 100.0 * best),
-          "check columns, rows, tag size and spacing; ids must run row by row from 0");
-    }
-    for (BoardSight& sight : sights) fill(sight, best_up, best_turn);
-  }
-
- private:
-  // Corner `corner` (lb, rb, rt, lt of the tag as detected) of a tag, turned by quarter turns on
-  // the board.
-  Eigen::Vector3d place(int id, int corner, bool upward, int turn) const {
-    const double pitch = board_.square_m * (1.0 + board_.spacing);
-    const int row = upward ? board_.rows - 1 - id / board_.columns : id / board_.columns;
-    const int k = (corner + turn) % 4;
-    const double right = k == 1 || k == 2 ? 1.0 : 0.0;
-    const double down = k == 0 || k == 1 ? 1.0 : 0.0;
-    return {(id % board_.columns) * pitch + right * board_.square_m,
-            row * pitch + down * board_.square_m, 0.0};
-  }
-
-  void fill(BoardSight& sight, bool upward, int turn) const {
-    sight.pixels.clear();
-    sight.places_m.clear();
-    for (const BoardMarker& marker : sight.markers) {
-      for (int corner = 0; corner < 4; ++corner) {
-        sight.pixels.push_back(marker.pixels[static_cast<std::size_t>(corner)]);
-        sight.places_m.push_back(place(marker.id, corner, upward, turn));
-      }
-    }
-  }
-
-  double misfit(const std::vector<BoardSight>& sights, bool upward, int turn) const {
-    std::vector<double> shares;
-    for (BoardSight sight : sights) {
-      if (sight.markers.size() < 3) continue;
-      fill(sight, upward, turn);
-      const double edge = (sight.pixels[0] - sight.pixels[1]).norm();
-      shares.push_back(plane_misfit_px(sight.places_m, sight.pixels) / edge);
-    }
-    if (shares.empty()) return 0.0;
-    std::ranges::sort(shares);
-    return shares[shares.size() / 2];
-  }
-
-  BoardSpec board_;
-  std::vector<std::string> families_;
-  std::vector<std::unique_ptr<TagDetector>> detectors_;
-  std::vector<TagLayout> layouts_;
-};
-
 void check_board(const BoardSpec& board) {
   const auto refuse = [](std::string_view key, std::string_view what, std::string_view remedy) {
     throw bad_request(key, what, remedy);
@@ -378,6 +268,25 @@ void check_board(const BoardSpec& board) {
 
 }  // namespace
 
+std::vector<BoardMarker> find_board_markers(TagDetector& detector, const TagLayout& layout,
+                                            const ImageView& image) {
+  std::vector<BoardMarker> out;
+  for (const TagObservation& tag : detector.detect(image)) {
+    Corners start;
+    std::ranges::copy(tag.corners_px, start.begin());
+    const RefinedCorners refined = refine_corners(image, start, layout);
+    out.push_back({tag.id.value,
+                   {refined.corners_px.begin(), refined.corners_px.end()},
+                   refined.status == RefineStatus::kDone});
+  }
+  // An id that is there twice says nothing.
+  std::vector<BoardMarker> unique;
+  for (const BoardMarker& marker : out) {
+    if (std::ranges::count(out, marker.id, &BoardMarker::id) == 1) unique.push_back(marker);
+  }
+  return unique;
+}
+
 std::unique_ptr<BoardFinder> make_board_finder(const BoardSpec& board) {
   check_board(board);
   switch (board.type) {
@@ -386,7 +295,7 @@ std::unique_ptr<BoardFinder> make_board_finder(const BoardSpec& board) {
     case BoardType::kCharuco:
       return std::make_unique<CharucoFinder>(board);
     case BoardType::kAprilGrid:
-      return std::make_unique<AprilGridFinder>(board);
+      return make_april_grid_finder(board);
   }
   throw bad_request("board", "of unknown type", "chessboard, charuco or aprilgrid");
 }

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   samples beside a marker's edges.
+// Gives   the grey value that a blurred step along each edge predicts there, and the normal
+//         equations of its unknowns.
+// Units   px, grey levels.
+// Method  a straight edge (shift, turn, sagitta) between two grey levels that change linearly from
+//         knot to knot, blurred by a Gaussian: grey = inside + (outside - inside) Phi(d / blur).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "calib/vision/marker_edges.h"
+
+namespace kinescope::corner_fit {
+
+// The unknowns: shift, turn and sagitta of each edge (px), two blurs (px), then the grey levels
+// beside each edge at knots along it, inside and outside.
+inline constexpr int kBlurIndex = 12;
+inline constexpr int kLevelsIndex = 14;
+
+inline constexpr double kRobust = 3.0;    // noise units beyond which a pixel's weight falls
+inline constexpr double kMinNoise = 0.3;  // grey levels, rounding
+
+// How the unknowns are stored.
+struct Layout {
+  std::array<int, 4> knots{};   // of each edge, on each side
+  std::array<int, 4> inside{};  // where each edge's levels begin
+  std::array<int, 4> outside{};
+  int size = 0;
+
+  explicit Layout(const Corners& corners);
+};
+
+/// The model's grey value and its derivatives, stored as (index, value) of the eight that are not
+/// zero.
+struct Prediction {
+  double grey = 0.0;
+  std::array<int, 8> index{};
+  std::array<double, 8> slope{};
+};
+
+[[nodiscard]] Prediction predict(const Layout& layout, const Eigen::VectorXd& unknowns,
+                                 const Sample& s);
+
+/// Normal equations of the weighted, robust least squares.
+struct System {
+  Eigen::MatrixXd H;  // lower triangle
+  Eigen::VectorXd g;
+  double cost = 0.0;    // weighted sum of squares
+  double weight = 0.0;  // sum of weights
+};
+
+/// `noise`: standard deviation of a grey value.
+[[nodiscard]] System make_system(const std::vector<Sample>& samples, const Layout& layout,
+                                 const Eigen::VectorXd& unknowns, double noise);
+
+/// Adds the belief that row_a * unknowns(a) + row_b * unknowns(b) is zero; `weight` is the noise's
+/// variance over the belief's.
+void add_belief(System& system, const Eigen::VectorXd& unknowns, int a, double row_a, int b,
+                double row_b, double weight);
+
+/// Standard deviation of the grey values around the model, from their median.
+[[nodiscard]] double robust_noise(const std::vector<Sample>& samples, const Layout& layout,
+                                  const Eigen::VectorXd& unknowns);
+
+/// A first guess of the grey values inside and outside: medians of the pixels well away from the
+/// edge; nothing where there are too few.
+[[nodiscard]] std::optional<std::array<double, 2>> guess_levels(const std::vector<Sample>& samples);
+
+/// Where the chord of edge e - 1 meets that of edge e, as the corner e, with the lever of each
+/// edge's unknowns.
+struct Meeting {
+  Eigen::Vector2d point;
+  Eigen::Matrix<double, 2, 12> slope = Eigen::Matrix<double, 2, 12>::Zero();
+};
+
+[[nodiscard]] Meeting meet(const std::array<Edge, 4>& edges, const Eigen::VectorXd& unknowns,
+                           std::size_t corner);
+
+}  // namespace kinescope::corner_fit
