@@ -21,18 +21,6 @@ namespace {
 // the robot.
 constexpr double kUnitTolerance = 0.05;
 
-void require_overlap(const Recording& recording, const std::vector<double>& times_s) {
-  if (recording.log.empty() || times_s.empty()) return;
-  const double begin = recording.log.times_s.front();
-  const double end = recording.log.times_s.back();
-  if (times_s.back() >= begin && times_s.front() <= end) return;
-  throw bad_input(
-      recording.log.source,
-      fmt::format("covers {:.3f} to {:.3f} s, the frames {:.3f} to {:.3f} s: no overlap", begin,
-                  end, times_s.front(), times_s.back()),
-      "give the video's start on the log's clock as video_start in recording.yaml");
-}
-
 void require_markers(const Recording& recording, const TagObservations& tags) {
   const std::string source =
       recording.video.empty() ? recording.folder.string() : recording.video.string();
@@ -227,7 +215,9 @@ Observed observe(const Recording& recording, const RunOptions& options,
     out.measurements.times_s = out.tags.times_s;
     out.measurements.corners = out.tags.observations;
   }
-  require_overlap(recording, out.measurements.times_s);
+  if (recording.entry == RecordingEntry::kVideo) {
+    require_time_overlap(recording.log, out.measurements.times_s, recording.video.string());
+  }
   return out;
 }
 

@@ -110,7 +110,6 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   } else {
     const auto find = [&](std::optional<double> time_offset_s) {
       run.structure = find_robot(recording, run.tracks, options.calibrate, time_offset_s);
-      folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
       require_determined(*run.structure);
     };
     find(std::nullopt);
@@ -127,6 +126,9 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   clock.lap("calibrate", run.times);
 
   const std::string urdf = write_urdf(run.calibration.tree);
+  if (run.structure) {
+    folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
+  }
   folder.write("robot.urdf", urdf);
   folder.write("calibration.json", calibration_json(run.calibration).dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));

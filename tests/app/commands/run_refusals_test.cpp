@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope run` on what cannot give an answer: the line that it ends with, its exit code, and
+// that nothing is lost.
+#include <map>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/io/products.h"
+#include "tests/app/commands/program.h"
+#include "tests/app/io/recording_folder.h"
+#include "tests/truth/random_robot.h"
+#include "tests/truth/render.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string joints_csv(const JointLog& log) {
+  std::string text = "t";
+  for (const std::string& channel : log.channels) text += "," + channel;
+  text += "\n";
+  for (Eigen::Index i = 0; i < log.values.rows(); ++i) {
+    text += fmt::format("{}", log.times_s[static_cast<std::size_t>(i)]);
+    for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
+      text += fmt::format(",{}", log.values(i, c));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::map<std::string, std::string> contents(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[entry.path().lexically_relative(folder).string()] = read_text_file(entry.path());
+    }
+  }
+  return files;
+}
+
+class RunRefusals : public testing::Test {
+ protected:
+  [[nodiscard]] std::string output() const { return (folder_.path() / "out").string(); }
+
+  /// Refused with `part` in the line; products of an earlier run stay as they were.
+  std::string refused(ExitCode code, const std::string& part,
+                      const std::vector<std::string>& more = {}) const {
+    const fs::path kept = output();
+    for (const char* name : {"robot.urdf", "structure.json", "report.html", "result.json"}) {
+      folder_.write(std::string("out/") + name, "of an earlier run");
+    }
+    const auto before = contents(kept);
+    std::vector<std::string> words{"run", folder_.path().string(), "--output", output(), "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    std::string line = expect_refusal(words, code, part);
+    const auto after = contents(kept);
+    for (const auto& [name, text] : before) {
+      EXPECT_TRUE(after.contains(name) && after.at(name) == text) << name << " was touched";
+    }
+    for (const auto& [name, text] : after) {
+      EXPECT_EQ(name.find(".tmp"), std::string::npos) << name << " was left behind";
+    }
+    return line;
+  }
+
+  void write_poses(const RobotRecording& recording) const {
+    folder_.write("poses.csv", tracks_csv(recording.tracks));
+    folder_.write("joints.csv", joints_csv(recording.log));
+  }
+
+  RecordingFolder folder_;
+};
+
+struct PosesOfArm {
+  RobotRecording recording;
+  std::vector<std::string> channel;  // of each joint
+};
+
+PosesOfArm arm(const std::string& name, const RecordingOptions& options, int joints = 3) {
+  Rng rng = Rng::from_name(name);
+  const RandomRobot robot = random_robot({.joints = joints, .prismatic_share = 0.0}, rng);
+  PosesOfArm out{record(robot, options, rng), {}};
+  for (const int c : out.recording.channel_of_joint) {
+    out.channel.push_back(out.recording.log.channels[static_cast<std::size_t>(c)]);
+  }
+  return out;
+}
+
+TEST_F(RunRefusals, AJointThatHardlyMoves) {
+  RecordingOptions options;
+  options.still_joints = {1};
+  const PosesOfArm still = arm("hardly", options);
+  write_poses(still.recording);
+  const std::string line = refused(ExitCode::kUndetermined, still.channel[1]);
+  EXPECT_NE(line.find("move"), std::string::npos) << line;
+}
+
+TEST_F(RunRefusals, TwoJointsThatMoveTogether) {
+  RecordingOptions options;
+  options.together = {{0, 2}};
+  const PosesOfArm together = arm("together", options, 4);
+  write_poses(together.recording);
+  const std::string line = refused(ExitCode::kUndetermined, together.channel[0]);
+  EXPECT_NE(line.find(together.channel[2]), std::string::npos) << line;
+}
+
+TEST_F(RunRefusals, MarkersThatNeverMove) {
+  RecordingOptions options;
+  options.still_joints = {0, 1, 2};
+  write_poses(arm("never", options).recording);
+  refused(ExitCode::kUndetermined, "move");
+}
+
+TEST_F(RunRefusals, ANominalRobotThatCannotBeRead) {
+  write_poses(arm("nominal", {}).recording);
+  folder_.write("broken.urdf", "<robot name='r'><link name='a'/><joint");
+  refused(ExitCode::kBadInput, "broken.urdf:1",
+          {"--nominal", (folder_.path() / "broken.urdf").string()});
+  refused(ExitCode::kBadInput, "none.urdf", {"--nominal", "none.urdf"});
+  folder_.write("other.urdf",
+                "<robot name='r'><link name='a'/><link name='b'/><joint name='elbow' "
+                "type='continuous'><parent link='a'/><child link='b'/></joint></robot>");
+  refused(ExitCode::kBadInput, "name the columns elbow",
+          {"--nominal", (folder_.path() / "other.urdf").string()});
+}
+
+TEST_F(RunRefusals, AFolderThatCannotBeWritten) {
+  write_poses(arm("unwritable", {}).recording);
+  folder_.write("a_file", "text");
+  const std::string inside = (folder_.path() / "a_file" / "out").string();
+  expect_refusal({"run", folder_.path().string(), "--output", inside, "--quiet"},
+                 ExitCode::kBadRequest, "a_file");
+  expect_refusal({"run", folder_.path().string(), "--output", "/proc/kinescope", "--quiet"},
+                 ExitCode::kBadRequest, "/proc/kinescope");
+  EXPECT_EQ(read_text_file(folder_.path() / "a_file"), "text");
+}
+
+TEST_F(RunRefusals, ALimitThatIsNoLimit) {
+  write_poses(arm("limit", {}).recording);
+  refused(ExitCode::kBadRequest, "held_out_pxx", {"--fail-on", "held_out_pxx>1"});
+}
+
+// Recordings as images: one marker at rest, or two of which one moves, or none.
+class RunRefusalsOfImages : public RunRefusals {
+ protected:
+  void film(bool moving, const std::string& family = "tag36h11") const {
+    const CameraModel camera = pinhole_guess(320, 240, 500.0);
+    Rng rng = Rng::from_name("film");
+    std::string times = "image,t\n";
+    fs::create_directories(folder_.path() / "images");
+    for (int f = 0; f < 20; ++f) {
+      PlacedMarker marker;
+      marker.art = apriltag_art("tag36h11", 4);
+      const double turn = moving ? 0.05 * f : 0.0;
+      marker.T_camera_tag =
+          pose_showing(camera, {150.0, 110.0}, 70.0, marker.size_m, 0.3, 0.2, turn);
+      const GreyImage image = render_markers(camera, {marker}, {.supersample = 3}, rng);
+      const cv::Mat picture(image.height, image.width, CV_8UC1,
+                            const_cast<std::uint8_t*>(image.pixels.data()));
+      const std::string name = fmt::format("{:03d}.png", f);
+      ASSERT_TRUE(cv::imwrite((folder_.path() / "images" / name).string(), picture));
+      times += fmt::format("{},{}\n", name, 0.1 * f);
+    }
+    folder_.write("images/times.csv", times);
+    folder_.write("tags.yaml", "family: " + family + "\ndefault_size: 0.05\n");
+    folder_.write("camera.yaml",
+                  "image_width: 320\nimage_height: 240\ncamera_matrix: {rows: 3, cols: 3, data: "
+                  "[500, 0, 159.5, 0, 500, 119.5, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
+                  "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
+  }
+};
+
+TEST_F(RunRefusalsOfImages, NoMarkerOfTheDeclaredFamily) {
+  film(false, "tag25h9");
+  refused(ExitCode::kBadInput, "no marker of family tag25h9 was found in 20 frames");
+}
+
+TEST_F(RunRefusalsOfImages, OneMarkerAtRest) {
+  film(false);
+  refused(ExitCode::kUndetermined, "move");
+}
+
+TEST_F(RunRefusalsOfImages, AMarkerWithoutASize) {
+  film(false);
+  folder_.write("tags.yaml", "family: tag36h11\nsizes: {9: 0.05}\n");
+  refused(ExitCode::kBadInput, "tags.yaml");
+  for (const char* size : {"0", "-0.05", ".nan", "fifty"}) {
+    folder_.write("tags.yaml", fmt::format("family: tag36h11\ndefault_size: {}\n", size));
+    refused(ExitCode::kBadInput, "tags.yaml:2: default_size");
+  }
+}
+
+TEST_F(RunRefusalsOfImages, ACameraOfAnotherShape) {
+  film(true);
+  folder_.write("camera.yaml",
+                "image_width: 300\nimage_height: 300\ncamera_matrix: {rows: 3, cols: 3, data: "
+                "[500, 0, 149.5, 0, 500, 149.5, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
+                "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
+  refused(ExitCode::kBadInput, "camera.yaml");
+}
+
+TEST_F(RunRefusalsOfImages, ALogOfAnotherTime) {
+  film(true);
+  folder_.write("joints.csv", "t,a\n100,0\n101,1\n102,2\n");
+  const std::string line = refused(ExitCode::kBadInput, "joints.csv");
+  EXPECT_NE(line.find("video_start"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace kinescope
