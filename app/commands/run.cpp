@@ -110,6 +110,11 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   } else {
     const auto find = [&](std::optional<double> time_offset_s) {
       run.structure = find_robot(recording, run.tracks, options.calibrate, time_offset_s);
+      // What was found is shown also where it is no answer, but never over an earlier answer.
+      if (!std::filesystem::exists(folder.file("robot.urdf"))) {
+        folder.write("structure.json",
+                     structure_json(*run.structure, recording.log).dump(2) + "\n");
+      }
       require_determined(*run.structure);
     };
     find(std::nullopt);
