@@ -6,8 +6,6 @@
 #include <limits>
 #include <map>
 
-#include <Eigen/Eigenvalues>
-
 #include "calib/bundle/make_spec.h"
 
 namespace kinescope::bundle {
@@ -32,13 +30,19 @@ std::map<const double*, Columns> pose_columns(const Uncertainty& uncertainty) {
   return out;
 }
 
-// Largest standard deviation over the directions of a covariance; nothing when a parameter is
-// unseen.
-Sigma largest_sigma(const Eigen::MatrixXd& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  const double most = eigen.eigenvalues()[covariance.rows() - 1];
-  if (!(most > 0.0) || !std::isfinite(most)) return std::nullopt;
-  return std::sqrt(most);
+// Half the length that an error of this covariance stays below in 95 of 100 cases, so that twice it
+// is an interval of that kind however the error is spread over directions. The squared length is
+// taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946), its quantile
+// after Wilson and Hilferty (1931). Nothing when a parameter is unseen.
+Sigma length_sigma(const Eigen::MatrixXd& covariance) {
+  constexpr double kNormal95 = 1.6449;  // 95 % quantile of the normal distribution
+  const double mean = covariance.trace();
+  const double square = covariance.squaredNorm();
+  if (!(mean > 0.0) || !std::isfinite(square)) return std::nullopt;
+  const double freedom = mean * mean / square;
+  const double shrink = 2.0 / (9.0 * freedom);
+  const double quantile = mean * std::pow(1.0 - shrink + kNormal95 * std::sqrt(shrink), 3);
+  return 0.5 * std::sqrt(quantile);
 }
 
 bool all_seen(const Uncertainty& uncertainty, const Columns& columns, int first, int count) {
@@ -58,7 +62,7 @@ Sigma block_sigma(const Uncertainty& uncertainty, const Columns& columns, int fi
     }
   }
   if (present.empty() || !all_seen(uncertainty, columns, first, 3)) return std::nullopt;
-  return largest_sigma(uncertainty.covariance(present, present));
+  return length_sigma(uncertainty.covariance(present, present));
 }
 
 double value_of(const FreeBlock& block, std::size_t i, const State& start) {
@@ -164,10 +168,10 @@ void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncert
       const Eigen::MatrixXd shift = (R * A.bottomRows<3>()).topRows<2>();
       if (seen) {
         estimate.direction_sigma_rad =
-            largest_sigma(tilt * uncertainty.covariance * tilt.transpose());
+            length_sigma(tilt * uncertainty.covariance * tilt.transpose());
         if (joint.type == JointType::kRevolute) {
           estimate.position_sigma_m =
-              largest_sigma(shift * uncertainty.covariance * shift.transpose());
+              length_sigma(shift * uncertainty.covariance * shift.transpose());
         }
       }
     }

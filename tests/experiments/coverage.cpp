@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Claimed intervals against scatter: `coverage [WORLDS [RENDERED]]`. Random robots, first with
+// white noise on exact corners, then as pictures that go through detection and corner refinement.
+// For every axis the error in direction and position against twice its standard uncertainty, and
+// for the clock; the axes are compared in the base marker's frame, where they do not depend on the
+// gauge.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "calib/bundle/calibrate.h"
+#include "calib/vision/refine_corners.h"
+#include "calib/vision/tag_detector.h"
+#include "tests/truth/camera_world.h"
+#include "tests/truth/render.h"
+
+namespace kinescope {
+namespace {
+
+using truth::World;
+using truth::WorldOptions;
+
+constexpr double kOffset = 0.012;  // s
+
+/// How often 95 % intervals hold the truth, and the mean square of error over sigma.
+struct Coverage {
+  int held = 0;
+  int count = 0;
+  double square = 0.0;
+
+  void add(double error, double sigma) {
+    held += std::abs(error) < 2.0 * sigma ? 1 : 0;
+    square += std::pow(error / sigma, 2);
+    ++count;
+  }
+  void print(const char* name) const {
+    const double share = static_cast<double>(held) / count;
+    fmt::print("  {:14} {:5.1f} % of {} hold the truth (+- {:.1f} %); rms of error/sigma {:.2f}\n",
+               name, 100.0 * share, count, 100.0 * std::sqrt(share * (1.0 - share) / count),
+               std::sqrt(square / count));
+  }
+};
+
+struct Score {
+  Coverage direction, position, clock;
+  double ratio = 0.0;  // sum of held out / training
+  int worlds = 0;
+
+  void print(const char* name) const {
+    fmt::print("{}, {} recordings: held out / training {:.3f}\n", name, worlds, ratio / worlds);
+    direction.print("axis direction");
+    position.print("axis position");
+    clock.print("clock offset");
+    std::fflush(stdout);
+  }
+};
+
+Eigen::VectorXd mean_values(const Eigen::MatrixXd& values) {
+  Eigen::VectorXd mean(values.cols());
+  for (Eigen::Index j = 0; j < values.cols(); ++j) mean[j] = values.col(j).mean();
+  return mean;
+}
+
+void judge(const World& world, const Calibration& found, Score& score) {
+  const Marker& anchor = world.tree.markers.front();
+  const Pose T_found_truth =
+      found.tree.markers.front().T_link_marker * anchor.T_link_marker.inverse();
+  const auto links = forward_kinematics(world.tree, mean_values(found.joint_values));
+  for (std::size_t j = 0; j < world.tree.joints.size(); ++j) {
+    const Joint& joint = world.tree.joints[j];
+    const Pose T_found_joint = T_found_truth * links[joint.parent.index()] * joint.T_parent_joint;
+    const Eigen::Vector3d axis = T_found_joint.rotation * joint.axis;
+    const JointEstimate& estimate = found.joints[j];
+    const double cosine = std::min(1.0, std::abs(axis.dot(estimate.axis_base)));
+    if (estimate.direction_sigma_rad) {
+      score.direction.add(std::acos(cosine), *estimate.direction_sigma_rad);
+    }
+    const Eigen::Vector3d off = estimate.point_base - T_found_joint.translation;
+    if (estimate.position_sigma_m) {
+      score.position.add(off.cross(axis).norm(), *estimate.position_sigma_m);
+    }
+  }
+  if (found.time_offset_sigma_s) {
+    score.clock.add(found.time_offset_s - kOffset, *found.time_offset_sigma_s);
+  }
+  score.ratio += found.held_out_rms / found.training_rms;
+  ++score.worlds;
+}
+
+WorldOptions options_of(int seed) {
+  WorldOptions options;
+  options.seed = 5000 + static_cast<std::uint64_t>(seed);
+  options.time_offset_s = kOffset;
+  options.link_length_m = 0.2;
+  options.joints = {JointType::kRevolute, JointType::kRevolute,
+                    seed % 2 == 0 ? JointType::kRevolute : JointType::kPrismatic,
+                    JointType::kRevolute};
+  return options;
+}
+
+Calibration calibrated(const World& world, const Measurements& measurements, std::uint64_t seed) {
+  return calibrate(measurements, world.markers, world.log,
+                   truth::perturbed_start(world, 0.01, 0.002, seed));
+}
+
+// Markers that the camera sees in a frame and that no other one overlaps in the picture.
+std::vector<PlacedMarker> visible(const World& world, const Measurements& exact, int frame) {
+  std::vector<PlacedMarker> out;
+  const auto links = forward_kinematics(world.tree, world.joint_values.row(frame));
+  for (const TagObservation& seen : exact.corners) {
+    if (seen.frame != frame) continue;
+    const Marker* marker = world.tree.marker(seen.id);
+    PlacedMarker placed;
+    placed.art = apriltag_art("tag36h11", seen.id.value);
+    placed.T_camera_tag = world.T_camera_base * links[marker->link.index()] * marker->T_link_marker;
+    placed.size_m = marker->size_m;
+    const auto pixel = project(world.camera, placed.T_camera_tag.translation);
+    const auto clear = [&](const PlacedMarker& other) {
+      const auto there = project(world.camera, other.T_camera_tag.translation);
+      const double size_px = world.camera.fx * placed.size_m / placed.T_camera_tag.translation.z();
+      return (*pixel - *there).norm() > 2.2 * size_px;
+    };
+    if (std::ranges::all_of(out, clear)) out.push_back(std::move(placed));
+  }
+  return out;
+}
+
+// A marker that others hide for most of the time makes no recording worth judging.
+bool all_seen(const World& world, const Measurements& measurements) {
+  return std::ranges::all_of(world.tree.markers, [&](const Marker& marker) {
+    return 2 * std::ranges::count(measurements.corners, marker.id, &TagObservation::id) >
+           static_cast<std::ptrdiff_t>(measurements.times_s.size());
+  });
+}
+
+Measurements filmed(const World& world, std::uint64_t seed) {
+  Rng rng = Rng::from_name("coverage pictures", seed);
+  const std::unique_ptr<TagDetector> detector = make_tag_detector("tag36h11");
+  const TagLayout layout = tag_layout("tag36h11");
+  Measurements out;
+  out.times_s = world.measurements.times_s;
+  for (int f = 0; f < static_cast<int>(out.times_s.size()); ++f) {
+    const auto placed = visible(world, world.measurements, f);
+    const GreyImage image = render_markers(world.camera, placed, {.supersample = 4}, rng);
+    for (TagObservation seen : detector->detect(image.view())) {
+      if (world.tree.marker(seen.id) == nullptr) continue;
+      Corners corners;
+      std::ranges::copy(seen.corners_px, corners.begin());
+      const RefinedCorners refined = refine_corners(image.view(), corners, layout);
+      if (refined.status != RefineStatus::kDone) continue;
+      seen.frame = f;
+      std::ranges::copy(refined.corners_px, seen.corners_px.begin());
+      seen.sigma_px = refined.sigma_px;
+      out.corners.push_back(seen);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace kinescope
+
+int main(int argc, char** argv) {
+  using namespace kinescope;
+  const int worlds = argc > 1 ? std::atoi(argv[1]) : 200;
+  const int rendered = argc > 2 ? std::atoi(argv[2]) : 20;
+  Score white;
+  for (int seed = 0; white.worlds < worlds; ++seed) {
+    const World world = truth::make_world(options_of(seed));
+    if (!all_seen(world, world.measurements)) continue;
+    judge(world, calibrated(world, world.measurements, static_cast<std::uint64_t>(seed)), white);
+  }
+  if (worlds > 0) white.print("white noise on corners");
+  Score pictures;
+  for (int seed = 0; pictures.worlds < rendered; ++seed) {
+    const World world = truth::make_world(options_of(seed));
+    const auto key = static_cast<std::uint64_t>(seed);
+    const Measurements pictured = filmed(world, key);
+    if (!all_seen(world, pictured)) continue;
+    judge(world, calibrated(world, pictured, key), pictures);
+  }
+  if (rendered > 0) pictures.print("pictures");
+  return 0;
+}
