@@ -13,20 +13,6 @@
 namespace kinescope {
 namespace {
 
-std::string_view name_of(RecordingEntry entry) {
-  switch (entry) {
-    case RecordingEntry::kVideo:
-      return "video";
-    case RecordingEntry::kCorners:
-      return "corners";
-    case RecordingEntry::kPoses:
-      return "poses";
-    case RecordingEntry::kPoints:
-      return "points";
-  }
-  return "unknown";
-}
-
 std::vector<std::string> file_names(const Recording& recording) {
   constexpr std::size_t kMost = 8;  // a folder of images has thousands
   std::vector<std::string> names;
@@ -88,7 +74,7 @@ void print_sightings(const Recording& recording) {
 
 void print_inspection(const Inspection& inspection) {
   const Recording& recording = inspection.recording;
-  fmt::print("recording {} ({}): {}\n", recording.settings.name, name_of(recording.entry),
+  fmt::print("recording {} ({}): {}\n", recording.settings.name, to_string(recording.entry),
              fmt::join(file_names(recording), ", "));
   if (inspection.video) print_video(recording, *inspection.video);
   print_sightings(recording);
@@ -158,7 +144,7 @@ nlohmann::json inspection_json(const Inspection& inspection) {
   const Recording& recording = inspection.recording;
   nlohmann::json out = {{"schema", 1},
                         {"recording", recording.settings.name},
-                        {"entry", name_of(recording.entry)},
+                        {"entry", to_string(recording.entry)},
                         {"ready", inspection.ready()},
                         {"camera_declared", recording.camera.has_value()},
                         {"nominal", recording.nominal.has_value()},

@@ -42,7 +42,7 @@ void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   run.robot = recording.settings.name;
   run.recording = recording.folder.filename().string();
-  run.entry = entry_name(recording.entry);
+  run.entry = to_string(recording.entry);
   run.version = program_version();
   run.command = options.command_line;
   run.inputs = hash_inputs(recording);

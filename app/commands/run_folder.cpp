@@ -119,20 +119,6 @@ void RunFolder::keep_observations(const Recording& recording,
   write(kObservationsKey, kept.dump(1) + "\n");
 }
 
-std::string entry_name(RecordingEntry entry) {
-  switch (entry) {
-    case RecordingEntry::kVideo:
-      return "video";
-    case RecordingEntry::kCorners:
-      return "corners";
-    case RecordingEntry::kPoses:
-      return "poses";
-    case RecordingEntry::kPoints:
-      return "points";
-  }
-  return "unknown";
-}
-
 std::string program_version() { return KINESCOPE_VERSION; }
 
 std::vector<InputFile> hash_inputs(const Recording& recording) {

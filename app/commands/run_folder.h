@@ -37,7 +37,6 @@ class RunFolder {
   bool force_ = false;
 };
 
-[[nodiscard]] std::string entry_name(RecordingEntry entry);
 [[nodiscard]] std::string program_version();
 /// Every file that was read, with its SHA-256.
 [[nodiscard]] std::vector<InputFile> hash_inputs(const Recording& recording);

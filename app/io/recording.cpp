@@ -134,6 +134,20 @@ void check_fixed_tags(const Recording& recording, const RecordingFiles& files) {
 
 }  // namespace
 
+std::string_view to_string(RecordingEntry entry) {
+  switch (entry) {
+    case RecordingEntry::kVideo:
+      return "video";
+    case RecordingEntry::kCorners:
+      return "corners";
+    case RecordingEntry::kPoses:
+      return "poses";
+    case RecordingEntry::kPoints:
+      return "points";
+  }
+  return "unknown";
+}
+
 void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
                           const std::string& source) {
   if (log.empty() || times_s.empty()) return;

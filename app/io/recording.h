@@ -48,6 +48,9 @@ struct RecordingSettings {
 /// How far into the path the recording enters.
 enum class RecordingEntry { kVideo, kCorners, kPoses, kPoints };
 
+/// "video", "corners", "poses", "points".
+[[nodiscard]] std::string_view to_string(RecordingEntry entry);
+
 struct Recording {
   std::filesystem::path folder;
   RecordingSettings settings;
