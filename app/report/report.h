@@ -27,14 +27,15 @@ struct Verdict {
 
 [[nodiscard]] Verdict make_verdict(const RunSummary& run);
 
-/// result.json: every number that the report shows. SI units (rad, m, s, px), named in the key. A
+/// result.json: every number that the report shows, but the times of the stages, which stand in
+/// run.json: the same recording gives the same bytes. SI units (rad, m, s, px), named in the key. A
 /// number that is not known is null, never NaN. `expanded` is an expanded uncertainty,
 /// coverage_factor (2) standard ones. Keys may be added under the same schema_version; a changed
 /// meaning raises it.
 ///
 ///   schema, schema_version, coverage_factor
-///   run            robot, recording, entry, kind (corners, poses, points), version, command,
-///                  inputs [name, sha256], options [name, value], times [stage, seconds], total_s
+///   run            robot, recording, entry, kind (corners, poses, points), version,
+///                  inputs [name, sha256], options [name, value]
 ///   verdict        found, accurate, limits, next: the sentences that the report opens with
 ///   data           frames, duration_s, independent_frames (residuals are alike over time),
 ///   image_coverage

@@ -227,6 +227,11 @@ json make_result(const RunSummary& run, const Analysis& analysis, const Verdict&
 
 namespace kinescope {
 
-nlohmann::json result_json(const RunSummary& run) { return report::gather_facts(run).result; }
+nlohmann::json result_json(const RunSummary& run) {
+  nlohmann::json result = report::gather_facts(run).result;
+  // What differs from one run to the next on the same input stands in run.json.
+  for (const char* key : {"command", "times", "total_s"}) result["run"].erase(key);
+  return result;
+}
 
 }  // namespace kinescope

@@ -181,6 +181,14 @@ void expect_shown(const nlohmann::json& result, const std::string& pointer, cons
   EXPECT_NEAR(shown, expected, half * 1.001) << pointer << " shows '" << text << "'";
 }
 
+TEST(Report, TheDocumentDoesNotDependOnWhenAndHowItWasMade) {
+  RunSummary run = synthetic_run(every_kind().front());
+  const std::string first = result_json(run).dump();
+  run.command = "kinescope run elsewhere --threads 2";
+  for (StageTime& time : run.times) time.seconds *= 2.0;
+  EXPECT_EQ(result_json(run).dump(), first);
+}
+
 TEST(Report, EveryNumberIsThatOfTheDocument) {
   for (const SyntheticRunOptions& options : every_kind()) {
     const RunSummary run = synthetic_run(options);
@@ -190,6 +198,8 @@ TEST(Report, EveryNumberIsThatOfTheDocument) {
     int numbers = 0;
     for (auto it = std::sregex_iterator(page.begin(), page.end(), cell);
          it != std::sregex_iterator(); ++it) {
+      // Times stand in run.json: they are no result.
+      if ((*it)[1].str().starts_with("/run/t")) continue;
       expect_shown(result, (*it)[1], (*it)[2], (*it)[3]);
       ++numbers;
     }
