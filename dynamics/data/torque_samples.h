@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The measured motion of a robot and the torques that go with it, ready for a dynamics model.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace kinescope {
+
+/// Rows are samples, in time order within a trajectory; columns are joints, in the order of the
+/// tree's movable joints. Revolute joints in rad, prismatic joints in m.
+struct TorqueSamples {
+  Eigen::VectorXd t_s;         ///< s, on the log's clock; increases within a trajectory
+  Eigen::MatrixXd q;           ///< rad or m
+  Eigen::MatrixXd dq;          ///< rad/s or m/s
+  Eigen::MatrixXd ddq;         ///< rad/s^2 or m/s^2
+  Eigen::MatrixXd torque;      ///< what the actuator applies along the joint: N m, N or torque_unit
+  Eigen::VectorXi trajectory;  ///< 0, 1, ..: samples of one uninterrupted motion share a number
+  std::vector<std::string> joint_names;       ///< one a column; empty when made by hand
+  std::vector<std::string> trajectory_names;  ///< what each trajectory number is called in the log
+  std::string torque_unit = "Nm";             ///< "Nm" (N for prismatic joints) or "A"
+
+  [[nodiscard]] Eigen::Index size() const { return t_s.size(); }
+  [[nodiscard]] Eigen::Index joints() const { return q.cols(); }
+};
+
+}  // namespace kinescope
