@@ -44,6 +44,7 @@ set(third_parties
     "tinyxml: kinematics/urdf calib/camera"
     "yaml-cpp/: calib/camera app/io"
     "openssl/: app/io"
+    "zlib.h: kinematics/core"
     "nlohmann/: app/io app/report app/commands"
     "CLI/: app/commands"
     "gtest/: none")

@@ -9,7 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/error.h"
-#include "kinematics/core/file.h"
+#include "kinematics/core/gzip.h"
 
 namespace kinescope {
 namespace {
@@ -147,7 +147,7 @@ CsvTable parse_csv(std::string_view text, std::string source) {
 }
 
 CsvTable read_csv(const std::filesystem::path& path) {
-  return parse_csv(read_text_file(path), path.string());
+  return parse_csv(read_plain_or_gzip(path), path.string());
 }
 
 std::optional<double> parse_number(std::string_view text) {

@@ -38,6 +38,7 @@ struct CsvTable {
 /// Parses text. Throws bad_input for: nothing in it, another delimiter than the comma, two columns
 /// of one name, an unnamed column, a row shorter or longer than the header, a NUL byte.
 [[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source);
+/// The same from a file, also from one packed with gzip.
 [[nodiscard]] CsvTable read_csv(const std::filesystem::path& path);
 
 /// The whole of the text as a number ("1.5", "-2e-3"), or nothing. NaN and infinities are numbers

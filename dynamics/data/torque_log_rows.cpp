@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "dynamics/data/torque_log.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+std::vector<Eigen::Index> kept_rows(const std::vector<char>& keep) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t row = 0; row < keep.size(); ++row) {
+    if (keep[row] != 0) rows.push_back(static_cast<Eigen::Index>(row));
+  }
+  return rows;
+}
+
+Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows) {
+  if (matrix.cols() == 0) return {};
+  return matrix(rows, Eigen::all);
+}
+
+Eigen::MatrixXd stacked(const Eigen::MatrixXd& top, const Eigen::MatrixXd& bottom) {
+  Eigen::MatrixXd out(top.rows() + bottom.rows(), top.cols());
+  out << top, bottom;
+  return out;
+}
+
+void append(TorqueLog& log, const TorqueLog& next) {
+  const bool alike = log.q.cols() == next.q.cols() && log.dq.cols() == next.dq.cols() &&
+                     log.ddq.cols() == next.ddq.cols() && log.torque.cols() == next.torque.cols() &&
+                     log.torque_unit == next.torque_unit && log.stamped == next.stamped;
+  if (!alike) {
+    throw bad_input(next.sources.front(),
+                    fmt::format("does not hold the same signals as {}", log.sources.front()),
+                    "name files of one kind together");
+  }
+  const int shift = static_cast<int>(log.trajectory_names.size());
+  const int sources = static_cast<int>(log.sources.size());
+  Eigen::VectorXd t_s(log.rows() + next.rows());
+  t_s << log.t_s, next.t_s;
+  Eigen::VectorXi trajectory(log.rows() + next.rows());
+  trajectory << log.trajectory, next.trajectory.array() + shift;
+  log.t_s = t_s;
+  log.trajectory = trajectory;
+  log.q = stacked(log.q, next.q);
+  log.dq = log.dq.cols() > 0 ? stacked(log.dq, next.dq) : log.dq;
+  log.ddq = log.ddq.cols() > 0 ? stacked(log.ddq, next.ddq) : log.ddq;
+  log.torque = log.torque.cols() > 0 ? stacked(log.torque, next.torque) : log.torque;
+  const bool commands = log.q_command.cols() > 0 && next.q_command.cols() == log.q_command.cols();
+  log.q_command = commands ? stacked(log.q_command, next.q_command) : Eigen::MatrixXd();
+  log.lines.insert(log.lines.end(), next.lines.begin(), next.lines.end());
+  for (const int source : next.source) log.source.push_back(source + sources);
+  log.sources.insert(log.sources.end(), next.sources.begin(), next.sources.end());
+  log.trajectory_names.insert(log.trajectory_names.end(), next.trajectory_names.begin(),
+                              next.trajectory_names.end());
+}
+
+}  // namespace
+
+std::string TorqueLog::place(Eigen::Index row) const {
+  const auto at = static_cast<std::size_t>(row);
+  return fmt::format("{}:{}", sources[static_cast<std::size_t>(source[at])], lines[at]);
+}
+
+std::vector<Eigen::Index> TorqueLog::bounds() const {
+  std::vector<Eigen::Index> out;
+  for (Eigen::Index row = 0; row < rows(); ++row) {
+    if (row == 0 || trajectory(row) != trajectory(row - 1)) out.push_back(row);
+  }
+  out.push_back(rows());
+  return out;
+}
+
+TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep) {
+  KINESCOPE_CHECK(keep.size() == static_cast<std::size_t>(log.rows()), "one flag a row");
+  const std::vector<Eigen::Index> rows = kept_rows(keep);
+  TorqueLog out = log;
+  out.t_s = log.t_s(rows);
+  out.q = rows_of(log.q, rows);
+  out.dq = rows_of(log.dq, rows);
+  out.ddq = rows_of(log.ddq, rows);
+  out.torque = rows_of(log.torque, rows);
+  out.q_command = rows_of(log.q_command, rows);
+  out.trajectory = log.trajectory(rows);
+  out.source.clear();
+  out.lines.clear();
+  for (const Eigen::Index row : rows) {
+    out.source.push_back(log.source[static_cast<std::size_t>(row)]);
+    out.lines.push_back(log.lines[static_cast<std::size_t>(row)]);
+  }
+  return out;
+}
+
+TorqueLog join(const std::vector<TorqueLog>& logs) {
+  KINESCOPE_CHECK(!logs.empty(), "nothing to join");
+  TorqueLog out = logs.front();
+  for (std::size_t k = 1; k < logs.size(); ++k) append(out, logs[k]);
+  return out;
+}
+
+}  // namespace kinescope
