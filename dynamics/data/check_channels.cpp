@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -19,8 +20,10 @@ constexpr double kGridTolerance = 0.05;  // of a step
 constexpr double kOnGrid = 0.98;         // of the values
 constexpr std::size_t kFewValues = 8;    // a grid needs that many levels to be one
 constexpr double kHeldShare = 0.35;      // of the rows without change
-constexpr double kHeldChange = 5.0;      // median change, in steps of the channel
-constexpr double kStill = 1e-3;          // rad or m: spread of a joint that does not move
+constexpr double kManyLevels = 0.5;      // of the changes: values that hardly ever come back
+constexpr std::size_t kFewLevels =
+    20;                          // a channel of fewer has its ends often without being cut off
+constexpr double kStill = 1e-3;  // rad or m: spread of a joint that does not move
 constexpr double kLagReachS = 0.3;
 constexpr double kLagGain = 0.8;
 
@@ -109,8 +112,13 @@ Clipping clipping_at(const Channel& channel, double limit) {
   return out;
 }
 
+std::size_t distinct_values(const Channel& channel) {
+  return std::set<double>(channel.values.begin(), channel.values.end()).size();
+}
+
 void name_clipping(const TorqueLog& log, const Channel& channel,
                    std::vector<LogFinding>& findings) {
+  if (distinct_values(channel) < kFewLevels) return;
   const auto [low, high] = std::ranges::minmax(channel.values);
   for (const double limit : {low, high}) {
     const Clipping clipping = clipping_at(channel, limit);
@@ -144,11 +152,8 @@ void name_held(const TorqueLog& log, const Channel& channel, std::vector<LogFind
   const double still =
       1.0 - static_cast<double>(moving.size()) / static_cast<double>(channel.changes.size());
   // A held signal takes a new value at nearly every change; one of few levels is quantised.
-  std::vector<double> levels = channel.values;
-  std::ranges::sort(levels);
-  const auto distinct = std::ranges::unique(levels).begin() - levels.begin();
-  const bool continuous =
-      static_cast<double>(distinct) > kManyLevels * static_cast<double>(moving.size());
+  const bool continuous = static_cast<double>(distinct_values(channel)) >
+                          kManyLevels * static_cast<double>(moving.size());
   if (still < kHeldShare || !continuous) return;
   const double step_s = median_of(steps_of(log.t_s, log.trajectory));
   findings.push_back(

@@ -27,6 +27,8 @@ constexpr double kLagStep = 0.25;        // of a row, of the scan
 constexpr double kLagWorthNaming = 0.5;  // rows
 constexpr double kLagGain = 0.7;         // of the residual left when the lag is undone
 
+constexpr double kSlowestStepS = 0.05;  // accelerations change too fast for trapezoids beyond
+
 /// The integral of `rate` from each trajectory's start (trapezoids).
 Eigen::VectorXd integral(const TorqueLog& log, const Eigen::Ref<const Eigen::VectorXd>& rate) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(rate.size());
@@ -295,6 +297,7 @@ void judge_acceleration(CheckedLog& checked) {
   TorqueLog& log = checked.log;
   if (log.ddq.cols() == 0 || log.dq.cols() == 0) return;
   const double step_s = median_of(steps_of(log.t_s, log.trajectory));
+  if (step_s > kSlowestStepS) return;
   const Windows windows = make_windows(log, step_s, 0.0);
   bool drop = false;
   for (Eigen::Index joint = 0; joint < log.q.cols(); ++joint) {

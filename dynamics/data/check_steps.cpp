@@ -124,7 +124,8 @@ void name_rate(const TorqueLog& log, const StepFacts& facts, std::vector<LogFind
     findings.push_back({LogFault::kSlow, FaultWeight::kWarning, "", 1.0, facts.median,
                         log.sources.front(),
                         fmt::format("{:.2g} rows a second", 1.0 / facts.median),
-                        "too slow for accelerations; log at 100 Hz or more"});
+                        "too slow to derive accelerations; log at 100 Hz or more, or use what the "
+                        "log holds as it is (filter: none)"});
   }
   if (facts.high - facts.low > kIrregular * facts.median) {
     findings.push_back({LogFault::kIrregularSteps, FaultWeight::kNote, "t", 0.0, facts.median,

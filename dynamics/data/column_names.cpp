@@ -83,10 +83,11 @@ bool is_command_word(std::string_view word) {
 
 bool is_computed_word(std::string_view word) {
   static const Words kWords = {
-      "model",     "est",     "estimated", "estimate", "pred",     "predicted", "rigid",
-      "nominal",   "clean",   "friction",  "ext",      "external", "hat",       "error",
-      "err",       "median",  "median40",  "tcp",      "tool",     "ee",        "cart",
-      "cartesian", "gravity", "offset",    "std",      "limit",    "min",       "max"};
+      "model",       "est",     "estimated", "estimate", "pred",     "predicted", "rigid",
+      "nominal",     "clean",   "friction",  "ext",      "external", "hat",       "error",
+      "err",         "median",  "median40",  "tcp",      "tool",     "ee",        "cart",
+      "cartesian",   "gravity", "enable",    "enabled",  "mode",     "status",    "temp",
+      "temperature", "offset",  "std",       "limit",    "min",      "max"};
   return kWords.contains(word);
 }
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "dynamics/data/statistics.h"
+
 namespace kinescope {
 namespace {
 
@@ -44,14 +46,16 @@ Term make_term(const Spectrum& spectrum, const MotionAndNoise& parts, int deriva
 
 struct Criterion {
   std::vector<Term> motion, torque;
-  Eigen::VectorXd end_hz;
+  Eigen::VectorXd end_hz, shares;
   double highest_hz = std::numeric_limits<double>::infinity();
   int order = 3;
 
   [[nodiscard]] Eigen::VectorXd errors(double cutoff_hz) const {
     Eigen::VectorXd out(static_cast<Eigen::Index>(motion.size()));
     for (std::size_t j = 0; j < motion.size(); ++j) {
-      out(static_cast<Eigen::Index>(j)) = std::sqrt(motion[j].relative_square(cutoff_hz, order));
+      const auto at = static_cast<Eigen::Index>(j);
+      out(at) = shares(at) > 0.0 ? std::sqrt(motion[j].relative_square(cutoff_hz, order))
+                                 : std::numeric_limits<double>::quiet_NaN();
     }
     return out;
   }
@@ -59,19 +63,25 @@ struct Criterion {
   /// A signal lost in noise counts as lost once, however much noise it has.
   [[nodiscard]] double total(double cutoff_hz) const {
     double sum = 0.0;
-    for (const std::vector<Term>* terms : {&motion, &torque}) {
-      for (const Term& term : *terms) {
-        const double square = term.relative_square(cutoff_hz, order);
-        if (std::isfinite(square)) sum += std::min(square, kMostlyNoise);
-      }
+    for (std::size_t j = 0; j < motion.size(); ++j) {
+      const double share = shares(static_cast<Eigen::Index>(j));
+      if (share <= 0.0) continue;
+      sum += share * lost(motion[j], cutoff_hz);
+      if (j < torque.size()) sum += lost(torque[j], cutoff_hz);
     }
     return sum;
+  }
+
+  [[nodiscard]] double lost(const Term& term, double cutoff_hz) const {
+    const double square = term.relative_square(cutoff_hz, order);
+    return std::isfinite(square) ? std::min(square, kMostlyNoise) : 0.0;
   }
 };
 
 Criterion make_criterion(const CutoffEvidence& evidence, int order) {
   Criterion out;
   out.order = order;
+  out.shares = evidence.shares;
   out.end_hz.resize(static_cast<Eigen::Index>(evidence.motion.size()));
   for (const Spectrum& spectrum : evidence.motion) {
     const MotionAndNoise parts = separate(spectrum, evidence.derivatives - 1);
@@ -84,6 +94,16 @@ Criterion make_criterion(const CutoffEvidence& evidence, int order) {
     out.torque.push_back(make_term(spectrum, separate(spectrum, 0), 0));
   }
   return out;
+}
+
+/// Median over the moving joints of where their motion ends: cutting below it loses more than
+/// noise.
+double typical_end(const Criterion& criterion) {
+  std::vector<double> ends;
+  for (Eigen::Index j = 0; j < criterion.end_hz.size(); ++j) {
+    if (criterion.shares(j) > 0.0 && criterion.end_hz(j) > 0.0) ends.push_back(criterion.end_hz(j));
+  }
+  return median_of(std::move(ends));
 }
 
 }  // namespace
@@ -102,7 +122,7 @@ CutoffChoice choose_cutoff(const CutoffEvidence& evidence, int order, double sta
     choice.expected_error = criterion.errors(stated_hz);
     return choice;
   }
-  const bool moves = criterion.end_hz.size() > 0 && criterion.end_hz.maxCoeff() > 0.0;
+  const bool moves = (criterion.end_hz.array() > 0.0 && criterion.shares.array() > 0.0).any();
   if (!moves || !std::isfinite(criterion.highest_hz)) return choice;
   double best = std::numeric_limits<double>::infinity();
   const int steps = static_cast<int>(kStepsPerOctave * std::log2(criterion.highest_hz / kLowestHz));

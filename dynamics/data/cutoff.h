@@ -8,8 +8,9 @@
 // relative to the integral of w^2k S: motion that was cut away plus noise that was let through; k
 // derivatives lie between the logged signal and the acceleration (2 from position, 1 from
 // velocity), none for the torque. This is Wiener's criterion (1949) for a filter of given form. All
-// joints and the torques must be filtered alike, so the cut-off minimises the sum of J over
-// accelerations and torques of all joints.
+// joints and the torques must be filtered alike, so the cut-off minimises the expected error of the
+// torque equation: the sum over the joints of J of the torque and J of the acceleration times the
+// share of the torque that goes with it.
 #pragma once
 
 #include <vector>
@@ -29,6 +30,7 @@ struct CutoffEvidence {
   std::vector<Spectrum> motion;
   int derivatives = 2;           ///< between the motion's signal and the acceleration
   std::vector<Spectrum> torque;  ///< may be empty
+  Eigen::VectorXd shares;        ///< of the torque that goes with the acceleration; 0: at rest
 };
 
 struct CutoffChoice {
@@ -40,8 +42,8 @@ struct CutoffChoice {
   bool chosen = false;            ///< false: stated by the caller, or nothing moves
 };
 
-/// The cut-off with the smallest sum, up to 0.4 times the sampling rate. With `stated_hz` > 0 the
-/// errors at that cut-off.
+/// The cut-off with the smallest sum between the median of the joints' ends of motion and 0.4 times
+/// the sampling rate. With `stated_hz` > 0 the errors at that cut-off.
 [[nodiscard]] CutoffChoice choose_cutoff(const CutoffEvidence& evidence, int order,
                                          double stated_hz = 0.0);
 

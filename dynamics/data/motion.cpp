@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/data/acceleration_share.h"
 #include "dynamics/data/smoothing_spline.h"
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
@@ -144,6 +145,7 @@ class MotionDeriver {
     const bool torque = log_.torque.cols() > 0;
     const std::vector<Spectrum> torques =
         torque ? spectra_of(log_.torque, 1) : std::vector<Spectrum>();
+    const Eigen::VectorXd shares = acceleration_shares(log_, step_s_);
     double best = std::numeric_limits<double>::infinity();
     for (const Candidate& candidate : candidates) {
       const bool wanted =
@@ -152,7 +154,7 @@ class MotionDeriver {
                          (candidate.source == MotionSource::kPosition || log_.dq.cols() > 0);
       if (!wanted || !there) continue;
       const CutoffEvidence evidence{spectra_of(*candidate.signal, candidate.derivatives),
-                                    candidate.derivatives, torques};
+                                    candidate.derivatives, torques, shares};
       const CutoffChoice choice =
           choose_cutoff(evidence, order_of(options_.filter), options_.cutoff_hz);
       const double error = sum_of_squares(choice.expected_error);
@@ -225,10 +227,14 @@ class MotionDeriver {
     const Eigen::MatrixXd value = spline.evaluate(part.t_s);
     const Eigen::MatrixXd rate = spline.evaluate(part.t_s, 1);
     part.q = value.leftCols(joints);
-    part.dq = velocity ? value.middleCols(joints, joints) : rate.leftCols(joints);
-    part.ddq = acceleration ? value.middleCols(2 * joints, joints)
-               : velocity   ? rate.middleCols(joints, joints)
-                            : spline.evaluate(part.t_s, 2).leftCols(joints);
+    part.dq = rate.leftCols(joints);
+    if (velocity) {
+      part.dq = value.middleCols(joints, joints);
+      part.ddq = rate.middleCols(joints, joints);
+    } else {
+      part.ddq = spline.evaluate(part.t_s, 2).leftCols(joints);
+    }
+    if (acceleration) part.ddq = value.middleCols(2 * joints, joints);
     part.torque = value.rightCols(log_.torque.cols());
   }
 
