@@ -125,7 +125,8 @@ CutoffChoice choose_cutoff(const CutoffEvidence& evidence, int order, double sta
   const bool moves = (criterion.end_hz.array() > 0.0 && criterion.shares.array() > 0.0).any();
   if (!moves || !std::isfinite(criterion.highest_hz)) return choice;
   double best = std::numeric_limits<double>::infinity();
-  const int steps = static_cast<int>(kStepsPerOctave * std::log2(criterion.highest_hz / kLowestHz));
+  const double lowest_hz = std::clamp(typical_end(criterion), kLowestHz, criterion.highest_hz);
+  const int steps = static_cast<int>(kStepsPerOctave * std::log2(criterion.highest_hz / lowest_hz));
   for (int k = 0; k <= steps; ++k) {
     const double cutoff_hz = criterion.highest_hz * std::exp2(-k / kStepsPerOctave);
     const double sum = criterion.total(cutoff_hz);

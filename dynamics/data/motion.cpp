@@ -18,7 +18,8 @@ namespace {
 
 constexpr int kSplineOrder = 3;
 constexpr int kButterworthOrder = 4;
-constexpr double kSamplesPerPeriod = 4.0;  // of the cut-off: aliases are 60 dB down
+constexpr double kSamplesPerPeriod =
+    10.0;  // of the cut-off: smooth to the eye, no longer independent
 constexpr Eigen::Index kFewestRows = 32;
 constexpr Eigen::Index kFewestSamples = 4;
 

@@ -37,7 +37,7 @@ struct MotionOptions {
   LowPass filter = LowPass::kSmoothingSpline;
   MotionSource source = MotionSource::kBest;
   double cutoff_hz = 0.0;     ///< -3 dB; 0: chosen
-  double rate_hz = 0.0;       ///< of the samples given; 0: about four times the cut-off
+  double rate_hz = 0.0;       ///< of the samples given; 0: about ten times the cut-off
   double edge_periods = 1.0;  ///< dropped at either end of a trajectory, in periods of the cut-off
 };
 
