@@ -14,7 +14,9 @@ namespace {
 
 constexpr Eigen::Index kClippedRun = 3;  // rows at the limit; a turning point has one or two
 constexpr int kClippedRuns = 2;
-constexpr double kEntryJump = 3.0;       // last change before the limit, in steps of the channel
+constexpr double kEntryJump = 3.0;  // change on entering the limit, in steps of the channel
+constexpr double kEntryChange =
+    0.25;  // the same, in usual changes: a turning point slows down first
 constexpr double kCoarseStep = 0.02;     // of the standard deviation; finer steps do no harm
 constexpr double kGridTolerance = 0.05;  // of a step
 constexpr double kOnGrid = 0.98;         // of the values
@@ -95,8 +97,8 @@ Clipping clipping_at(const Channel& channel, double limit) {
   for (const double change : channel.changes) {
     if (change > 0.0) moving.push_back(change);
   }
-  const double usual =
-      std::max(median_of(std::move(moving)), kEntryJump * channel.step.value_or(0.0));
+  const double usual = std::max(kEntryChange * median_of(std::move(moving)),
+                                kEntryJump * channel.step.value_or(0.0));
   const auto count = static_cast<Eigen::Index>(channel.values.size());
   const auto at = [&](Eigen::Index row) { return channel.values[static_cast<std::size_t>(row)]; };
   for (Eigen::Index row = 1; row < count; ++row) {

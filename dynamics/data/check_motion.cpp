@@ -17,6 +17,7 @@ namespace kinescope {
 namespace {
 
 constexpr double kWindowS = 0.1;           // long against noise, short against the motion
+constexpr double kMostOfWindow = 2.0;      // of its usual length: a longer one holds a gap
 constexpr Eigen::Index kWindowRows = 5;    // at least
 constexpr double kFits = 0.9;              // of the change of q explained by the integral of dq
 constexpr double kFactorTolerance = 0.03;  // of a wrong factor worth naming
@@ -67,6 +68,8 @@ Windows make_windows(const TorqueLog& log, double step_s, double margin_s) {
     const double last = log.t_s(bounds[b + 1] - 1) - margin_s;
     for (Eigen::Index row = bounds[b]; row + length < bounds[b + 1]; row += length) {
       if (log.t_s(row) < first || log.t_s(row + length) > last) continue;
+      const double usual_s = step_s * static_cast<double>(length);
+      if (log.t_s(row + length) - log.t_s(row) > kMostOfWindow * usual_s) continue;  // a gap
       out.begin.push_back(row);
       out.end.push_back(row + length);
       out.from.push_back(bounds[b]);

@@ -152,6 +152,10 @@ SignalColumns find_signal(const ChannelTable& table, const std::vector<std::stri
   return {};
 }
 
+SignalColumns find_position_commands(const ChannelTable& table) {
+  return named_signal(table, LoggedQuantity::kPosition, LoggedOrigin::kCommanded);
+}
+
 JointMatch match_joints(const std::vector<Key>& keys, const std::vector<WantedJoint>& wanted,
                         const LogMapping& mapping, const std::string& where) {
   std::vector<Key> logged;

@@ -31,6 +31,9 @@ struct SignalColumns {
                                         const std::vector<std::string>& listed,
                                         LoggedQuantity quantity, LoggedOrigin worst);
 
+/// The commanded positions, where the log has them.
+[[nodiscard]] SignalColumns find_position_commands(const ChannelTable& table);
+
 /// For each wanted joint the place among `keys`, or throws bad_input that names both lists and the
 /// option.
 struct JointMatch {

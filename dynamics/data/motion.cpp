@@ -154,8 +154,9 @@ class MotionDeriver {
       const bool there = candidate.signal->cols() > 0 &&
                          (candidate.source == MotionSource::kPosition || log_.dq.cols() > 0);
       if (!wanted || !there) continue;
-      const CutoffEvidence evidence{spectra_of(*candidate.signal, candidate.derivatives),
-                                    candidate.derivatives, torques, shares};
+      const CutoffEvidence evidence{
+          spectra_of(*candidate.signal, std::max(0, candidate.derivatives - 1)),
+          candidate.derivatives, torques, shares};
       const CutoffChoice choice =
           choose_cutoff(evidence, order_of(options_.filter), options_.cutoff_hz);
       const double error = sum_of_squares(choice.expected_error);

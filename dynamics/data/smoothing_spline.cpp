@@ -17,7 +17,7 @@ namespace {
 constexpr int kDegree = 5;
 constexpr int kBasis = kDegree + 1;      // functions that are not zero at a point
 constexpr double kKnotsPerPeriod = 6.0;  // of the cut-off: the basis follows it to 1e-4
-constexpr double kLargestWeight = 3.0;   // of a sample before a gap, in mean weights
+constexpr double kLargestWeight = 10.0;  // of a sample before a gap, in mean weights
 constexpr Eigen::Index kFewest = 8;
 
 using Functions = std::array<double, kBasis>;

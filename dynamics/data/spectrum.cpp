@@ -18,6 +18,7 @@ constexpr Eigen::Index kWantedWindows = 8;
 constexpr Eigen::Index kLongest = 16384;
 constexpr double kSixthOctave = 1.122;  // frequency ratio
 constexpr double kClearOfNoise = 2.5;   // power over the level above that counts as motion
+constexpr double kClearPeak = 5.0;      // the same, somewhere: else there is no motion
 constexpr double kLargestValley = 1.5;  // frequency ratio
 
 Eigen::Index windows_of(const std::vector<Eigen::VectorXd>& pieces, Eigen::Index length) {
@@ -78,17 +79,23 @@ double level_above(const Eigen::VectorXd& power, Eigen::Index k) {
   return median_of(to_vector(power.segment(first, std::max<Eigen::Index>(1, last - first))));
 }
 
-/// Bins of the motion, from the lowest on; a gap of half an octave ends it.
+/// Bins up to the end of the motion: from the strongest one upward; a gap of half an octave ends
+/// it.
 Eigen::Index motion_end(const Eigen::VectorXd& velocity_power) {
-  Eigen::Index end = 0;
-  for (Eigen::Index k = 0; k < velocity_power.size(); ++k) {
+  Eigen::Index strongest = 0;
+  velocity_power.maxCoeff(&strongest);
+  Eigen::Index end = strongest + 1;
+  double clearest = 0.0;
+  for (Eigen::Index k = strongest; k < velocity_power.size(); ++k) {
     if (static_cast<double>(k) >
         kLargestValley * static_cast<double>(std::max<Eigen::Index>(end, 2))) {
       break;
     }
-    if (velocity_power(k) > kClearOfNoise * level_above(velocity_power, k)) end = k + 1;
+    const double clear = velocity_power(k) / level_above(velocity_power, k);
+    if (clear > kClearOfNoise) end = k + 1;
+    clearest = std::max(clearest, clear);
   }
-  return end;
+  return clearest > kClearPeak ? end : 0;
 }
 
 }  // namespace

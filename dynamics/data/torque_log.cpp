@@ -275,9 +275,8 @@ class Reader {
   }
 
   void read_commands() {
-    SignalColumns command =
-        find_signal(table_, {}, LoggedQuantity::kPosition, LoggedOrigin::kCommanded);
-    if (command.origin != LoggedOrigin::kCommanded || command.empty()) return;
+    const SignalColumns command = find_position_commands(table_);
+    if (command.columns.size() < out_.log.joints.size()) return;
     if (const auto order = order_or_none(command)) {
       out_.log.q_command = read_signal(table_, {command, *order, &mapping_.position_unit,
                                                 &mapping_.position_factor, "position"})

@@ -11,7 +11,7 @@
 namespace kinescope {
 namespace {
 
-constexpr double kSettledPeriods = 3.0;  // of the cut-off, that the reflected ends are long
+constexpr double kSettledPeriods = 5.0;  // of the cut-off, that the reflected ends are long
 
 /// Angular frequency of the analogue filter whose two passes have fallen by 3 dB at the warped
 /// cut-off: (1 + x^2n)^-1 = 2^-1/2.

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Each kind of damage once, done to a sound log: the right finding with its place and remedy, and
+// only it.
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "dynamics/data/torque_data.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/gzip.h"
+#include "tests/dynamics/data/log_world.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+struct Looked {
+  TorqueLogReport report;
+
+  [[nodiscard]] std::vector<LogFinding> of(LogFault fault) const {
+    return findings_of(report.findings, fault);
+  }
+  /// The first of a kind; an empty one where there is none, which no expectation fits.
+  [[nodiscard]] LogFinding first(LogFault fault) const {
+    const std::vector<LogFinding> found = of(fault);
+    return found.empty() ? LogFinding{} : found.front();
+  }
+  /// Findings that ask for attention, as text.
+  [[nodiscard]] std::string loud() const {
+    std::string text;
+    for (const LogFinding& finding : report.findings) {
+      if (finding.weight != FaultWeight::kNote) text += std::string(to_string(finding.fault)) + " ";
+    }
+    return text;
+  }
+};
+
+Looked look(const LogWorld& world, const TorqueDataOptions& options = {}) {
+  return {look_at_torque_log({write_log("damaged.csv", world.csv())}, world.joints, options)};
+}
+
+std::string refusal(const LogWorld& world) {
+  return refusal_of([&] {
+    static_cast<void>(read_torque_data({write_log("damaged.csv", world.csv())}, world.joints));
+  });
+}
+
+LogWorldOptions usual() {
+  return {.position_noise = 2e-5, .velocity_noise = 1e-3, .torque_noise = 0.02};
+}
+
+/// "/.../damaged.csv:17" ends with ":17".
+void expect_line(const LogFinding& finding, std::size_t line) {
+  const std::string end = "damaged.csv:" + std::to_string(line);
+  EXPECT_TRUE(finding.place.ends_with(end)) << finding.place << " is not " << end;
+  EXPECT_FALSE(finding.remedy.empty());
+}
+
+// The header is line 1, row 0 is line 2.
+constexpr std::size_t kFirstLine = 2;
+
+TEST(DamagedLog, ASoundLogHasNothingToSay) {
+  const Looked looked = look(make_log_world(usual()));
+  EXPECT_TRUE(looked.report.findings.empty()) << to_line(looked.report.findings.front());
+  EXPECT_EQ(looked.report.log.rows(), looked.report.rows_read);
+}
+
+TEST(DamagedLog, EmptyAndInfiniteCells) {
+  LogWorld world = make_log_world(usual());
+  world.rows(100, world.column("q2")) = std::nan("");
+  world.rows(101, world.column("tau3")) = HUGE_VAL;
+  world.rows(102, world.column("tau3")) = 1e282;
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "not_a_number infinite ");
+  expect_line(looked.first(LogFault::kNotANumber), kFirstLine + 100);
+  EXPECT_EQ(looked.first(LogFault::kNotANumber).channel, "q2");
+  expect_line(looked.first(LogFault::kInfinite), kFirstLine + 101);
+  EXPECT_EQ(looked.first(LogFault::kInfinite).value, 2.0);
+  EXPECT_EQ(looked.report.log.rows(), world.rows.rows() - 3);
+}
+
+TEST(DamagedLog, MostlyEmptyIsRefused) {
+  LogWorld world = make_log_world(usual());
+  world.rows.col(world.column("q2")).head(1500).setConstant(std::nan(""));
+  EXPECT_NE(refusal(world).find("of 2001 rows hold numbers"), std::string::npos);
+}
+
+TEST(DamagedLog, RepeatedStamps) {
+  LogWorld world = make_log_world(usual());
+  world.rows(200, 0) = world.rows(199, 0);
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "repeated_stamps ");
+  expect_line(looked.first(LogFault::kRepeatedStamps), kFirstLine + 200);
+}
+
+TEST(DamagedLog, AFewLateRowsAreLeftOutAndShuffledRowsRefused) {
+  LogWorld world = make_log_world(usual());
+  world.rows.row(300).swap(world.rows.row(301));
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "stamps_go_back ");
+  expect_line(looked.first(LogFault::kStampsGoBack), kFirstLine + 301);
+  LogWorld reversed = make_log_world(usual());
+  reversed.rows = reversed.rows.colwise().reverse().eval();
+  EXPECT_NE(refusal(reversed).find("(sort the rows by time)"), std::string::npos);
+}
+
+TEST(DamagedLog, AClockThatStartsAgainBeginsATrajectory) {
+  LogWorld world = make_log_world(usual());
+  const Eigen::MatrixXd once = world.rows;
+  world.rows.resize(2 * once.rows(), once.cols());
+  world.rows << once, once;
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "");
+  expect_line(looked.first(LogFault::kStampsGoBack),
+              kFirstLine + static_cast<std::size_t>(once.rows()));
+  EXPECT_EQ(looked.report.log.bounds().size(), 3U);
+}
+
+TEST(DamagedLog, GapsAreFoundAndLongOnesSplit) {
+  LogWorld world = make_log_world(usual());
+  Eigen::MatrixXd kept(world.rows.rows() - 103, world.rows.cols());
+  kept << world.rows.topRows(500), world.rows.middleRows(503, 497), world.rows.bottomRows(901);
+  world.rows = kept;
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "gap ");
+  const LogFinding gap = looked.first(LogFault::kGap);
+  expect_line(gap, kFirstLine + 997);
+  EXPECT_NEAR(gap.value, 0.505, 1e-9);
+  EXPECT_EQ(looked.report.log.bounds().size(), 3U)
+      << "one split: 20 ms are bridged, 505 ms are not";
+}
+
+TEST(DamagedLog, StaleRows) {
+  LogWorld world = make_log_world(usual());
+  for (Eigen::Index r = 0; r < world.rows.rows(); ++r) {
+    const double t = world.rows(r, 0);
+    world.rows.row(r) = world.rows.row(r - r % 4);
+    world.rows(r, 0) = t;
+  }
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "stale_rows ");
+  const LogFinding stale = looked.first(LogFault::kStaleRows);
+  EXPECT_NEAR(stale.share, 0.75, 0.01);
+  EXPECT_EQ(stale.value, 4.0);
+  expect_line(stale, kFirstLine + 1);
+  EXPECT_NE(stale.remedy.find("about 50 times a second"), std::string::npos);
+}
+
+TEST(DamagedLog, ARobotAtRestIsNotStale) {
+  LogWorld world = make_log_world({});
+  const Eigen::Index rest = 400;
+  Eigen::MatrixXd rows(world.rows.rows() + rest, world.rows.cols());
+  rows << world.rows.row(0).replicate(rest, 1), world.rows;
+  rows.col(0) =
+      Eigen::VectorXd::LinSpaced(rows.rows(), 0.0, 0.005 * static_cast<double>(rows.rows() - 1));
+  world.rows = rows;
+  const Looked looked = look(world);
+  EXPECT_TRUE(looked.of(LogFault::kStaleRows).empty());
+  EXPECT_EQ(looked.report.log.rows(), rows.rows());
+}
+
+TEST(DamagedLog, Spikes) {
+  LogWorld world = make_log_world(usual());
+  world.rows(700, world.column("tau1")) += 80.0;
+  world.rows(900, world.column("q1")) -= 3.0;
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "spike spike ");
+  expect_line(looked.first(LogFault::kSpike), kFirstLine + 900);
+  ASSERT_EQ(looked.of(LogFault::kSpike).size(), 2U);
+  expect_line(looked.of(LogFault::kSpike)[1], kFirstLine + 700);
+}
+
+TEST(DamagedLog, WrappedAnglesAreUnwrapped) {
+  const LogWorld sound = make_log_world(usual());
+  LogWorld world = sound;
+  const Eigen::Index q = world.column("q1");
+  const double turn = 2.0 * std::numbers::pi;
+  world.rows.col(q) = sound.rows.col(q).unaryExpr([&](double x) { return x < 0.0 ? x + turn : x; });
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "");
+  EXPECT_EQ(looked.of(LogFault::kWrapped).size(), 1U);
+  const double shift = looked.report.log.q(0, 0) - sound.rows(0, q);
+  EXPECT_LT(
+      (looked.report.log.q.col(0) - sound.rows.col(q)).array().abs().maxCoeff() - std::abs(shift),
+      1e-6);
+}
+
+TEST(DamagedLog, DegreesForRadians) {
+  LogWorld world = make_log_world(usual());
+  for (const char* name : {"q1", "q2"}) world.rows.col(world.column(name)) *= kDegrees;
+  EXPECT_NE(refusal(world).find("dynamics: {position_unit: [deg]}"), std::string::npos);
+  LogWorld velocity = make_log_world(usual());
+  velocity.rows.col(velocity.column("dq1")) *= kDegrees;
+  EXPECT_NE(refusal(velocity).find("'q1' and 'dq1' differ by 1/57.3"), std::string::npos);
+  // Declared, it is read without a word.
+  TorqueDataOptions options;
+  options.mapping.position_unit = {"deg", "deg", "m"};
+  EXPECT_EQ(look(world, options).loud(), "");
+}
+
+TEST(DamagedLog, DegreesEverywhereAreSeenByTheirSize) {
+  LogWorld world = make_log_world(usual());
+  for (const char* name : {"q1", "q2", "dq1", "dq2"})
+    world.rows.col(world.column(name)) *= kDegrees;
+  EXPECT_NE(refusal(world).find("is it in degrees?"), std::string::npos);
+}
+
+TEST(DamagedLog, MillimetresForMetres) {
+  LogWorld world = make_log_world(usual());
+  world.rows.col(world.column("q3")) *= 1000.0;
+  EXPECT_NE(refusal(world).find("mm"), std::string::npos);
+}
+
+TEST(DamagedLog, MillisecondsForSeconds) {
+  LogWorld world = make_log_world(usual());
+  world.rows.col(0) *= 1000.0;
+  EXPECT_NE(refusal(world).find("are the stamps in ms?"), std::string::npos);
+  EXPECT_NE(refusal(world).find("{time_unit: ms}"), std::string::npos);
+  // Without velocities, the rate alone says it.
+  LogWorld bare = world;
+  bare.header = {"t", "q1", "q2", "q3", "x1", "x2", "x3", "tau1", "tau2", "tau3"};
+  EXPECT_NE(refusal(bare).find("one row in 5 s: are the stamps in ms?"), std::string::npos);
+  TorqueDataOptions options;
+  options.mapping.time_unit = "ms";
+  EXPECT_EQ(look(world, options).loud(), "");
+}
+
+TEST(DamagedLog, VelocityOfTheWrongSizeSignLagOrJoint) {
+  LogWorld scaled = make_log_world(usual());
+  scaled.rows.col(scaled.column("dq2")) *= 0.5;
+  EXPECT_EQ(look(scaled).loud(), "velocity_scale ");
+  EXPECT_NEAR(look(scaled).first(LogFault::kVelocityScale).value, 2.0, 0.02);
+  EXPECT_EQ(look(scaled).report.log.dq.cols(), 0) << "derived instead";
+  LogWorld negative = make_log_world(usual());
+  negative.rows.col(negative.column("dq1")) *= -1.0;
+  EXPECT_NEAR(look(negative).first(LogFault::kVelocityScale).value, -1.0, 0.02);
+  LogWorldOptions late = usual();
+  late.velocity_lag_s = 0.02;
+  const Looked lagging = look(make_log_world(late));
+  ASSERT_EQ(lagging.of(LogFault::kVelocityLag).size(), 3U);
+  constexpr double kLagError = 1e-3;  // s; a fifth of a step
+  for (const LogFinding& lag : lagging.of(LogFault::kVelocityLag))
+    EXPECT_NEAR(lag.value, 0.02, kLagError);
+  LogWorld other = make_log_world(usual());
+  other.rows.col(other.column("dq1")).swap(other.rows.col(other.column("dq2")));
+  EXPECT_EQ(look(other).loud(), "velocity_mismatch velocity_mismatch ");
+}
+
+TEST(DamagedLog, AccelerationsThatAreNone) {
+  LogWorld world = make_log_world(usual());
+  world.header.insert(world.header.end(), {"ddq1", "ddq2", "ddq3"});
+  Eigen::MatrixXd rows(world.rows.rows(), world.rows.cols() + 3);
+  rows << world.rows, world.ddq;
+  world.rows = rows;
+  EXPECT_EQ(look(world).loud(), "");
+  EXPECT_EQ(look(world).report.log.ddq.cols(), 3);
+  world.rows.col(world.column("ddq2")) *= 3.0;
+  EXPECT_EQ(look(world).loud(), "acceleration ");
+  EXPECT_EQ(look(world).report.log.ddq.cols(), 0);
+  world.rows.rightCols(3).setZero();
+  EXPECT_EQ(look(world).loud(), "constant constant constant ");
+  EXPECT_EQ(look(world).report.log.ddq.cols(), 0);
+}
+
+TEST(DamagedLog, ConstantTorque) {
+  LogWorld world = make_log_world(usual());
+  world.rows.col(world.column("tau2")).setConstant(0.25);
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "constant ");
+  EXPECT_EQ(looked.first(LogFault::kConstant).channel, "tau2");
+}
+
+TEST(DamagedLog, ClippedTorque) {
+  LogWorld world = make_log_world(usual());
+  const Eigen::Index tau = world.column("tau1");
+  const double limit = 0.6 * world.rows.col(tau).maxCoeff();
+  world.rows.col(tau) = world.rows.col(tau).cwiseMin(limit);
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "clipped ");
+  EXPECT_NEAR(looked.first(LogFault::kClipped).value, limit, 1e-6);
+}
+
+TEST(DamagedLog, QuantisedAndHeldTorque) {
+  LogWorld world = make_log_world(usual());
+  const Eigen::Index tau = world.column("tau1");
+  world.rows.col(tau) = (world.rows.col(tau) / 0.5).array().round() * 0.5;
+  const Looked coarse = look(world);
+  EXPECT_EQ(coarse.loud(), "");
+  ASSERT_EQ(coarse.of(LogFault::kQuantised).size(), 1U);
+  EXPECT_NEAR(coarse.first(LogFault::kQuantised).value, 0.5, 1e-6);
+  LogWorld held = make_log_world(usual());
+  for (Eigen::Index r = 0; r < held.rows.rows(); ++r) held.rows(r, tau) = held.rows(r - r % 4, tau);
+  const Looked slow = look(held);
+  EXPECT_EQ(slow.loud(), "");
+  ASSERT_EQ(slow.of(LogFault::kHeld).size(), 1U);
+  EXPECT_NEAR(slow.first(LogFault::kHeld).value, 0.02, 1e-4) << "renewed every 20 ms";
+}
+
+TEST(DamagedLog, CommandsThatTheRobotFollowsLate) {
+  const LogWorldOptions options = usual();
+  LogWorld world = make_log_world(options);
+  world.header.insert(world.header.end(), {"q_cmd1", "q_cmd2", "q_cmd3"});
+  Eigen::MatrixXd rows(world.rows.rows(), world.rows.cols() + 3);
+  rows.leftCols(world.rows.cols()) = world.rows;
+  for (Eigen::Index r = 0; r < rows.rows(); ++r) {
+    for (int j = 0; j < 3; ++j) {
+      rows(r, world.rows.cols() + j) = exact_motion(options, j, world.rows(r, 0) + 0.03)(0);
+    }
+  }
+  world.rows = rows;
+  const Looked looked = look(world);
+  ASSERT_EQ(looked.of(LogFault::kLag).size(), 1U);
+  EXPECT_NEAR(looked.first(LogFault::kLag).value, 0.03, 1e-9);
+}
+
+TEST(DamagedLog, WithoutAClockTheVelocityTellsTheRate) {
+  LogWorld world = make_log_world(usual());
+  world.header[0] = "row";
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "no_clock ");
+  EXPECT_NEAR(looked.first(LogFault::kNoClock).value, 200.0, 2.0);
+  world.header[4] = "a";
+  world.header[5] = "b";
+  world.header[6] = "c";
+  EXPECT_NE(refusal(world).find("dynamics: {rate_hz: ..}"), std::string::npos);
+}
+
+TEST(DamagedLog, CutOffAndCorruptFilesNameTheLine) {
+  const std::string text = make_log_world(usual()).csv();
+  const auto read = [&](const std::string& name, const std::string& bytes) {
+    return refusal_of([&] { static_cast<void>(read_torque_data({write_log(name, bytes)}, {})); });
+  };
+  EXPECT_NE(read("cut.csv", text.substr(0, text.size() - 20)).find("cut.csv:2002:"),
+            std::string::npos);
+  const std::string packed = gzip(text);
+  EXPECT_NE(read("cut.csv.gz", packed.substr(0, packed.size() / 2)).find("cut off"),
+            std::string::npos);
+  std::string flipped = packed;
+  flipped[packed.size() / 2] = static_cast<char>(flipped[packed.size() / 2] ^ 0x10);
+  EXPECT_NE(read("bad.csv.gz", flipped).find("gzip file is"), std::string::npos);
+  EXPECT_NE(read("plain.csv.gz", text).find("is no gzip file"), std::string::npos);
+  EXPECT_EQ(read("whole.csv.gz", packed), "accepted");
+  EXPECT_NE(refusal_of([] { static_cast<void>(read_torque_data({}, {})); }).find("no torque log"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace kinescope
