@@ -4,7 +4,7 @@
 // Gives   a KinematicTree, or URDF text that check_urdf, KDL, MuJoCo and RViz load.
 // Frames  URDF's own: a link's frame is its joint's frame; rpy is fixed-axis x, y, z. SI units.
 //         A marker is a fixed link "tag_<id>", its frame as in the AprilTag library.
-// Not here: meshes, inertias (dynamics), SRDF.
+// Not here: inertias (dynamic_urdf.h), meshes, SRDF.
 #pragma once
 
 #include <filesystem>

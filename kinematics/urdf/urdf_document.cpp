@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
-#include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/urdf/xml_numbers.h"
 
 namespace kinescope::urdf_document {
 namespace {
@@ -31,7 +31,7 @@ class Checker {
   explicit Checker(std::string source) : source_(std::move(source)) {}
 
   [[nodiscard]] std::string place(const XMLElement& element) const {
-    return fmt::format("{}:{}", source_, element.GetLineNum());
+    return xml_place(element, source_);
   }
 
   [[nodiscard]] std::string name_of(const XMLElement& element) const {
@@ -43,35 +43,9 @@ class Checker {
     return name;
   }
 
-  /// The attribute, where there is one, holds exactly `count` finite numbers.
   [[nodiscard]] std::vector<double> numbers(const XMLElement& element, const char* attribute,
                                             std::size_t count, const std::string& owner) const {
-    const char* text = element.Attribute(attribute);
-    if (text == nullptr) return {};
-    std::vector<double> values;
-    for (std::string_view rest = text; !rest.empty();) {
-      const std::size_t begin = rest.find_first_not_of(" \t\r\n");
-      if (begin == std::string_view::npos) break;
-      rest.remove_prefix(begin);
-      const std::string_view word = rest.substr(0, rest.find_first_of(" \t\r\n"));
-      rest.remove_prefix(word.size());
-      const auto value = parse_number(word);
-      if (!value || !std::isfinite(*value)) {
-        throw bad_input(place(element),
-                        fmt::format("{}: <{} {}=\"{}\"> holds '{}', not a finite number", owner,
-                                    element.Name(), attribute, text, word),
-                        word.find("${") == std::string_view::npos ? "correct it"
-                                                                  : "run xacro on the file first");
-      }
-      values.push_back(*value);
-    }
-    if (values.size() != count) {
-      throw bad_input(place(element),
-                      fmt::format("{}: <{} {}=\"{}\"> has {} numbers, not {}", owner,
-                                  element.Name(), attribute, text, values.size(), count),
-                      "correct it");
-    }
-    return values;
+    return xml_numbers(element, attribute, count, {.source = source_, .owner = owner});
   }
 
   void check_origin(const XMLElement& parent, const std::string& owner) const {

@@ -10,12 +10,15 @@
 #include <tinyxml2.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/urdf/dynamic_urdf.h"
 #include "kinematics/urdf/urdf.h"
+#include "kinematics/urdf/urdf_inertia.h"
 
 namespace kinescope {
 namespace {
 
 using tinyxml2::XMLElement;
+using urdf_document::number_text;
 
 // Nobody measured how strong or fast the joints are, and URDF asks for both. Zero would stop every
 // planner; these are wide enough to bind nowhere.
@@ -44,13 +47,6 @@ constexpr Material kRevoluteColour{"revolute_orange", "0.90 0.45 0.10 1"};
 constexpr Material kPrismaticColour{"prismatic_blue", "0.15 0.45 0.80 1"};
 constexpr Material kTagBlack{"tag_black", "0.05 0.05 0.05 1"};
 constexpr Material kTagWhite{"tag_white", "0.97 0.97 0.97 1"};
-
-/// Shortest text that reads back as the same double.
-std::string number(double value) { return fmt::format("{}", value == 0.0 ? 0.0 : value); }
-
-std::string numbers(const Eigen::Vector3d& v) {
-  return fmt::format("{} {} {}", number(v.x()), number(v.y()), number(v.z()));
-}
 
 /// Fixed-axis angles about x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll). Roll is taken from the rotation
 /// that is left after the yaw, so that the product is exact also where pitch is 90 degrees.
@@ -122,8 +118,8 @@ XMLElement& add(XMLElement& parent, const char* name) {
 
 void add_origin(XMLElement& parent, const Pose& pose) {
   XMLElement& origin = add(parent, "origin");
-  origin.SetAttribute("xyz", numbers(pose.translation).c_str());
-  origin.SetAttribute("rpy", numbers(roll_pitch_yaw(pose.rotation)).c_str());
+  origin.SetAttribute("xyz", number_text(pose.translation).c_str());
+  origin.SetAttribute("rpy", number_text(roll_pitch_yaw(pose.rotation)).c_str());
 }
 
 /// A <visual> at `pose` whose geometry the caller fills in.
@@ -137,14 +133,14 @@ XMLElement& add_visual(XMLElement& link, const Pose& pose, const Material& mater
 
 void add_box(XMLElement& link, const Pose& pose, const Eigen::Vector3d& size,
              const Material& material) {
-  add(add_visual(link, pose, material), "box").SetAttribute("size", numbers(size).c_str());
+  add(add_visual(link, pose, material), "box").SetAttribute("size", number_text(size).c_str());
 }
 
 void add_cylinder(XMLElement& link, const Pose& pose, double radius, double length,
                   const Material& material) {
   XMLElement& cylinder = add(add_visual(link, pose, material), "cylinder");
-  cylinder.SetAttribute("radius", number(radius).c_str());
-  cylinder.SetAttribute("length", number(length).c_str());
+  cylinder.SetAttribute("radius", number_text(radius).c_str());
+  cylinder.SetAttribute("length", number_text(length).c_str());
 }
 
 /// A rod between two points; nothing where they are one.
@@ -202,7 +198,7 @@ void add_marker_link(XMLElement& robot, const Marker& marker, double radius) {
   const double s = marker.size_m;
   if (s <= 0.0) {
     add(add_visual(link, {}, kTagBlack), "sphere")
-        .SetAttribute("radius", number(1.5 * radius).c_str());
+        .SetAttribute("radius", number_text(1.5 * radius).c_str());
     return;
   }
   const double thickness = 0.02 * s;
@@ -240,19 +236,19 @@ XMLElement& add_joint(XMLElement& robot, const std::string& name, const char* ty
 /// MuJoCo and parse_urdf both take as none), a revolute one is continuous.
 void add_axis_and_limit(XMLElement& element, const Joint& joint) {
   if (joint.type == JointType::kFixed) return;
-  add(element, "axis").SetAttribute("xyz", numbers(joint.axis).c_str());
+  add(element, "axis").SetAttribute("xyz", number_text(joint.axis).c_str());
   XMLElement& limit = add(element, "limit");
-  limit.SetAttribute("effort", number(kAnyEffort).c_str());
-  limit.SetAttribute("velocity", number(kAnyVelocity).c_str());
+  limit.SetAttribute("effort", number_text(kAnyEffort).c_str());
+  limit.SetAttribute("velocity", number_text(kAnyVelocity).c_str());
   if (!joint.limits) return;
-  limit.SetAttribute("lower", number(joint.limits->lower).c_str());
-  limit.SetAttribute("upper", number(joint.limits->upper).c_str());
+  limit.SetAttribute("lower", number_text(joint.limits->lower).c_str());
+  limit.SetAttribute("upper", number_text(joint.limits->upper).c_str());
 }
 
-void add_mujoco_extension(XMLElement& robot) {
+void add_mujoco_extension(XMLElement& robot, bool bound) {
   XMLElement& compiler = add(add(robot, "mujoco"), "compiler");
-  compiler.SetAttribute("boundmass", number(kMujocoMassKg).c_str());
-  compiler.SetAttribute("boundinertia", number(kMujocoInertiaKgM2).c_str());
+  compiler.SetAttribute("boundmass", number_text(bound ? kMujocoMassKg : 0.0).c_str());
+  compiler.SetAttribute("boundinertia", number_text(bound ? kMujocoInertiaKgM2 : 0.0).c_str());
   compiler.SetAttribute("inertiafromgeom", "false");
   compiler.SetAttribute("discardvisual", "false");
   compiler.SetAttribute("fusestatic", "false");
@@ -272,46 +268,71 @@ void check_numbers(const KinematicTree& tree) {
   }
 }
 
-}  // namespace
+/// Every link that a movable joint carries has a mass.
+bool all_moving_links_weigh(const DynamicModel& model) {
+  return std::ranges::all_of(model.tree.joints, [&](const Joint& joint) {
+    return joint.type == JointType::kFixed || model.links[joint.child.index()].mass_kg > 0.0;
+  });
+}
 
-std::string write_urdf(const KinematicTree& tree) {
-  check_tree(tree);
-  check_numbers(tree);
-  const Names names = make_names(tree);
-  const double radius = rod_radius(tree);
-  tinyxml2::XMLDocument document;
-  document.InsertEndChild(document.NewDeclaration(R"(xml version="1.0" encoding="UTF-8")"));
-  XMLElement& robot = *document.NewElement("robot");
-  document.InsertEndChild(&robot);
-  robot.SetAttribute("name", names.robot.c_str());
-  robot.InsertNewComment(std::string(kFirstComment).c_str());
-  add_mujoco_extension(robot);
+void add_materials(XMLElement& robot) {
   for (const Material& material :
        {kLinkColour, kRevoluteColour, kPrismaticColour, kTagBlack, kTagWhite}) {
     XMLElement& element = add(robot, "material");
     element.SetAttribute("name", material.name);
     add(element, "color").SetAttribute("rgba", material.rgba);
   }
+}
+
+void add_links(XMLElement& robot, const DynamicModel& model, const Names& names) {
+  const KinematicTree& tree = model.tree;
+  const double radius = rod_radius(tree);
   for (std::size_t i = 0; i < tree.links.size(); ++i) {
     XMLElement& link = add(robot, "link");
     link.SetAttribute("name", names.links[i].c_str());
+    urdf_document::add_inertial(link, names.links[i], model.links[i]);
     add_link_visuals(link, tree, LinkId{static_cast<int>(i)}, radius);
   }
   for (const Marker& marker : tree.markers) add_marker_link(robot, marker, radius);
+}
+
+void add_joints(XMLElement& robot, const DynamicModel& model, const Names& names) {
+  const KinematicTree& tree = model.tree;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const Joint& joint = tree.joints[j];
-    add_axis_and_limit(
+    XMLElement& element =
         add_joint(robot, names.joints[j], urdf_type(joint), joint.T_parent_joint,
-                  names.links[joint.parent.index()], names.links[joint.child.index()]),
-        joint);
+                  names.links[joint.parent.index()], names.links[joint.child.index()]);
+    add_axis_and_limit(element, joint);
+    urdf_document::add_joint_dynamics(element, model.joints[j]);
   }
   for (const Marker& marker : tree.markers) {
     add_joint(robot, marker_name(marker) + "_joint", "fixed", marker.T_link_marker,
               names.links[marker.link.index()], marker_name(marker));
   }
+}
+
+}  // namespace
+
+std::string write_urdf(const DynamicModel& model) {
+  check_model(model);
+  check_numbers(model.tree);
+  const Names names = make_names(model.tree);
+  tinyxml2::XMLDocument document;
+  document.InsertEndChild(document.NewDeclaration(R"(xml version="1.0" encoding="UTF-8")"));
+  XMLElement& robot = *document.NewElement("robot");
+  document.InsertEndChild(&robot);
+  robot.SetAttribute("name", names.robot.c_str());
+  robot.InsertNewComment(std::string(kFirstComment).c_str());
+  add_mujoco_extension(robot, !all_moving_links_weigh(model));
+  add_materials(robot);
+  add_links(robot, model, names);
+  add_joints(robot, model, names);
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
   return printer.CStr();
 }
+
+std::string write_urdf(const KinematicTree& tree) { return write_urdf(without_masses(tree)); }
 
 }  // namespace kinescope
