@@ -38,7 +38,7 @@ set(third_parties
     "apriltag: calib/vision"
     "libav: calib/vision"
     "libsw: calib/vision"
-    "ceres/: calib/bundle"
+    "ceres/: calib/bundle dynamics/identify"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"
     "tinyxml: kinematics/urdf calib/camera"
