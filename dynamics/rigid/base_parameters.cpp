@@ -2,6 +2,7 @@
 #include "dynamics/rigid/base_parameters.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -69,46 +70,6 @@ Eigen::MatrixXd regroup_on(const Eigen::MatrixXd& R, const std::vector<int>& kep
   return regroup;
 }
 
-/// Moments first, the mass and what turning about an axis hides last, links from the base outwards:
-/// what depends on others is then regrouped towards the base, as by hand (Khalil and Dombre 2002,
-/// table 9.4).
-std::vector<int> usual_preference(Eigen::Index bodies) {
-  constexpr std::array<int, 10> kOrder = {5, 6, 8, 9, 4, 7, 1, 2, 3, 0};
-  std::vector<int> preference;
-  for (Eigen::Index b = 0; b < bodies; ++b) {
-    for (const int k : kOrder) preference.push_back(static_cast<int>(10 * b) + k);
-  }
-  return preference;
-}
-
-/// Regressors at random states, stacked. Four rows a column and joint: enough that no direction is
-/// left out by chance.
-Eigen::MatrixXd random_regressors(const RigidModel& model, std::uint64_t seed) {
-  Rng rng = Rng::from_name("base_parameters", seed);
-  const Eigen::Index n = model.size();
-  const Eigen::Index samples = 40 + 4 * n;
-  Eigen::MatrixXd q(samples, n);
-  Eigen::MatrixXd dq(samples, n);
-  Eigen::MatrixXd ddq(samples, n);
-  // Rates and accelerations as large as gravity makes them on arms of a metre.
-  const double scale = std::sqrt(std::max(1.0, model.gravity_m_s2.norm()));
-  for (Eigen::Index t = 0; t < samples; ++t) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const bool turns = model.bodies[static_cast<std::size_t>(j)].type == JointType::kRevolute;
-      const double reach = turns ? std::numbers::pi : 0.5;
-      q(t, j) = rng.uniform(-reach, reach);
-      dq(t, j) = rng.uniform(-scale, scale);
-      ddq(t, j) = rng.uniform(-scale * scale, scale * scale);
-    }
-  }
-  const std::vector<Eigen::MatrixXd> Y = regressors_of_samples(model, q, dq, ddq);
-  Eigen::MatrixXd W(samples * n, 10 * n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    W.middleRows(samples * j, samples) = Y[static_cast<std::size_t>(j)];
-  }
-  return W;
-}
-
 }  // namespace
 
 ColumnBasis independent_columns(const Eigen::MatrixXd& W, const std::vector<int>& preference,
@@ -142,6 +103,35 @@ ColumnBasis independent_columns(const Eigen::MatrixXd& W, const std::vector<int>
   return out;
 }
 
+std::vector<int> usual_preference(const RigidModel& model) {
+  constexpr std::array<int, 10> kOrder = {5, 6, 8, 9, 4, 7, 1, 2, 3, 0};
+  std::vector<int> preference;
+  for (int b = 0; b < static_cast<int>(model.size()); ++b) {
+    for (const int k : kOrder) preference.push_back(10 * b + k);
+  }
+  return preference;
+}
+
+RandomMotion random_motion(const RigidModel& model, Eigen::Index samples, std::uint64_t seed) {
+  Rng rng = Rng::from_name("random_motion", seed);
+  const Eigen::Index n = model.size();
+  RandomMotion out{.q = Eigen::MatrixXd(samples, n),
+                   .dq = Eigen::MatrixXd(samples, n),
+                   .ddq = Eigen::MatrixXd(samples, n)};
+  // Rates and accelerations as large as gravity makes them on arms of a metre.
+  const double scale = std::sqrt(std::max(1.0, model.gravity_m_s2.norm()));
+  for (Eigen::Index t = 0; t < samples; ++t) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const bool turns = model.bodies[static_cast<std::size_t>(j)].type == JointType::kRevolute;
+      const double reach = turns ? std::numbers::pi : 0.5;
+      out.q(t, j) = rng.uniform(-reach, reach);
+      out.dq(t, j) = rng.uniform(-scale, scale);
+      out.ddq(t, j) = rng.uniform(-scale * scale, scale * scale);
+    }
+  }
+  return out;
+}
+
 std::vector<std::string> body_parameter_names(const RigidModel& model) {
   std::vector<std::string> names;
   for (const RigidBody& body : model.bodies) {
@@ -166,8 +156,16 @@ std::string combination_name(const Eigen::VectorXd& row, const std::vector<std::
 
 BaseParameters base_parameters(const RigidModel& model, const BaseParameterOptions& options) {
   BaseParameters out;
-  out.basis = independent_columns(random_regressors(model, options.seed),
-                                  usual_preference(model.size()), options.tolerance);
+  const Eigen::Index n = model.size();
+  const Eigen::Index samples = 40 + 4 * n;  // six rows a column and more
+  const RandomMotion motion = random_motion(model, samples, options.seed);
+  const std::vector<Eigen::MatrixXd> Y =
+      regressors_of_samples(model, motion.q, motion.dq, motion.ddq);
+  Eigen::MatrixXd W(samples * n, 10 * n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    W.middleRows(samples * j, samples) = Y[static_cast<std::size_t>(j)];
+  }
+  out.basis = independent_columns(W, usual_preference(model), options.tolerance);
   const std::vector<std::string> names = body_parameter_names(model);
   for (std::size_t k = 0; k < out.basis.kept.size(); ++k) {
     out.names.push_back(combination_name(out.basis.regroup.row(static_cast<Eigen::Index>(k)), names,

@@ -4,6 +4,7 @@
 // base parameters. Found numerically from the regressor at random states. Gautier 1991.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,20 @@ struct BaseParameterOptions {
 /// (or 0.5 m), rates and accelerations within 1 (rad or m per s, s^2) times sqrt(gravity).
 [[nodiscard]] BaseParameters base_parameters(const RigidModel& model,
                                              const BaseParameterOptions& options = {});
+
+/// Order in which the columns of a regressor are kept: moments first, the mass last, links from the
+/// base outwards, so that what depends on others is regrouped towards the base, as by hand (Khalil
+/// and Dombre 2002, table 9.4).
+[[nodiscard]] std::vector<int> usual_preference(const RigidModel& model);
+
+/// Random states at which every term of the dynamics acts, samples x joints.
+struct RandomMotion {
+  Eigen::MatrixXd q;
+  Eigen::MatrixXd dq;
+  Eigen::MatrixXd ddq;
+};
+[[nodiscard]] RandomMotion random_motion(const RigidModel& model, Eigen::Index samples,
+                                         std::uint64_t seed);
 
 /// "Izz(link2) + 0.16 m(link3)": one row of a regrouping in words, coefficients with `digits`
 /// digits.

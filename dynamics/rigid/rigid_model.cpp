@@ -21,6 +21,7 @@ RigidModel make_rigid_model(const DynamicModel& model) {
     } else {
       child = {.body = static_cast<int>(out.bodies.size()), .T_body_link = {}};
       out.bodies.push_back({.name = tree.links[joint.child.index()].name,
+                            .joint = joint.name,
                             .type = joint.type,
                             .parent = parent.body,
                             .R_parent_joint = T_body_joint.matrix3(),
@@ -60,7 +61,8 @@ Eigen::MatrixXd bodies_from_links(const RigidModel& model) {
   for (Eigen::Index l = 0; l < links; ++l) {
     const LinkPlacement& link = model.links[static_cast<std::size_t>(l)];
     if (link.body < 0) continue;
-    out.block<10, 10>(10 * link.body, 10 * l) = inertial_frame_change(link.T_body_link);
+    out.block<10, 10>(Eigen::Index{10} * link.body, 10 * l) =
+        inertial_frame_change(link.T_body_link);
   }
   return out;
 }

@@ -19,7 +19,8 @@ namespace kinescope {
 
 /// One moving body: the child link of a movable joint with all links that fixed joints tie to it.
 struct RigidBody {
-  std::string name;  ///< of the child link
+  std::string name;   ///< of the child link
+  std::string joint;  ///< name of the joint that moves it
   JointType type = JointType::kRevolute;
   int parent = -1;  ///< body that carries the joint; -1 is the base
   Eigen::Matrix3d R_parent_joint = Eigen::Matrix3d::Identity();

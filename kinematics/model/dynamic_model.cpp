@@ -29,7 +29,7 @@ void check_model(const DynamicModel& model) {
   }
 }
 
-std::vector<JointId> movable_joints(const KinematicTree& tree) {
+std::vector<JointId> moving_joints(const KinematicTree& tree) {
   std::vector<JointId> movable;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     if (tree.joints[j].type != JointType::kFixed) movable.push_back(JointId{static_cast<int>(j)});

@@ -39,6 +39,6 @@ void check_model(const DynamicModel& model);
 
 /// The joints that move, in the tree's order: the order of the columns of a joint log's arrays and
 /// of the entries of every q, dq, ddq and torque of dynamics/.
-[[nodiscard]] std::vector<JointId> movable_joints(const KinematicTree& tree);
+[[nodiscard]] std::vector<JointId> moving_joints(const KinematicTree& tree);
 
 }  // namespace kinescope

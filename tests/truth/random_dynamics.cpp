@@ -32,7 +32,7 @@ DynamicModel random_masses(const KinematicTree& tree, const RandomMassOptions& o
 }
 
 RandomStates random_states(const KinematicTree& tree, int samples, Rng& rng) {
-  const std::vector<JointId> joints = movable_joints(tree);
+  const std::vector<JointId> joints = moving_joints(tree);
   const auto n = static_cast<Eigen::Index>(joints.size());
   RandomStates out{.q = Eigen::MatrixXd(samples, n),
                    .dq = Eigen::MatrixXd(samples, n),

@@ -36,7 +36,7 @@ double relative_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
 /// Our movable joints' places in KDL's arrays.
 std::vector<unsigned> kdl_places(const KinematicTree& tree, const KDL::Tree& kdl) {
   std::vector<unsigned> places;
-  for (const JointId id : movable_joints(tree)) {
+  for (const JointId id : moving_joints(tree)) {
     const Joint& joint = tree.joints[id.index()];
     places.push_back(kdl.getSegment(tree.links[joint.child.index()].name)->second.q_nr);
   }
@@ -137,7 +137,7 @@ MujocoModel load(const DynamicModel& model) {
     const int body = mj_name2id(loaded.get(), mjOBJ_BODY, model.tree.links[l].name.c_str());
     refine_inertia(model.links[l], *loaded, body);
   }
-  for (const JointId id : movable_joints(model.tree)) {
+  for (const JointId id : moving_joints(model.tree)) {
     const Joint& joint = model.tree.joints[id.index()];
     const int theirs = mj_name2id(loaded.get(), mjOBJ_JOINT, joint.name.c_str());
     const double armature = model.joints[id.index()].motor_inertia;
@@ -149,7 +149,7 @@ MujocoModel load(const DynamicModel& model) {
 /// Torques of one sample, in our order.
 Eigen::VectorXd mujoco_torque(const DynamicModel& model, const mjModel& theirs, mjData& data,
                               const RandomStates& states, int row) {
-  const std::vector<JointId> joints = movable_joints(model.tree);
+  const std::vector<JointId> joints = moving_joints(model.tree);
   Eigen::VectorXd out(static_cast<Eigen::Index>(joints.size()));
   std::vector<int> place;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -172,7 +172,7 @@ TEST(RigidOracle, MujocoFindsTheSameTorques) {
   Rng rng = Rng::from_name("RigidOracle.MujocoFindsTheSameTorques");
   for (int robot = 0; robot < 30; ++robot) {
     const DynamicModel model = random_masses(random_tree(rng, 1 + rng.index(10), 0), {}, rng);
-    if (movable_joints(model.tree).empty()) continue;
+    if (moving_joints(model.tree).empty()) continue;
     const MujocoModel theirs = load(model);
     ASSERT_NE(theirs, nullptr);
     const MujocoData data(mj_makeData(theirs.get()));

@@ -139,13 +139,13 @@ TEST(DynamicModel, ChecksItsSizesAndNumbers) {
   EXPECT_THROW(check_model(bad), std::logic_error);
 }
 
-TEST(DynamicModel, MovableJointsKeepTheirOrder) {
+TEST(DynamicModel, MovingJointsKeepTheirOrder) {
   Rng rng = Rng::from_name("DynamicModel.MovableJoints");
   const KinematicTree tree = random_tree(rng, 12, 0);
   int last = -1;
   std::size_t fixed = 0;
   for (const Joint& joint : tree.joints) fixed += joint.type == JointType::kFixed ? 1 : 0;
-  const std::vector<JointId> joints = movable_joints(tree);
+  const std::vector<JointId> joints = moving_joints(tree);
   EXPECT_EQ(joints.size() + fixed, tree.joints.size());
   for (const JointId id : joints) {
     EXPECT_GT(id.value, last);
