@@ -44,7 +44,8 @@ using identify::LogCholesky;
 /// blocks: ten numbers a body, then the drives' values.
 class BaseMisfit {
  public:
-  BaseMisfit(Eigen::MatrixXd root, Eigen::MatrixXd regroup, Eigen::VectorXd target, int bodies)
+  BaseMisfit(const Eigen::MatrixXd& root, const Eigen::MatrixXd& regroup,
+             const Eigen::VectorXd& target, int bodies)
       : weighted_(root * regroup), offset_(root * target), bodies_(bodies) {}
 
   template <typename Scalar>
@@ -195,12 +196,12 @@ class ConsistentProblem {
     add_drives();
     add_misfit();
     const double weight = 1.0 / options.prior_relative_sigma;
-    for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      const Eigen::Matrix4d U = identify::upper_factor(bodies_[b].data());
+    for (LogCholesky& body : bodies_) {
+      const Eigen::Matrix4d U = identify::upper_factor(body.data());
       problem_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<BregmanPrior, 10, 10>(  // owned by the problem
               new BregmanPrior{.inverse_factor = U.inverse(), .weight = weight}),
-          nullptr, bodies_[b].data());
+          nullptr, body.data());
     }
   }
 

@@ -167,6 +167,8 @@ void estimate_covariance(const TorqueSamples& samples, const StackedSystem& syst
       samples.trajectory, options.block_correlations * out.correlation_samples,
       options.fewest_blocks);
   out.blocks = static_cast<int>(blocks.size());
+  const double rows_per_block = static_cast<double>(samples.trajectory.size()) / out.blocks;
+  out.short_blocks = rows_per_block < 3.0 * out.correlation_samples;
   const Eigen::MatrixXd covariance =
       identify::jackknife_covariance(system, fit, options.ridge, blocks);
   out.covariance = covariance.topLeftCorner(p, p);

@@ -22,7 +22,7 @@ struct DriveTerms {
   /// More motors that turn by a combination of joints, one weight a joint: (0, 0, 0, 0, 1, 1) for a
   /// wrist whose last motor also sees joint 5. Inertia, viscous and Coulomb friction of each act on
   /// all of its joints.
-  std::vector<Eigen::VectorXd> coupled_drives = {};
+  std::vector<Eigen::VectorXd> coupled_drives;
 };
 
 enum class TermKind {

@@ -88,12 +88,15 @@ class Fitter {
     loss_ = loss;
     reweight();
     fit_.converged = false;
+    // A median of residuals and its weights can chase each other; then the noise level stays.
+    constexpr int kScaleSteps = 15;
+    const int first = fit_.iterations;
     while (!fit_.converged && fit_.iterations < options_.max_iterations) {
       ++fit_.iterations;
       const Eigen::VectorXd sigma = fit_.sigma;
       const Eigen::MatrixXd residuals = fit_.residuals;
       solve();
-      find_sigma();
+      if (fit_.iterations - first <= kScaleSteps) find_sigma();
       fit_.converged = settled(sigma, residuals);
       reweight();
     }

@@ -64,8 +64,8 @@ class ScaledSolver {
 
 struct WeightedFitOptions {
   RobustLoss loss = RobustLoss::kNone;
-  double ridge = 1e-10;        ///< draws to the prior where the data say nothing
-  Eigen::VectorXd prior = {};  ///< empty: zero
+  double ridge = 1e-10;   ///< draws to the prior where the data say nothing
+  Eigen::VectorXd prior;  ///< empty: zero
   int max_iterations = 50;
 };
 

@@ -12,8 +12,8 @@
 
 namespace kinescope {
 
-/// Which columns of a matrix W are kept, and how the others are regrouped on them:
-/// W = W(:, kept) * regroup, so W x = W(:, kept) (regroup x).
+/// Which columns of a matrix W are kept, and how the others are regrouped on them: W = W(:, kept) *
+/// regroup, so W x = W(:, kept) (regroup x).
 struct ColumnBasis {
   std::vector<int> kept;            ///< independent columns, increasing
   Eigen::MatrixXd regroup;          ///< kept x columns; the identity on the kept ones
@@ -28,8 +28,8 @@ struct ColumnBasis {
 [[nodiscard]] ColumnBasis independent_columns(const Eigen::MatrixXd& W,
                                               const std::vector<int>& preference, double tolerance);
 
-/// Base parameters of a robot. base = regroup * body_parameters(model), and
-/// Y * body_parameters = Y(:, kept) * base for every state.
+/// Base parameters of a robot. base = regroup * body_parameters(model), and Y * body_parameters =
+/// Y(:, kept) * base for every state.
 struct BaseParameters {
   ColumnBasis basis;
   std::vector<std::string>

@@ -2,12 +2,10 @@
 //
 // Takes   a DynamicModel (tree, inertias, gravity) and joint values, rates and accelerations.
 // Gives   torques and their parts, energies, mass matrix, the regressor and the base parameters.
-// Frames  a body's frame is its link's (URDF); torques act along the joint axes, N m or N. Vectors
-// have one
-//         entry a movable joint, in the tree's order; matrices of samples one row a sample.
-// Method  recursive Newton-Euler, composite bodies (Featherstone 2008); regressor: Atkeson et al.
-// 1986. Not here: friction (identify), estimation. Couplings of joints are refused where URDF is
-// read.
+// Frames  a body's frame is its link's (URDF); torques along the joint axes, N m or N. Vectors have
+//         one entry a moving joint, in the tree's order; matrices of samples one row a sample.
+// Method  recursive Newton-Euler, composite bodies (Featherstone 2008); Atkeson et al. 1986.
+// Not here: friction, estimation (identify); mimic joints (refused where URDF is read).
 #pragma once
 
 #include <string>

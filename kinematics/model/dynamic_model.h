@@ -13,9 +13,8 @@ namespace kinescope {
 /// Standard gravity, CGPM 1901.
 inline constexpr double kStandardGravity_m_s2 = 9.80665;
 
-/// What a joint adds to the rigid bodies, on the joint's side of the gear:
-/// motor_inertia * ddq + viscous * dq + coulomb * sign(dq). N m for a revolute joint, N for a
-/// prismatic one.
+/// What a joint adds to the rigid bodies, on the joint's side of the gear: motor_inertia * ddq +
+/// viscous * dq + coulomb * sign(dq). N m for a revolute joint, N for a prismatic one.
 struct JointDynamics {
   double viscous = 0.0;        ///< N m s/rad or N s/m
   double coulomb = 0.0;        ///< N m or N

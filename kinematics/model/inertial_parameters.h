@@ -51,8 +51,8 @@ struct CentralInertia {
 /// The same as a matrix on vector(): it is linear.
 [[nodiscard]] Matrix10d inertial_frame_change(const Pose& T_a_b);
 
-/// Spatial inertia, order rotation, translation: momentum = inertia * twist. Featherstone 2008,
-/// eq. 2.63.
+/// Spatial inertia, order rotation, translation: momentum = inertia * twist. Featherstone 2008, eq.
+/// 2.63.
 [[nodiscard]] Matrix6d spatial_inertia(const InertialParameters& parameters);
 
 /// [S h; h' m] with S = integral of r r' dm and h the first moment. Positive semidefinite exactly

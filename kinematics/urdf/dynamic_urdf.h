@@ -3,8 +3,7 @@
 // Takes   URDF text, or a DynamicModel.
 // Gives   the DynamicModel with <inertial> and <dynamics damping friction>, or the text.
 // Frames  as in urdf.h; a marker's inertia is added to the link that carries it.
-// Not here: <mimic> (refused: its joint has no torque of its own), transmissions, gravity (URDF has
-// none).
+// Not here: <mimic> (refused: its joint has no torque of its own), transmissions, gravity.
 #pragma once
 
 #include "kinematics/model/dynamic_model.h"

@@ -78,7 +78,7 @@ TorqueSamples rows_between(const TorqueSamples& samples, double from_s, double t
 }
 
 TorqueSamples filtered(const TorqueLog& log, double cutoff_hz) {
-  MotionOptions options{.filter = LowPass::kButterworth, .source = MotionSource::kPosition};
+  MotionOptions options{.filter = LowPass::kButterworth, .source = MotionSource::kBest};
   options.cutoff_hz = cutoff_hz;
   return derive_motion(log, options).samples;
 }
@@ -159,6 +159,7 @@ RealSet panda(const fs::path& folder) {
               .first_fit =
                   "0.37 0.03 0.05 0.11 0.45 0.18 2.6 (with position harmonics 0.33 0.02 "
                   "0.04 0.08 0.37 0.10 2.3)"};
+  set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = dh_arm({{0, 0, 0.333},
                       {0, -kQuarter, 0},
                       {0, kQuarter, 0.316},
@@ -177,6 +178,7 @@ RealSet rokae(const fs::path& folder) {
   RealSet set{.name = "rokae",
               .split = "first 65 % -> rest, 4 Hz, gravity along base x",
               .first_fit = "0.09 0.32 0.48 0.17 11 3.7 3.2"};
+  set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = read_dynamic_urdf(folder / "AR5-5_07R-W4C4A2.urdf");
   set.model.gravity_m_s2 = {kStandardGravity_m_s2, 0.0, 0.0};
   const TorqueSamples all = filtered(read_log(folder / "ident.csv", 7, "tau"), 4.0);
@@ -190,6 +192,7 @@ RealSet lwr4(const fs::path& folder) {
   RealSet set{.name = "lwr4",
               .split = "measurements_1 -> measurements_2 (the same path), 8 Hz",
               .first_fit = "6.9 0.08 0.83 0.29 12 30 32"};
+  set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = read_dynamic_urdf(folder / "kuka_lwr4.urdf");
   set.train = filtered(read_log(folder / "measurements_1.csv", 7, "tau"), 8.0);
   set.test = filtered(read_log(folder / "measurements_2.csv", 7, "tau"), 8.0);

@@ -87,9 +87,9 @@ TEST(Coverage, WhiteNoise) {
 }
 
 TEST(Coverage, ColouredNoise) {
-  // Correlation time of about 19 samples: the white covariance is wrong by a factor of four.
+  // Correlation time of about 12 samples: the white sigma is too small by a factor of three.
   const Coverage c =
-      measure({.samples = 8000, .noise = 0.02, .noise_memory = 0.9}, RobustLoss::kNone);
+      measure({.samples = 6000, .noise = 0.02, .noise_memory = 0.85}, RobustLoss::kNone);
   RecordProperty("share", std::to_string(c.share));
   EXPECT_GT(c.share, kLowest);
   EXPECT_LT(c.share, kHighest);
@@ -99,7 +99,7 @@ TEST(Coverage, ColouredNoise) {
 
 TEST(Coverage, ColouredNoiseRobustly) {
   const Coverage c =
-      measure({.samples = 8000, .noise = 0.02, .noise_memory = 0.9}, RobustLoss::kHuber);
+      measure({.samples = 6000, .noise = 0.02, .noise_memory = 0.85}, RobustLoss::kHuber);
   EXPECT_GT(c.share, kLowest);
   EXPECT_LT(c.share, kHighest);
 }

@@ -65,8 +65,8 @@ TEST(BaseParameters, KnownCounts) {
   EXPECT_EQ(base_parameters(make_rigid_model(one)).size(), 1);
   one.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};
   EXPECT_EQ(base_parameters(make_rigid_model(one)).size(), 3);
-  // Two parallel joints: I1 + m2 l^2, m2 c2 (x, y), I2 when gravity is along them;
-  // across them also m1 c1 + m2 l and m1 c1y.
+  // Two parallel joints: I1 + m2 l^2, m2 c2 (x, y), I2 when gravity is along them; across them also
+  // m1 c1 + m2 l and m1 c1y.
   DynamicModel two = dh_robot({{0, 0, 0}, {0.4, 0, 0}});
   EXPECT_EQ(base_parameters(make_rigid_model(two)).size(), 4);
   two.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};

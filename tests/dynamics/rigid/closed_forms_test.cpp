@@ -63,9 +63,8 @@ TEST(ClosedForm, Pendulum) {
 }
 
 TEST(ClosedForm, CartPole) {
-  // Cart along x, pole about y hanging along -z at q = 0:
-  // force  = (M + m) a - m l cos(q) ddq + m l sin(q) dq^2   (pole's centre at x - l sin q),
-  // torque = m l^2 ddq - m l cos(q) a + m g l sin q.
+  // Cart along x, pole about y hanging along -z at q = 0: force  = (M + m) a - m l cos(q) ddq + m l
+  // sin(q) dq^2   (pole's centre at x - l sin q), torque = m l^2 ddq - m l cos(q) a + m g l sin q.
   DynamicModel model = chain({{JointType::kPrismatic, {0, 0, 0}, Eigen::Vector3d::UnitX()},
                               {JointType::kRevolute, {0, 0, 0}, Eigen::Vector3d::UnitY()}});
   const double M = 0.5;
