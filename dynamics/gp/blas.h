@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The few BLAS and LAPACK calls of this room, on column-major blocks. Every call runs on one thread
+// (`SingleThreadedBlas`): OpenBLAS cuts a product by its number of threads and so changes the last
+// bits; here the work is cut into tiles of fixed size that workers share, so that results have the
+// same bytes on any number of threads.
+#pragma once
+
+#include <string>
+
+#include <Eigen/Core>
+
+namespace kinescope::gp {
+
+using Block = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+using ConstBlock = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+
+/// While one of these lives, OpenBLAS uses one thread a call. May nest and be used by many threads.
+class SingleThreadedBlas {
+ public:
+  SingleThreadedBlas();
+  ~SingleThreadedBlas();
+  SingleThreadedBlas(const SingleThreadedBlas&) = delete;
+  SingleThreadedBlas& operator=(const SingleThreadedBlas&) = delete;
+};
+
+/// c = alpha * a * b' + beta * c.
+void product_transposed(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+/// c = alpha * a * b + beta * c.
+void product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+/// c = alpha * a' * b + beta * c.
+void transposed_product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+/// Lower triangle of c = alpha * a * a' + beta * c.
+void add_square(double alpha, ConstBlock a, double beta, Block c);
+
+/// b = l^-1 b, with l lower triangular (only its lower triangle is read).
+void solve_lower(ConstBlock l, Block b);
+/// b = l'^-1 b.
+void solve_lower_transposed(ConstBlock l, Block b);
+/// b = b l'^-1.
+void solve_lower_transposed_right(ConstBlock l, Block b);
+/// b = b l^-1.
+void solve_lower_right(ConstBlock l, Block b);
+
+/// Cholesky factor in place (lower triangle). Returns 0, or the 1-based row whose pivot is not
+/// positive.
+[[nodiscard]] int cholesky(Block a);
+/// Inverse of a lower triangle in place.
+void invert_lower(Block l);
+/// QR in place: the upper triangle of the first min(rows, columns) rows becomes R, with a
+/// diagonal >= 0; the rest is undefined.
+void upper_of_qr(Eigen::MatrixXd& a);
+
+/// What OpenBLAS runs on ("Haswell", "SkylakeX").
+[[nodiscard]] std::string blas_core();
+
+}  // namespace kinescope::gp

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "dynamics/gp/posterior.h"
+#include "dynamics/gp/tiled_cholesky.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::gp {
+namespace {
+
+using Eigen::Index;
+
+class DensePosterior : public Posterior {
+ public:
+  DensePosterior(Covariance covariance, Prepared training, Eigen::VectorXd noise,
+                 Eigen::MatrixXd factor, Eigen::VectorXd targets, Eigen::VectorXd alpha)
+      : covariance_(std::move(covariance)),
+        training_(std::move(training)),
+        noise_(std::move(noise)),
+        factor_(std::move(factor)),
+        targets_(std::move(targets)),
+        alpha_(std::move(alpha)) {}
+
+  [[nodiscard]] Moments predict(Workers& workers, Inputs inputs, bool variance) const override {
+    const Index m = covariance_.outputs();
+    const Prepared at = covariance_.prepare(inputs);
+    Moments out;
+    out.mean.resize(at.samples * m);
+    if (variance) out.variance = covariance_.diagonal(workers, at);
+    const Index width = covariance_.tile_samples();
+    workers.run((at.samples + width - 1) / width, [&](Index task, Scratch& scratch) {
+      const Scratch::Frame frame(scratch);
+      const Index begin = task * width;
+      const Index size = std::min(width, at.samples - begin);
+      Eigen::Map<Eigen::MatrixXd> cross = scratch.take(factor_.rows(), size * m);
+      for (Index row = 0; row < training_.samples; row += width) {
+        const Index rows = std::min(width, training_.samples - row);
+        covariance_.tile({training_, row, rows}, {at, begin, size}, scratch,
+                         cross.middleRows(row * m, rows * m));
+      }
+      transposed_product(1.0, cross, alpha_, 0.0, out.mean.segment(begin * m, size * m));
+      if (!variance) return;
+      solve_lower(factor_, cross);
+      auto own = out.variance.segment(begin * m, size * m);
+      own = (own - cross.colwise().squaredNorm().transpose()).cwiseMax(0.0).eval();
+    });
+    return out;
+  }
+
+  void mean_of_one(OneSample& work) const override {
+    const Index m = covariance_.outputs();
+    covariance_.prepare(work.input, work.prepared);
+    work.cross.resize(factor_.rows(), m);
+    covariance_.tile({training_, 0, training_.samples}, {work.prepared, 0, 1}, work.scratch,
+                     work.cross);
+    work.mean.resize(m);
+    transposed_product(1.0, work.cross, alpha_, 0.0, work.mean);
+  }
+
+  void variance_of_one(OneSample& work) const override {
+    const Index m = covariance_.outputs();
+    work.prior.resize(m, m);
+    covariance_.tile({work.prepared, 0, 1}, {work.prepared, 0, 1}, work.scratch, work.prior);
+    solve_lower(factor_, work.cross);
+    work.variance.resize(m);
+    for (Index o = 0; o < m; ++o) {
+      work.variance[o] = std::max(0.0, work.prior(o, o) - work.cross.col(o).squaredNorm());
+    }
+  }
+
+  // With B = K^-1: y_b - E[y_b | others] = B_bb^-1 alpha_b, var = B_bb^-1 (Rasmussen and Williams
+  // 2006, eq. 5.12, for blocks).
+  [[nodiscard]] LeftOut leave_out(Workers& workers,
+                                  const std::vector<std::vector<Index>>& folds) const override {
+    const Index m = covariance_.outputs();
+    Eigen::MatrixXd inverse = factor_;
+    tiled_invert_lower(workers, inverse);
+    LeftOut out{targets_, Eigen::VectorXd::Zero(targets_.size()), 0.0};
+    std::vector<double> densities(folds.size());
+    workers.run(static_cast<Index>(folds.size()), [&](Index fold, Scratch& scratch) {
+      std::vector<Index> rows;
+      for (const Index sample : folds[static_cast<std::size_t>(fold)]) {
+        for (Index o = 0; o < m; ++o) rows.push_back(sample * m + o);
+      }
+      if (rows.empty()) return;
+      const Scratch::Frame frame(scratch);
+      const auto size = static_cast<Index>(rows.size());
+      const Index first = *std::ranges::min_element(rows);
+      Eigen::Map<Eigen::MatrixXd> columns = scratch.take(size, inverse.rows() - first);
+      for (Index k = 0; k < size; ++k) {
+        columns.row(k) = inverse.col(rows[static_cast<std::size_t>(k)]).tail(columns.cols());
+      }
+      Eigen::Map<Eigen::MatrixXd> block = scratch.take(size, size);
+      add_square(1.0, columns, 0.0, block);
+      KINESCOPE_CHECK(cholesky(block) == 0, "a block of an inverse is positive definite");
+      Eigen::VectorXd residual = alpha_(rows);
+      solve_lower(block, residual);
+      // log det of the predictive covariance is minus that of B_bb.
+      double log_density = block.diagonal().array().log().sum() - 0.5 * residual.squaredNorm();
+      log_density -= 0.5 * static_cast<double>(size) * std::log(2.0 * std::numbers::pi);
+      densities[static_cast<std::size_t>(fold)] = log_density;
+      solve_lower_transposed(block, residual);
+      block.triangularView<Eigen::StrictlyUpper>().setZero();
+      invert_lower(block);
+      for (Index k = 0; k < size; ++k) {
+        const Index row = rows[static_cast<std::size_t>(k)];
+        out.mean[row] = targets_[row] - residual[k];
+        out.variance[row] = block.col(k).squaredNorm();
+      }
+    });
+    for (const double density : densities) out.log_density += density;
+    return out;
+  }
+
+  // y - f = noise * alpha, var = noise - noise^2 B_ii.
+  [[nodiscard]] Moments at_training(Workers& workers) const override {
+    Eigen::MatrixXd inverse = factor_;
+    tiled_invert_lower(workers, inverse);
+    const Eigen::VectorXd diagonal = inverse.colwise().squaredNorm();
+    return {noise_.cwiseProduct(alpha_),
+            (noise_.array() - noise_.array().square() * diagonal.array()).max(0.0)};
+  }
+
+ private:
+  Covariance covariance_;
+  Prepared training_;
+  Eigen::VectorXd noise_;
+  Eigen::MatrixXd factor_;
+  Eigen::VectorXd targets_;
+  Eigen::VectorXd alpha_;
+};
+
+struct Factorised {
+  Eigen::MatrixXd factor;
+  double jitter = 0.0;
+};
+
+// Jitter grows tenfold from the rounding of the diagonal until the matrix has a factor.
+Factorised factorise(Workers& workers, const Covariance& covariance, const Prepared& training,
+                     const Eigen::VectorXd& noise, double max_jitter) {
+  const Index rows = noise.size();
+  Factorised out{Eigen::MatrixXd::Zero(rows, rows), 0.0};
+  double relative = 0.0;
+  while (true) {
+    covariance.lower(workers, training, out.factor);
+    out.factor.diagonal() += noise;
+    const double scale = out.factor.diagonal().mean();
+    out.jitter = relative * scale;
+    out.factor.diagonal().array() += out.jitter;
+    const Index failed = tiled_cholesky(workers, out.factor);
+    if (failed == 0) return out;
+    constexpr double kFirst = 1e-14;
+    relative = relative == 0.0 ? kFirst : 10.0 * relative;
+    if (relative > max_jitter) {
+      throw undetermined(
+          "kernel matrix",
+          fmt::format("not positive definite at sample {} of {}, even with {:.1e} of its mean "
+                      "diagonal added",
+                      (failed - 1) / covariance.outputs(), training.samples,
+                      std::max(0.0, max_jitter)),
+          "the same input twice without noise, or more samples than the kernel has features: raise "
+          "the noise variance");
+    }
+  }
+}
+
+}  // namespace
+
+Fit fit_dense(Workers& workers, const Kernel& kernel, const Eigen::VectorXd& log_noise,
+              Problem problem, const FitOptions& options) {
+  check_memory(problem.samples, problem.outputs, 1.0, options.memory_limit_bytes);
+  Covariance covariance(kernel);
+  Prepared training = covariance.prepare(problem.inputs);
+  const Eigen::VectorXd noise = noise_of_rows(problem, log_noise);
+  Factorised factorised = factorise(workers, covariance, training, noise, options.max_jitter);
+  Eigen::VectorXd alpha = problem.targets;
+  solve_lower(factorised.factor, alpha);
+  Fit out;
+  out.jitter = factorised.jitter;
+  out.log_likelihood = -0.5 * alpha.squaredNorm() -
+                       factorised.factor.diagonal().array().log().sum() -
+                       0.5 * static_cast<double>(alpha.size()) * std::log(2.0 * std::numbers::pi);
+  solve_lower_transposed(factorised.factor, alpha);
+  const Eigen::VectorXd total_noise = noise.array() + factorised.jitter;
+  out.posterior = std::make_shared<DensePosterior>(
+      std::move(covariance), std::move(training), total_noise, std::move(factorised.factor),
+      std::move(problem.targets), std::move(alpha));
+  return out;
+}
+
+}  // namespace kinescope::gp

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/gp/gram.h"
+
+#include <algorithm>
+
+namespace kinescope::gp {
+namespace {
+
+using Eigen::Index;
+
+// 256 x 256 doubles fill half of a usual second-level cache.
+constexpr Index kTileRows = 256;
+
+struct Tile {
+  Index row;
+  Index rows;
+  Index col;
+  Index cols;
+};
+
+std::vector<Tile> make_tiles(Index rows, Index cols, Index width, bool lower) {
+  std::vector<Tile> tiles;
+  for (Index col = 0; col < cols; col += width) {
+    for (Index row = lower ? col : 0; row < rows; row += width) {
+      tiles.push_back({row, std::min(width, rows - row), col, std::min(width, cols - col)});
+    }
+  }
+  return tiles;
+}
+
+// Output-major tile to sample-major block and back.
+void scatter(ConstBlock tile, Index outputs, Block out) {
+  const Index rows = tile.rows() / outputs;
+  const Index cols = tile.cols() / outputs;
+  for (Index b = 0; b < outputs; ++b) {
+    for (Index j = 0; j < cols; ++j) {
+      for (Index a = 0; a < outputs; ++a) {
+        for (Index i = 0; i < rows; ++i) {
+          out(i * outputs + a, j * outputs + b) = tile(a * rows + i, b * cols + j);
+        }
+      }
+    }
+  }
+}
+
+void gather(ConstBlock block, Index outputs, Block tile) {
+  const Index rows = tile.rows() / outputs;
+  const Index cols = tile.cols() / outputs;
+  for (Index b = 0; b < outputs; ++b) {
+    for (Index j = 0; j < cols; ++j) {
+      for (Index a = 0; a < outputs; ++a) {
+        for (Index i = 0; i < rows; ++i) {
+          tile(a * rows + i, b * cols + j) = block(i * outputs + a, j * outputs + b);
+        }
+      }
+    }
+  }
+}
+
+// In the order of the tiles, whoever worked on them.
+Eigen::VectorXd add_columns(const Eigen::MatrixXd& parts) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(parts.rows());
+  for (Index k = 0; k < parts.cols(); ++k) sum += parts.col(k);
+  return sum;
+}
+
+}  // namespace
+
+Covariance::Covariance(const Kernel& kernel)
+    : node_(kernel.shared_node()),
+      theta_(kernel.log_values()),
+      outputs_(kernel.outputs()),
+      tile_samples_(std::max<Index>(8, kTileRows / kernel.outputs())) {}
+
+void Covariance::prepare(Inputs inputs, Prepared& out) const {
+  node_->prepare(theta_, inputs, out);
+}
+
+Prepared Covariance::prepare(Inputs inputs) const {
+  Prepared out;
+  prepare(inputs, out);
+  return out;
+}
+
+void Covariance::tile(Samples a, Samples b, Scratch& scratch, Block out) const {
+  if (outputs_ == 1) {
+    node_->evaluate(theta_, a, b, scratch, out);
+    return;
+  }
+  const Scratch::Frame frame(scratch);
+  Eigen::Map<Eigen::MatrixXd> own = scratch.take(out.rows(), out.cols());
+  node_->evaluate(theta_, a, b, scratch, own);
+  scatter(own, outputs_, out);
+}
+
+void Covariance::lower(Workers& workers, const Prepared& x, Block out) const {
+  const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
+  const Index m = outputs_;
+  workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
+    const Tile& t = tiles[static_cast<std::size_t>(task)];
+    tile({x, t.row, t.rows}, {x, t.col, t.cols}, scratch,
+         out.block(t.row * m, t.col * m, t.rows * m, t.cols * m));
+  });
+}
+
+Eigen::MatrixXd Covariance::lower(Workers& workers, const Prepared& x) const {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(x.samples * outputs_, x.samples * outputs_);
+  lower(workers, x, out);
+  return out;
+}
+
+void Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y, Block out) const {
+  const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
+  const Index m = outputs_;
+  workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
+    const Tile& t = tiles[static_cast<std::size_t>(task)];
+    tile({x, t.row, t.rows}, {y, t.col, t.cols}, scratch,
+         out.block(t.row * m, t.col * m, t.rows * m, t.cols * m));
+  });
+}
+
+Eigen::MatrixXd Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y) const {
+  Eigen::MatrixXd out(x.samples * outputs_, y.samples * outputs_);
+  cross(workers, x, y, out);
+  return out;
+}
+
+Eigen::VectorXd Covariance::diagonal(Workers& workers, const Prepared& x) const {
+  Eigen::VectorXd out(x.samples * outputs_);
+  constexpr Index kChunk = 1024;
+  workers.run((x.samples + kChunk - 1) / kChunk, [&](Index task, Scratch& scratch) {
+    const Scratch::Frame frame(scratch);
+    Eigen::Map<Eigen::MatrixXd> own = scratch.take(outputs_, outputs_);
+    for (Index i = task * kChunk; i < std::min(x.samples, (task + 1) * kChunk); ++i) {
+      node_->evaluate(theta_, {x, i, 1}, {x, i, 1}, scratch, own);
+      out.segment(i * outputs_, outputs_) = own.diagonal();
+    }
+  });
+  return out;
+}
+
+void Covariance::contract_tile(Samples a, Samples b, ConstBlock q, Scratch& scratch,
+                               Gradient out) const {
+  if (outputs_ == 1) {
+    node_->contract(theta_, a, b, q, scratch, out);
+    return;
+  }
+  const Scratch::Frame frame(scratch);
+  Eigen::Map<Eigen::MatrixXd> own = scratch.take(q.rows(), q.cols());
+  gather(q, outputs_, own);
+  node_->contract(theta_, a, b, own, scratch, out);
+}
+
+Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
+                                           const Weights& weights) const {
+  const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
+  Eigen::MatrixXd parts =
+      Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
+  const Index m = outputs_;
+  workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
+    const Tile& t = tiles[static_cast<std::size_t>(task)];
+    const Scratch::Frame frame(scratch);
+    Eigen::Map<Eigen::MatrixXd> q = scratch.take(t.rows * m, t.cols * m);
+    weights(t.row * m, t.col * m, scratch, q);
+    if (t.row != t.col) q *= 2.0;
+    contract_tile({x, t.row, t.rows}, {x, t.col, t.cols}, q, scratch, parts.col(task));
+  });
+  return add_columns(parts);
+}
+
+Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const Prepared& y,
+                                     const Weights& weights) const {
+  const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
+  Eigen::MatrixXd parts =
+      Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
+  const Index m = outputs_;
+  workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
+    const Tile& t = tiles[static_cast<std::size_t>(task)];
+    const Scratch::Frame frame(scratch);
+    Eigen::Map<Eigen::MatrixXd> q = scratch.take(t.rows * m, t.cols * m);
+    weights(t.row * m, t.col * m, scratch, q);
+    contract_tile({x, t.row, t.rows}, {y, t.col, t.cols}, q, scratch, parts.col(task));
+  });
+  return add_columns(parts);
+}
+
+Eigen::VectorXd Covariance::contract_diagonal(Workers& workers, const Prepared& x,
+                                              const Eigen::VectorXd& q) const {
+  constexpr Index kChunk = 1024;
+  Eigen::MatrixXd parts =
+      Eigen::MatrixXd::Zero(theta_.size(), (x.samples + kChunk - 1) / kChunk);
+  workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
+    const Scratch::Frame frame(scratch);
+    Eigen::Map<Eigen::MatrixXd> own = scratch.take(outputs_, outputs_);
+    for (Index i = task * kChunk; i < std::min(x.samples, (task + 1) * kChunk); ++i) {
+      own.setZero();
+      own.diagonal() = q.segment(i * outputs_, outputs_);
+      node_->contract(theta_, {x, i, 1}, {x, i, 1}, own, scratch, parts.col(task));
+    }
+  });
+  return add_columns(parts);
+}
+
+}  // namespace kinescope::gp

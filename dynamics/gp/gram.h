@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Kernel matrices and contractions with their derivatives, tile by tile; internal.
+#pragma once
+
+#include <functional>
+
+#include "dynamics/gp/kernel_node.h"
+
+namespace kinescope::gp {
+
+/// A kernel with its parameters, ready for large matrices. Rows and columns of all matrices are
+/// sample-major: sample * outputs + output.
+class Covariance {
+ public:
+  explicit Covariance(const Kernel& kernel);
+
+  [[nodiscard]] Eigen::Index outputs() const { return outputs_; }
+  [[nodiscard]] Prepared prepare(Inputs inputs) const;
+  void prepare(Inputs inputs, Prepared& out) const;
+
+  /// The lower triangle of k(x, x); the tiles on the diagonal are complete, the rest is zero.
+  [[nodiscard]] Eigen::MatrixXd lower(Workers& workers, const Prepared& x) const;
+  void lower(Workers& workers, const Prepared& x, Block out) const;
+  [[nodiscard]] Eigen::MatrixXd cross(Workers& workers, const Prepared& x, const Prepared& y) const;
+  void cross(Workers& workers, const Prepared& x, const Prepared& y, Block out) const;
+  /// Some samples against some, in the calling thread.
+  void tile(Samples a, Samples b, Scratch& scratch, Block out) const;
+  /// k(x_i, x_i): samples * outputs.
+  [[nodiscard]] Eigen::VectorXd diagonal(Workers& workers, const Prepared& x) const;
+
+  /// Writes a block of Q; called once for each tile with row >= col (its first row and column).
+  using Weights = std::function<void(Eigen::Index row, Eigen::Index col, Scratch& scratch, Block)>;
+  /// d/dtheta sum_ij Q_ij k_ij over the whole symmetric matrix, from the tiles of its lower half.
+  [[nodiscard]] Eigen::VectorXd contract_lower(Workers& workers, const Prepared& x,
+                                               const Weights& weights) const;
+  /// The same for k(x, y) and any Q.
+  [[nodiscard]] Eigen::VectorXd contract(Workers& workers, const Prepared& x, const Prepared& y,
+                                         const Weights& weights) const;
+  /// The same for the diagonal.
+  [[nodiscard]] Eigen::VectorXd contract_diagonal(Workers& workers, const Prepared& x,
+                                                  const Eigen::VectorXd& q) const;
+
+  /// Samples in a tile.
+  [[nodiscard]] Eigen::Index tile_samples() const { return tile_samples_; }
+
+ private:
+  void contract_tile(Samples a, Samples b, ConstBlock q, Scratch& scratch, Gradient out) const;
+
+  std::shared_ptr<const KernelNode> node_;
+  Eigen::VectorXd theta_;
+  Eigen::Index outputs_;
+  Eigen::Index tile_samples_;
+};
+
+}  // namespace kinescope::gp

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a fit leaves behind, for each route; internal. Everything in normalised units, sample-major.
+#pragma once
+
+#include <vector>
+
+#include "dynamics/gp/feature_system.h"
+#include "dynamics/gp/gram.h"
+#include "dynamics/gp/problem.h"
+
+namespace kinescope::gp {
+
+struct Moments {
+  Eigen::VectorXd mean;
+  Eigen::VectorXd variance;  ///< empty where not asked for
+};
+
+/// Workspace of one-sample prediction.
+struct OneSample {
+  Scratch scratch;
+  Prepared prepared;
+  Eigen::MatrixXd input;       ///< 1 x columns
+  Eigen::MatrixXd cross;       ///< rows x outputs
+  Eigen::MatrixXd prior;       ///< outputs x outputs
+  Eigen::VectorXd mean;
+  Eigen::VectorXd variance;
+};
+
+/// Predictions for the targets that a fold leaves out.
+struct LeftOut {
+  Eigen::VectorXd mean;
+  Eigen::VectorXd variance;  ///< noise included
+  double log_density = 0.0;  ///< sum over the folds, joint within a fold
+};
+
+class Posterior {
+ public:
+  Posterior() = default;
+  virtual ~Posterior() = default;
+  Posterior(const Posterior&) = delete;
+  Posterior& operator=(const Posterior&) = delete;
+
+  [[nodiscard]] virtual Moments predict(Workers& workers, Inputs inputs, bool variance) const = 0;
+  virtual void mean_of_one(OneSample& work) const = 0;
+  virtual void variance_of_one(OneSample& work) const = 0;
+  /// `folds`: for each fold its samples.
+  [[nodiscard]] virtual LeftOut leave_out(
+      Workers& workers, const std::vector<std::vector<Eigen::Index>>& folds) const = 0;
+  /// y - E[f | y] and var[f | y] at the training samples.
+  [[nodiscard]] virtual Moments at_training(Workers& workers) const = 0;
+};
+
+struct Fit {
+  std::shared_ptr<const Posterior> posterior;
+  double log_likelihood = 0.0;
+  double jitter = 0.0;
+  Eigen::Index features = 0;
+};
+
+[[nodiscard]] Fit fit_dense(Workers& workers, const Kernel& kernel,
+                            const Eigen::VectorXd& log_noise, Problem problem,
+                            const FitOptions& options);
+[[nodiscard]] Fit fit_features(Workers& workers, const Kernel& kernel,
+                               const Eigen::VectorXd& log_noise, Problem problem);
+
+}  // namespace kinescope::gp

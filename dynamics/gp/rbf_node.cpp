@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Squared exponential. Distances come from one product of scaled features, derivatives by the
+// length scales from row and column sums of M = Q o K and one product M X, never from an
+// (N, N, D) tensor:
+//   sum_ij M_ij (x_id - y_jd)^2 = sum_i r_i x_id^2 + sum_j c_j y_jd^2 - 2 sum_i x_id (M Y)_id.
+#include <cmath>
+#include <utility>
+
+#include "dynamics/gp/kernel_node.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::gp {
+namespace {
+
+using Eigen::Index;
+
+class RbfNode : public KernelNode {
+ public:
+  RbfNode(FeatureMap map, LengthScales scales, Amplitude amplitude)
+      : map_(std::move(map)),
+        common_(scales == LengthScales::kCommon),
+        free_amplitude_(amplitude == Amplitude::kFree) {}
+
+  [[nodiscard]] int input_columns() const override { return map_.input_columns; }
+  [[nodiscard]] Index parameter_count() const override {
+    return first_scale() + (common_ ? 1 : map_.size());
+  }
+
+  // Tables: features / length scale; half of their squared norm.
+  void prepare(Theta theta, Inputs inputs, Prepared& out) const override {
+    out.samples = inputs.rows();
+    out.tables.resize(2);
+    Eigen::MatrixXd& scaled = out.tables[0];
+    scaled.resize(inputs.rows(), map_.size());
+    map_.map(inputs, scaled);
+    for (Index d = 0; d < map_.size(); ++d) scaled.col(d) *= std::exp(-theta[scale_index(d)]);
+    out.tables[1].resize(inputs.rows(), 1);
+    out.tables[1].setZero();
+    for (Index d = 0; d < map_.size(); ++d) {
+      out.tables[1].col(0).array() += 0.5 * scaled.col(d).array().square();
+    }
+  }
+
+  void evaluate(Theta theta, Samples a, Samples b, Scratch&, Block out) const override {
+    product_transposed(1.0, a.rows(0), b.rows(0), 0.0, out);
+    const double log_variance = free_amplitude_ ? theta[0] : 0.0;
+    const auto half_a = a.rows(1).col(0).array();
+    const auto half_b = b.rows(1).col(0).array();
+    for (Index j = 0; j < b.size; ++j) {
+      // Rounding may leave a squared distance below zero.
+      out.col(j).array() = ((out.col(j).array() - half_a - half_b[j]).min(0.0) + log_variance).exp();
+    }
+  }
+
+  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+                Gradient gradient) const override {
+    const Scratch::Frame frame(scratch);
+    Eigen::Map<Eigen::MatrixXd> m = scratch.take(a.size, b.size);
+    evaluate(theta, a, b, scratch, m);
+    m.array() *= q.array();
+    Eigen::Map<Eigen::MatrixXd> sums = scratch.take(a.size, 1);
+    sums.setZero();
+    Eigen::Map<Eigen::MatrixXd> my = scratch.take(a.size, map_.size());
+    product(1.0, m, b.rows(0), 0.0, my);
+    const auto x = a.rows(0);
+    const auto y = b.rows(0);
+    double total = 0.0;
+    for (Index j = 0; j < b.size; ++j) {
+      const double c = m.col(j).sum();
+      total += c;
+      sums.col(0) += m.col(j);
+      for (Index d = 0; d < map_.size(); ++d) gradient[scale_index(d)] += c * y(j, d) * y(j, d);
+    }
+    for (Index d = 0; d < map_.size(); ++d) {
+      gradient[scale_index(d)] += (x.col(d).array() * (sums.col(0).array() * x.col(d).array() -
+                                                       2.0 * my.col(d).array()))
+                                      .sum();
+    }
+    if (free_amplitude_) gradient[0] += total;
+  }
+
+ private:
+  [[nodiscard]] Index first_scale() const { return free_amplitude_ ? 1 : 0; }
+  [[nodiscard]] Index scale_index(Index d) const { return first_scale() + (common_ ? 0 : d); }
+
+  FeatureMap map_;
+  bool common_;
+  bool free_amplitude_;
+};
+
+}  // namespace
+
+Kernel rbf(FeatureMap map, LengthScales scales, Amplitude amplitude) {
+  KINESCOPE_CHECK(map.size() > 0, "at least one feature");
+  std::vector<Parameter> parameters;
+  if (amplitude == Amplitude::kFree) parameters.push_back({.name = "rbf variance"});
+  if (scales == LengthScales::kCommon) {
+    parameters.push_back({.name = "rbf length scale", .lower = 1e-2, .upper = 1e3});
+  } else {
+    for (const std::string& name : map.names) {
+      parameters.push_back({.name = "rbf length scale " + name, .lower = 1e-2, .upper = 1e3});
+    }
+  }
+  return {std::make_shared<RbfNode>(std::move(map), scales, amplitude), std::move(parameters)};
+}
+
+}  // namespace kinescope::gp
