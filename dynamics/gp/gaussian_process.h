@@ -32,6 +32,7 @@ enum class Route {
   kAuto,      ///< features where there are clearly fewer of them than samples
   kDense,     ///< the kernel matrix: N^3 / 3
   kFeatures,  ///< N d^2
+  kSparse,    ///< of fit_sparse() only
 };
 
 struct FitOptions {
@@ -57,7 +58,7 @@ struct FittedGp {
   double log_likelihood = 0.0;  ///< of the normalised targets
   double jitter = 0.0;          ///< added to the diagonal, normalised units; 0 as a rule
   Eigen::Index samples = 0;
-  Eigen::Index features = 0;    ///< of the route kFeatures
+  Eigen::Index features = 0;    ///< of the route kFeatures; of kSparse: inducing points
   std::shared_ptr<const Posterior> posterior;
 };
 

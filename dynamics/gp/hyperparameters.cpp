@@ -187,19 +187,24 @@ Eigen::VectorXd best_start(const GpModel& model, const Dataset& dataset,
 
 Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
                                   const EstimateOptions& options) {
+  const auto objective = make_objective(model, dataset, options.fit, options.score);
+  return estimate_hyperparameters(model, dataset, *objective, options);
+}
+
+Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
+                                  Objective& objective, const EstimateOptions& options) {
   // Ceres says in its summary what it also prints.
   FLAGS_minloglevel = google::GLOG_FATAL;
   const std::vector<Parameter> parameters = parameters_of(model);
   const std::vector<Free> free = free_parameters(parameters);
   const Eigen::VectorXd before = log_values_of(model);
   Estimate out{model, EstimateStatus::kFailed, "", 0.0, 0.0, {}, 0, {}, {}};
-  const auto objective = make_objective(model, dataset, options.fit, options.score);
-  std::optional<Likelihood> score = objective->evaluate(before);
+  std::optional<Likelihood> score = objective.evaluate(before);
   out.score_before = score ? score->value : -std::numeric_limits<double>::infinity();
   Eigen::VectorXd values = before;
   if (!free.empty()) {
     const Eigen::VectorXd start = best_start(model, dataset, free, options, out);
-    const Climb climbed = climb(*objective, free, before, start, options);
+    const Climb climbed = climb(objective, free, before, start, options);
     out.evaluations = climbed.evaluations;
     out.message = climbed.message;
     if (climbed.usable) {
@@ -208,7 +213,7 @@ Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
       }
       out.status =
           climbed.converged ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit;
-      score = objective->evaluate(values);
+      score = objective.evaluate(values);
     }
   } else {
     out.status = score ? EstimateStatus::kConverged : EstimateStatus::kFailed;

@@ -50,5 +50,9 @@ struct Estimate {
 
 [[nodiscard]] Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
                                                 const EstimateOptions& options = {});
+/// The same for another score of all samples.
+[[nodiscard]] Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
+                                                Objective& objective,
+                                                const EstimateOptions& options);
 
 }  // namespace kinescope::gp

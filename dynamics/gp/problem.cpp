@@ -121,6 +121,9 @@ Eigen::VectorXd noise_gradient(const Problem&, const Eigen::Ref<const Eigen::Vec
 
 Route choose_route(const Kernel& kernel, const Problem& problem, Route wanted) {
   const std::optional<double> features = kernel.node().feature_count();
+  if (wanted == Route::kSparse) {
+    throw bad_request("route", "inducing points have a function of their own", "call fit_sparse()");
+  }
   if (wanted == Route::kFeatures && !features) {
     throw bad_request("route", "the kernel has infinitely many features", "use the dense route");
   }

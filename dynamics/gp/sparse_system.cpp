@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/gp/sparse_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/gp/tiled_cholesky.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::gp {
+namespace {
+
+using Eigen::Index;
+
+Index chunk_for(Index features) { return std::max<Index>(1024, 2 * features); }
+
+bool factorise(Workers& workers, const Covariance& covariance, const Prepared& inducing,
+               double max_jitter, Eigen::MatrixXd& factor, double& jitter) {
+  for (double relative = 1e-14; relative <= max_jitter * 1.0001; relative *= 10.0) {
+    factor = covariance.lower(workers, inducing);
+    jitter = relative * factor.diagonal().mean();
+    factor.diagonal().array() += jitter;
+    if (!factor.diagonal().allFinite()) return false;
+    if (tiled_cholesky(workers, factor) == 0) return true;
+  }
+  return false;
+}
+
+void absorb(Eigen::MatrixXd& triangle, const Eigen::MatrixXd& rows) {
+  Eigen::MatrixXd stacked(triangle.rows() + rows.rows(), rows.cols());
+  stacked << triangle, rows;
+  upper_of_qr(stacked);
+  triangle = stacked.topRows(rows.cols()).triangularView<Eigen::Upper>();
+}
+
+void press_samples(Workers& workers, const Problem& problem, SparseSystem& system) {
+  const Index m = system.count();
+  const Prepared at = system.covariance.prepare(problem.inputs);
+  const Eigen::VectorXd prior = system.covariance.diagonal(workers, at);
+  const Eigen::VectorXd noise = noise_of_rows(problem, system.log_noise);
+  const Index chunk = chunk_for(m);
+  const Index chunks = (problem.samples + chunk - 1) / chunk;
+  std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(chunks));
+  std::vector<double> lost(static_cast<std::size_t>(chunks));
+  workers.run(chunks, [&](Index task, Scratch& scratch) {
+    const Index begin = task * chunk;
+    const Index size = std::min(chunk, problem.samples - begin);
+    Eigen::MatrixXd rows(size, m + 1);
+    system.features(at, begin, scratch, rows.leftCols(m));
+    lost[static_cast<std::size_t>(task)] =
+        ((prior.segment(begin, size) - rows.leftCols(m).rowwise().squaredNorm()).cwiseMax(0.0))
+            .cwiseQuotient(noise.segment(begin, size))
+            .sum();
+    rows.col(m) = problem.targets.segment(begin, size);
+    rows = problem.noise_scale.segment(begin, size).cwiseSqrt().cwiseInverse().asDiagonal() * rows;
+    Eigen::MatrixXd triangle = Eigen::MatrixXd::Zero(m + 1, m + 1);
+    absorb(triangle, rows);
+    parts[static_cast<std::size_t>(task)] = std::move(triangle);
+  });
+  PressedOutput pressed{Eigen::MatrixXd::Zero(m + 1, m + 1), problem.samples,
+                        problem.noise_scale.array().log().sum()};
+  for (std::size_t c = 0; c < parts.size(); ++c) {
+    absorb(pressed.triangle, parts[c]);
+    system.lost += lost[c];
+  }
+  system.pressed.outputs = {std::move(pressed)};
+  system.pressed.exponents.resize(m, 0);
+}
+
+}  // namespace
+
+void SparseSystem::features(const Prepared& at, Index begin, Scratch& scratch, Block out) const {
+  const Index width = covariance.tile_samples();
+  for (Index row = 0; row < out.rows(); row += width) {
+    const Index rows = std::min(width, out.rows() - row);
+    for (Index col = 0; col < count(); col += width) {
+      const Index cols = std::min(width, count() - col);
+      covariance.tile({at, begin + row, rows}, {inducing, col, cols}, scratch,
+                      out.block(row, col, rows, cols));
+    }
+  }
+  solve_lower_transposed_right(factor, out);
+}
+
+std::optional<SparseSystem> make_sparse_system(Workers& workers, const Kernel& kernel,
+                                               const Eigen::VectorXd& log_noise,
+                                               const Problem& problem,
+                                               const Eigen::MatrixXd& inducing, double max_jitter) {
+  SparseSystem out{Covariance(kernel), {}, {}, 0.0, {}, {}, log_noise, 0.0, 0.0};
+  out.inducing = out.covariance.prepare(inducing);
+  if (!factorise(workers, out.covariance, out.inducing, max_jitter, out.factor, out.jitter)) {
+    return std::nullopt;
+  }
+  press_samples(workers, problem, out);
+  out.solution = solve(out.pressed, Eigen::VectorXd(), log_noise);
+  // Titsias 2009, eq. 9.
+  out.bound = out.solution.log_likelihood - 0.5 * out.lost;
+  return out;
+}
+
+// With Q = Phi Phi' the approximate kernel matrix, G = d bound / dQ obeys
+//   2 G Phi = alpha w' + S^-1 Phi (1 - A^-1),  2 Phi' G Phi = w w' + A - 2 + A^-1,
+// and d bound = tr(2 G P dK_xz') - tr(P' G P dK_zz) - sum dk_ii / (2 s_i), P = Phi L^-1.
+Eigen::VectorXd bound_gradient(Workers& workers, const SparseSystem& system,
+                               const Problem& problem) {
+  const Index m = system.count();
+  const Eigen::VectorXd& w = system.solution.weights;
+  const Eigen::MatrixXd& u = system.solution.lower;
+  Eigen::MatrixXd inverse_factor = u;
+  invert_lower(inverse_factor);
+  Eigen::MatrixXd a_inverse(m, m);
+  transposed_product(1.0, inverse_factor, inverse_factor, 0.0, a_inverse);
+  Eigen::MatrixXd a(m, m);
+  product_transposed(1.0, u, u, 0.0, a);
+  const Prepared at = system.covariance.prepare(problem.inputs);
+  const Eigen::VectorXd noise = noise_of_rows(problem, system.log_noise);
+
+  // K_zz.
+  Eigen::MatrixXd middle = a + a_inverse + w * w.transpose();
+  middle.diagonal().array() -= 2.0;
+  solve_lower_transposed(system.factor, middle);
+  solve_lower_right(system.factor, middle);
+  Eigen::VectorXd theta = system.covariance.contract_lower(
+      workers, system.inducing, [&](Index row, Index col, Scratch&, Block q) {
+        q = -0.5 * middle.block(row, col, q.rows(), q.cols());
+      });
+  // K_xz, tile rows share their features: whole chunks of samples.
+  const Eigen::MatrixXd damping = Eigen::MatrixXd::Identity(m, m) - a_inverse;
+  const Index chunk = chunk_for(m);
+  for (Index begin = 0; begin < problem.samples; begin += chunk) {
+    const Index size = std::min(chunk, problem.samples - begin);
+    Eigen::MatrixXd phi(size, m);
+    system.features(at, begin, workers.scratch(), phi);
+    const auto s = noise.segment(begin, size);
+    const Eigen::VectorXd alpha = (problem.targets.segment(begin, size) - phi * w).cwiseQuotient(s);
+    Eigen::MatrixXd weights = alpha * w.transpose();
+    phi = s.cwiseInverse().asDiagonal() * phi;
+    product(1.0, phi, damping, 1.0, weights);
+    solve_lower_right(system.factor, weights);
+    const Prepared part = system.covariance.prepare(problem.inputs.middleRows(begin, size));
+    theta += system.covariance.contract(workers, part, system.inducing,
+                                        [&](Index row, Index col, Scratch&, Block q) {
+                                          q = weights.block(row, col, q.rows(), q.cols());
+                                        });
+  }
+  theta += system.covariance.contract_diagonal(workers, at, -0.5 * noise.cwiseInverse());
+  Eigen::VectorXd out(theta.size() + system.log_noise.size());
+  out.head(theta.size()) = theta;
+  out.tail(system.log_noise.size()) =
+      likelihood_gradient(system.pressed, system.solution, system.log_noise);
+  out[theta.size()] += 0.5 * system.lost;
+  return out;
+}
+
+}  // namespace kinescope::gp
