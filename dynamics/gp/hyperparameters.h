@@ -16,7 +16,7 @@
 namespace kinescope::gp {
 
 struct EstimateOptions {
-  FitOptions fit;
+  FitOptions fit{};
   Score score = Score::kMarginalLikelihood;
   int starts = 3;                ///< the model's own values, and others drawn about them
   double start_log_sigma = 1.0;  ///< of the drawn ones

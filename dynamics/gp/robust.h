@@ -16,7 +16,7 @@ struct StudentOptions {
   int max_iterations = 50;
   double tolerance = 1e-4;  ///< largest change of a weight at which the iteration ends
   bool estimate_scale = true;  ///< the noise variance follows the weighted residuals
-  FitOptions fit;
+  FitOptions fit{};
 };
 
 struct RobustFit {
@@ -33,7 +33,7 @@ struct RobustFit {
 struct TrimOptions {
   double widen = 3.0;      ///< factor on all length scales in the first fit
   double share = 0.1;      ///< of the samples that are left out
-  FitOptions fit;
+  FitOptions fit{};
 };
 
 struct TrimmedFit {
