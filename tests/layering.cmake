@@ -39,6 +39,8 @@ set(third_parties
     "libav: calib/vision"
     "libsw: calib/vision"
     "ceres/: calib/bundle dynamics/identify"
+    "ceres/: calib/bundle dynamics/gp"
+    "cblas: dynamics/gp"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"
     "tinyxml: kinematics/urdf calib/camera"

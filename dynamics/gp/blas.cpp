@@ -11,6 +11,7 @@
 
 // OpenBLAS holds LAPACK; Debian ships its C interface in another package, so these are declared
 // here.
+// NOLINTBEGIN(readability-identifier-naming): the names LAPACK has.
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void dtrtri_(const char* uplo, const char* diag, const int* n, double* a, const int* lda,
@@ -18,11 +19,12 @@ void dtrtri_(const char* uplo, const char* diag, const int* n, double* a, const 
 void dgeqrf_(const int* m, const int* n, double* a, const int* lda, double* tau, double* work,
              const int* lwork, int* info);
 }
+// NOLINTEND(readability-identifier-naming)
 
 namespace kinescope::gp {
 namespace {
 
-std::mutex guard_mutex;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+std::mutex guard_mutex;
 int guard_depth = 0;
 int threads_before = 0;
 
@@ -80,28 +82,32 @@ SingleThreadedBlas::~SingleThreadedBlas() {
   if (--guard_depth == 0) openblas_set_num_threads(threads_before);
 }
 
-void product_transposed(double alpha, ConstBlock a, ConstBlock b, double beta, Block c) {
+void product_transposed(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,
+                        Block c) {
   gemm(CblasNoTrans, CblasTrans, a.cols(), alpha, a, b, beta, c);
 }
 
-void product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c) {
+void product(double alpha, const ConstBlock& a, const ConstBlock& b, double beta, Block c) {
   gemm(CblasNoTrans, CblasNoTrans, a.cols(), alpha, a, b, beta, c);
 }
 
-void transposed_product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c) {
+void transposed_product(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,
+                        Block c) {
   gemm(CblasTrans, CblasNoTrans, a.rows(), alpha, a, b, beta, c);
 }
 
-void add_square(double alpha, ConstBlock a, double beta, Block c) {
+void add_square(double alpha, const ConstBlock& a, double beta, Block c) {
   if (empty(c)) return;
   cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, as_int(c.rows()), as_int(a.cols()), alpha,
               a.data(), stride(a), beta, c.data(), stride(c));
 }
 
-void solve_lower(ConstBlock l, Block b) { trsm(CblasLeft, CblasNoTrans, l, b); }
-void solve_lower_transposed(ConstBlock l, Block b) { trsm(CblasLeft, CblasTrans, l, b); }
-void solve_lower_transposed_right(ConstBlock l, Block b) { trsm(CblasRight, CblasTrans, l, b); }
-void solve_lower_right(ConstBlock l, Block b) { trsm(CblasRight, CblasNoTrans, l, b); }
+void solve_lower(const ConstBlock& l, Block b) { trsm(CblasLeft, CblasNoTrans, l, b); }
+void solve_lower_transposed(const ConstBlock& l, Block b) { trsm(CblasLeft, CblasTrans, l, b); }
+void solve_lower_transposed_right(const ConstBlock& l, Block b) {
+  trsm(CblasRight, CblasTrans, l, b);
+}
+void solve_lower_right(const ConstBlock& l, Block b) { trsm(CblasRight, CblasNoTrans, l, b); }
 
 int cholesky(Block a) {
   if (empty(a)) return 0;

@@ -25,22 +25,24 @@ class SingleThreadedBlas {
 };
 
 /// c = alpha * a * b' + beta * c.
-void product_transposed(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+void product_transposed(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,
+                        Block c);
 /// c = alpha * a * b + beta * c.
-void product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+void product(double alpha, const ConstBlock& a, const ConstBlock& b, double beta, Block c);
 /// c = alpha * a' * b + beta * c.
-void transposed_product(double alpha, ConstBlock a, ConstBlock b, double beta, Block c);
+void transposed_product(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,
+                        Block c);
 /// Lower triangle of c = alpha * a * a' + beta * c.
-void add_square(double alpha, ConstBlock a, double beta, Block c);
+void add_square(double alpha, const ConstBlock& a, double beta, Block c);
 
 /// b = l^-1 b, with l lower triangular (only its lower triangle is read).
-void solve_lower(ConstBlock l, Block b);
+void solve_lower(const ConstBlock& l, Block b);
 /// b = l'^-1 b.
-void solve_lower_transposed(ConstBlock l, Block b);
+void solve_lower_transposed(const ConstBlock& l, Block b);
 /// b = b l'^-1.
-void solve_lower_transposed_right(ConstBlock l, Block b);
+void solve_lower_transposed_right(const ConstBlock& l, Block b);
 /// b = b l^-1.
-void solve_lower_right(ConstBlock l, Block b);
+void solve_lower_right(const ConstBlock& l, Block b);
 
 /// Cholesky factor in place (lower triangle). Returns 0, or the 1-based row whose pivot is not
 /// positive.

@@ -22,9 +22,9 @@ struct Spread {
 Spread spread_of(const Eigen::MatrixXd& values) {
   Spread out;
   out.mean = values.colwise().mean();
-  out.deviation = ((values.rowwise() - out.mean).colwise().squaredNorm() /
-                   static_cast<double>(values.rows()))
-                      .cwiseSqrt();
+  out.deviation =
+      ((values.rowwise() - out.mean).colwise().squaredNorm() / static_cast<double>(values.rows()))
+          .cwiseSqrt();
   for (Eigen::Index k = 0; k < out.deviation.size(); ++k) {
     // A constant column has a deviation of a few roundings.
     if (!(out.deviation[k] > 1e-12 * std::abs(out.mean[k]))) out.deviation[k] = 1.0;
@@ -39,7 +39,7 @@ Dataset subset(const Dataset& dataset, const std::vector<Eigen::Index>& indices)
           rows_of(dataset.prior_mean, indices), rows_of(dataset.noise_scale, indices)};
 }
 
-Eigen::MatrixXd Normalisation::normalised_inputs(Inputs inputs) const {
+Eigen::MatrixXd Normalisation::normalised_inputs(const Inputs& inputs) const {
   if (input_shift.size() == 0) return inputs;
   KINESCOPE_CHECK(inputs.cols() == input_shift.size(), "as many columns as were normalised");
   return (inputs.rowwise() - input_shift).array().rowwise() / input_scale.array();
@@ -66,7 +66,7 @@ Normalisation standardise(const Dataset& dataset) {
 
 MeanFunction linear_mean(FeatureMap map, Eigen::MatrixXd coefficients) {
   KINESCOPE_CHECK(coefficients.rows() == map.size(), "one row of coefficients for each feature");
-  return [map = std::move(map), coefficients = std::move(coefficients)](Inputs inputs) {
+  return [map = std::move(map), coefficients = std::move(coefficients)](const Inputs& inputs) {
     return Eigen::MatrixXd(map(inputs) * coefficients);
   };
 }

@@ -10,9 +10,9 @@
 namespace kinescope::gp {
 
 struct Dataset {
-  Eigen::MatrixXd inputs;       ///< samples x columns
-  Eigen::MatrixXd targets;      ///< samples x outputs
-  Eigen::MatrixXd prior_mean;   ///< samples x outputs, what is known of the targets; empty: nothing
+  Eigen::MatrixXd inputs;      ///< samples x columns
+  Eigen::MatrixXd targets;     ///< samples x outputs
+  Eigen::MatrixXd prior_mean;  ///< samples x outputs, what is known of the targets; empty: nothing
   /// samples x outputs: noise variance of each target, relative to the model's; empty: all 1.
   Eigen::MatrixXd noise_scale;
 
@@ -29,7 +29,7 @@ struct Normalisation {
   Eigen::RowVectorXd target_shift;
   Eigen::RowVectorXd target_scale;
 
-  [[nodiscard]] Eigen::MatrixXd normalised_inputs(Inputs inputs) const;
+  [[nodiscard]] Eigen::MatrixXd normalised_inputs(const Inputs& inputs) const;
 };
 
 /// Mean 0 and standard deviation 1 of every input column and of every target less its prior mean;
@@ -39,7 +39,7 @@ struct Normalisation {
 [[nodiscard]] Normalisation standardise_targets(const Dataset& dataset);
 
 /// Prior mean of the outputs: inputs (as given, not normalised) -> samples x outputs.
-using MeanFunction = std::function<Eigen::MatrixXd(Inputs)>;
+using MeanFunction = std::function<Eigen::MatrixXd(const Inputs&)>;
 /// features * coefficients (features x outputs).
 [[nodiscard]] MeanFunction linear_mean(FeatureMap map, Eigen::MatrixXd coefficients);
 

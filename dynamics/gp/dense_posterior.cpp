@@ -26,7 +26,8 @@ class DensePosterior : public Posterior {
         targets_(std::move(targets)),
         alpha_(std::move(alpha)) {}
 
-  [[nodiscard]] Moments predict(Workers& workers, Inputs inputs, bool variance) const override {
+  [[nodiscard]] Moments predict(Workers& workers, const Inputs& inputs,
+                                bool variance) const override {
     const Index m = covariance_.outputs();
     const Prepared at = covariance_.prepare(inputs);
     Moments out;
@@ -78,8 +79,7 @@ class DensePosterior : public Posterior {
   [[nodiscard]] LeftOut leave_out(Workers& workers,
                                   const std::vector<std::vector<Index>>& folds) const override {
     const Index m = covariance_.outputs();
-    Eigen::MatrixXd inverse = factor_;
-    tiled_invert_lower(workers, inverse);
+    const Eigen::MatrixXd inverse = inverse_factor(workers);
     LeftOut out{targets_, Eigen::VectorXd::Zero(targets_.size()), 0.0};
     std::vector<double> densities(folds.size());
     workers.run(static_cast<Index>(folds.size()), [&](Index fold, Scratch& scratch) {
@@ -119,14 +119,20 @@ class DensePosterior : public Posterior {
 
   // y - f = noise * alpha, var = noise - noise^2 B_ii.
   [[nodiscard]] Moments at_training(Workers& workers) const override {
-    Eigen::MatrixXd inverse = factor_;
-    tiled_invert_lower(workers, inverse);
+    const Eigen::MatrixXd inverse = inverse_factor(workers);
     const Eigen::VectorXd diagonal = inverse.colwise().squaredNorm();
     return {noise_.cwiseProduct(alpha_),
             (noise_.array() - noise_.array().square() * diagonal.array()).max(0.0)};
   }
 
  private:
+  [[nodiscard]] Eigen::MatrixXd inverse_factor(Workers& workers) const {
+    check_memory(training_.samples, covariance_.outputs(), 1.0, 0);
+    Eigen::MatrixXd inverse = factor_;
+    tiled_invert_lower(workers, inverse);
+    return inverse;
+  }
+
   Covariance covariance_;
   Prepared training_;
   Eigen::VectorXd noise_;
@@ -187,9 +193,9 @@ Fit fit_dense(Workers& workers, const Kernel& kernel, const Eigen::VectorXd& log
                        0.5 * static_cast<double>(alpha.size()) * std::log(2.0 * std::numbers::pi);
   solve_lower_transposed(factorised.factor, alpha);
   const Eigen::VectorXd total_noise = noise.array() + factorised.jitter;
-  out.posterior = std::make_shared<DensePosterior>(
-      std::move(covariance), std::move(training), total_noise, std::move(factorised.factor),
-      std::move(problem.targets), std::move(alpha));
+  out.posterior = std::make_shared<DensePosterior>(std::move(covariance), std::move(training),
+                                                   total_noise, std::move(factorised.factor),
+                                                   std::move(problem.targets), std::move(alpha));
   return out;
 }
 

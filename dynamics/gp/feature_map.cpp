@@ -10,7 +10,7 @@
 
 namespace kinescope::gp {
 
-Eigen::MatrixXd FeatureMap::operator()(Inputs inputs) const {
+Eigen::MatrixXd FeatureMap::operator()(const Inputs& inputs) const {
   Eigen::MatrixXd features(inputs.rows(), size());
   map(inputs, features);
   return features;
@@ -23,7 +23,7 @@ FeatureMap columns(std::vector<int> indices) {
     out.names.push_back(fmt::format("x{}", index));
     out.input_columns = std::max(out.input_columns, index + 1);
   }
-  out.map = [indices = std::move(indices)](Inputs inputs, Features features) {
+  out.map = [indices = std::move(indices)](const Inputs& inputs, Features features) {
     for (std::size_t k = 0; k < indices.size(); ++k) {
       features.col(static_cast<Eigen::Index>(k)) = inputs.col(indices[k]);
     }
@@ -41,7 +41,7 @@ FeatureMap angle(int column) {
   KINESCOPE_CHECK(column >= 0, "a negative column");
   return {{fmt::format("cos x{}", column), fmt::format("sin x{}", column)},
           column + 1,
-          [column](Inputs inputs, Features features) {
+          [column](const Inputs& inputs, Features features) {
             features.col(0) = inputs.col(column).array().cos();
             features.col(1) = inputs.col(column).array().sin();
           }};
@@ -50,7 +50,7 @@ FeatureMap angle(int column) {
 FeatureMap joined(FeatureMap a, FeatureMap b) {
   FeatureMap out{a.names, std::max(a.input_columns, b.input_columns), {}};
   out.names.insert(out.names.end(), b.names.begin(), b.names.end());
-  out.map = [a = std::move(a), b = std::move(b)](Inputs inputs, Features features) {
+  out.map = [a = std::move(a), b = std::move(b)](const Inputs& inputs, Features features) {
     a.map(inputs, features.leftCols(a.size()));
     b.map(inputs, features.rightCols(b.size()));
   };
@@ -61,7 +61,8 @@ FeatureMap mixed(FeatureMap map, Eigen::MatrixXd mixing) {
   KINESCOPE_CHECK(mixing.rows() == map.size(), "one row of `mixing` for each feature");
   FeatureMap out{{}, map.input_columns, {}};
   for (Eigen::Index k = 0; k < mixing.cols(); ++k) out.names.push_back(fmt::format("mix {}", k));
-  out.map = [map = std::move(map), mixing = std::move(mixing)](Inputs inputs, Features features) {
+  out.map = [map = std::move(map), mixing = std::move(mixing)](const Inputs& inputs,
+                                                               Features features) {
     features.noalias() = map(inputs) * mixing;
   };
   return out;
@@ -69,17 +70,18 @@ FeatureMap mixed(FeatureMap map, Eigen::MatrixXd mixing) {
 
 FeatureMap friction(int velocity_column, double transition_velocity) {
   KINESCOPE_CHECK(velocity_column >= 0 && transition_velocity >= 0.0, "a negative argument");
-  return {{fmt::format("viscous x{}", velocity_column), fmt::format("Coulomb x{}", velocity_column)},
-          velocity_column + 1,
-          [velocity_column, transition_velocity](Inputs inputs, Features features) {
-            const auto velocity = inputs.col(velocity_column).array();
-            features.col(0) = velocity;
-            if (transition_velocity > 0.0) {
-              features.col(1) = (velocity / transition_velocity).tanh();
-            } else {
-              features.col(1) = velocity.sign();
-            }
-          }};
+  return {
+      {fmt::format("viscous x{}", velocity_column), fmt::format("Coulomb x{}", velocity_column)},
+      velocity_column + 1,
+      [velocity_column, transition_velocity](const Inputs& inputs, Features features) {
+        const auto velocity = inputs.col(velocity_column).array();
+        features.col(0) = velocity;
+        if (transition_velocity > 0.0) {
+          features.col(1) = (velocity / transition_velocity).tanh();
+        } else {
+          features.col(1) = velocity.sign();
+        }
+      }};
 }
 
 }  // namespace kinescope::gp

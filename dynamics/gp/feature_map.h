@@ -19,10 +19,10 @@ struct FeatureMap {
   std::vector<std::string> names;  ///< one for each feature
   int input_columns = 0;           ///< the inputs must have at least so many
   /// Writes samples x features. Must treat every sample (row) alike and alone.
-  std::function<void(Inputs inputs, Features features)> map;
+  std::function<void(const Inputs& inputs, Features features)> map;
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(names.size()); }
-  [[nodiscard]] Eigen::MatrixXd operator()(Inputs inputs) const;
+  [[nodiscard]] Eigen::MatrixXd operator()(const Inputs& inputs) const;
 };
 
 /// The columns as they are. Names: "x0", "x1", ..

@@ -26,7 +26,8 @@ class FeaturePosterior : public Posterior {
   FeaturePosterior(Given given, FeatureSolution solution)
       : given_(std::move(given)), solution_(std::move(solution)) {}
 
-  [[nodiscard]] Moments predict(Workers& workers, Inputs inputs, bool variance) const override {
+  [[nodiscard]] Moments predict(Workers& workers, const Inputs& inputs,
+                                bool variance) const override {
     return moments(workers, inputs, variance, solution_);
   }
 
@@ -78,7 +79,7 @@ class FeaturePosterior : public Posterior {
 
  private:
   // (outputs * samples, sample-major) x features.
-  [[nodiscard]] Eigen::MatrixXd scaled_features(Inputs inputs,
+  [[nodiscard]] Eigen::MatrixXd scaled_features(const Inputs& inputs,
                                                 const FeatureSolution& solution) const {
     const Basis basis = given_.node->basis(inputs);
     const Index m = given_.problem.outputs;
@@ -93,7 +94,7 @@ class FeaturePosterior : public Posterior {
     return out;
   }
 
-  [[nodiscard]] Moments moments(Workers& workers, Inputs inputs, bool variance,
+  [[nodiscard]] Moments moments(Workers& workers, const Inputs& inputs, bool variance,
                                 const FeatureSolution& solution) const {
     const Index m = given_.problem.outputs;
     Moments out;

@@ -124,8 +124,7 @@ FeatureSolution solve(const FeatureSystem& system, const Eigen::VectorXd& theta,
   out.weights = rows.col(d).head(d);
   if (d > 0) solve_lower_transposed(out.lower, out.weights);
   left += rows(d, d) * rows(d, d);
-  const double log_determinant =
-      d > 0 ? 2.0 * out.lower.diagonal().array().abs().log().sum() : 0.0;
+  const double log_determinant = d > 0 ? 2.0 * out.lower.diagonal().array().abs().log().sum() : 0.0;
   out.log_likelihood = -0.5 * (left + log_determinant + log_noise_sum + count * log_two_pi());
   return out;
 }

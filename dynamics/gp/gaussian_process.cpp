@@ -58,7 +58,7 @@ Eigen::RowVectorXd target_scale(const FittedGp& fitted) {
 
 }  // namespace
 
-Prediction predict(const FittedGp& fitted, Inputs inputs, const PredictOptions& options) {
+Prediction predict(const FittedGp& fitted, const Inputs& inputs, const PredictOptions& options) {
   const GpModel& model = fitted.model;
   if (inputs.cols() < model.kernel.input_columns()) {
     throw bad_request("inputs", "too few columns", "give the columns of the training inputs");
@@ -128,8 +128,7 @@ const Eigen::VectorXd& Predictor::variance() {
   State& state = *state_;
   KINESCOPE_CHECK(state.mean.size() > 0, "ask for the mean first");
   state.posterior->variance_of_one(state.work);
-  state.variance =
-      state.work.variance.array() * state.scale.transpose().array().square();
+  state.variance = state.work.variance.array() * state.scale.transpose().array().square();
   return state.variance;
 }
 

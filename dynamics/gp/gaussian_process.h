@@ -45,8 +45,8 @@ struct FitOptions {
 };
 
 struct Prediction {
-  Eigen::MatrixXd mean;            ///< samples x outputs, units of the targets
-  Eigen::MatrixXd variance;        ///< of the function, without noise; empty where not asked for
+  Eigen::MatrixXd mean;               ///< samples x outputs, units of the targets
+  Eigen::MatrixXd variance;           ///< of the function, without noise; empty where not asked for
   Eigen::RowVectorXd noise_variance;  ///< of a new measurement, to be added; one for each output
 };
 
@@ -58,7 +58,7 @@ struct FittedGp {
   double log_likelihood = 0.0;  ///< of the normalised targets
   double jitter = 0.0;          ///< added to the diagonal, normalised units; 0 as a rule
   Eigen::Index samples = 0;
-  Eigen::Index features = 0;    ///< of the route kFeatures; of kSparse: inducing points
+  Eigen::Index features = 0;  ///< of the route kFeatures; of kSparse: inducing points
   std::shared_ptr<const Posterior> posterior;
 };
 
@@ -73,7 +73,7 @@ struct PredictOptions {
 };
 
 /// The dataset's `prior_mean` is not known at new inputs: add it yourself.
-[[nodiscard]] Prediction predict(const FittedGp& fitted, Inputs inputs,
+[[nodiscard]] Prediction predict(const FittedGp& fitted, const Inputs& inputs,
                                  const PredictOptions& options = {});
 
 /// One sample after another at control rate: no allocation after the first call. One for each

@@ -29,7 +29,7 @@ std::vector<Tile> make_tiles(Index rows, Index cols, Index width, bool lower) {
 }
 
 // Output-major tile to sample-major block and back.
-void scatter(ConstBlock tile, Index outputs, Block out) {
+void scatter(const ConstBlock& tile, Index outputs, Block out) {
   const Index rows = tile.rows() / outputs;
   const Index cols = tile.cols() / outputs;
   for (Index b = 0; b < outputs; ++b) {
@@ -43,7 +43,7 @@ void scatter(ConstBlock tile, Index outputs, Block out) {
   }
 }
 
-void gather(ConstBlock block, Index outputs, Block tile) {
+void gather(const ConstBlock& block, Index outputs, Block tile) {
   const Index rows = tile.rows() / outputs;
   const Index cols = tile.cols() / outputs;
   for (Index b = 0; b < outputs; ++b) {
@@ -72,11 +72,11 @@ Covariance::Covariance(const Kernel& kernel)
       outputs_(kernel.outputs()),
       tile_samples_(std::max<Index>(8, kTileRows / kernel.outputs())) {}
 
-void Covariance::prepare(Inputs inputs, Prepared& out) const {
+void Covariance::prepare(const Inputs& inputs, Prepared& out) const {
   node_->prepare(theta_, inputs, out);
 }
 
-Prepared Covariance::prepare(Inputs inputs) const {
+Prepared Covariance::prepare(const Inputs& inputs) const {
   Prepared out;
   prepare(inputs, out);
   return out;
@@ -139,7 +139,7 @@ Eigen::VectorXd Covariance::diagonal(Workers& workers, const Prepared& x) const 
   return out;
 }
 
-void Covariance::contract_tile(Samples a, Samples b, ConstBlock q, Scratch& scratch,
+void Covariance::contract_tile(Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                                Gradient out) const {
   if (outputs_ == 1) {
     node_->contract(theta_, a, b, q, scratch, out);
@@ -154,8 +154,7 @@ void Covariance::contract_tile(Samples a, Samples b, ConstBlock q, Scratch& scra
 Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
                                            const Weights& weights) const {
   const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
-  Eigen::MatrixXd parts =
-      Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
+  Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
   const Index m = outputs_;
   workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
     const Tile& t = tiles[static_cast<std::size_t>(task)];
@@ -171,8 +170,7 @@ Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
 Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const Prepared& y,
                                      const Weights& weights) const {
   const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
-  Eigen::MatrixXd parts =
-      Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
+  Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
   const Index m = outputs_;
   workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
     const Tile& t = tiles[static_cast<std::size_t>(task)];
@@ -187,8 +185,7 @@ Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const 
 Eigen::VectorXd Covariance::contract_diagonal(Workers& workers, const Prepared& x,
                                               const Eigen::VectorXd& q) const {
   constexpr Index kChunk = 1024;
-  Eigen::MatrixXd parts =
-      Eigen::MatrixXd::Zero(theta_.size(), (x.samples + kChunk - 1) / kChunk);
+  Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), (x.samples + kChunk - 1) / kChunk);
   workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
     const Scratch::Frame frame(scratch);
     Eigen::Map<Eigen::MatrixXd> own = scratch.take(outputs_, outputs_);

@@ -16,8 +16,8 @@ class Covariance {
   explicit Covariance(const Kernel& kernel);
 
   [[nodiscard]] Eigen::Index outputs() const { return outputs_; }
-  [[nodiscard]] Prepared prepare(Inputs inputs) const;
-  void prepare(Inputs inputs, Prepared& out) const;
+  [[nodiscard]] Prepared prepare(const Inputs& inputs) const;
+  void prepare(const Inputs& inputs, Prepared& out) const;
 
   /// The lower triangle of k(x, x); the tiles on the diagonal are complete, the rest is zero.
   [[nodiscard]] Eigen::MatrixXd lower(Workers& workers, const Prepared& x) const;
@@ -45,7 +45,8 @@ class Covariance {
   [[nodiscard]] Eigen::Index tile_samples() const { return tile_samples_; }
 
  private:
-  void contract_tile(Samples a, Samples b, ConstBlock q, Scratch& scratch, Gradient out) const;
+  void contract_tile(Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
+                     Gradient out) const;
 
   std::shared_ptr<const KernelNode> node_;
   Eigen::VectorXd theta_;

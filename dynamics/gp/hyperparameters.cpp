@@ -86,8 +86,7 @@ class Cost : public ceres::FirstOrderFunction {
     for (std::size_t k = 0; k < free_.size(); ++k) {
       double slope = -score->gradient[free_[k].index];
       if (free_[k].prior_sigma > 0.0) {
-        const double z =
-            (values[free_[k].index] - free_[k].prior_mean) / free_[k].prior_sigma;
+        const double z = (values[free_[k].index] - free_[k].prior_mean) / free_[k].prior_sigma;
         *cost += 0.5 * z * z;
         slope += z / free_[k].prior_sigma;
       }
@@ -211,8 +210,7 @@ Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
       for (std::size_t k = 0; k < free.size(); ++k) {
         values[free[k].index] = free[k].range.value(climbed.u[static_cast<Index>(k)]);
       }
-      out.status =
-          climbed.converged ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit;
+      out.status = climbed.converged ? EstimateStatus::kConverged : EstimateStatus::kIterationLimit;
       score = objective.evaluate(values);
     }
   } else {

@@ -2,7 +2,8 @@
 //
 // Takes   GpModel with ranges and priors of its parameters, Dataset.
 // Gives   the model with the parameters of the largest score, and how it was found.
-// Method  L-BFGS (Ceres) on the logarithms with exact gradients, ranges kept by a smooth map; several
+// Method  L-BFGS (Ceres) on the logarithms with exact gradients, ranges kept by a smooth map;
+// several
 //         seeded starts, tried on a subset of the data where it is large.
 // Not here: the score (likelihood.h), comparison of kernels on unseen data (leave_out.h).
 #pragma once
@@ -23,7 +24,7 @@ struct EstimateOptions {
   std::uint64_t seed = 1;
   int max_iterations = 100;
   /// Stops where an iteration changes the score by less than this times the score.
-  double relative_tolerance = 1e-6;
+  double relative_tolerance = 1e-7;
   /// Starts are compared on at most so many samples; only the best one sees all of them.
   Eigen::Index samples_for_starts = 500;
 };
@@ -41,9 +42,9 @@ struct Estimate {
   EstimateStatus status = EstimateStatus::kNotRun;
   std::string message;
   double score_before = 0.0;
-  double score = 0.0;      ///< of all samples, priors left out
+  double score = 0.0;  ///< of all samples, priors left out
   Eigen::VectorXd gradient;
-  int evaluations = 0;     ///< on all samples
+  int evaluations = 0;  ///< on all samples
   std::vector<Start> starts;
   std::vector<std::string> at_bound;  ///< parameters that ended at an end of their range
 };

@@ -76,7 +76,7 @@ Kernel linear(FeatureMap map, Offset offset, Weights weights) {
 }
 
 Kernel constant(double variance) {
-  FeatureMap nothing{{}, 0, [](Inputs, Features) {}};
+  FeatureMap nothing{{}, 0, [](const Inputs&, Features) {}};
   Kernel out = polynomial(std::move(nothing), 1, Offset::kFree);
   std::vector<Parameter> parameters = out.parameters();
   parameters[0].name = "scale";
@@ -108,8 +108,7 @@ Kernel feature_kernel(FeatureMap map, const Eigen::MatrixXd& sigma) {
     throw bad_request("sigma", "the covariance of the weights has a negative eigenvalue",
                       "give a symmetric positive semi-definite matrix");
   }
-  const Eigen::MatrixXd root =
-      eigen.eigenvectors() * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd root = eigen.eigenvectors() * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   Kernel out = linear(mixed(std::move(map), root), Offset::kNone, Weights::kCommon);
   std::vector<Parameter> parameters = out.parameters();
   parameters[0].name = "model scale";
@@ -118,13 +117,13 @@ Kernel feature_kernel(FeatureMap map, const Eigen::MatrixXd& sigma) {
 
 namespace {
 
-void check_inputs(const Kernel& kernel, Inputs x) {
+void check_inputs(const Kernel& kernel, const Inputs& x) {
   KINESCOPE_CHECK(x.cols() >= kernel.input_columns(), "the inputs have too few columns");
 }
 
 }  // namespace
 
-Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x, Inputs y) {
+Eigen::MatrixXd covariance(const Kernel& kernel, const Inputs& x, const Inputs& y) {
   check_inputs(kernel, x);
   check_inputs(kernel, y);
   Workers workers;
@@ -132,7 +131,7 @@ Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x, Inputs y) {
   return function.cross(workers, function.prepare(x), function.prepare(y));
 }
 
-Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x) {
+Eigen::MatrixXd covariance(const Kernel& kernel, const Inputs& x) {
   check_inputs(kernel, x);
   Workers workers;
   const Covariance function(kernel);
@@ -141,7 +140,8 @@ Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x) {
   return out;
 }
 
-Eigen::VectorXd covariance_gradient(const Kernel& kernel, Inputs x, const Eigen::MatrixXd& q) {
+Eigen::VectorXd covariance_gradient(const Kernel& kernel, const Inputs& x,
+                                    const Eigen::MatrixXd& q) {
   check_inputs(kernel, x);
   Workers workers;
   const Covariance function(kernel);

@@ -19,18 +19,19 @@ namespace kinescope::gp {
 
 /// A positive number of a model.
 struct Parameter {
-  std::string name;      ///< "rbf length scale x3"
+  std::string name;  ///< "rbf length scale x3"
   double value = 1.0;
-  double lower = 1e-4;   ///< range of the search
+  double lower = 1e-4;  ///< range of the search
   double upper = 1e4;
-  bool fixed = false;    ///< is left as it is
+  bool fixed = false;            ///< is left as it is
   double prior_log_sigma = 0.0;  ///< > 0: log-normal prior about `prior_value`
   double prior_value = 1.0;
 };
 
 class KernelNode;
 
-/// Covariance function of one or several outputs. A tree that is shared, and the parameters' values.
+/// Covariance function of one or several outputs. A tree that is shared, and the parameters'
+/// values.
 class Kernel {
  public:
   Kernel(std::shared_ptr<const KernelNode> node, std::vector<Parameter> parameters);
@@ -85,11 +86,11 @@ enum class Weights { kOneEach, kCommon };
 [[nodiscard]] Kernel independent_outputs(const std::vector<Kernel>& kernels);
 
 /// k(x, y) for all pairs; rows and columns are sample-major (sample * outputs + output).
-[[nodiscard]] Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x, Inputs y);
+[[nodiscard]] Eigen::MatrixXd covariance(const Kernel& kernel, const Inputs& x, const Inputs& y);
 /// The same for x with itself, symmetric to the last bit.
-[[nodiscard]] Eigen::MatrixXd covariance(const Kernel& kernel, Inputs x);
+[[nodiscard]] Eigen::MatrixXd covariance(const Kernel& kernel, const Inputs& x);
 /// d/d log(parameter) of sum_ij Q_ij k(x_i, x_j) for symmetric Q, at the cost of one covariance.
-[[nodiscard]] Eigen::VectorXd covariance_gradient(const Kernel& kernel, Inputs x,
+[[nodiscard]] Eigen::VectorXd covariance_gradient(const Kernel& kernel, const Inputs& x,
                                                   const Eigen::MatrixXd& q);
 
 }  // namespace kinescope::gp

@@ -25,7 +25,7 @@ class Composite : public KernelNode {
   [[nodiscard]] Index parameter_count() const override { return count_; }
   [[nodiscard]] const std::vector<NodePtr>& children() const { return children_; }
 
-  void prepare(Theta theta, Inputs inputs, Prepared& out) const override {
+  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.children.resize(children_.size());
     for (std::size_t c = 0; c < children_.size(); ++c) {
@@ -55,7 +55,8 @@ class SumNode : public Composite {
 
   [[nodiscard]] int outputs() const override { return children().front()->outputs(); }
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const override {
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                Block out) const override {
     const Scratch::Frame frame(scratch);
     children()[0]->evaluate(part(theta, 0), a.child(0), b.child(0), scratch, out);
     Eigen::Map<Eigen::MatrixXd> term = scratch.take(out.rows(), out.cols());
@@ -65,7 +66,7 @@ class SumNode : public Composite {
     }
   }
 
-  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                 Gradient gradient) const override {
     for (std::size_t c = 0; c < children().size(); ++c) {
       children()[c]->contract(part(theta, c), a.child(c), b.child(c), q, scratch,
@@ -83,7 +84,7 @@ class SumNode : public Composite {
     return total;
   }
 
-  [[nodiscard]] Basis basis(Inputs inputs) const override {
+  [[nodiscard]] Basis basis(const Inputs& inputs) const override {
     Basis out;
     const auto features = static_cast<Index>(*feature_count());
     out.values.resize(inputs.rows() * outputs(), features);
@@ -92,8 +93,7 @@ class SumNode : public Composite {
     for (std::size_t c = 0; c < children().size(); ++c) {
       const Basis own = children()[c]->basis(inputs);
       out.values.middleCols(at, own.values.cols()) = own.values;
-      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) =
-          own.exponents;
+      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) = own.exponents;
       at += own.values.cols();
     }
     return out;
@@ -104,7 +104,8 @@ class ProductNode : public Composite {
  public:
   using Composite::Composite;
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const override {
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                Block out) const override {
     children()[0]->evaluate(part(theta, 0), a.child(0), b.child(0), scratch, out);
     for (std::size_t c = 1; c < children().size(); ++c) {
       children()[c]->multiply(part(theta, c), a.child(c), b.child(c), scratch, out);
@@ -113,7 +114,7 @@ class ProductNode : public Composite {
 
   // Each factor sees Q times the product of the others: products from the left are kept, those
   // from the right run along. No division, so factors may vanish.
-  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                 Gradient gradient) const override {
     const Scratch::Frame frame(scratch);
     const std::size_t count = children().size();
@@ -149,9 +150,8 @@ class ProductNode : public Composite {
     return total;
   }
 
-  [[nodiscard]] Basis basis(Inputs inputs) const override {
-    Basis out{Eigen::MatrixXd::Ones(inputs.rows(), 1),
-              Eigen::MatrixXd::Zero(1, parameter_count())};
+  [[nodiscard]] Basis basis(const Inputs& inputs) const override {
+    Basis out{Eigen::MatrixXd::Ones(inputs.rows(), 1), Eigen::MatrixXd::Zero(1, parameter_count())};
     for (std::size_t c = 0; c < children().size(); ++c) {
       const Basis factor = children()[c]->basis(inputs);
       Basis next{Eigen::MatrixXd(inputs.rows(), out.values.cols() * factor.values.cols()),
@@ -178,7 +178,8 @@ class IndependentNode : public Composite {
 
   [[nodiscard]] int outputs() const override { return static_cast<int>(children().size()); }
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const override {
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                Block out) const override {
     out.setZero();
     for (std::size_t c = 0; c < children().size(); ++c) {
       const auto k = static_cast<Index>(c);
@@ -187,7 +188,7 @@ class IndependentNode : public Composite {
     }
   }
 
-  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                 Gradient gradient) const override {
     for (std::size_t c = 0; c < children().size(); ++c) {
       const auto k = static_cast<Index>(c);
@@ -207,7 +208,7 @@ class IndependentNode : public Composite {
     return total;
   }
 
-  [[nodiscard]] Basis basis(Inputs inputs) const override {
+  [[nodiscard]] Basis basis(const Inputs& inputs) const override {
     const auto features = static_cast<Index>(*feature_count());
     Basis out{Eigen::MatrixXd::Zero(inputs.rows() * outputs(), features),
               Eigen::MatrixXd::Zero(features, parameter_count())};
@@ -216,8 +217,7 @@ class IndependentNode : public Composite {
       const Basis own = children()[c]->basis(inputs);
       out.values.block(static_cast<Index>(c) * inputs.rows(), at, inputs.rows(),
                        own.values.cols()) = own.values;
-      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) =
-          own.exponents;
+      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) = own.exponents;
       at += own.values.cols();
     }
     return out;
@@ -240,14 +240,15 @@ std::vector<NodePtr> flattened(const std::vector<NodePtr>& nodes) {
 
 }  // namespace
 
-void KernelNode::multiply(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const {
+void KernelNode::multiply(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                          Block out) const {
   const Scratch::Frame frame(scratch);
   Eigen::Map<Eigen::MatrixXd> factor = scratch.take(out.rows(), out.cols());
   evaluate(theta, a, b, scratch, factor);
   out.array() *= factor.array();
 }
 
-Basis KernelNode::basis(Inputs) const {
+Basis KernelNode::basis(const Inputs&) const {
   KINESCOPE_CHECK(false, "a kernel of infinite dimension has no features");
   return {};
 }

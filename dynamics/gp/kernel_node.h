@@ -32,9 +32,7 @@ struct Samples {
   [[nodiscard]] auto rows(std::size_t table) const {
     return of.tables[table].middleRows(begin, size);
   }
-  [[nodiscard]] Samples child(std::size_t index) const {
-    return {of.children[index], begin, size};
-  }
+  [[nodiscard]] Samples child(std::size_t index) const { return {of.children[index], begin, size}; }
 };
 
 /// Finitely many features phi_f with k = sum_f s_f phi_f phi_f' and log s = exponents * theta:
@@ -54,17 +52,19 @@ class KernelNode {
   [[nodiscard]] virtual int outputs() const { return 1; }
   [[nodiscard]] virtual int input_columns() const = 0;
   [[nodiscard]] virtual Eigen::Index parameter_count() const = 0;
-  virtual void prepare(Theta theta, Inputs inputs, Prepared& out) const = 0;
+  virtual void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const = 0;
   /// out = k.
-  virtual void evaluate(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const = 0;
+  virtual void evaluate(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                        Block out) const = 0;
   /// out *= k, elementwise.
-  virtual void multiply(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const;
+  virtual void multiply(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                        Block out) const;
   /// gradient += d/dtheta sum_ij q_ij k_ij.
-  virtual void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
-                        Gradient gradient) const = 0;
+  virtual void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q,
+                        Scratch& scratch, Gradient gradient) const = 0;
   /// Number of features; nothing for kernels of infinite dimension. As double: products explode.
   [[nodiscard]] virtual std::optional<double> feature_count() const { return std::nullopt; }
-  [[nodiscard]] virtual Basis basis(Inputs inputs) const;
+  [[nodiscard]] virtual Basis basis(const Inputs& inputs) const;
 };
 
 /// Nodes of kernel_algebra.cpp know how to take each other apart.

@@ -14,12 +14,12 @@
 namespace kinescope::gp {
 
 struct LeaveOut {
-  Eigen::MatrixXd mean;       ///< samples x outputs, units of the targets
-  Eigen::MatrixXd variance;   ///< of a measurement: function and noise
-  Eigen::MatrixXd residual;   ///< target - mean
-  Eigen::MatrixXd z;          ///< residual / sigma
-  double log_density = 0.0;   ///< sum over folds, joint within each, of the normalised targets
-  Eigen::RowVectorXd nmse;    ///< mean square of the residuals / variance of the targets
+  Eigen::MatrixXd mean;      ///< samples x outputs, units of the targets
+  Eigen::MatrixXd variance;  ///< of a measurement: function and noise
+  Eigen::MatrixXd residual;  ///< target - mean
+  Eigen::MatrixXd z;         ///< residual / sigma
+  double log_density = 0.0;  ///< sum over folds, joint within each, of the normalised targets
+  Eigen::RowVectorXd nmse;   ///< mean square of the residuals / variance of the targets
 };
 
 /// `fold_of`: a fold >= 0 for every sample (a trajectory, say); a negative one is never left out.

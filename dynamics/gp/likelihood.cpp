@@ -51,21 +51,21 @@ class DenseObjective : public Objective {
       return out;
     }
     // d L = 1/2 tr((alpha alpha' - K^-1) dK) (Rasmussen and Williams 2006, eq. 5.9).
-    out.gradient.head(kernel_count) = covariance.contract_lower(
-        workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
+    out.gradient.head(kernel_count) =
+        covariance.contract_lower(workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
           inverse_tile(row, col, -0.5, q);
-          q.noalias() += 0.5 * alpha.segment(row, q.rows()) *
-                         alpha.segment(col, q.cols()).transpose();
+          q.noalias() +=
+              0.5 * alpha.segment(row, q.rows()) * alpha.segment(col, q.cols()).transpose();
         });
     out.gradient.tail(log_noise.size()) = noise_gradient(
-        problem_,
-        0.5 * noise.array() * (alpha.array().square() - inverse_diagonal.array()).array(),
+        problem_, 0.5 * noise.array() * (alpha.array().square() - inverse_diagonal.array()).array(),
         log_noise.size());
     return out;
   }
 
  private:
-  // scale * (K^-1)(row.., col..) from W = L^-1, for row >= col: rows of W above `row` are zero there.
+  // scale * (K^-1)(row.., col..) from W = L^-1, for row >= col: rows of W above `row` are zero
+  // there.
   void inverse_tile(Index row, Index col, double scale, Block out) const {
     const Index below = matrix_.rows() - row;
     transposed_product(scale, matrix_.block(row, row, below, out.rows()),
@@ -85,20 +85,20 @@ class DenseObjective : public Objective {
     Eigen::MatrixXd full(n, n);
     transposed_product(1.0, matrix_, matrix_, 0.0, full);
     const Eigen::VectorXd left = full * error;
-    const Eigen::VectorXd root =
-        ((1.0 + alpha.array() * error.array()) / (2.0 * b.array())).sqrt();
+    const Eigen::VectorXd root = ((1.0 + alpha.array() * error.array()) / (2.0 * b.array())).sqrt();
     full = full * root.asDiagonal();
     const auto kernel_count = static_cast<Index>(kernel_.parameters().size());
-    out.gradient.head(kernel_count) = covariance.contract_lower(
-        workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
+    out.gradient.head(kernel_count) =
+        covariance.contract_lower(workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
           product_transposed(-1.0, full.middleRows(row, q.rows()), full.middleRows(col, q.cols()),
                              0.0, q);
-          q.noalias() += 0.5 * left.segment(row, q.rows()) * alpha.segment(col, q.cols()).transpose();
-          q.noalias() += 0.5 * alpha.segment(row, q.rows()) * left.segment(col, q.cols()).transpose();
+          q.noalias() +=
+              0.5 * left.segment(row, q.rows()) * alpha.segment(col, q.cols()).transpose();
+          q.noalias() +=
+              0.5 * alpha.segment(row, q.rows()) * left.segment(col, q.cols()).transpose();
         });
     const Eigen::VectorXd share =
-        noise.array() *
-        (left.array() * alpha.array() - full.rowwise().squaredNorm().array());
+        noise.array() * (left.array() * alpha.array() - full.rowwise().squaredNorm().array());
     const Index noises = out.gradient.size() - kernel_count;
     out.gradient.tail(noises) = noise_gradient(problem_, share, noises);
   }

@@ -47,9 +47,8 @@ Functions joint_functions(JointKind kind, const Eigen::VectorXd& q, std::size_t 
     int sine;
   };
   const double root = degree == 2 ? std::numbers::sqrt2 : 1.0;
-  std::vector<Term> terms = {
-      {Eigen::ArrayXd::Ones(q.size()), Eigen::ArrayXd::Zero(q.size()), 0, 0},
-      {root * c, root * dc, 1, 0}};
+  std::vector<Term> terms = {{Eigen::ArrayXd::Ones(q.size()), Eigen::ArrayXd::Zero(q.size()), 0, 0},
+                             {root * c, root * dc, 1, 0}};
   if (turns) terms.push_back({root * s, root * ds, 0, 1});
   if (degree == 2) {
     terms.push_back({c * c, 2.0 * c * dc, 2, 0});
@@ -59,10 +58,9 @@ Functions joint_functions(JointKind kind, const Eigen::VectorXd& q, std::size_t 
     }
   }
   const auto count = static_cast<Index>(terms.size());
-  Functions out{
-      Eigen::MatrixXd(q.size(), count),
-      std::vector<Eigen::MatrixXd>(joints, Eigen::MatrixXd::Zero(q.size(), count)),
-      Eigen::MatrixXd::Zero(count, parameters)};
+  Functions out{Eigen::MatrixXd(q.size(), count),
+                std::vector<Eigen::MatrixXd>(joints, Eigen::MatrixXd::Zero(q.size(), count)),
+                Eigen::MatrixXd::Zero(count, parameters)};
   for (Index k = 0; k < count; ++k) {
     const Term& term = terms[static_cast<std::size_t>(k)];
     out.value.col(k) = term.value;
@@ -95,7 +93,7 @@ Functions product(const Functions& a, const Functions& b) {
 
 Functions position_functions(const JointKinds& joints,
                              const std::vector<LipLayout::Position>& positions, int degree,
-                             Inputs inputs, Index parameters) {
+                             const Inputs& inputs, Index parameters) {
   Functions out = one_function(inputs.rows(), joints.size(), parameters);
   for (std::size_t j = 0; j < positions.size(); ++j) {
     out = product(out, joint_functions(joints[j], inputs.col(static_cast<Index>(j)), j,
@@ -133,7 +131,7 @@ double lip_feature_count(const JointKinds& joints) {
 
 // For an energy m dq_b dq_c R(q): the operator gives, for torque a,
 //   (d/dt m_a) R + m_a dR/dt - m dR/dq_a,  m_a = d(m dq_b dq_c)/d(dq_a).
-Basis lip_features(const JointKinds& joints, const LipLayout& layout, Inputs inputs) {
+Basis lip_features(const JointKinds& joints, const LipLayout& layout, const Inputs& inputs) {
   const auto n = static_cast<Index>(joints.size());
   const Index samples = inputs.rows();
   const auto features = static_cast<Index>(lip_feature_count(joints));

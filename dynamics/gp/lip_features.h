@@ -29,6 +29,7 @@ struct LipLayout {
 };
 
 [[nodiscard]] double lip_feature_count(const JointKinds& joints);
-[[nodiscard]] Basis lip_features(const JointKinds& joints, const LipLayout& layout, Inputs inputs);
+[[nodiscard]] Basis lip_features(const JointKinds& joints, const LipLayout& layout,
+                                 const Inputs& inputs);
 
 }  // namespace kinescope::gp

@@ -36,7 +36,7 @@ class LipNode : public KernelNode {
   [[nodiscard]] int input_columns() const override { return 3 * n(); }
   [[nodiscard]] Index parameter_count() const override { return layout_.count; }
 
-  void prepare(Theta, Inputs inputs, Prepared& out) const override {
+  void prepare(const Theta&, const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.tables.resize(kTables);
     for (Eigen::MatrixXd& table : out.tables) table.resize(inputs.rows(), n());
@@ -54,7 +54,7 @@ class LipNode : public KernelNode {
     out.tables[kAcceleration] = inputs.middleCols(2 * n(), n());
   }
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch&, Block out) const override {
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
     const Energies energies = read(theta);
     lip_pairs::Torques k;
     for (Index i = 0; i < a.size; i += kLanes) {
@@ -80,7 +80,7 @@ class LipNode : public KernelNode {
     }
   }
 
-  void contract(Theta theta, Samples a, Samples b, ConstBlock weights, Scratch&,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& weights, Scratch&,
                 Gradient gradient) const override {
     const Energies energies = read(theta);
     std::vector<lip_pairs::WeightGradient> links(joints_.size(), lip_pairs::WeightGradient{});
@@ -117,7 +117,7 @@ class LipNode : public KernelNode {
   [[nodiscard]] std::optional<double> feature_count() const override {
     return lip_feature_count(joints_);
   }
-  [[nodiscard]] Basis basis(Inputs inputs) const override {
+  [[nodiscard]] Basis basis(const Inputs& inputs) const override {
     return lip_features(joints_, layout_, inputs);
   }
 
@@ -164,7 +164,7 @@ class LipNode : public KernelNode {
     return out;
   }
 
-  void read_positions(Theta theta, const std::vector<LipLayout::Position>& positions,
+  void read_positions(const Theta& theta, const std::vector<LipLayout::Position>& positions,
                       lip_pairs::Weights& out) const {
     for (std::size_t j = 0; j < positions.size(); ++j) {
       out.cosine[j] = std::exp(theta[positions[j].cosine]);
@@ -172,7 +172,7 @@ class LipNode : public KernelNode {
     }
   }
 
-  [[nodiscard]] Energies read(Theta theta) const {
+  [[nodiscard]] Energies read(const Theta& theta) const {
     Energies out;
     for (const LipLayout::Link& link : layout_.links) {
       lip_pairs::Weights weights{};
@@ -243,7 +243,10 @@ Kernel lip(const JointKinds& joints) {
     const LipLayout::Link& link = layout.links[i];
     for (std::size_t j = 0; j < link.velocity.size(); ++j) {
       parameters[static_cast<std::size_t>(link.velocity[j])] = {
-          .name = fmt::format("{} weight dq{}", name, j), .value = 0.1, .lower = 1e-8, .upper = 1e4};
+          .name = fmt::format("{} weight dq{}", name, j),
+          .value = 0.1,
+          .lower = 1e-8,
+          .upper = 1e4};
     }
     describe_positions(link.positions, name, parameters);
   }

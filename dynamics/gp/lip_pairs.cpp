@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Notation: x the strip, y the sample; v, a velocity and acceleration of x, v', a' of y;
-//   u = sum w v v',  ua = sum w v' a (d/dt of u along x),  ub = sum w v a' (along y), uab = sum w a a';
-//   R_a = dR/dq_a, R'_b = dR/dq'_b, R_ab both; Rd = sum v_a R_a, Re = sum v'_b R'_b,
-//   Rd_b = sum_a v_a R_ab, Re_a = sum_b v'_b R_ab, Rde = sum v_a v'_b R_ab.
+//   u = sum w v v',  ua = sum w v' a (d/dt of u along x),  ub = sum w v a' (along y), uab = sum w a
+//   a'; R_a = dR/dq_a, R'_b = dR/dq'_b, R_ab both; Rd = sum v_a R_a, Re = sum v'_b R'_b, Rd_b =
+//   sum_a v_a R_ab, Re_a = sum_b v'_b R_ab, Rde = sum v_a v'_b R_ab.
 // The Lagrange operator on both arguments of u^2 R gives
 //   k_ab = 2 w_a delta_ab D + w_a v'_a m_b + w_a a'_a l_b - h_a w_b v_b + u^2 R_ab,
 //   D = R uab + Re ua + Rd ub + Rde u,   m_b = 2 w_b (Re a_b + Rde v_b) - 2 ua R'_b - 2 u Rd_b,
@@ -242,8 +242,8 @@ KINESCOPE_WIDE void add_kinetic(const JointKinds& kinds, int link, const Weights
     const double wv = weights.velocity[a] * y.velocity[a];
     const double wa = weights.velocity[a] * y.acceleration[a];
     for (unsigned b = 0; b < n; ++b) {
-      add(k[a][b], wv * t.m[b] + wa * t.l[b] -
-                       weights.velocity[b] * (t.h[a] * x.velocity[b]) + square * p.xy[a][b]);
+      add(k[a][b], wv * t.m[b] + wa * t.l[b] - weights.velocity[b] * (t.h[a] * x.velocity[b]) +
+                       square * p.xy[a][b]);
     }
     add(k[a][a], 2.0 * weights.velocity[a], t.diagonal);
   }
@@ -309,14 +309,13 @@ KINESCOPE_WIDE void contract_kinetic(const JointKinds& kinds, int link, const We
                    x.velocity[b] * (y.velocity[k] * by_rde - 2.0 * (t.u * by_m[k])) +
                    (2.0 * y.velocity[k]) * (t.u * by_h[b]);
     }
-    const Lane direct =
-        2.0 * (t.diagonal * q[b][b]) + y.velocity[b] * by_front_m[b] +
-        y.acceleration[b] * by_front_l[b] - x.velocity[b] * by_front_h[b] +
-        2.0 * (by_m[b] * (t.re * x.acceleration[b] + t.rde * x.velocity[b]) +
-               by_l[b] * (p.r * x.acceleration[b] + t.rd * x.velocity[b]));
-    const Lane through_sums = y.velocity[b] * (by_u * x.velocity[b] + by_ua * x.acceleration[b]) +
-                              y.acceleration[b] *
-                                  (by_ub * x.velocity[b] + by_uab * x.acceleration[b]);
+    const Lane direct = 2.0 * (t.diagonal * q[b][b]) + y.velocity[b] * by_front_m[b] +
+                        y.acceleration[b] * by_front_l[b] - x.velocity[b] * by_front_h[b] +
+                        2.0 * (by_m[b] * (t.re * x.acceleration[b] + t.rde * x.velocity[b]) +
+                               by_l[b] * (p.r * x.acceleration[b] + t.rd * x.velocity[b]));
+    const Lane through_sums =
+        y.velocity[b] * (by_u * x.velocity[b] + by_ua * x.acceleration[b]) +
+        y.acceleration[b] * (by_ub * x.velocity[b] + by_uab * x.acceleration[b]);
     add(gradient.velocity[b], direct + through_sums);
   }
   reverse_product(kinds, link + 1, true, x, y, p, d, gradient);
@@ -333,8 +332,7 @@ KINESCOPE_WIDE void add_potential(const JointKinds& kinds, const Weights& weight
 
 KINESCOPE_WIDE void contract_potential(const JointKinds& kinds, const Weights& weights,
                                        double scale, const Strip& x, const Sample& y,
-                                       const Torques& q, WeightGradient& gradient,
-                                       Lane& by_scale) {
+                                       const Torques& q, WeightGradient& gradient, Lane& by_scale) {
   Product p;
   make_product(kinds, static_cast<int>(kinds.size()), weights, false, x, y, p);
   ProductAdjoint d;

@@ -84,7 +84,7 @@ class PolynomialNode : public KernelNode {
     return first_weight() + (common_ ? 1 : map_.size());
   }
 
-  void prepare(Theta theta, Inputs inputs, Prepared& out) const override {
+  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.tables.resize(1);
     Eigen::MatrixXd& weighted = out.tables[0];
@@ -95,11 +95,12 @@ class PolynomialNode : public KernelNode {
     }
   }
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch&, Block out) const override {
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
     raised(theta, a, b, degree_, out);
   }
 
-  void multiply(Theta theta, Samples a, Samples b, Scratch& scratch, Block out) const override {
+  void multiply(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                Block out) const override {
     if (map_.size() > kFewFeatures) {
       KernelNode::multiply(theta, a, b, scratch, out);
       return;
@@ -116,7 +117,7 @@ class PolynomialNode : public KernelNode {
     }
   }
 
-  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                 Gradient gradient) const override {
     const Scratch::Frame frame(scratch);
     // dk / d base = p base^(p-1).
@@ -143,7 +144,7 @@ class PolynomialNode : public KernelNode {
     return count;
   }
 
-  [[nodiscard]] Basis basis(Inputs inputs) const override {
+  [[nodiscard]] Basis basis(const Inputs& inputs) const override {
     std::vector<Eigen::VectorXi> terms;
     Eigen::VectorXi current = Eigen::VectorXi::Zero(variables());
     if (variables() > 0) list_exponents(variables(), degree_, current, 0, terms);
@@ -169,12 +170,12 @@ class PolynomialNode : public KernelNode {
   [[nodiscard]] Index first_weight() const { return offset_ == Offset::kFree ? 1 : 0; }
   [[nodiscard]] Index weight_index(Index d) const { return first_weight() + (common_ ? 0 : d); }
   [[nodiscard]] Index variables() const { return map_.size() + (offset_ == Offset::kNone ? 0 : 1); }
-  [[nodiscard]] double offset(Theta theta) const {
+  [[nodiscard]] double offset(const Theta& theta) const {
     if (offset_ == Offset::kNone) return 0.0;
     return offset_ == Offset::kUnit ? 1.0 : std::exp(theta[0]);
   }
 
-  void raised(Theta theta, Samples a, Samples b, int degree, Block out) const {
+  void raised(const Theta& theta, Samples a, Samples b, int degree, Block out) const {
     if (map_.size() == 0) {
       out.setZero();
     } else {
@@ -196,7 +197,8 @@ class PolynomialNode : public KernelNode {
 Kernel polynomial(FeatureMap map, int degree, Offset offset, Weights weights) {
   KINESCOPE_CHECK(degree >= 1, "a degree of at least 1");
   std::vector<Parameter> parameters;
-  if (offset == Offset::kFree) parameters.push_back({.name = "offset", .lower = 1e-8, .upper = 1e6});
+  if (offset == Offset::kFree)
+    parameters.push_back({.name = "offset", .lower = 1e-8, .upper = 1e6});
   if (weights == Weights::kCommon) {
     parameters.push_back({.name = "weight", .lower = 1e-8, .upper = 1e6});
   } else {

@@ -20,9 +20,9 @@ struct Moments {
 struct OneSample {
   Scratch scratch;
   Prepared prepared;
-  Eigen::MatrixXd input;       ///< 1 x columns
-  Eigen::MatrixXd cross;       ///< rows x outputs
-  Eigen::MatrixXd prior;       ///< outputs x outputs
+  Eigen::MatrixXd input;  ///< 1 x columns
+  Eigen::MatrixXd cross;  ///< rows x outputs
+  Eigen::MatrixXd prior;  ///< outputs x outputs
   Eigen::VectorXd mean;
   Eigen::VectorXd variance;
 };
@@ -41,7 +41,8 @@ class Posterior {
   Posterior(const Posterior&) = delete;
   Posterior& operator=(const Posterior&) = delete;
 
-  [[nodiscard]] virtual Moments predict(Workers& workers, Inputs inputs, bool variance) const = 0;
+  [[nodiscard]] virtual Moments predict(Workers& workers, const Inputs& inputs,
+                                        bool variance) const = 0;
   virtual void mean_of_one(OneSample& work) const = 0;
   virtual void variance_of_one(OneSample& work) const = 0;
   /// `folds`: for each fold its samples.

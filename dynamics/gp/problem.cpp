@@ -156,17 +156,18 @@ void check_memory(Index samples, Index outputs, double matrices, std::size_t lim
   constexpr double kGigabyte = 1e9;
   // sparse.h keeps two matrices of rows x m.
   const double inducing = std::floor(available / (2.5 * rows * sizeof(double)));
-  const double fitting = std::floor(std::sqrt(available / (matrices * sizeof(double))) /
-                                    static_cast<double>(outputs));
+  const double fitting =
+      std::floor(std::sqrt(available / (matrices * sizeof(double))) / static_cast<double>(outputs));
   throw bad_request(
       "kernel matrix",
       fmt::format("N = {}{} needs {:.1f} GB, {:.1f} GB are available", samples,
                   outputs > 1 ? fmt::format(" x {} outputs", outputs) : "", needed / kGigabyte,
                   available / kGigabyte),
-      outputs > 1 ? fmt::format("use a subset of at most {:.0f} samples", fitting)
-                  : fmt::format("use fit_sparse with at most {:.0f} inducing points, or a subset of "
-                                "at most {:.0f} samples",
-                                inducing, fitting));
+      outputs > 1
+          ? fmt::format("use a subset of at most {:.0f} samples", fitting)
+          : fmt::format("use fit_sparse with at most {:.0f} inducing points, or a subset of "
+                        "at most {:.0f} samples",
+                        inducing, fitting));
 }
 
 }  // namespace kinescope::gp

@@ -28,7 +28,7 @@ class RbfNode : public KernelNode {
   }
 
   // Tables: features / length scale; half of their squared norm.
-  void prepare(Theta theta, Inputs inputs, Prepared& out) const override {
+  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.tables.resize(2);
     Eigen::MatrixXd& scaled = out.tables[0];
@@ -42,18 +42,25 @@ class RbfNode : public KernelNode {
     }
   }
 
-  void evaluate(Theta theta, Samples a, Samples b, Scratch&, Block out) const override {
-    product_transposed(1.0, a.rows(0), b.rows(0), 0.0, out);
+  void evaluate(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
     const double log_variance = free_amplitude_ ? theta[0] : 0.0;
     const auto half_a = a.rows(1).col(0).array();
     const auto half_b = b.rows(1).col(0).array();
+    // Far from the origin (a time stamp, say) the product would lose the distance in rounding.
+    constexpr double kFar = 1e5;
+    if (half_a.maxCoeff() > kFar && half_b.maxCoeff() > kFar) {
+      evaluate_by_differences(log_variance, a, b, out);
+      return;
+    }
+    product_transposed(1.0, a.rows(0), b.rows(0), 0.0, out);
     for (Index j = 0; j < b.size; ++j) {
       // Rounding may leave a squared distance below zero.
-      out.col(j).array() = ((out.col(j).array() - half_a - half_b[j]).min(0.0) + log_variance).exp();
+      out.col(j).array() =
+          ((out.col(j).array() - half_a - half_b[j]).min(0.0) + log_variance).exp();
     }
   }
 
-  void contract(Theta theta, Samples a, Samples b, ConstBlock q, Scratch& scratch,
+  void contract(const Theta& theta, Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                 Gradient gradient) const override {
     const Scratch::Frame frame(scratch);
     Eigen::Map<Eigen::MatrixXd> m = scratch.take(a.size, b.size);
@@ -61,10 +68,16 @@ class RbfNode : public KernelNode {
     m.array() *= q.array();
     Eigen::Map<Eigen::MatrixXd> sums = scratch.take(a.size, 1);
     sums.setZero();
+    // From a sample of the tile as origin, so that sums of squares do not cancel.
+    Eigen::Map<Eigen::MatrixXd> x = scratch.take(a.size, map_.size());
+    Eigen::Map<Eigen::MatrixXd> y = scratch.take(b.size, map_.size());
     Eigen::Map<Eigen::MatrixXd> my = scratch.take(a.size, map_.size());
-    product(1.0, m, b.rows(0), 0.0, my);
-    const auto x = a.rows(0);
-    const auto y = b.rows(0);
+    for (Index d = 0; d < map_.size(); ++d) {
+      const double origin = a.rows(0)(0, d);
+      x.col(d).array() = a.rows(0).col(d).array() - origin;
+      y.col(d).array() = b.rows(0).col(d).array() - origin;
+    }
+    product(1.0, m, y, 0.0, my);
     double total = 0.0;
     for (Index j = 0; j < b.size; ++j) {
       const double c = m.col(j).sum();
@@ -73,14 +86,26 @@ class RbfNode : public KernelNode {
       for (Index d = 0; d < map_.size(); ++d) gradient[scale_index(d)] += c * y(j, d) * y(j, d);
     }
     for (Index d = 0; d < map_.size(); ++d) {
-      gradient[scale_index(d)] += (x.col(d).array() * (sums.col(0).array() * x.col(d).array() -
-                                                       2.0 * my.col(d).array()))
-                                      .sum();
+      gradient[scale_index(d)] +=
+          (x.col(d).array() * (sums.col(0).array() * x.col(d).array() - 2.0 * my.col(d).array()))
+              .sum();
     }
     if (free_amplitude_) gradient[0] += total;
   }
 
  private:
+  void evaluate_by_differences(double log_variance, Samples a, Samples b, Block out) const {
+    const auto x = a.rows(0);
+    const auto y = b.rows(0);
+    for (Index j = 0; j < b.size; ++j) {
+      out.col(j).setConstant(log_variance);
+      for (Index d = 0; d < map_.size(); ++d) {
+        out.col(j).array() -= 0.5 * (x.col(d).array() - y(j, d)).square();
+      }
+      out.col(j).array() = out.col(j).array().exp();
+    }
+  }
+
   [[nodiscard]] Index first_scale() const { return free_amplitude_ ? 1 : 0; }
   [[nodiscard]] Index scale_index(Index d) const { return first_scale() + (common_ ? 0 : d); }
 

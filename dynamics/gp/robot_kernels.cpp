@@ -30,7 +30,7 @@ FeatureMap accelerations_and_velocity_products(int joints) {
   for (int i = 0; i < joints; ++i) {
     for (int j = i; j < joints; ++j) out.names.push_back(fmt::format("dq{} dq{}", i, j));
   }
-  out.map = [joints](Inputs inputs, Features features) {
+  out.map = [joints](const Inputs& inputs, Features features) {
     features.leftCols(joints) = inputs.middleCols(2 * joints, joints);
     Eigen::Index at = joints;
     for (int i = 0; i < joints; ++i) {
@@ -48,8 +48,9 @@ Kernel gip(const JointKinds& joints) {
   Kernel out = renamed(linear(accelerations_and_velocity_products(n)), "gip");
   constexpr int kDegree = 2;
   for (int j = 0; j < n; ++j) {
-    out = out * renamed(multiplicative_polynomial(joint_position(joints, j), kDegree, Offset::kUnit),
-                        "gip");
+    out =
+        out * renamed(multiplicative_polynomial(joint_position(joints, j), kDegree, Offset::kUnit),
+                      "gip");
   }
   return out;
 }

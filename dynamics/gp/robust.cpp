@@ -45,15 +45,16 @@ RobustFit fit_student(const GpModel& model, const Dataset& dataset, const Studen
   Eigen::VectorXd log_noise = log_noise_values(model);
   GpModel current = model;
   Dataset weighted = dataset;
-  const Eigen::MatrixXd own = dataset.noise_scale.size() > 0
-                                  ? dataset.noise_scale
-                                  : Eigen::MatrixXd::Ones(dataset.samples(), dataset.targets.cols());
+  const Eigen::MatrixXd own =
+      dataset.noise_scale.size() > 0
+          ? dataset.noise_scale
+          : Eigen::MatrixXd::Ones(dataset.samples(), dataset.targets.cols());
   RobustFit out{fit(current, dataset, options.fit), Eigen::MatrixXd::Ones(own.rows(), own.cols()),
                 0, false};
   while (out.iterations < options.max_iterations && !out.converged) {
     ++out.iterations;
-    const Eigen::MatrixXd weight = reweigh(out.fitted, workers, options.degrees_of_freedom,
-                                           log_noise, options.estimate_scale);
+    const Eigen::MatrixXd weight =
+        reweigh(out.fitted, workers, options.degrees_of_freedom, log_noise, options.estimate_scale);
     const double change = (weight - out.weight).cwiseAbs().maxCoeff();
     out.converged = change < options.tolerance;
     out.weight = weight;

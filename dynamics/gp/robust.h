@@ -14,7 +14,7 @@ namespace kinescope::gp {
 struct StudentOptions {
   double degrees_of_freedom = 4.0;
   int max_iterations = 50;
-  double tolerance = 1e-4;  ///< largest change of a weight at which the iteration ends
+  double tolerance = 1e-4;     ///< largest change of a weight at which the iteration ends
   bool estimate_scale = true;  ///< the noise variance follows the weighted residuals
   FitOptions fit{};
 };
@@ -31,8 +31,8 @@ struct RobustFit {
                                     const StudentOptions& options = {});
 
 struct TrimOptions {
-  double widen = 3.0;      ///< factor on all length scales in the first fit
-  double share = 0.1;      ///< of the samples that are left out
+  double widen = 3.0;  ///< factor on all length scales in the first fit
+  double share = 0.1;  ///< of the samples that are left out
   FitOptions fit{};
 };
 

@@ -24,7 +24,8 @@ class SparsePosterior : public Posterior {
   SparsePosterior(SparseSystem system, Problem problem)
       : system_(std::move(system)), problem_(std::move(problem)) {}
 
-  [[nodiscard]] Moments predict(Workers& workers, Inputs inputs, bool variance) const override {
+  [[nodiscard]] Moments predict(Workers& workers, const Inputs& inputs,
+                                bool variance) const override {
     const Prepared at = system_.covariance.prepare(inputs);
     Moments out;
     out.mean.resize(at.samples);
@@ -65,7 +66,8 @@ class SparsePosterior : public Posterior {
   }
 
   [[nodiscard]] LeftOut leave_out(Workers&, const std::vector<std::vector<Index>>&) const override {
-    throw bad_request("leave_out", "not for inducing points", "use fit() on a subset of the samples");
+    throw bad_request("leave_out", "not for inducing points",
+                      "use fit() on a subset of the samples");
   }
 
   [[nodiscard]] Moments at_training(Workers& workers) const override {
@@ -182,14 +184,14 @@ FittedGp fit_sparse(const GpModel& model, const Dataset& dataset, const Eigen::M
   check_sparse(model, dataset, inducing, options);
   Problem problem = make_problem(model, dataset);
   Workers workers(options.threads);
-  auto system = make_sparse_system(workers, model.kernel, log_noise_values(model), problem,
-                                   model.normalisation.normalised_inputs(inducing),
-                                   options.max_jitter);
+  auto system =
+      make_sparse_system(workers, model.kernel, log_noise_values(model), problem,
+                         model.normalisation.normalised_inputs(inducing), options.max_jitter);
   if (!system) {
     throw undetermined("inducing points", "their kernel matrix is not positive definite",
                        "choose fewer, or with choose_inducing()");
   }
-  FittedGp out{model,           Route::kSparse,    system->bound, system->jitter,
+  FittedGp out{model,           Route::kSparse,  system->bound, system->jitter,
                problem.samples, system->count(), nullptr};
   out.posterior = std::make_shared<SparsePosterior>(*std::move(system), std::move(problem));
   return out;
@@ -200,7 +202,8 @@ std::unique_ptr<Objective> make_sparse_objective(const GpModel& model, const Dat
                                                  const FitOptions& options) {
   check_sparse(model, dataset, inducing, options);
   return std::make_unique<SparseObjective>(model.kernel, make_problem(model, dataset),
-                                           model.normalisation.normalised_inputs(inducing), options);
+                                           model.normalisation.normalised_inputs(inducing),
+                                           options);
 }
 
 Estimate estimate_sparse(const GpModel& model, const Dataset& dataset,

@@ -43,8 +43,7 @@ Index tiled_cholesky(Workers& workers, Block a) {
         .setZero();
     workers.run(tiles - k - 1, [&](Index task, Scratch&) {
       const Range row = tile(k + 1 + task, width, n);
-      solve_lower_transposed_right(diagonal,
-                                   a.block(row.begin, pivot.begin, row.size, pivot.size));
+      solve_lower_transposed_right(diagonal, a.block(row.begin, pivot.begin, row.size, pivot.size));
     });
     std::vector<Pair> trailing;
     for (Index j = k + 1; j < tiles; ++j) {
@@ -85,8 +84,8 @@ void tiled_invert_lower(Workers& workers, Block l) {
       const Range row = tile(tiles - 1 - task, kWidth, n);
       const Index inner = row.begin + row.size - below;
       Eigen::Map<Eigen::MatrixXd> sum = scratch.take(row.size, col.size);
-      product(-1.0, l.block(row.begin, below, row.size, inner), panel.topLeftCorner(inner, col.size),
-              0.0, sum);
+      product(-1.0, l.block(row.begin, below, row.size, inner),
+              panel.topLeftCorner(inner, col.size), 0.0, sum);
       product(1.0, sum, diagonal, 0.0, l.block(row.begin, col.begin, row.size, col.size));
     });
   }
@@ -106,11 +105,11 @@ void solve_columns(Workers& workers, Block b, Solve solve) {
 
 }  // namespace
 
-void tiled_solve_lower(Workers& workers, ConstBlock l, Block b) {
+void tiled_solve_lower(Workers& workers, const ConstBlock& l, Block b) {
   solve_columns(workers, b, [&](Block part) { solve_lower(l, part); });
 }
 
-void tiled_solve_lower_transposed(Workers& workers, ConstBlock l, Block b) {
+void tiled_solve_lower_transposed(Workers& workers, const ConstBlock& l, Block b) {
   solve_columns(workers, b, [&](Block part) { solve_lower_transposed(l, part); });
 }
 

@@ -17,7 +17,7 @@ namespace kinescope::gp {
 void tiled_invert_lower(Workers& workers, Block l);
 
 /// b = l^-1 b and b = l'^-1 b for many right-hand sides.
-void tiled_solve_lower(Workers& workers, ConstBlock l, Block b);
-void tiled_solve_lower_transposed(Workers& workers, ConstBlock l, Block b);
+void tiled_solve_lower(Workers& workers, const ConstBlock& l, Block b);
+void tiled_solve_lower_transposed(Workers& workers, const ConstBlock& l, Block b);
 
 }  // namespace kinescope::gp

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <numeric>
 
-#include <gtest/gtest.h>
 #include <Eigen/LU>
+#include <gtest/gtest.h>
 
 #include "dynamics/gp/likelihood.h"
 #include "dynamics/gp/robot_kernels.h"
@@ -29,16 +29,18 @@ bool same_bytes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 }
 
 TEST(Fit, OnePointByHand) {
-  GpModel model = make_model(3.0 * rbf(columns({0}), LengthScales::kOneEach, Amplitude::kUnit), 1.0);
-  const Dataset data{Eigen::MatrixXd::Constant(1, 1, 0.5), Eigen::MatrixXd::Constant(1, 1, 2.0), {}, {}};
+  GpModel model =
+      make_model(3.0 * rbf(columns({0}), LengthScales::kOneEach, Amplitude::kUnit), 1.0);
+  const Dataset data{
+      Eigen::MatrixXd::Constant(1, 1, 0.5), Eigen::MatrixXd::Constant(1, 1, 2.0), {}, {}};
   const FittedGp fitted = fit(model, data);
   // k = 3, noise 1: mean 3/4 y, variance 3 - 9/4.
   const Prediction at = predict(fitted, data.inputs);
   EXPECT_NEAR(at.mean(0, 0), 1.5, kRounding);
   EXPECT_NEAR(at.variance(0, 0), 0.75, kRounding);
   EXPECT_NEAR(at.noise_variance[0], 1.0, kRounding);
-  EXPECT_NEAR(fitted.log_likelihood, -0.5 * (4.0 / 4.0 + std::log(4.0) + std::log(2.0 * std::numbers::pi)),
-              kRounding);
+  EXPECT_NEAR(fitted.log_likelihood,
+              -0.5 * (4.0 / 4.0 + std::log(4.0) + std::log(2.0 * std::numbers::pi)), kRounding);
   EXPECT_EQ(fitted.jitter, 0.0);
 }
 
@@ -96,7 +98,8 @@ TEST(Fit, RecoversANoiseFreePolynomial) {
   Dataset data;
   data.inputs = random_matrix(rng, 60, 2);
   const auto truth = [](const Eigen::MatrixXd& x) {
-    return Eigen::MatrixXd(1.5 + 2.0 * x.col(0).array() - 0.7 * x.col(0).array() * x.col(1).array() +
+    return Eigen::MatrixXd(1.5 + 2.0 * x.col(0).array() -
+                           0.7 * x.col(0).array() * x.col(1).array() +
                            0.4 * x.col(1).array().square());
   };
   data.targets = truth(data.inputs);
@@ -165,7 +168,8 @@ TEST(Fit, ThreadsDoNotShow) {
     const Prediction one = predict(fit(each, data, {.threads = 1}), x, {.threads = 1});
     const Likelihood first = log_marginal_likelihood(each, data, {.threads = 1});
     for (const int threads : {2, 3}) {
-      const Prediction many = predict(fit(each, data, {.threads = threads}), x, {.threads = threads});
+      const Prediction many =
+          predict(fit(each, data, {.threads = threads}), x, {.threads = threads});
       EXPECT_TRUE(same_bytes(one.mean, many.mean));
       EXPECT_TRUE(same_bytes(one.variance, many.variance));
       const Likelihood other = log_marginal_likelihood(each, data, {.threads = threads});
@@ -196,8 +200,8 @@ TEST(Fit, OrderOfSamplesDoesNotMatter) {
 TEST(Fit, OneSamplePredictorAgreesWithTheBatch) {
   Rng rng = Rng::from_name("predictor");
   const Dataset data = smooth_data(rng, 150, 3, 0.1);
-  for (const Kernel& kernel : {rbf(first_columns(3)) * linear(columns({0})),
-                               polynomial(first_columns(3), 2)}) {
+  for (const Kernel& kernel :
+       {rbf(first_columns(3)) * linear(columns({0})), polynomial(first_columns(3), 2)}) {
     const FittedGp fitted = fit(make_model(kernel, 0.01, standardise(data)), data);
     Predictor predictor(fitted);
     const Eigen::MatrixXd x = random_matrix(rng, 10, 3);

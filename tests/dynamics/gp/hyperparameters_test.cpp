@@ -71,7 +71,8 @@ TEST(Estimate, KeepsRangesAndWhatIsHeld) {
 TEST(Estimate, APriorPullsWhatTheDataDoNotSay) {
   Rng rng = Rng::from_name("prior");
   Dataset data = smooth_data(rng, 100, 1, 0.1);
-  data.inputs = Eigen::MatrixXd((Eigen::MatrixXd(100, 2) << data.inputs, Eigen::MatrixXd::Zero(100, 1)).finished());
+  data.inputs = Eigen::MatrixXd(
+      (Eigen::MatrixXd(100, 2) << data.inputs, Eigen::MatrixXd::Zero(100, 1)).finished());
   GpModel model = make_model(rbf(first_columns(2)), 0.1);
   std::vector<Parameter> parameters = model.kernel.parameters();
   parameters[2].prior_value = 5.0;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <functional>
 
-#include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
 
 #include "dynamics/gp/kernel_node.h"
 #include "dynamics/gp/robot_kernels.h"
@@ -31,24 +31,24 @@ struct Case {
 
 std::vector<Case> all_kernels() {
   const Eigen::MatrixXd root = (Eigen::Matrix3d() << 1, 0, 0, 0.5, 1, 0, -0.2, 0.1, 0.7).finished();
-  return {{"rbf", rbf(first_columns(3)), 3},
-          {"rbf of some columns, one scale", rbf(columns({2, 0}), LengthScales::kCommon), 3},
-          {"linear", linear(first_columns(3)), 3},
-          {"linear, unit offset", linear(first_columns(2), Offset::kUnit), 2},
-          {"cubic", polynomial(first_columns(3), 3), 3},
-          {"homogeneous square", polynomial(first_columns(2), 2, Offset::kNone), 2},
-          {"common weight", polynomial(first_columns(2), 2, Offset::kFree, Weights::kCommon), 2},
-          {"multiplicative", multiplicative_polynomial(first_columns(3), 3), 3},
-          {"sum", rbf(columns({0})) + linear(first_columns(3)) + constant(0.7), 3},
-          {"product", rbf(columns({0})) * linear(first_columns(3)) * polynomial(columns({1}), 2), 3},
-          {"scaled sum in a product", 2.0 * (rbf(columns({0})) + constant()) * linear(columns({1})),
-           2},
-          {"features", feature_kernel(first_columns(3), root * root.transpose()), 3},
-          {"angles", linear(joined(angle(0), friction(1, 0.3))), 2},
-          {"gip", gip(kTwoTurnsOneSlide) + joint_friction(3, 1), 9},
-          {"semi-parametric",
-           semi_parametric(first_columns(3), root * root.transpose(), first_columns(2)), 3},
-          {"two outputs", independent_outputs({rbf(columns({0})), linear(first_columns(2))}), 2}};
+  return {
+      {"rbf", rbf(first_columns(3)), 3},
+      {"rbf of some columns, one scale", rbf(columns({2, 0}), LengthScales::kCommon), 3},
+      {"linear", linear(first_columns(3)), 3},
+      {"linear, unit offset", linear(first_columns(2), Offset::kUnit), 2},
+      {"cubic", polynomial(first_columns(3), 3), 3},
+      {"homogeneous square", polynomial(first_columns(2), 2, Offset::kNone), 2},
+      {"common weight", polynomial(first_columns(2), 2, Offset::kFree, Weights::kCommon), 2},
+      {"multiplicative", multiplicative_polynomial(first_columns(3), 3), 3},
+      {"sum", rbf(columns({0})) + linear(first_columns(3)) + constant(0.7), 3},
+      {"product", rbf(columns({0})) * linear(first_columns(3)) * polynomial(columns({1}), 2), 3},
+      {"scaled sum in a product", 2.0 * (rbf(columns({0})) + constant()) * linear(columns({1})), 2},
+      {"features", feature_kernel(first_columns(3), root * root.transpose()), 3},
+      {"angles", linear(joined(angle(0), friction(1, 0.3))), 2},
+      {"gip", gip(kTwoTurnsOneSlide) + joint_friction(3, 1), 9},
+      {"semi-parametric",
+       semi_parametric(first_columns(3), root * root.transpose(), first_columns(2)), 3},
+      {"two outputs", independent_outputs({rbf(columns({0})), linear(first_columns(2))}), 2}};
 }
 
 TEST(Kernel, IsSymmetricAndPositive) {
@@ -98,6 +98,26 @@ TEST(Kernel, TilesDoNotShow) {
   const Eigen::MatrixXd part = covariance(kernel, x.topRows(5), x.bottomRows(7));
   EXPECT_LT((whole.topRightCorner(5, 7) - part).cwiseAbs().maxCoeff(),
             kRounding * whole.maxCoeff());
+}
+
+// Inputs as far from the origin as time stamps are give the same distances.
+TEST(Kernel, SquaredExponentialDoesNotMindWhereTheOriginIs) {
+  Rng rng = Rng::from_name("far");
+  const Kernel kernel = shuffled_parameters(rbf(first_columns(2)), rng);
+  Eigen::MatrixXd x = random_matrix(rng, 20, 2);
+  Eigen::MatrixXd far = x;
+  far.col(0).array() += 1024.0 * 1024.0 * 1024.0;
+  // What the addition left of the inputs.
+  x.col(0) = far.col(0).array() - 1024.0 * 1024.0 * 1024.0;
+  Eigen::MatrixXd q = random_matrix(rng, 20, 20);
+  q = (q + q.transpose()).eval();
+  // Dividing by the length scale rounds 1e9 to 1e-7.
+  constexpr double kTolerance = 1e-5;
+  EXPECT_LT((covariance(kernel, x) - covariance(kernel, far)).cwiseAbs().maxCoeff(), kTolerance);
+  EXPECT_LT((covariance_gradient(kernel, x, q) - covariance_gradient(kernel, far, q))
+                .cwiseAbs()
+                .maxCoeff(),
+            100.0 * kTolerance);
 }
 
 TEST(Kernel, FeaturesGiveTheSameCovariance) {
@@ -158,7 +178,8 @@ TEST(Gip, IsTheProductOfItsDefinition) {
     }
   }
   ASSERT_EQ(at, w.size());
-  EXPECT_NEAR(covariance(kernel, x.row(0), x.row(1))(0, 0), expected, kRounding * std::abs(expected));
+  EXPECT_NEAR(covariance(kernel, x.row(0), x.row(1))(0, 0), expected,
+              kRounding * std::abs(expected));
 }
 
 }  // namespace

@@ -108,8 +108,7 @@ TEST(LeaveOut, SamplesOfNoFoldAreInEveryFit) {
     for (Eigen::Index i = 0; i < 60; ++i) {
       (fold_of[static_cast<std::size_t>(i)] == 2 ? held : seen).push_back(i);
     }
-    const Prediction naive =
-        predict(fit(model, subset(data, seen)), data.inputs(held, Eigen::all));
+    const Prediction naive = predict(fit(model, subset(data, seen)), data.inputs(held, Eigen::all));
     EXPECT_LT((left.mean(held, Eigen::all) - naive.mean).cwiseAbs().maxCoeff(), kTwoRoads);
     EXPECT_EQ(left.residual.topRows(20).cwiseAbs().maxCoeff(), 0.0);
   }

@@ -7,9 +7,9 @@
 #include <array>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
 
 #include "dynamics/gp/kernel_node.h"
 #include "tests/dynamics/gp/gp_samples.h"
@@ -75,10 +75,10 @@ S energy_covariance(const Kernel& kernel, const JointKinds& joints, const std::a
   return out + r;
 }
 
-// tau_a = sum_b L_(dq_a dq_b) ddq_b + L_(dq_a q_b) dq_b - L_(q_a) on both arguments: the operator is
-// linear in mixed derivatives of order (<= 2, <= 2), taken one direction at a time:
-// d/dt along (dq, ddq) of the derivative by dq_a is one Jet direction more. k_T and k_V are
-// independent, and L = T - V has the covariance k_T + k_V.
+// tau_a = sum_b L_(dq_a dq_b) ddq_b + L_(dq_a q_b) dq_b - L_(q_a) on both arguments: the operator
+// is linear in mixed derivatives of order (<= 2, <= 2), taken one direction at a time: d/dt along
+// (dq, ddq) of the derivative by dq_a is one Jet direction more. k_T and k_V are independent, and L
+// = T - V has the covariance k_T + k_V.
 using J1 = ceres::Jet<double, 1>;
 using J2 = ceres::Jet<J1, 1>;
 using J3 = ceres::Jet<J2, 1>;

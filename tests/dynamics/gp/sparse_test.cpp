@@ -50,7 +50,8 @@ TEST(Sparse, GradientOfTheBoundAgreesWithDifferences) {
   Dataset data = smooth_data(rng, 120, 2, 0.1);
   data.noise_scale = random_matrix(rng, 120, 1).cwiseAbs().array() + 0.5;
   const GpModel model = make_model(rbf(first_columns(2)) + linear(columns({0})), 0.05);
-  const auto objective = make_sparse_objective(model, data, choose_inducing(model, data, {.count = 15}));
+  const auto objective =
+      make_sparse_objective(model, data, choose_inducing(model, data, {.count = 15}));
   const Eigen::VectorXd values = log_values_of(model);
   const Eigen::VectorXd gradient = objective->evaluate(values)->gradient;
   for (Eigen::Index p = 0; p < values.size(); ++p) {
@@ -83,7 +84,8 @@ TEST(Sparse, EstimatesOnAllSamples) {
   const Eigen::MatrixXd inducing = choose_inducing(model, data, {.count = 60});
   const Estimate found = estimate_sparse(model, data, inducing, {.starts = 1});
   EXPECT_EQ(found.status, EstimateStatus::kConverged) << found.message;
-  // Noise of 0.1, from 1500 samples: 4 percent of its variance; two of those and what 60 points lose.
+  // Noise of 0.1, from 1500 samples: 4 percent of its variance; two of those and what 60 points
+  // lose.
   EXPECT_NEAR(found.model.noise_variance[0].value, 0.01, 0.001);
 }
 
