@@ -10,6 +10,8 @@ using Eigen::Index;
 
 // 256 x 256 doubles fill half of a usual second-level cache.
 constexpr Index kTileRows = 256;
+// Samples in a tile come in strips of so many (lip_pairs.h).
+constexpr Index kStrip = 8;
 
 struct Tile {
   Index row;
@@ -70,7 +72,7 @@ Covariance::Covariance(const Kernel& kernel)
     : node_(kernel.shared_node()),
       theta_(kernel.log_values()),
       outputs_(kernel.outputs()),
-      tile_samples_(std::max<Index>(8, kTileRows / kernel.outputs())) {}
+      tile_samples_(std::max(kStrip, kTileRows / kernel.outputs() / kStrip * kStrip)) {}
 
 void Covariance::prepare(const Inputs& inputs, Prepared& out) const {
   node_->prepare(theta_, inputs, out);
