@@ -86,7 +86,7 @@ class SumNode : public Composite {
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
     Basis out;
-    const auto features = static_cast<Index>(*feature_count());
+    const auto features = static_cast<Index>(feature_count().value_or(0.0));
     out.values.resize(inputs.rows() * outputs(), features);
     out.exponents = Eigen::MatrixXd::Zero(features, parameter_count());
     Index at = 0;
@@ -209,7 +209,7 @@ class IndependentNode : public Composite {
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
-    const auto features = static_cast<Index>(*feature_count());
+    const auto features = static_cast<Index>(feature_count().value_or(0.0));
     Basis out{Eigen::MatrixXd::Zero(inputs.rows() * outputs(), features),
               Eigen::MatrixXd::Zero(features, parameter_count())};
     Index at = 0;
