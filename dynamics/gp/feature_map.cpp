@@ -33,6 +33,7 @@ FeatureMap columns(std::vector<int> indices) {
 
 FeatureMap first_columns(int count) {
   std::vector<int> indices;
+  indices.reserve(static_cast<std::size_t>(std::max(0, count)));
   for (int i = 0; i < count; ++i) indices.push_back(i);
   return columns(std::move(indices));
 }

@@ -95,7 +95,7 @@ void Covariance::tile(Samples a, Samples b, Scratch& scratch, Block out) const {
   scatter(own, outputs_, out);
 }
 
-void Covariance::lower(Workers& workers, const Prepared& x, Block out) const {
+void Covariance::lower(Workers& workers, const Prepared& x, Eigen::MatrixXd& out) const {
   const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
   const Index m = outputs_;
   workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
@@ -111,19 +111,15 @@ Eigen::MatrixXd Covariance::lower(Workers& workers, const Prepared& x) const {
   return out;
 }
 
-void Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y, Block out) const {
+Eigen::MatrixXd Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y) const {
   const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
   const Index m = outputs_;
+  Eigen::MatrixXd out(x.samples * m, y.samples * m);
   workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
     const Tile& t = tiles[static_cast<std::size_t>(task)];
     tile({x, t.row, t.rows}, {y, t.col, t.cols}, scratch,
          out.block(t.row * m, t.col * m, t.rows * m, t.cols * m));
   });
-}
-
-Eigen::MatrixXd Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y) const {
-  Eigen::MatrixXd out(x.samples * outputs_, y.samples * outputs_);
-  cross(workers, x, y, out);
   return out;
 }
 

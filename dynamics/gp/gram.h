@@ -21,9 +21,9 @@ class Covariance {
 
   /// The lower triangle of k(x, x); the tiles on the diagonal are complete, the rest is zero.
   [[nodiscard]] Eigen::MatrixXd lower(Workers& workers, const Prepared& x) const;
-  void lower(Workers& workers, const Prepared& x, Block out) const;
+  /// The same into a matrix of the right size; what lies above the tiles stays.
+  void lower(Workers& workers, const Prepared& x, Eigen::MatrixXd& out) const;
   [[nodiscard]] Eigen::MatrixXd cross(Workers& workers, const Prepared& x, const Prepared& y) const;
-  void cross(Workers& workers, const Prepared& x, const Prepared& y, Block out) const;
   /// Some samples against some, in the calling thread.
   void tile(Samples a, Samples b, Scratch& scratch, Block out) const;
   /// k(x_i, x_i): samples * outputs.

@@ -151,6 +151,7 @@ Dataset thinned(const Dataset& dataset, Index limit) {
   const Index samples = dataset.samples();
   if (samples <= limit) return dataset;
   std::vector<Index> indices;
+  indices.reserve(static_cast<std::size_t>(limit));
   for (Index k = 0; k < limit; ++k) indices.push_back(k * samples / limit);
   return subset(dataset, indices);
 }
@@ -159,7 +160,7 @@ Eigen::VectorXd best_start(const GpModel& model, const Dataset& dataset,
                            const std::vector<Free>& free, const EstimateOptions& options,
                            Estimate& out) {
   const Eigen::VectorXd log_values = log_values_of(model);
-  const Eigen::VectorXd own = to_u(free, log_values);
+  Eigen::VectorXd own = to_u(free, log_values);
   const bool small = dataset.samples() <= options.samples_for_starts;
   if (options.starts <= 1 && small) return own;
   const auto objective = make_objective(model, thinned(dataset, options.samples_for_starts),

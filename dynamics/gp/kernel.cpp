@@ -76,7 +76,7 @@ Kernel linear(FeatureMap map, Offset offset, Weights weights) {
 }
 
 Kernel constant(double variance) {
-  FeatureMap nothing{{}, 0, [](const Inputs&, Features) {}};
+  FeatureMap nothing{{}, 0, [](const Inputs&, const Features&) {}};
   Kernel out = polynomial(std::move(nothing), 1, Offset::kFree);
   std::vector<Parameter> parameters = out.parameters();
   parameters[0].name = "scale";
@@ -103,7 +103,7 @@ Kernel feature_kernel(FeatureMap map, const Eigen::MatrixXd& sigma) {
   KINESCOPE_CHECK(sigma.rows() == map.size() && sigma.cols() == map.size(),
                   "a covariance for every pair of features");
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sigma);
-  const Eigen::VectorXd values = eigen.eigenvalues();
+  const Eigen::VectorXd& values = eigen.eigenvalues();
   if (values.size() > 0 && !(values[0] >= -1e-9 * values.cwiseAbs().maxCoeff())) {
     throw bad_request("sigma", "the covariance of the weights has a negative eigenvalue",
                       "give a symmetric positive semi-definite matrix");

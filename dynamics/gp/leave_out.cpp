@@ -30,6 +30,7 @@ LeaveOut leave_out(const FittedGp& fitted, const Dataset& dataset, const std::ve
     if (fold_of[i] >= 0) members[fold_of[i]].push_back(static_cast<Index>(i));
   }
   std::vector<std::vector<Index>> folds;
+  folds.reserve(members.size());
   for (auto& [fold, samples] : members) folds.push_back(std::move(samples));
   Workers workers(threads);
   const LeftOut left = fitted.posterior->leave_out(workers, folds);
@@ -63,6 +64,7 @@ LeaveOut leave_one_out(const FittedGp& fitted, const Dataset& dataset, int threa
 std::vector<int> consecutive_folds(Index samples, int folds) {
   KINESCOPE_CHECK(folds >= 2, "at least two folds");
   std::vector<int> out;
+  out.reserve(static_cast<std::size_t>(samples));
   for (Index i = 0; i < samples; ++i) out.push_back(static_cast<int>(i * folds / samples));
   return out;
 }

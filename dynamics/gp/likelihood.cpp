@@ -66,7 +66,7 @@ class DenseObjective : public Objective {
  private:
   // scale * (K^-1)(row.., col..) from W = L^-1, for row >= col: rows of W above `row` are zero
   // there.
-  void inverse_tile(Index row, Index col, double scale, Block out) const {
+  void inverse_tile(Index row, Index col, double scale, const Block& out) const {
     const Index below = matrix_.rows() - row;
     transposed_product(scale, matrix_.block(row, row, below, out.rows()),
                        matrix_.block(row, col, below, out.cols()), 0.0, out);

@@ -50,8 +50,8 @@ class LipNode : public KernelNode {
         out.tables[kSine].col(j).setZero();
       }
     }
-    out.tables[kVelocity] = inputs.middleCols(n(), n());
-    out.tables[kAcceleration] = inputs.middleCols(2 * n(), n());
+    out.tables[kVelocity] = inputs.middleCols(size(), size());
+    out.tables[kAcceleration] = inputs.middleCols(2 * size(), size());
   }
 
   void evaluate(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
@@ -129,6 +129,7 @@ class LipNode : public KernelNode {
   };
 
   [[nodiscard]] int n() const { return static_cast<int>(joints_.size()); }
+  [[nodiscard]] Index size() const { return static_cast<Index>(joints_.size()); }
 
   void clear(lip_pairs::Torques& torques) const {
     for (std::size_t r = 0; r < joints_.size(); ++r) {

@@ -48,7 +48,7 @@ KINESCOPE_INLINE void add(Lane& to, double a, const Lane& b) {
 }
 KINESCOPE_INLINE Lane all(double value) {
   Lane out;
-  for (int i = 0; i < kLanes; ++i) out.v[i] = value;
+  for (double& v : out.v) v = value;
   return out;
 }
 
