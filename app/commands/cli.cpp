@@ -62,7 +62,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     remedy = did_you_mean(argv[1], known_words(app, nullptr));
   } else if (command == nullptr) {
     message = "name a command";
-    remedy = "run, inspect or camera; see kinescope --help";
+    remedy = "run, dynamics, inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -76,6 +76,12 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   return static_cast<int>(ExitCode::kBadRequest);
 }
 
+// "log" of "folder/log.csv.gz".
+std::string log_name(const std::filesystem::path& log) {
+  const std::string name = log.filename().string();
+  return name.substr(0, name.find('.'));
+}
+
 ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
   if (app.got_subcommand("run")) {
     if (line.run.output.empty()) {
@@ -84,6 +90,12 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     line.run.calibrate.estimate_time_offset = !line.no_time_offset;
     line.run.calibrate.estimate_intrinsics = line.run.estimate_intrinsics;
     return run_command(line.run, console);
+  }
+  if (app.got_subcommand("dynamics")) {
+    if (line.dynamics.output.empty()) {
+      line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
+    }
+    return dynamics_command(line.dynamics, console);
   }
   if (app.got_subcommand("inspect")) return inspect_command(line.inspect, console);
   return camera_command(line.camera, console);
@@ -124,6 +136,7 @@ int run_program(int argc, const char* const* argv) {
   CLI::App app("Learns a robot's body from a video of markers and a joint log", "kinescope");
   CommandLine line;
   line.run.command_line = join_arguments(argc, argv);
+  line.dynamics.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

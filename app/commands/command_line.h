@@ -18,6 +18,7 @@ struct OutputOptions {
 /// Everything the command line can say.
 struct CommandLine {
   RunOptions run;
+  DynamicsOptions dynamics;
   InspectOptions inspect;
   CameraOptions camera;
   OutputOptions output;

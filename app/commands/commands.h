@@ -13,6 +13,8 @@
 #include "calib/bundle/calibrate.h"
 #include "calib/vision/board.h"
 #include "calib/vision/detect.h"
+#include "dynamics/data/torque_data.h"
+#include "dynamics/models/torque_model.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/progress.h"
 
@@ -39,6 +41,21 @@ struct RunOptions {
 };
 
 [[nodiscard]] ExitCode run_command(const RunOptions& options, const Console& console);
+
+struct DynamicsOptions {
+  std::vector<std::filesystem::path> logs;
+  std::vector<std::filesystem::path> test_logs;  ///< judged on; empty: the logs' last part
+  std::filesystem::path robot;                   ///< URDF
+  std::filesystem::path output;                  ///< folder
+  TorqueDataOptions data;
+  TorqueModelOptions models_options;
+  std::vector<std::string> models;              ///< names; empty: all
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.80665 down z
+  bool learning_curve = false;
+  std::string command_line;  ///< for the report
+};
+
+[[nodiscard]] ExitCode dynamics_command(const DynamicsOptions& options, const Console& console);
 
 struct InspectOptions {
   RecordingPaths recording;

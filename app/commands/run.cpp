@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope run`: every arrow of the data's path on one page.
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -12,6 +11,7 @@
 #include "app/commands/limits.h"
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
+#include "app/commands/stopwatch.h"
 #include "app/io/products.h"
 #include "app/report/report.h"
 #include "calib/quality/error_summary.h"
@@ -24,19 +24,6 @@ namespace {
 
 // Offsets of the clocks closer than this (s) give the same structure.
 constexpr double kSameOffset = 0.003;
-
-// Wall-clock times of the stages, for the report.
-class Stopwatch {
- public:
-  void lap(std::string stage, std::vector<StageTime>& times) {
-    const auto now = std::chrono::steady_clock::now();
-    times.push_back({std::move(stage), std::chrono::duration<double>(now - last_).count()});
-    last_ = now;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {

@@ -9,10 +9,6 @@
 #include "app/io/sha256.h"
 #include "kinematics/core/file.h"
 
-#ifndef KINESCOPE_VERSION
-#error "KINESCOPE_VERSION is set by the build"
-#endif
-
 namespace kinescope {
 namespace {
 
@@ -52,17 +48,10 @@ std::string sha256_of_path(const fs::path& path) {
 }  // namespace
 
 RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
-    : folder_(options.output), detect_(options.detect), force_(options.force) {
-  if (folder_.empty()) {
-    const std::string name = recording.folder.filename().string();
-    folder_ = (name.empty() ? "recording" : name) + "_run";
-  }
-  require_writable_folder(folder_);
-}
-
-void RunFolder::write(std::string_view name, std::string_view content) const {
-  write_file_atomically(folder_ / name, content);
-}
+    : OutputFolder(options.output.empty() ? fs::path(recording_name(recording.folder) + "_run")
+                                          : options.output),
+      detect_(options.detect),
+      force_(options.force) {}
 
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
@@ -118,8 +107,6 @@ void RunFolder::keep_observations(const Recording& recording,
       {"times_s", observations.times_s}, {"rejected", std::move(rejected)}};
   write(kObservationsKey, kept.dump(1) + "\n");
 }
-
-std::string program_version() { return KINESCOPE_VERSION; }
 
 std::vector<InputFile> hash_inputs(const Recording& recording) {
   std::vector<InputFile> inputs;

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope dynamics`: from a joint log with torques and a URDF to a model of the torque.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
+#include "app/commands/stopwatch.h"
+#include "app/io/nearest_name.h"
+#include "app/io/sha256.h"
+#include "app/report/torque_summary.h"
+#include "dynamics/data/splits.h"
+#include "dynamics/data/torque_scale.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/dynamic_urdf.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Share of the samples that is held out where no log is named for it.
+constexpr double kHeldOut = 0.3;
+
+std::vector<TorqueModelKind> parse_models(const std::vector<std::string>& names) {
+  if (names.empty()) return all_torque_models();
+  std::vector<TorqueModelKind> kinds;
+  for (const std::string& name : names) {
+    const auto kind = torque_model_kind(name);
+    if (!kind) {
+      std::vector<std::string> known;
+      for (const TorqueModelKind k : all_torque_models()) known.emplace_back(to_string(k));
+      throw bad_request("--model", fmt::format("'{}' is no torque model", name),
+                        did_you_mean(name, known));
+    }
+    kinds.push_back(*kind);
+  }
+  return kinds;
+}
+
+std::string file_list(const std::vector<fs::path>& files) {
+  std::vector<std::string> names;
+  for (const fs::path& file : files) names.push_back(file.filename().string());
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+void split_samples(const DynamicsOptions& options, const DynamicModel& model,
+                   TorqueSummary& summary) {
+  if (!options.test_logs.empty()) {
+    TorqueDataOptions data = options.data;
+    data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
+    summary.train = summary.data.samples;
+    summary.test = read_torque_data(options.test_logs, movable_joints(model.tree), data).samples;
+    summary.split = "the unseen log " + file_list(options.test_logs);
+    return;
+  }
+  const Fold fold = split_last(summary.data.samples, kHeldOut);
+  summary.train = select_rows(summary.data.samples, fold.train);
+  summary.test = select_rows(summary.data.samples, fold.test);
+  const bool whole = summary.train.trajectory.size() > 0 &&
+                     (summary.test.trajectory.array() != summary.train.trajectory[0]).all();
+  summary.split = whole ? "unseen trajectories of the log" : "the log's last part, after a gap";
+}
+
+// The scale of the torque against the nominal masses, where there are any.
+void check_scale(const DynamicModel& model, TorqueSummary& summary) {
+  double mass = 0.0;
+  for (const InertialParameters& link : model.links) mass += link.mass_kg;
+  if (!(mass > 0.0) || summary.data.samples.torque_unit == "A") return;
+  const TorqueSamples& samples = summary.data.samples;
+  const TorqueScales scales = compare_torque_scale(
+      samples,
+      inverse_dynamics_of_samples(make_rigid_model(model), samples.q, samples.dq, samples.ddq));
+  throw_refusals(scales.findings);
+  summary.data.findings.insert(summary.data.findings.end(), scales.findings.begin(),
+                               scales.findings.end());
+}
+
+std::string_view drive_term(TermKind kind) {
+  switch (kind) {
+    case TermKind::kViscous:
+      return "viscous";
+    case TermKind::kCoulomb:
+      return "coulomb";
+    case TermKind::kOffset:
+      return "offset";
+    case TermKind::kMotorInertia:
+      return "motor inertia";
+    default:
+      return "";
+  }
+}
+
+// The drive terms that stand alone among the base parameters.
+std::vector<DriveEstimate> drives_of(const TorqueSummary& summary) {
+  std::vector<DriveEstimate> out;
+  const Identification& found = summary.identification;
+  for (std::size_t k = 0; k < found.basis.kept.size(); ++k) {
+    const TorqueTerm& term = found.terms[static_cast<std::size_t>(found.basis.kept[k])];
+    const std::string_view name = drive_term(term.kind);
+    if (name.empty()) continue;
+    const auto i = static_cast<Eigen::Index>(k);
+    out.push_back({std::string(name), summary.joints[static_cast<std::size_t>(term.index)],
+                   found.parameters[i], found.sigma_of(i)});
+  }
+  std::ranges::stable_sort(out, {}, &DriveEstimate::joint);
+  return out;
+}
+
+std::vector<LearningCurve> learning_curves(const std::vector<TorqueModelKind>& kinds,
+                                           const DynamicModel& model, const TorqueSummary& summary,
+                                           const TorqueModelOptions& options) {
+  std::vector<LearningCurve> curves;
+  for (const TorqueModelKind kind : kinds) {
+    if (kind == TorqueModelKind::kLip) continue;  // its sizes are other ones
+    std::vector<int> sizes;
+    for (int size = 100;
+         size <= std::min<int>(options.samples, static_cast<int>(summary.train.size()));
+         size *= 2) {
+      sizes.push_back(size);
+    }
+    try {
+      curves.push_back(
+          {kind, learning_curve(kind, model, summary.train, summary.test, sizes, options)});
+    } catch (const Error&) {
+      // Too few samples for this model: its line is missing, its score says why.
+    }
+  }
+  return curves;
+}
+
+int best_of(const std::vector<TorqueScore>& scores) {
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    if (!scores[k].failure.empty() || !(scores[k].nmse_percent.mean() < least)) continue;
+    least = scores[k].nmse_percent.mean();
+    best = static_cast<int>(k);
+  }
+  return best;
+}
+
+// Every model on the held-out samples; the best one's prediction is kept.
+void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& model,
+             const TorqueModelOptions& options, const Progress& progress, TorqueSummary& summary) {
+  std::vector<FittedTorqueModel> fitted(kinds.size());
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    TorqueScore score;
+    score.kind = kinds[k];
+    try {
+      fitted[k] = fit_torque_model(kinds[k], model, summary.train, options);
+      score = score_torque_model(fitted[k], summary.test);
+    } catch (const Error& error) {
+      score.failure = error.what();
+    }
+    summary.scores.push_back(std::move(score));
+    report(progress, "models", static_cast<int>(k) + 1, static_cast<int>(kinds.size()));
+  }
+  summary.best = best_of(summary.scores);
+  const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];
+  if (best.predict) {
+    summary.prediction = best.predict(summary.test.q, summary.test.dq, summary.test.ddq);
+  }
+}
+
+void print_scores(const TorqueSummary& summary) {
+  fmt::print("nMSE on {}, %\n{:<16} {:>8}", summary.split, "model", "samples");
+  for (const std::string& joint : summary.joints) fmt::print(" {:>10}", joint);
+  fmt::print("\n");
+  for (const TorqueScore& score : summary.scores) {
+    if (!score.failure.empty()) {
+      fmt::print("{:<16} {}\n", to_string(score.kind), score.failure);
+      continue;
+    }
+    fmt::print("{:<16} {:>8}", to_string(score.kind), score.training_samples);
+    for (const double nmse : score.nmse_percent) fmt::print(" {:>10.3g}", nmse);
+    fmt::print("\n");
+  }
+}
+
+}  // namespace
+
+ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
+  Stopwatch clock;
+  TorqueSummary summary;
+  const std::vector<TorqueModelKind> kinds = parse_models(options.models);
+  DynamicModel model = read_dynamic_urdf(options.robot);
+  if (options.gravity_m_s2) model.gravity_m_s2 = *options.gravity_m_s2;
+  const OutputFolder folder(options.output);
+  summary.robot = model.tree.name;
+  summary.log = "Log " + file_list(options.logs);
+  summary.version = program_version();
+  summary.command = options.command_line;
+  summary.gravity_m_s2 = model.gravity_m_s2;
+  for (const auto& files : {options.logs, options.test_logs, {options.robot}}) {
+    for (const fs::path& file : files) {
+      summary.inputs.push_back({file.filename().string(), sha256_of_file(file)});
+    }
+  }
+  for (const Joint& joint : model.tree.joints) {
+    if (joint.type == JointType::kFixed) continue;
+    summary.joints.push_back(joint.name);
+    summary.types.push_back(joint.type);
+  }
+  summary.data = read_torque_data(options.logs, movable_joints(model.tree), options.data);
+  check_scale(model, summary);
+  split_samples(options, model, summary);
+  clock.lap("read", summary.times);
+
+  summary.identification = identify_dynamics(model, summary.train, options.models_options.identify);
+  summary.consistent = consistent_model(summary.identification);
+  summary.drives = drives_of(summary);
+  clock.lap("identify", summary.times);
+  compare(kinds, model, options.models_options, console.progress, summary);
+  clock.lap("models", summary.times);
+  if (options.learning_curve) {
+    summary.learning = learning_curves(kinds, model, summary, options.models_options);
+    clock.lap("learning curve", summary.times);
+  }
+
+  const nlohmann::json document = torque_json(summary);
+  folder.write("dynamics.json", document.dump(1) + "\n");
+  folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));
+  folder.write("dynamics.html", torque_report_html(summary));
+  if (console.json) {
+    fmt::print("{}\n", document.dump(2));
+    return ExitCode::kDone;
+  }
+  const TorqueVerdict verdict = torque_verdict(summary);
+  fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  print_scores(summary);
+  fmt::print("urdf    {}\nreport  {}\n", folder.file("robot_dynamics.urdf").string(),
+             folder.file("dynamics.html").string());
+  return ExitCode::kDone;
+}
+
+}  // namespace kinescope

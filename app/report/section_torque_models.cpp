@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/report/html.h"
+#include "app/report/plot.h"
+#include "app/report/sections.h"
+#include "app/report/torque_sections.h"
+
+namespace kinescope::report {
+namespace {
+
+constexpr Eigen::Index kMostPoints = 600;  // of one curve
+
+std::vector<std::string> joint_header(const TorqueSummary& summary, std::string_view first) {
+  std::vector<std::string> names{std::string(first)};
+  names.insert(names.end(), summary.joints.begin(), summary.joints.end());
+  return names;
+}
+
+// One row a model, one column a joint.
+std::string score_table(const TorqueFacts& facts, std::string_view id, std::string_view caption,
+                        std::string_view key, Quantity quantity) {
+  Table table(id, caption, facts.result);
+  std::vector<std::string> head = joint_header(facts.summary, "Model");
+  head.insert(head.begin() + 1, "Samples");
+  table.header(head);
+  for (std::size_t m = 0; m < facts.summary.scores.size(); ++m) {
+    const TorqueScore& score = facts.summary.scores[m];
+    if (!score.failure.empty()) continue;
+    table.begin_row();
+    table.text(to_string(score.kind));
+    table.number(fmt::format("/models/{}/samples", m), Quantity::kCount);
+    for (std::size_t j = 0; j < facts.summary.joints.size(); ++j) {
+      table.number(fmt::format("/models/{}/{}/{}", m, key, j), quantity);
+    }
+  }
+  return table.str();
+}
+
+std::string learning_plot(const TorqueSummary& summary) {
+  double low = 1e300;
+  double high = -1e300;
+  double least = 1e300;
+  double most = 0.0;
+  for (const LearningCurve& curve : summary.learning) {
+    for (const LearningPoint& point : curve.points) {
+      low = std::min(low, std::log10(std::max(1e-6, point.nmse_percent)));
+      high = std::max(high, std::log10(std::max(1e-6, point.nmse_percent)));
+      least = std::min(least, std::log10(static_cast<double>(point.samples)));
+      most = std::max(most, std::log10(static_cast<double>(point.samples)));
+    }
+  }
+  if (!(low <= high)) return "";
+  pad_range(low, high);
+  pad_range(least, most);
+  Plot plot("nMSE against the number of training samples",
+            {.label = "training samples", .lower = least, .upper = most, .log10 = true},
+            {.label = "nMSE over all joints, %", .lower = low, .upper = high, .log10 = true});
+  for (std::size_t k = 0; k < summary.learning.size(); ++k) {
+    std::vector<Eigen::Vector2d> points;
+    for (const LearningPoint& point : summary.learning[k].points) {
+      points.emplace_back(std::log10(static_cast<double>(point.samples)),
+                          std::log10(std::max(1e-6, point.nmse_percent)));
+    }
+    plot.line(points, series_class(k));
+    plot.dots(points, series_class(k));
+    plot.legend(to_string(summary.learning[k].kind), series_class(k));
+  }
+  return figure(plot.str(), "Learning curve: samples of the training part, evenly chosen.");
+}
+
+std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
+  const Eigen::Index samples = summary.test.size();
+  const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
+  constexpr double kBand = 1.96;
+  std::vector<double> time;
+  std::vector<double> lower;
+  std::vector<double> upper;
+  std::vector<Eigen::Vector2d> measured;
+  std::vector<Eigen::Vector2d> predicted;
+  for (Eigen::Index i = 0; i < samples; i += step) {
+    const double t = summary.test.t_s[i] - summary.test.t_s[0];
+    const double mean = summary.prediction.mean(i, joint);
+    const double sigma = summary.prediction.sigma(i, joint);
+    time.push_back(t);
+    lower.push_back(mean - kBand * sigma);
+    upper.push_back(mean + kBand * sigma);
+    measured.emplace_back(t, summary.test.torque(i, joint));
+    predicted.emplace_back(t, mean);
+  }
+  double low = summary.test.torque.col(joint).minCoeff();
+  double high = summary.test.torque.col(joint).maxCoeff();
+  pad_range(low, high, 0.1);
+  double begin = *std::ranges::min_element(time);
+  double end = *std::ranges::max_element(time);
+  pad_range(begin, end, 0.01);
+  const std::string& name = summary.joints[static_cast<std::size_t>(joint)];
+  Plot plot(
+      fmt::format("Measured and predicted torque of {}", name),
+      {.label = "time, s", .lower = begin, .upper = end},
+      {.label = fmt::format("{}, {}", name, summary.test.torque_unit), .lower = low, .upper = high},
+      {.width = 940.0, .height = 200.0});
+  plot.band(time, lower, upper, series_class(0));
+  plot.line(measured, series_class(7));
+  plot.line(predicted, series_class(0));
+  plot.legend("measured", series_class(7));
+  plot.legend("predicted, 95 % band", series_class(0));
+  return figure(plot.str(), fmt::format("{}: samples that the model has not seen.", name), "wide");
+}
+
+}  // namespace
+
+std::string torque_models_section(const TorqueFacts& facts) {
+  std::string out = section_head("models", "Models side by side");
+  out += paragraph(
+      "nMSE: mean squared error over the variance of the measured torque, on the held-out part. "
+      "Coverage: share of the held-out samples within the model's own 90 % and 95 % bands.");
+  out += score_table(facts, "nmse-table", "nMSE, %", "nmse_percent", Quantity::kPlain);
+  out +=
+      score_table(facts, "rms-table", fmt::format("Rms error, {}", facts.summary.train.torque_unit),
+                  "rms", Quantity::kPlain);
+  out += score_table(facts, "coverage90-table", "Coverage of the 90 % band, %", "coverage_90",
+                     Quantity::kPercent);
+  out += score_table(facts, "coverage95-table", "Coverage of the 95 % band, %", "coverage_95",
+                     Quantity::kPercent);
+  for (const TorqueScore& score : facts.summary.scores) {
+    if (!score.failure.empty()) {
+      out += paragraph(fmt::format("{} was not fitted: {}", to_string(score.kind), score.failure),
+                       "note");
+    }
+  }
+  return out + learning_plot(facts.summary) + "</section>\n";
+}
+
+std::string torque_prediction_section(const TorqueFacts& facts) {
+  std::string out = section_head("prediction", "Measured and predicted torque");
+  if (facts.summary.test.size() == 0 || facts.summary.scores.empty()) return out + "</section>\n";
+  out += paragraph(fmt::format(
+      "Predicted by the {} model.",
+      to_string(facts.summary.scores[static_cast<std::size_t>(facts.summary.best)].kind)));
+  for (Eigen::Index j = 0; j < facts.summary.test.joints(); ++j) {
+    out += prediction_plot(facts.summary, j);
+  }
+  return out + "</section>\n";
+}
+
+}  // namespace kinescope::report

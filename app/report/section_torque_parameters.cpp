@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/report/html.h"
+#include "app/report/plot.h"
+#include "app/report/sections.h"
+#include "app/report/torque_sections.h"
+
+namespace kinescope::report {
+namespace {
+
+constexpr int kBins = 24;
+constexpr std::size_t kMostParameters = 120;
+
+const DriveEstimate* drive(const TorqueSummary& summary, std::string_view term,
+                           const std::string& joint) {
+  for (const DriveEstimate& estimate : summary.drives) {
+    if (estimate.term == term && estimate.joint == joint) return &estimate;
+  }
+  return nullptr;
+}
+
+double drive_value(const TorqueSummary& summary, std::string_view term, const std::string& joint) {
+  const DriveEstimate* found = drive(summary, term, joint);
+  return found == nullptr ? 0.0 : found->value;
+}
+
+// What is left of the torque without the rigid body, over velocity: the friction as measured.
+std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
+                          const Eigen::MatrixXd& rest) {
+  const std::string& name = summary.joints[static_cast<std::size_t>(joint)];
+  const double viscous = drive_value(summary, "viscous", name);
+  const double coulomb = drive_value(summary, "coulomb", name);
+  const auto dq = summary.train.dq.col(joint);
+  const double fastest = std::max(dq.cwiseAbs().maxCoeff(), 1e-9);
+  std::vector<double> sum(kBins, 0.0);
+  std::vector<double> square(kBins, 0.0);
+  std::vector<int> count(kBins, 0);
+  for (Eigen::Index i = 0; i < dq.size(); ++i) {
+    const int bin =
+        std::clamp(static_cast<int>((dq[i] / fastest + 1.0) * 0.5 * kBins), 0, kBins - 1);
+    const double value = rest(i, joint) + viscous * dq[i] +
+                         coulomb * (dq[i] > 0.0   ? 1.0
+                                    : dq[i] < 0.0 ? -1.0
+                                                  : 0.0);
+    sum[static_cast<std::size_t>(bin)] += value;
+    square[static_cast<std::size_t>(bin)] += value * value;
+    ++count[static_cast<std::size_t>(bin)];
+  }
+  std::vector<Eigen::Vector2d> means;
+  std::vector<Eigen::Vector2d> model;
+  double low = 0.0;
+  double high = 0.0;
+  for (int b = 0; b < kBins; ++b) {
+    const auto k = static_cast<std::size_t>(b);
+    const double velocity = ((b + 0.5) / kBins * 2.0 - 1.0) * fastest;
+    const double friction = viscous * velocity + std::copysign(coulomb, velocity);
+    model.emplace_back(velocity, friction);
+    low = std::min(low, friction);
+    high = std::max(high, friction);
+    if (count[k] < 3) continue;
+    means.emplace_back(velocity, sum[k] / count[k]);
+    low = std::min(low, means.back().y());
+    high = std::max(high, means.back().y());
+  }
+  pad_range(low, high, 0.1);
+  const bool turns = summary.types[static_cast<std::size_t>(joint)] != JointType::kPrismatic;
+  Plot plot(fmt::format("Friction of {}", name),
+            {.label = turns ? "velocity, rad/s" : "velocity, m/s",
+             .lower = -1.05 * fastest,
+             .upper = 1.05 * fastest},
+            {.label = fmt::format("{}, {}", name, summary.train.torque_unit),
+             .lower = low,
+             .upper = high});
+  plot.line(model, series_class(0));
+  plot.dots(means, series_class(1));
+  plot.legend("viscous and Coulomb", series_class(0));
+  plot.legend("measured, mean of the bin", series_class(1));
+  return figure(plot.str(), fmt::format("Friction profile of {}.", name));
+}
+
+std::string drive_table(const TorqueFacts& facts) {
+  Table table("drives-table",
+              fmt::format("Drives, in {} per SI (expanded uncertainty, k = 2)",
+                          facts.summary.train.torque_unit),
+              facts.result);
+  table.header({"Joint", "Term", "Value", "U"});
+  for (std::size_t k = 0; k < facts.summary.drives.size(); ++k) {
+    const DriveEstimate& estimate = facts.summary.drives[k];
+    table.begin_row();
+    table.text(estimate.joint);
+    table.text(estimate.term);
+    table.number(fmt::format("/drives/{}/value", k), Quantity::kPlain);
+    table.text(std::isfinite(estimate.sigma) ? fmt::format("{:.2g}", 2.0 * estimate.sigma)
+                                             : "not determined");
+  }
+  return table.str();
+}
+
+std::string parameter_table(const TorqueFacts& facts) {
+  Table table("parameters-table", "Base parameters: all that this torque can tell", facts.result);
+  table.header({"Combination of inertial parameters", "Value", "U (k = 2)"});
+  const Identification& found = facts.summary.identification;
+  const auto count = std::min<std::size_t>(kMostParameters, found.names.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    table.begin_row();
+    table.text(found.names[k]);
+    table.number(fmt::format("/parameters/{}/value", k), Quantity::kPlain);
+    const double sigma = found.sigma_of(static_cast<Eigen::Index>(k));
+    table.text(std::isfinite(sigma) ? fmt::format("{:.2g}", 2.0 * sigma) : "not determined");
+  }
+  return table.str();
+}
+
+}  // namespace
+
+std::string torque_parameters_section(const TorqueFacts& facts) {
+  const TorqueSummary& summary = facts.summary;
+  std::string out = section_head("parameters", "Friction and parameters");
+  const Eigen::MatrixXd rest =
+      summary.train.torque -
+      predict_torque(summary.identification, summary.train.q, summary.train.dq, summary.train.ddq)
+          .mean;
+  out += "<div class=\"columns\">";
+  for (Eigen::Index j = 0; j < summary.train.joints(); ++j) out += friction_plot(summary, j, rest);
+  return out + "</div>\n" + drive_table(facts) + parameter_table(facts) + "</section>\n";
+}
+
+}  // namespace kinescope::report

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "app/report/page.h"
+#include "app/report/torque_sections.h"
+
+namespace kinescope {
+namespace {
+
+constexpr std::array<report::ContentsEntry, 6> kContents = {{
+    {"verdict", "Verdict"},
+    {"data", "Data quality"},
+    {"models", "Models side by side"},
+    {"prediction", "Measured and predicted"},
+    {"parameters", "Friction and parameters"},
+    {"reproduce", "How to reproduce"},
+}};
+
+}  // namespace
+
+std::string torque_report_html(const TorqueSummary& summary) {
+  const report::TorqueFacts facts{summary, torque_json(summary)};
+  return report::page_begin("torque report", summary.robot, summary.log, summary.version,
+                            kContents) +
+         "<main>\n" + report::torque_verdict_section(facts) + report::torque_data_section(facts) +
+         report::torque_models_section(facts) + report::torque_prediction_section(facts) +
+         report::torque_parameters_section(facts) + report::torque_reproduce_section(facts) +
+         "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace kinescope

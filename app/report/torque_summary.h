@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// All products of one torque log, gathered for its report.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "app/report/run_summary.h"
+#include "dynamics/data/torque_data.h"
+#include "dynamics/identify/consistent_model.h"
+#include "dynamics/models/comparison.h"
+
+namespace kinescope {
+
+struct LearningCurve {
+  TorqueModelKind kind = TorqueModelKind::kParametric;
+  std::vector<LearningPoint> points;
+};
+
+/// What a joint's drive is found to take, in the torque's unit per SI.
+struct DriveEstimate {
+  std::string term;  ///< "viscous", "coulomb", "offset", "motor inertia"
+  std::string joint;
+  double value = 0.0;
+  double sigma = 0.0;  ///< infinite where it cannot be told from other terms
+};
+
+struct TorqueSummary {
+  std::string robot;
+  std::string log;      ///< what was learned from, in words
+  std::string version;  ///< of the program
+  std::string command;  ///< how to reproduce
+  std::vector<InputFile> inputs;
+  std::vector<StageTime> times;
+
+  std::vector<std::string> joints;
+  std::vector<JointType> types;  ///< beside joints
+  Eigen::Vector3d gravity_m_s2 = Eigen::Vector3d::Zero();
+  TorqueData data;    ///< of the log learned from; its samples are `train` and, without a log of
+                      ///< its own, `test`
+  std::string split;  ///< in words: what was held out
+  TorqueSamples train;
+  TorqueSamples test;
+
+  std::vector<TorqueScore> scores;  ///< on `test`
+  std::vector<LearningCurve> learning;
+  Identification identification;  ///< on `train`
+  ConsistentModel consistent;
+  std::vector<DriveEstimate> drives;
+  int best = 0;                 ///< index into scores: what `prediction` is from
+  TorquePrediction prediction;  ///< of `test`
+  std::vector<std::string> warnings;
+};
+
+/// dynamics.json: schema "kinescope.dynamics". Arrays beside `joints` hold one entry a joint.
+/// Numbers that are not known are null. Torques in `unit`, everything else SI.
+///
+///   robot, version, unit, joints [name, type], gravity_m_s2
+///   data      rows_read, rows_used, log_rate_hz, rate_hz, filter, source, cutoff_hz, training,
+///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
+///             place, what, remedy]
+///   models    [model, samples, nmse_percent, rms, coverage_90, coverage_95, failure]
+///   best      name of the model with the smallest mean nMSE
+///   learning  [model, points [samples, nmse_percent]]
+///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
+///   drives    [term, joint, value, sigma]
+///   consistent  links [name, mass_kg, first_moment_kg_m, inertia_kg_m2 (Ixx Ixy Ixz Iyy Iyz Izz)],
+///             joints [viscous, coulomb, motor_inertia], misfit
+[[nodiscard]] nlohmann::json torque_json(const TorqueSummary& summary);
+
+/// The sentences that a torque report opens with: how well, what limits it, what to record next.
+struct TorqueVerdict {
+  std::string found;
+  std::string accurate;
+  std::string limits;
+};
+[[nodiscard]] TorqueVerdict torque_verdict(const TorqueSummary& summary);
+
+/// One self-contained page. Pure: the same summary gives the same bytes.
+[[nodiscard]] std::string torque_report_html(const TorqueSummary& summary);
+
+}  // namespace kinescope

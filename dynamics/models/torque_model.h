@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a DynamicModel (kinematics; masses as a prior where there are any) and TorqueSamples.
+// Gives   FittedTorqueModel: predictive mean and sigma of every joint's torque, whatever the kind.
+// Units   those of the samples; rows are samples, columns joints, as in dynamics/data.
+// Method  parametric: dynamics/identify; Gaussian processes: dynamics/gp with the kernels of the
+//         field, hyperparameters by marginal likelihood.
+// Not here: filtering (dynamics/data), what a model lacks (dynamics/effects).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dynamics/data/torque_samples.h"
+#include "dynamics/identify/identify.h"
+#include "dynamics/identify/prediction.h"
+#include "kinematics/model/dynamic_model.h"
+
+namespace kinescope {
+
+enum class TorqueModelKind {
+  kParametric,      ///< rigid body and drives, least squares (dynamics/identify)
+  kRbf,             ///< squared exponential of (q, dq, ddq), one length each, each joint by itself
+  kGip,             ///< geometrically inspired polynomial and friction, each joint by itself
+  kModelBased,      ///< features of the parametric model, each joint by itself
+  kSemiParametric,  ///< the same plus a squared exponential for what they lack
+  kLip              ///< Lagrangian-inspired polynomial of all joints together, and friction
+};
+
+[[nodiscard]] std::string_view to_string(TorqueModelKind kind);
+/// Nothing for an unknown name.
+[[nodiscard]] std::optional<TorqueModelKind> torque_model_kind(std::string_view name);
+[[nodiscard]] const std::vector<TorqueModelKind>& all_torque_models();
+
+struct TorqueModelOptions {
+  IdentifyOptions identify;
+  /// Training samples of a Gaussian process, evenly chosen; kernels of few features take all.
+  int samples = 1500;
+  int samples_of_all_joints = 400;   ///< the same for kLip, whose matrix is joints times as wide
+  int hyperparameter_samples = 600;  ///< of them, for the search
+  int starts = 2;
+  std::uint64_t seed = 1;
+  int threads = 0;  ///< 0: all of the machine; never changes a result
+};
+
+struct FittedTorqueModel {
+  TorqueModelKind kind = TorqueModelKind::kParametric;
+  int samples = 0;  ///< learned from
+  /// q, dq, ddq: samples x joints.
+  std::function<TorquePrediction(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
+                                 const Eigen::MatrixXd& ddq)>
+      predict;
+};
+
+/// Throws what identification and fit throw.
+[[nodiscard]] FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
+                                                 const TorqueSamples& samples,
+                                                 const TorqueModelOptions& options = {});
+
+/// `count` rows at most, evenly spread over the samples.
+[[nodiscard]] std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count);
+
+}  // namespace kinescope

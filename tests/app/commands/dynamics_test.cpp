@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope dynamics` as a user meets it: results, products, refusals.
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "kinematics/urdf/dynamic_urdf.h"
+#include "tests/app/commands/program.h"
+#include "tests/app/io/recording_folder.h"
+#include "tests/truth/torque_world.h"
+
+namespace kinescope {
+namespace {
+
+std::string log_csv(const TorqueSamples& samples) {
+  const auto joints = static_cast<int>(samples.joints());
+  std::string text = "t";
+  for (const char* name : {"q", "dq", "ddq", "tau"}) {
+    for (int j = 1; j <= joints; ++j) text += fmt::format(",{}{}", name, j);
+  }
+  text += "\n";
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    text += fmt::format("{}", samples.t_s[i]);
+    for (const Eigen::MatrixXd* values : {&samples.q, &samples.dq, &samples.ddq, &samples.torque}) {
+      for (int j = 0; j < joints; ++j) text += fmt::format(",{}", (*values)(i, j));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+class DynamicsCommand : public testing::Test {
+ protected:
+  DynamicsCommand() {
+    Rng rng = Rng::from_name("dynamics command");
+    const RandomRobot robot = random_robot({.joints = 2, .prismatic_share = 0.0}, rng);
+    model_ = random_masses(robot.tree, {.every_direction = false}, rng);
+    samples_ = torque_log_of(model_, {.samples = 1500, .trajectories = 1}, rng);
+    folder_.write("log.csv", log_csv(samples_)).write("robot.urdf", write_urdf(model_));
+  }
+  [[nodiscard]] std::string path(const char* name) const {
+    return (folder_.path() / name).string();
+  }
+  [[nodiscard]] std::vector<std::string> words(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> out{"dynamics",         path("log.csv"), "--robot",
+                                 path("robot.urdf"), "--model",       "parametric",
+                                 "--output",         path("out"),     "--quiet"};
+    out.insert(out.end(), more.begin(), more.end());
+    return out;
+  }
+
+  RecordingFolder folder_;
+  DynamicModel model_;
+  TorqueSamples samples_;
+};
+
+TEST_F(DynamicsCommand, GivesModelUrdfAndReport) {
+  const Outcome outcome = run(words());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("parametric"), std::string::npos);
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  EXPECT_EQ(document.at("schema"), "kinescope.dynamics");
+  ASSERT_EQ(document.at("models").size(), 1U);
+  for (const auto& nmse : document.at("models")[0].at("nmse_percent")) {
+    EXPECT_LT(nmse.get<double>(), 1.0);
+  }
+  const DynamicModel written = read_dynamic_urdf(folder_.path() / "out/robot_dynamics.urdf");
+  EXPECT_EQ(written.tree.joints.size(), model_.tree.joints.size());
+  const std::string page = read_text_file(folder_.path() / "out/dynamics.html");
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+  EXPECT_NE(page.find("Models side by side"), std::string::npos);
+}
+
+TEST_F(DynamicsCommand, TheSameLogGivesTheSameBytes) {
+  ASSERT_EQ(run(words()).code, 0);
+  const std::string first = read_text_file(folder_.path() / "out/dynamics.json");
+  ASSERT_EQ(run(words()).code, 0);
+  EXPECT_EQ(read_text_file(folder_.path() / "out/dynamics.json"), first);
+}
+
+TEST_F(DynamicsCommand, RefusesWhatCannotBe) {
+  expect_refusal(words({"--model", "perceptron"}), ExitCode::kBadRequest,
+                 "'perceptron' is no torque model");
+  expect_refusal(words({"--gravity", "0,0"}), ExitCode::kBadRequest, "gravity");
+  folder_.write("log.csv", "t,q1,q2,dq1,dq2\n0,0,0,0,0\n1,0,0,0,0\n");
+  expect_refusal(words(), ExitCode::kBadInput, "log.csv");
+  folder_.write("log.csv", log_csv(samples_));
+  folder_.write("robot.urdf", "<robot name='r'><link name='a'/></robot>");
+  const Outcome none = run(words());
+  EXPECT_NE(none.code, 0);
+  EXPECT_NE(none.code, 1) << none.err;
+}
+
+TEST_F(DynamicsCommand, TorquesInTheWrongUnitAreNamed) {
+  TorqueSamples wrong = samples_;
+  wrong.torque *= 1000.0;
+  folder_.write("log.csv", log_csv(wrong));
+  const std::string line = expect_refusal(words(), ExitCode::kBadInput, "1000");
+  EXPECT_NE(line.find("--torque"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace kinescope

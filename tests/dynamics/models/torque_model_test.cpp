@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/models/torque_model.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "dynamics/data/splits.h"
+#include "dynamics/models/comparison.h"
+#include "tests/truth/torque_world.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kNoise = 0.01;  // share of each joint's rms torque
+// The noise alone leaves kNoise^2 of the variance; a model with the right parameters little more.
+constexpr double kNoiseFloorPercent = 100.0 * kNoise * kNoise;
+
+struct Experiment {
+  DynamicModel model;
+  TorqueSamples train;
+  TorqueSamples test;
+};
+
+// A two-joint arm: the last trajectory is held out.
+Experiment two_joints() {
+  Rng rng = Rng::from_name("torque models");
+  const RandomRobot robot = random_robot({.joints = 2, .prismatic_share = 0.0}, rng);
+  Experiment out;
+  out.model = random_masses(robot.tree, {}, rng);
+  const TorqueSamples all = torque_log_of(
+      out.model, {.samples = 600, .rate_hz = 50.0, .noise = kNoise, .trajectories = 2}, rng);
+  const Fold fold = split_last(all, 0.4);
+  out.train = select_rows(all, fold.train);
+  out.test = select_rows(all, fold.test);
+  return out;
+}
+
+TorqueModelOptions quick() {
+  TorqueModelOptions options;
+  options.samples = 250;
+  options.samples_of_all_joints = 120;
+  options.hyperparameter_samples = 150;
+  options.starts = 1;
+  return options;
+}
+
+TEST(TorqueModel, NamesGoBothWays) {
+  std::set<std::string_view> names;
+  for (const TorqueModelKind kind : all_torque_models()) {
+    EXPECT_EQ(torque_model_kind(to_string(kind)), kind);
+    names.insert(to_string(kind));
+  }
+  EXPECT_EQ(names.size(), all_torque_models().size());
+  EXPECT_FALSE(torque_model_kind("perceptron"));
+}
+
+TEST(TorqueModel, EveryKindExplainsUnseenMotion) {
+  const Experiment e = two_joints();
+  const auto scores = compare_torque_models(all_torque_models(), e.model, e.train, e.test, quick());
+  ASSERT_EQ(scores.size(), all_torque_models().size());
+  for (const TorqueScore& score : scores) {
+    SCOPED_TRACE(to_string(score.kind));
+    EXPECT_EQ(score.failure, "");
+    EXPECT_EQ(score.test_samples, e.test.size());
+    EXPECT_LT(score.nmse_percent.maxCoeff(), 15.0);
+    EXPECT_GT(score.coverage_95.minCoeff(), 0.6);
+  }
+  const auto nmse = [&](TorqueModelKind kind) {
+    return std::ranges::find(scores, kind, &TorqueScore::kind)->nmse_percent.mean();
+  };
+  EXPECT_LT(nmse(TorqueModelKind::kParametric), 2.0 * kNoiseFloorPercent);
+  EXPECT_LT(nmse(TorqueModelKind::kModelBased), 2.0 * kNoiseFloorPercent);
+  EXPECT_LT(nmse(TorqueModelKind::kSemiParametric), nmse(TorqueModelKind::kRbf));
+  EXPECT_LT(nmse(TorqueModelKind::kGip), nmse(TorqueModelKind::kRbf));
+}
+
+TEST(TorqueModel, SameSamplesSameNumbersWithAnyThreads) {
+  const Experiment e = two_joints();
+  TorqueModelOptions options = quick();
+  options.threads = 1;
+  const auto one = fit_torque_model(TorqueModelKind::kGip, e.model, e.train, options);
+  options.threads = 2;
+  const auto two = fit_torque_model(TorqueModelKind::kGip, e.model, e.train, options);
+  const auto a = one.predict(e.test.q, e.test.dq, e.test.ddq);
+  const auto b = two.predict(e.test.q, e.test.dq, e.test.ddq);
+  EXPECT_EQ(a.mean, b.mean);
+  EXPECT_EQ(a.sigma, b.sigma);
+}
+
+TEST(TorqueModel, LearnsFromMoreSamples) {
+  const Experiment e = two_joints();
+  const auto curve =
+      learning_curve(TorqueModelKind::kRbf, e.model, e.train, e.test, {40, 250}, quick());
+  ASSERT_EQ(curve.size(), 2U);
+  EXPECT_EQ(curve[0].samples, 40);
+  EXPECT_LT(curve[1].nmse_percent, curve[0].nmse_percent);
+}
+
+TEST(TorqueModel, WhatCannotBeFittedIsSaid) {
+  const Experiment e = two_joints();
+  const TorqueSamples few = select_rows(e.train, {0, 1, 2});
+  const auto scores =
+      compare_torque_models({TorqueModelKind::kParametric}, e.model, few, e.test, quick());
+  EXPECT_NE(scores[0].failure, "");
+}
+
+TEST(EvenlyChosen, SpreadsOverAll) {
+  EXPECT_EQ(evenly_chosen(10, 5), (std::vector<Eigen::Index>{0, 2, 4, 6, 8}));
+  EXPECT_EQ(evenly_chosen(3, 5), (std::vector<Eigen::Index>{0, 1, 2}));
+  EXPECT_TRUE(evenly_chosen(0, 5).empty());
+}
+
+}  // namespace
+}  // namespace kinescope
