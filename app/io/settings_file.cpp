@@ -43,8 +43,8 @@ std::string read_unit(const YamlValue& value) {
 
 RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   const YamlValue file = YamlValue::read(path);
-  file.only_keys(
-      {"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances", "units"});
+  file.only_keys({"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances",
+                  "units", "dynamics"});
   RecordingSettings settings;
   if (const auto name = file.find("name")) settings.name = name->text();
   if (const auto list = file.find("torques")) {

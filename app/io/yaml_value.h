@@ -29,6 +29,7 @@ class YamlValue {
   /// The entries of a mapping in the file's order; no key twice.
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   [[nodiscard]] std::vector<YamlValue> items() const;
+  [[nodiscard]] bool is_list() const { return node_.IsSequence(); }
   /// The value of a key, where it is there.
   [[nodiscard]] std::optional<YamlValue> find(const std::string& key) const;
   /// The value of a key that must be there.

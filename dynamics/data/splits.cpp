@@ -156,6 +156,7 @@ std::vector<Fold> folds_by_group(const TorqueSamples& samples, const std::vector
     }
   }
   std::vector<Fold> folds;
+  folds.reserve(test.size());
   for (const std::vector<char>& rows : test) folds.push_back(fold_of(samples, rows, 0.0));
   return folds;
 }

@@ -167,7 +167,7 @@ std::vector<WantedJoint> joints_of_log(const SignalColumns& position) {
   std::vector<WantedJoint> out;
   for (std::size_t j = 0; j < position.keys.size(); ++j) {
     std::string name = key_text(position.keys[j]);
-    if (name.find_first_not_of("0123456789") == std::string::npos) name = "joint" + name;
+    if (name.find_first_not_of("0123456789") == std::string::npos) name.insert(0, "joint");
     const bool metric = position.units[j] == "m" || position.units[j] == "mm";
     out.push_back({name, metric});
   }
@@ -241,6 +241,7 @@ class Reader {
     const auto order = order_of(position_, by_order);
     if (by_order) {
       std::vector<std::string> pairs;
+      pairs.reserve(order.size());
       for (std::size_t j = 0; j < order.size(); ++j) {
         pairs.push_back(fmt::format("{} = {}", log.joints[j].name, key_text(position_.keys[j])));
       }
