@@ -190,39 +190,129 @@ Attachment attachment_from(ChainFit fit, int parent, const RelativeMotion& relat
   return a;
 }
 
+namespace {
+
+// Share of a free coordinate's variance that the channel which drives it explains, at least.
+constexpr double kFollows = 0.5;
+
+// The joint with the coordinates that its channel would give them, by regression of the coordinates
+// that the sightings ask for; nothing when no channel goes with them. A second pass leaves out what
+// lies far from the line.
+std::optional<Candidate> driven_by_best_channel(const ChainModel& free, const Motion& motion,
+                                                const Readings& readings,
+                                                const std::vector<char>& usable) {
+  const auto n = static_cast<Eigen::Index>(motion.size());
+  const Eigen::Map<const Eigen::VectorXd> y(free.coordinates.data(), n);
+  Candidate best;
+  double most = kFollows;
+  for (int c = 0; c < readings.channels(); ++c) {
+    if (usable[static_cast<std::size_t>(c)] == 0) continue;
+    Eigen::VectorXd q(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      q(i) = readings.value(motion[static_cast<std::size_t>(i)].instant, c);
+    }
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);
+    for (int pass = 0; pass < 2; ++pass) {
+      const double total = weight.sum();
+      const Eigen::VectorXd dq = q.array() - q.dot(weight) / total;
+      const Eigen::VectorXd dy = y.array() - y.dot(weight) / total;
+      const Eigen::VectorXd w = weight.cwiseProduct(dq);
+      const double slope = w.dot(dy) / std::max(1e-300, w.dot(dq));
+      const Eigen::VectorXd left = dy - slope * dq;
+      const double explained =
+          1.0 - weight.dot(left.cwiseAbs2()) / std::max(1e-300, weight.dot(dy.cwiseAbs2()));
+      if (explained > most) {
+        most = explained;
+        best.channel = c;
+        best.start = free;
+        best.start.coordinates.clear();
+        best.start.joints.front().terms = {{c, slope}};
+        const double zero = (y.dot(weight) - slope * q.dot(weight)) / total;
+        const Pose& F = free.joints.front().frame;
+        const Pose shift = joint_motion(free.joints.front().type, Eigen::Vector3d::UnitZ(), zero);
+        best.start.mount = F * shift * F.inverse() * free.mount;
+      }
+      std::vector<double> squared(left.data(), left.data() + n);
+      for (double& value : squared) value *= value;
+      const double limit = 25.0 * median_of(squared) / 0.4549;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        weight(i) = squared[static_cast<std::size_t>(i)] > limit ? 0.0 : 1.0;
+      }
+    }
+  }
+  if (best.channel < 0) return std::nullopt;
+  return best;
+}
+
+// Refines candidates of one body and one link, and keeps them.
+class Refiner {
+ public:
+  Refiner(const Body& body, int parent, const RelativeMotion& relative, const Readings& readings,
+          const std::vector<char>& usable)
+      : relative_(relative),
+        readings_(readings),
+        usable_(usable),
+        parent_(parent),
+        seen_(seen_with_log(body, readings)) {}
+
+  void refine(const Candidate& candidate) {
+    ChainFit fit = fit_weighted(relative_.motion, readings_, candidate.start);
+    if (candidate.channel >= 0) {
+      fit = with_couplings(std::move(fit), relative_.motion, readings_, usable_);
+    } else if (!candidate.start.joints.empty()) {
+      const auto driven = driven_by_best_channel(fit.model, relative_.motion, readings_, usable_);
+      if (driven) refine(*driven);
+    }
+    Attachment a = complete(std::move(fit), relative_, seen_, readings_);
+    best_ = std::min(best_, a.data_cost);
+    a.parent = parent_;
+    out_.push_back(std::move(a));
+  }
+
+  [[nodiscard]] double best() const { return best_; }
+  [[nodiscard]] std::size_t count() const { return out_.size(); }
+
+  [[nodiscard]] std::vector<Attachment> sorted() && {
+    if (out_.empty()) return {};
+    const auto by_data =
+        std::ranges::min_element(out_, {}, [](const Attachment& a) { return a.data_cost; });
+    const double correlation = by_data->fit.correlation;
+    std::ranges::stable_sort(out_, {}, [&](const Attachment& a) { return a.cost(correlation); });
+    return std::move(out_);
+  }
+
+ private:
+  const RelativeMotion& relative_;
+  const Readings& readings_;
+  const std::vector<char>& usable_;
+  int parent_ = 0;
+  int seen_ = 0;
+  double best_ = std::numeric_limits<double>::infinity();
+  std::vector<Attachment> out_;
+};
+
+}  // namespace
+
 std::vector<Attachment> find_attachments(const Body& body, int parent, const LinkPath& path,
                                          const Readings& readings, const std::vector<char>& usable,
                                          const AttachmentOptions& options) {
-  std::vector<Attachment> out;
   const RelativeMotion relative = relative_motion(body, path, readings);
-  const int seen = seen_with_log(body, readings);
-  if (relative.motion.size() < 5 || 3 * relative.motion.size() < static_cast<std::size_t>(seen))
-    return out;
+  const auto seen = static_cast<std::size_t>(seen_with_log(body, readings));
+  if (relative.motion.size() < 5 || 3 * relative.motion.size() < seen) return {};
   const Screening screening =
       screen_motion(relative.motion, readings.value, usable,
                     {.coordinate_free = options.coordinate_free, .max_channels = 4});
   const double limit = options.give_up_above * static_cast<double>(relative.motion.size());
-  double best = std::numeric_limits<double>::infinity();
+  Refiner refiner(body, parent, relative, readings, usable);
   for (const Candidate& candidate : screening.candidates) {
     const bool rest = candidate.start.joints.empty();
-    const bool enough = static_cast<int>(out.size()) >= options.max_refined && !rest;
-    const double hopeless = (rest ? 1.5 * best : best) + kHopeless;
-    if (!out.empty() && (candidate.cost > hopeless || enough)) continue;
+    const bool enough = static_cast<int>(refiner.count()) >= options.max_refined && !rest;
+    const double hopeless = (rest ? 1.5 * refiner.best() : refiner.best()) + kHopeless;
+    if (refiner.count() > 0 && (candidate.cost > hopeless || enough)) continue;
     if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
-    ChainFit fit = fit_weighted(relative.motion, readings, candidate.start);
-    if (candidate.channel >= 0)
-      fit = with_couplings(std::move(fit), relative.motion, readings, usable);
-    Attachment a = complete(std::move(fit), relative, seen, readings);
-    best = std::min(best, a.data_cost);
-    a.parent = parent;
-    out.push_back(std::move(a));
+    refiner.refine(candidate);
   }
-  if (out.empty()) return out;
-  const auto by_data =
-      std::ranges::min_element(out, {}, [](const Attachment& a) { return a.data_cost; });
-  const double correlation = by_data->fit.correlation;
-  std::ranges::stable_sort(out, {}, [&](const Attachment& a) { return a.cost(correlation); });
-  return out;
+  return std::move(refiner).sorted();
 }
 
 Attachment refit(const Attachment& attachment, const Body& body, const LinkPath& path,

@@ -38,8 +38,4 @@ struct Readings {
 [[nodiscard]] Readings readings_like(const Readings& other, const JointLog& log,
                                      const Series& series, double time_offset_s, double max_gap_s);
 
-/// Time offset from a first scan of all pairs, s; 0 unless another one is clearly better.
-[[nodiscard]] double scan_time_offset(const Series& series, const JointLog& log,
-                                      double half_width_s, double max_gap_s);
-
 }  // namespace kinescope::structure_search

@@ -30,6 +30,9 @@ constexpr double kLeastNoiseScale = 0.2;
 constexpr double kSmoothRatio = 12.0;
 // and in rad and m (at 1 m), for recordings with little noise.
 constexpr double kSmoothStep = 0.06;
+// or when frames no further apart than half a neighbour's time bend less than this part of their
+// step: white noise, and stops in any order, bend by 1.7 of it.
+constexpr double kSmoothBend = 0.5;
 // Noise below this is not believed: interpolation of the log alone is worse (rad, m).
 constexpr double kNoiseFloor = 2e-6;
 // Averaging stays within this much motion (rad; m at 1 m), so that the path is straight to its
@@ -121,8 +124,28 @@ Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
   return out;
 }
 
-bool is_smooth(const Deviations& d) {
-  return d.median > 0.0 && (d.median < kSmoothRatio || d.step < kSmoothStep);
+// Second differences of the pose over first ones, medians; nothing where frames are far apart.
+std::optional<double> bend_of(const Body& body, const std::vector<double>& times_s) {
+  std::vector<double> first;
+  std::vector<double> second;
+  for (std::size_t f = 1; f + 1 < body.at.size(); ++f) {
+    if (!body.at[f - 1].seen || !body.at[f].seen || !body.at[f + 1].seen) continue;
+    if (times_s[f + 1] - times_s[f - 1] > kNeighbourTime) continue;
+    const Pose inverse = body.at[f].pose.inverse();
+    const Vector6d before = fast_log(inverse * body.at[f - 1].pose);
+    const Vector6d after = fast_log(inverse * body.at[f + 1].pose);
+    first.push_back((body.at[f].whitening * (after - before)).norm());
+    second.push_back((body.at[f].whitening * (after + before)).norm());
+  }
+  if (first.size() < 10) return std::nullopt;
+  return median_of(std::move(second)) / std::max(1e-300, median_of(std::move(first)));
+}
+
+bool is_smooth(const Body& body, const Deviations& d, const std::vector<double>& times_s) {
+  if (!(d.median > 0.0)) return false;
+  if (d.median < kSmoothRatio || d.step < kSmoothStep) return true;
+  const auto bend = bend_of(body, times_s);
+  return bend && *bend < kSmoothBend;
 }
 
 void swap_branch(Sighting& s) {
@@ -271,7 +294,7 @@ Series clean_series(const PoseTracks& tracks) {
   for (Body& body : series.bodies) {
     const Deviations d = deviations_of(body, series.times_s);
     if (d.median > 0.0) ++judged;
-    if (!is_smooth(d)) continue;
+    if (!is_smooth(body, d, series.times_s)) continue;
     ++smooth;
     clean_in_time(body, d);
     clean_in_time(body, deviations_of(body, series.times_s));

@@ -49,6 +49,7 @@ struct RecordingOptions {
   double highest_hz = 0.25;
   double sigma_m = 1e-3;
   double sigma_rad = 0.1 * 3.14159265358979323846 / 180.0;
+  double corner_px = 0.0;  ///< above 0: noise of a square target's pose from corners this exact
   double declared_noise = 1.0;  ///< declared sigma over the true one
   double flip_share = 0.0;      ///< frames that show the wrong planar branch first
   bool alternatives = false;    ///< both branches are given
@@ -58,6 +59,7 @@ struct RecordingOptions {
   bool ticks = false;           ///< every channel in its own ticks with its own zero
   double coupling = 0.0;        ///< joint k also moves with the parent's motion, as a share
   double lag_s = 0.0;           ///< joint-log time = frame time + lag
+  double log_margin_s = 1.5;    ///< that the log starts before and ends after the frames
   double backlash_rad = 0.0;    ///< width of the gap between encoder and link
   int idle_channels = 0;        ///< channels that drive nothing
   bool shuffle_channels = true;

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "kinematics/structure/time_offset.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// A tree is grown again when its offset moved by more than this (s): less changes no joint.
+constexpr double kOffsetMoved = 3e-3;
+constexpr int kMostGrowths = 3;
+// How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
+constexpr double kClearly = 25.0;
+// Variances over the declared ones up to which a tree explains all there is.
+constexpr double kNoiseOnly = 1.5;
+
+// Channels of one log are mostly of one kind: when the clear joints are in rad and m, the others
+// are too.
+double si_share_of(const GrownTree& tree, const Readings& readings) {
+  int si = 0;
+  int driven = 0;
+  for (const GrownLink& link : tree.links) {
+    if (link.founder < 0 || !link.attachment.driven()) continue;
+    const ChainFit& fit = link.attachment.fit;
+    std::size_t t = 0;
+    for (const ChainJoint& joint : fit.model.joints) {
+      const double rms = readings.rms[static_cast<std::size_t>(joint.terms.front().channel)];
+      const double sigma = fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms;
+      const double away = std::abs(std::abs(joint.terms.front().scale) / rms - 1.0);
+      ++driven;
+      if (away < 0.01 + 3.0 * sigma && sigma < 0.3) ++si;
+      t += joint.terms.size();
+    }
+  }
+  return driven >= 3 && 3 * si > 2 * driven ? 0.98 : readings.si_share;
+}
+
+bool has_driven_joint(const GrownTree& tree) {
+  return std::ranges::any_of(
+      tree.links, [](const GrownLink& l) { return l.founder >= 0 && l.attachment.driven(); });
+}
+
+double most_correlated(const GrownTree& tree) {
+  double correlation = 1.0;
+  for (const GrownBody& b : tree.bodies) {
+    if (b.link > 0) correlation = std::max(correlation, b.attachment.fit.correlation);
+  }
+  return correlation;
+}
+
+// Penalised cost as if the log covered every instant, so that offsets may be compared.
+double score_of(const FoundTree& found) {
+  double sum = 0.0;
+  for (const GrownBody& b : found.tree.bodies) {
+    sum += b.link < 0 ? b.free_cost : b.attachment.cost(1.0);
+  }
+  const auto valid = static_cast<double>(std::ranges::count(found.readings.valid, 1));
+  return sum * static_cast<double>(found.readings.valid.size()) / std::max(1.0, valid);
+}
+
+// Every body hangs by joints with one channel each that leave nothing but noise: no other offset
+// can be better.
+bool explains_all(const GrownTree& tree) {
+  return std::ranges::all_of(tree.bodies, [](const GrownBody& b) {
+    if (b.link < 0 || b.attachment.fit.variance > kNoiseOnly) return false;
+    if (b.attachment.at_rest()) return true;
+    return b.attachment.driven() && b.attachment.fit.axis_variance < kNoiseOnly &&
+           std::ranges::all_of(
+               b.attachment.fit.model.joints,
+               [](const ChainJoint& j) { return j.terms.size() == 1; });
+  });
+}
+
+class Search {
+ public:
+  Search(const Series& thin, const JointLog& log, const StructureOptions& options)
+      : thin_(thin), log_(log), options_(options) {}
+
+  [[nodiscard]] FoundTree grow_at(double offset_s) const {
+    FoundTree found;
+    found.offset.value_s = offset_s;
+    found.readings = readings_at(log_, thin_, offset_s, options_.max_gap_s);
+    found.tree = grow_tree(thin_, found.readings);
+    const double si_share = si_share_of(found.tree, found.readings);
+    if (si_share > found.readings.si_share) {
+      found.readings.si_share = si_share;
+      found.tree = grow_tree(thin_, found.readings);
+    }
+    return found;
+  }
+
+  // Tree and offset settled on each other.
+  [[nodiscard]] FoundTree settle_at(double start_s, double step_s) const {
+    FoundTree found = grow_at(start_s);
+    for (int growth = 1; has_driven_joint(found.tree); ++growth) {
+      const TimeOffset refined = refine_offset(found, step_s);
+      const bool moved = std::abs(refined.value_s - found.offset.value_s) > kOffsetMoved;
+      if (moved && growth < kMostGrowths) {
+        found = grow_at(refined.value_s);
+      } else {
+        found.readings =
+            readings_like(found.readings, log_, thin_, refined.value_s, options_.max_gap_s);
+        found.tree = refit_tree(found.tree, thin_, found.readings);
+      }
+      found.offset = refined;
+      if (!moved || growth >= kMostGrowths) break;
+    }
+    return found;
+  }
+
+ private:
+  // Walks downhill to a minimum of the tree's cost, then narrows it by parabolas down to its sigma.
+  [[nodiscard]] TimeOffset refine_offset(const FoundTree& found, double step_s) const {
+    constexpr double kFinest = 5e-4;  // s
+    constexpr int kMostSteps = 16;
+    std::map<double, double> known;
+    const auto cost_at = [&](double value_s) {
+      const auto [place, is_new] = known.try_emplace(value_s, 0.0);
+      if (is_new) place->second = cost_of(found, value_s);
+      return place->second;
+    };
+    const double correlation = most_correlated(found.tree);
+    TimeOffset offset = found.offset;
+    double step = 0.5 * step_s;
+    for (int k = 0; k < kMostSteps; ++k) {
+      const double left = cost_at(offset.value_s - step);
+      const double middle = cost_at(offset.value_s);
+      const double right = cost_at(offset.value_s + step);
+      if (std::min(left, right) < middle) {
+        const double next = offset.value_s + (left < right ? -step : step);
+        if (std::abs(next) > options_.max_time_offset_s) break;
+        offset.value_s = next;
+        continue;
+      }
+      const double curvature = (left - 2.0 * middle + right) / (step * step);
+      if (!(curvature > 0.0)) break;
+      offset.value_s += 0.5 * (left - right) / (curvature * step);
+      offset.sigma_s = std::sqrt(2.0 * correlation / curvature);
+      const double next = std::max({0.25 * step, 0.5 * offset.sigma_s, kFinest});
+      if (next > 0.7 * step) break;
+      step = next;
+    }
+    return offset;
+  }
+
+  [[nodiscard]] double cost_of(const FoundTree& found, double offset_s) const {
+    const Readings r = readings_like(found.readings, log_, thin_, offset_s, options_.max_gap_s);
+    const auto valid = std::max<double>(1.0, static_cast<double>(std::ranges::count(r.valid, 1)));
+    return tree_cost(refit_tree(found.tree, thin_, r)) * static_cast<double>(r.valid.size()) /
+           valid;
+  }
+
+  const Series& thin_;
+  const JointLog& log_;
+  const StructureOptions& options_;
+};
+
+}  // namespace
+
+FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
+                      const StructureOptions& options) {
+  const Search search(thin, log, options);
+  if (!options.scan_time_offset || !thin.smooth || log.channels.empty()) return search.grow_at(0.0);
+  const OffsetScan scan =
+      scan_time_offsets(full, log, options.max_time_offset_s, options.max_gap_s);
+  std::vector<FoundTree> found;
+  for (const double start_s : scan.likely) {
+    const bool known = std::ranges::any_of(found, [&](const FoundTree& f) {
+      return std::abs(f.offset.value_s - start_s) < 0.5 * scan.step_s;
+    });
+    if (known) continue;
+    found.push_back(search.settle_at(start_s, scan.step_s));
+    if (explains_all(found.back().tree)) return std::move(found.back());
+  }
+  std::ranges::stable_sort(found, {},
+                           [](const FoundTree& f) { return std::abs(f.offset.value_s); });
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < found.size(); ++k) {
+    if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
+  }
+  return std::move(found[best]);
+}
+
+}  // namespace kinescope::structure_search

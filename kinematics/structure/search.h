@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a clean series, thinned, and the log.
+// Gives   the tree that explains it best, over all offsets between the two clocks.
+// Method  the scan's likely offsets are starts: at each a tree is grown, the offset refined on that
+//         tree's likelihood, and the tree grown again where the offset moved. The likelihoods of
+//         the trees decide, since a scan of pairs may well have its minimum elsewhere.
+#pragma once
+
+#include "kinematics/structure/growth.h"
+#include "kinematics/structure/structure.h"
+
+namespace kinescope::structure_search {
+
+struct TimeOffset {
+  double value_s = 0.0;
+  double sigma_s = 0.0;
+};
+
+struct FoundTree {
+  GrownTree tree;
+  Readings readings;  ///< at the offset
+  TimeOffset offset;
+};
+
+[[nodiscard]] FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
+                                    const StructureOptions& options);
+
+}  // namespace kinescope::structure_search
