@@ -195,16 +195,17 @@ namespace {
 // Share of a free coordinate's variance that the channel which drives it explains, at least.
 constexpr double kFollows = 0.5;
 
-// The joint with the coordinates that its channel would give them, by regression of the coordinates
-// that the sightings ask for; nothing when no channel goes with them. A second pass leaves out what
-// lies far from the line.
-std::optional<Candidate> driven_by_best_channel(const ChainModel& free, const Motion& motion,
-                                                const Readings& readings,
-                                                const std::vector<char>& usable) {
-  const auto n = static_cast<Eigen::Index>(motion.size());
-  const Eigen::Map<const Eigen::VectorXd> y(free.coordinates.data(), n);
-  Candidate best;
-  double most = kFollows;
+struct CoordinateFit {
+  int channel = -1;
+  double slope = 0.0;
+  double zero = 0.0;
+  double explained = kFollows;
+};
+
+// Coordinates regressed on every channel; a second pass leaves out what lies far from the line.
+void regress_coordinates(const Eigen::VectorXd& y, const Motion& motion, const Readings& readings,
+                         const std::vector<char>& usable, CoordinateFit& best) {
+  const Eigen::Index n = y.size();
   for (int c = 0; c < readings.channels(); ++c) {
     if (usable[static_cast<std::size_t>(c)] == 0) continue;
     Eigen::VectorXd q(n);
@@ -218,30 +219,47 @@ std::optional<Candidate> driven_by_best_channel(const ChainModel& free, const Mo
       const Eigen::VectorXd dy = y.array() - y.dot(weight) / total;
       const Eigen::VectorXd w = weight.cwiseProduct(dq);
       const double slope = w.dot(dy) / std::max(1e-300, w.dot(dq));
-      const Eigen::VectorXd left = dy - slope * dq;
-      const double explained =
-          1.0 - weight.dot(left.cwiseAbs2()) / std::max(1e-300, weight.dot(dy.cwiseAbs2()));
-      if (explained > most) {
-        most = explained;
-        best.channel = c;
-        best.start = free;
-        best.start.coordinates.clear();
-        best.start.joints.front().terms = {{c, slope}};
-        const double zero = (y.dot(weight) - slope * q.dot(weight)) / total;
-        const Pose& F = free.joints.front().frame;
-        const Pose shift = joint_motion(free.joints.front().type, Eigen::Vector3d::UnitZ(), zero);
-        best.start.mount = F * shift * F.inverse() * free.mount;
+      Eigen::VectorXd squared = (dy - slope * dq).cwiseAbs2();
+      const double variance = weight.dot(Eigen::VectorXd(dy.cwiseAbs2()));
+      const double explained = 1.0 - weight.dot(squared) / std::max(1e-300, variance);
+      if (explained > best.explained) {
+        best = {c, slope, (y.dot(weight) - slope * q.dot(weight)) / total, explained};
       }
-      std::vector<double> squared(left.data(), left.data() + n);
-      for (double& value : squared) value *= value;
-      const double limit = 25.0 * median_of(squared) / 0.4549;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        weight(i) = squared[static_cast<std::size_t>(i)] > limit ? 0.0 : 1.0;
-      }
+      const double median = median_of({squared.data(), squared.data() + n});
+      weight = (squared.array() > 25.0 * median / 0.4549).select(0.0, Eigen::VectorXd::Ones(n));
     }
   }
-  if (best.channel < 0) return std::nullopt;
-  return best;
+}
+
+// Angles within half a turn of their mean direction.
+Eigen::VectorXd within_a_turn(const Eigen::VectorXd& angle) {
+  const double mean = std::atan2(angle.array().sin().sum(), angle.array().cos().sum());
+  const double turn = 2.0 * std::numbers::pi;
+  return angle.array() - turn * ((angle.array() - mean) / turn).round();
+}
+
+// A joint with free coordinates as its best channel would drive it; nothing when none goes with
+// them. Angles between few and fast samples may have been counted a turn off.
+std::optional<Candidate> driven_by_best_channel(const ChainModel& free, const Motion& motion,
+                                                const Readings& readings,
+                                                const std::vector<char>& usable) {
+  const ChainJoint& joint = free.joints.front();
+  const Eigen::VectorXd y = Eigen::Map<const Eigen::VectorXd>(
+      free.coordinates.data(), static_cast<Eigen::Index>(free.coordinates.size()));
+  CoordinateFit fit;
+  regress_coordinates(y, motion, readings, usable, fit);
+  if (joint.type == JointType::kRevolute) {
+    regress_coordinates(within_a_turn(y), motion, readings, usable, fit);
+  }
+  if (fit.channel < 0) return std::nullopt;
+  Candidate out;
+  out.channel = fit.channel;
+  out.start = free;
+  out.start.coordinates.clear();
+  out.start.joints.front().terms = {{fit.channel, fit.slope}};
+  const Pose shift = joint_motion(joint.type, Eigen::Vector3d::UnitZ(), fit.zero);
+  out.start.mount = joint.frame * shift * joint.frame.inverse() * free.mount;
+  return out;
 }
 
 // Refines candidates of one body and one link, and keeps them.

@@ -160,6 +160,21 @@ class Grower {
     return clean && ratio > options_.free_ratio;
   }
 
+  // The best of what is known, if it is acceptable. Of a joint that would need to leave less to do
+  // without a channel, the same joint with one may be.
+  const Attachment* acceptable_best(std::size_t b) const {
+    const GrownBody& g = tree_.bodies[b];
+    const Attachment* best = best_of(g);
+    if (best == nullptr || acceptable(b, *best)) return best;
+    if (best->at_rest() || best->driven()) return nullptr;
+    const Attachment* driven = nullptr;
+    for (const Attachment& a : g.alternatives) {
+      if (!a.driven() || a.parent != best->parent || !acceptable(b, a)) continue;
+      if (driven == nullptr || a.data_cost < driven->data_cost) driven = &a;
+    }
+    return driven;
+  }
+
   // Attaches the body that fits best anywhere; false when none is acceptable.
   bool attach_next() {
     std::size_t chosen = tree_.bodies.size();
@@ -167,8 +182,8 @@ class Grower {
     for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
       const GrownBody& g = tree_.bodies[b];
       if (g.link >= 0) continue;
-      const Attachment* best = best_of(g);
-      if (best == nullptr || !acceptable(b, *best)) continue;
+      const Attachment* best = acceptable_best(b);
+      if (best == nullptr) continue;
       // Rest first, then driven joints, then free coordinates; within each the cleanest.
       const double rank = best->at_rest() ? 0.0 : best->driven() ? 1e3 : 1e6;
       const double badness = rank + best->data_cost / std::max(1, body(b).seen);
@@ -178,7 +193,7 @@ class Grower {
       }
     }
     if (chosen == tree_.bodies.size()) return false;
-    place(chosen, *best_of(tree_.bodies[chosen]));
+    place(chosen, *acceptable_best(chosen));
     return true;
   }
 

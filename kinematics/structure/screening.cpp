@@ -52,55 +52,53 @@ Direction principal_direction(const Matrix6d& G, int samples) {
   return d;
 }
 
-// The best slope without rotation: b / qq projected, and what it leaves.
-Direction slide_of(const LinearMotion& linear, const Matrix6d& G, const Direction& d, double qq) {
-  const Eigen::Matrix<double, 6, 3> W = linear.whitening.rightCols<3>();
-  Direction out = d;
-  out.slope = W * (W.transpose() * W).ldlt().solve(W.transpose() * d.slope);
-  if (out.slope.squaredNorm() < 1e-30) return out;
-  const Vector6d u = out.slope.normalized();
-  const double total = u.dot(G * u);
-  // Sum of squares along u after regression on the coordinate, whose slope along u is u . d.slope.
-  const double explained = std::pow(u.dot(d.slope), 2) * qq;
-  out.cost =
-      split_cost(std::max(0.0, total - explained), std::max(0.0, G.trace() - total), linear.count);
-  if (d.channel < 0) out.cost += linear.count * std::log1p(std::pow(u.dot(d.slope), 2));
-  return out;
-}
-
-void add_candidate(const LinearMotion& linear, const Direction& d, JointType type,
-                   std::vector<Candidate>& out) {
-  const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
-  const double scale =
-      type == JointType::kRevolute ? twist.head<3>().norm() : twist.tail<3>().norm();
+void add_candidate(const LinearMotion& linear, const LineFit& line, int channel, JointType type,
+                   const Eigen::VectorXd& coordinate, std::vector<Candidate>& out) {
+  const bool turns = type == JointType::kRevolute;
+  const double scale = turns ? line.slope.head<3>().norm() : line.slope.tail<3>().norm();
   if (!(scale > 1e-12)) return;
   Candidate c;
-  c.channel = d.channel;
-  c.cost = d.cost;
-  ChainJoint joint = joint_from_twist(linear.mean, twist, type);
-  c.start.mount = linear.mean;
-  if (d.channel >= 0) {
-    joint.terms = {{d.channel, scale}};
+  c.channel = channel;
+  c.cost = line.cost;
+  const Pose centre = linear.mean * exp_pose(line.mean);
+  ChainJoint joint = joint_from_twist(centre, line.slope, type);
+  c.start.mount = centre;
+  if (channel >= 0) {
+    joint.terms = {{channel, scale}};
   } else {
-    const Vector6d unit = d.slope / d.slope.squaredNorm();
-    for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
-      c.start.coordinates.push_back(scale * unit.dot(linear.y.col(i)));
-    }
+    for (const double value : coordinate) c.start.coordinates.push_back(scale * value);
   }
   c.start.joints = {std::move(joint)};
   out.push_back(std::move(c));
 }
 
+// The line through the whitened average as a start in tangent coordinates.
+LineFit start_of(const LinearMotion& linear, const Eigen::VectorXd& coordinate,
+                 const Direction& d) {
+  const auto W = linear.whitening.triangularView<Eigen::Upper>();
+  LineFit start;
+  start.slope = W.solve(d.slope);
+  const Eigen::MatrixXd left = linear.tangent - start.slope * coordinate.transpose();
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    const Eigen::VectorXd row = left.row(c);
+    start.mean(c) = median_of({row.data(), row.data() + row.size()});
+  }
+  return start;
+}
+
 // A turn where the rotation shows, and a slide; each with the cost it leaves.
-void add_candidates(const LinearMotion& linear, const Direction& d, const Matrix6d& G, double qq,
+void add_candidates(const LinearMotion& linear, const Direction& d, const Eigen::VectorXd& q,
                     std::vector<Candidate>& out) {
-  const Vector6d twist = linear.whitening.triangularView<Eigen::Upper>().solve(d.slope);
-  const Matrix6d covariance =
-      (linear.whitening.transpose() * linear.whitening).inverse() / std::max(1.0, qq);
-  const double rotation_sigma = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
-  if (twist.head<3>().norm() > kTurnEvidence * rotation_sigma)
-    add_candidate(linear, d, JointType::kRevolute, out);
-  add_candidate(linear, slide_of(linear, G, d, qq), JointType::kPrismatic, out);
+  const auto fit = [&](JointType type) {
+    Eigen::VectorXd coordinate = q;
+    const LineFit start = start_of(linear, coordinate, d);
+    const LineFit line = d.channel >= 0 ? fit_line(linear, coordinate, type, start)
+                                        : fit_free_line(linear, coordinate, type, start);
+    const bool shows = type == JointType::kPrismatic || line.turn_evidence > kTurnEvidence;
+    if (shows) add_candidate(linear, line, d.channel, type, coordinate, out);
+  };
+  fit(JointType::kRevolute);
+  fit(JointType::kPrismatic);
 }
 
 // Squared residuals of all samples about one direction (none: about the mean).
@@ -121,29 +119,19 @@ std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::M
   return squared;
 }
 
-// Cost of rest about the median, which few outliers do not move.
-double rest_cost(const LinearMotion& linear) {
-  Vector6d centre;
-  for (Eigen::Index c = 0; c < 6; ++c) {
-    std::vector<double> values(static_cast<std::size_t>(linear.y.cols()));
-    for (Eigen::Index i = 0; i < linear.y.cols(); ++i)
-      values[static_cast<std::size_t>(i)] = linear.y(c, i);
-    centre(c) = median_of(std::move(values));
-  }
-  ResidualParts parts;
-  for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
-    parts.across.push_back(linear.weight(i) * (linear.y.col(i) - centre).squaredNorm());
-    parts.along.push_back(0.0);
-    parts.penalty.push_back(0.0);
-  }
-  return residual_scale(parts).cost;
+// Rest about the median, which few outliers do not move.
+Candidate rest_candidate(const LinearMotion& linear) {
+  const LineFit line =
+      fit_point(linear, start_of(linear, Eigen::VectorXd::Zero(linear.y.cols()), Direction{}));
+  Candidate rest;
+  rest.start.mount = linear.mean * exp_pose(line.mean);
+  rest.cost = line.cost;
+  return rest;
 }
 
 struct Regression {
   std::vector<Direction> driven;  // by cost
   Direction principal;
-  Matrix6d G;             // sum of y y'
-  Eigen::VectorXd power;  // sum of squares of every channel
 };
 
 // Leaves out the samples that lie far from the direction most samples follow; true when there are
@@ -184,8 +172,6 @@ Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q,
   const Eigen::MatrixXd y = (linear.y.colwise() - y_mean) * weight.asDiagonal();
   const Matrix6d G = y * y.transpose();
   Regression out;
-  out.G = G;
-  out.power = Eigen::VectorXd::Zero(q.rows());
   out.principal = principal_direction(G, linear.count);
   if (q.rows() == 0) return out;
   const Eigen::VectorXd q_mean = q * weight.cwiseAbs2() / total;
@@ -193,7 +179,6 @@ Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q,
   const Eigen::MatrixXd B = y * centred.transpose();
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     const double qq = centred.row(k).squaredNorm();
-    out.power(k) = qq;
     if (usable[static_cast<std::size_t>(k)] == 0 || qq < 1e-6 * n) continue;
     out.driven.push_back(driven_direction(G, B.col(k), qq, static_cast<int>(k), linear.count));
   }
@@ -239,10 +224,7 @@ Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
   for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass)
     r = regress(linear, q, usable);
 
-  Candidate rest;
-  rest.start.mount = linear.mean;
-  rest.cost = rest_cost(linear);
-  out.candidates.push_back(std::move(rest));
+  out.candidates.push_back(rest_candidate(linear));
   if (linear.widest > kWideTurn) {
     for (Candidate& c : wide_turn_candidates(motion, q, usable, linear, options.coordinate_free)) {
       out.candidates.push_back(std::move(c));
@@ -250,10 +232,14 @@ Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
   }
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
   for (std::size_t k = 0; k < channels; ++k) {
-    add_candidates(linear, r.driven[k], r.G, r.power(r.driven[k].channel), out.candidates);
+    const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
+    add_candidates(linear, r.driven[k], readings_k, out.candidates);
   }
-  if (options.coordinate_free)
-    add_candidates(linear, r.principal, r.G, linear.count, out.candidates);
+  if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0) {
+    const Eigen::VectorXd along =
+        linear.y.transpose() * r.principal.slope / r.principal.slope.squaredNorm();
+    add_candidates(linear, r.principal, along, out.candidates);
+  }
   std::ranges::stable_sort(out.candidates, {}, &Candidate::cost);
   return out;
 }
