@@ -79,11 +79,6 @@ std::vector<std::vector<ChannelShare>> couplings_of(const Structure& structure,
   return out;
 }
 
-std::size_t driven_joints(const Structure& structure) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      structure.joints, [](const StructureJoint& joint) { return joint.channel.has_value(); }));
-}
-
 // The base frame seen from the frame the structure stands in (the camera's).
 Pose base_frame(const KinematicTree& tree, const std::optional<Eigen::Vector3d>& gravity) {
   Pose T_camera_base;
@@ -232,29 +227,14 @@ CameraModel choose_camera(const Recording& recording, const TagObservations& tag
 }
 
 Structure find_robot(const Recording& recording, const PoseTracks& tracks,
-                     const CalibrateOptions& options, std::optional<double> time_offset_s) {
+                     const CalibrateOptions& options) {
   if (recording.entry == RecordingEntry::kPoints) {
     throw bad_request("points.csv", "points alone do not show a structure",
                       "give a nominal robot with --nominal robot.urdf");
   }
   StructureOptions structure_options;
-  structure_options.scan_time_offset = options.estimate_time_offset && !time_offset_s;
-  if (!time_offset_s) {
-    Structure scanned = find_structure(tracks, recording.log, structure_options);
-    // A scan may settle on an offset at which the channels fit by chance: clocks that agree are the
-    // first guess of all, and win when they explain more joints.
-    structure_options.scan_time_offset = false;
-    if (!options.estimate_time_offset || driven_joints(scanned) == scanned.joints.size()) {
-      return scanned;
-    }
-    Structure agreeing = find_structure(tracks, recording.log, structure_options);
-    return driven_joints(agreeing) > driven_joints(scanned) ? agreeing : scanned;
-  }
-  JointLog shifted = recording.log;
-  for (double& t : shifted.times_s) t -= *time_offset_s;
-  Structure structure = find_structure(tracks, shifted, structure_options);
-  structure.time_offset_s += *time_offset_s;
-  return structure;
+  structure_options.scan_time_offset = options.estimate_time_offset;
+  return find_structure(tracks, recording.log, structure_options);
 }
 
 CalibrationStart start_from_structure(const Structure& structure, const Recording& recording,

@@ -31,11 +31,10 @@ struct Observed {
 /// The declared camera, checked against the image size, or a guess from the markers' shapes.
 [[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
 
-/// The structure, with the clocks' offset scanned for, or held at a known one. Throws bad_request
-/// for points, which show no structure.
+/// The structure, with the clocks' offset scanned for unless they are trusted to agree. Throws
+/// bad_request for points, which show no structure.
 [[nodiscard]] Structure find_robot(const Recording& recording, const PoseTracks& tracks,
-                                   const CalibrateOptions& options,
-                                   std::optional<double> time_offset_s);
+                                   const CalibrateOptions& options);
 
 /// A start from the found structure: units of the channels recognised, the base frame placed on the
 /// first tag at rest (its normal up; without one at the camera, upright), or level when gravity is

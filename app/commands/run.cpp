@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope run`: every arrow of the data's path on one page.
-#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -21,9 +20,6 @@
 
 namespace kinescope {
 namespace {
-
-// Offsets of the clocks closer than this (s) give the same structure.
-constexpr double kSameOffset = 0.003;
 
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
@@ -95,24 +91,14 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     clock.lap("structure", run.times);
     run.calibration = calibrate_from(start);
   } else {
-    const auto find = [&](std::optional<double> time_offset_s) {
-      run.structure = find_robot(recording, run.tracks, options.calibrate, time_offset_s);
-      // What was found is shown also where it is no answer, but never over an earlier answer.
-      if (!std::filesystem::exists(folder.file("robot.urdf"))) {
-        folder.write("structure.json",
-                     structure_json(*run.structure, recording.log).dump(2) + "\n");
-      }
-      require_determined(*run.structure);
-    };
-    find(std::nullopt);
+    run.structure = find_robot(recording, run.tracks, options.calibrate);
+    // What was found is shown also where it is no answer, but never over an earlier answer.
+    if (!std::filesystem::exists(folder.file("robot.urdf"))) {
+      folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
+    }
+    require_determined(*run.structure);
     clock.lap("structure", run.times);
     run.calibration = calibrate_from(start_from_structure(*run.structure, recording, camera));
-    // Corners see the clocks' offset far better than poses do: where the two differ, the structure
-    // is judged again at the offset that the corners show.
-    if (std::abs(run.calibration.time_offset_s - run.structure->time_offset_s) > kSameOffset) {
-      find(run.calibration.time_offset_s);
-      run.calibration = calibrate_from(start_from_structure(*run.structure, recording, camera));
-    }
   }
   run.errors = summarise_errors(run.calibration);
   clock.lap("calibrate", run.times);

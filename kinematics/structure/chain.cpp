@@ -244,18 +244,19 @@ void update_coordinates(ChainModel& model, const Evaluation& e) {
   static_cast<void>(mean);
 }
 
-std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd& H,
-                                 double variance) {
-  std::vector<double> sigma;
+Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& H, double variance) {
   const Eigen::MatrixXd damped =
       H + 1e-9 * Eigen::MatrixXd(H.diagonal().cwiseMax(1e-12).asDiagonal());
-  const Eigen::MatrixXd covariance =
-      damped.ldlt().solve(Eigen::MatrixXd::Identity(H.rows(), H.cols()));
+  return variance * damped.ldlt().solve(Eigen::MatrixXd::Identity(H.rows(), H.cols()));
+}
+
+std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd& covariance) {
+  std::vector<double> sigma;
   Eigen::Index column = 0;
   for (const ChainJoint& joint : model.joints) {
     column += geometry_size(joint.type);
     for (std::size_t t = 0; t < joint.terms.size(); ++t, ++column) {
-      sigma.push_back(std::sqrt(std::max(0.0, covariance(column, column)) * variance));
+      sigma.push_back(std::sqrt(std::max(0.0, covariance(column, column))));
     }
   }
   return sigma;
@@ -303,6 +304,21 @@ Pose chain_pose(const ChainModel& model, const Eigen::MatrixXd& readings, int in
     coordinates.push_back(chain_coordinate(joint, readings, instant));
   }
   return chain_pose_at(model, coordinates);
+}
+
+Eigen::MatrixXd chain_jacobian(const ChainModel& model, const std::vector<double>& coordinates,
+                               const Eigen::MatrixXd& readings, int instant) {
+  const Prepared p = prepare(model);
+  const std::size_t joints = model.joints.size();
+  std::vector<Pose> to_child(joints);
+  Pose tail = p.links[joints];
+  for (std::size_t k = joints; k-- > 0;) {
+    to_child[k] = tail;
+    tail = p.links[k] * (motion_of(model.joints[k].type, coordinates[k]) * tail);
+  }
+  Jacobian J(6, parameter_count(model));
+  static_cast<void>(fill_jacobian(model, to_child, coordinates, readings, instant, J));
+  return J;
 }
 
 Vector6d axis_in_child(const ChainModel& model, double coordinate) {
@@ -354,7 +370,8 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
   if (normal.H.size() == 0) {
     normal = linearise(motion, model, readings, axis_weight, robust_weights(e.parts, scale));
   }
-  fit.scale_sigma = scale_sigmas(model, normal.H, std::max(scale.across, scale.along));
+  fit.covariance = covariance_of(normal.H, std::max(scale.across, scale.along));
+  fit.scale_sigma = scale_sigmas(model, fit.covariance);
   fit.model = std::move(model);
   describe(motion, e, scale, fit);
   if (options.with_residuals) fit.residuals = std::move(e.white);

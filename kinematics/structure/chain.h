@@ -60,6 +60,8 @@ struct ChainFit {
   double rotation_rms = 0.0;  ///< rad, m: robust size of what is left (across the joint)
   double translation_rms = 0.0;
   std::vector<double> scale_sigma;  ///< of every term in order, per RMS of the channel
+  Eigen::MatrixXd covariance;       ///< of the parameters in chain_jacobian()'s order, as if the
+                                    ///< samples erred independently
   std::vector<Vector6d> residuals;  ///< whitened, one a sample
 };
 
@@ -79,6 +81,11 @@ struct ChainFitOptions {
 /// Coordinate of joint k.
 [[nodiscard]] double chain_coordinate(const ChainJoint& joint, const Eigen::MatrixXd& readings,
                                       int instant);
+
+/// d(right perturbation of the last body) / d(tilts, shifts and scales of every joint, mount).
+[[nodiscard]] Eigen::MatrixXd chain_jacobian(const ChainModel& model,
+                                             const std::vector<double>& coordinates,
+                                             const Eigen::MatrixXd& readings, int instant);
 
 /// Refines `start`. `readings`: instants x channels.
 [[nodiscard]] ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings,

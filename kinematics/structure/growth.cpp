@@ -508,6 +508,7 @@ class Grower {
     for (const Attachment& a : g.alternatives) {
       if (a.channel() == channel || is_below(a.parent, link.founder)) continue;
       if (conflicts(static_cast<std::size_t>(link.founder), a)) continue;
+      if (!acceptable(static_cast<std::size_t>(link.founder), a)) continue;
       if (best == nullptr || a.cost(correlation) < best->cost(correlation)) best = &a;
     }
     return best;

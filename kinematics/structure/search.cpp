@@ -45,6 +45,10 @@ bool has_driven_joint(const GrownTree& tree) {
       tree.links, [](const GrownLink& l) { return l.founder >= 0 && l.attachment.driven(); });
 }
 
+bool has_free_body(const GrownTree& tree) {
+  return std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
+}
+
 double most_correlated(const GrownTree& tree) {
   double correlation = 1.0;
   for (const GrownBody& b : tree.bodies) {
@@ -81,27 +85,28 @@ class Search {
   Search(const Series& thin, const JointLog& log, const StructureOptions& options)
       : thin_(thin), log_(log), options_(options) {}
 
-  [[nodiscard]] FoundTree grow_at(double offset_s) const {
+  [[nodiscard]] FoundTree grow_at(double offset_s, const GrowthOptions& growth = {}) const {
     FoundTree found;
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, thin_, offset_s, options_.max_gap_s);
-    found.tree = grow_tree(thin_, found.readings);
+    found.tree = grow_tree(thin_, found.readings, growth);
     const double si_share = si_share_of(found.tree, found.readings);
     if (si_share > found.readings.si_share) {
       found.readings.si_share = si_share;
-      found.tree = grow_tree(thin_, found.readings);
+      found.tree = grow_tree(thin_, found.readings, growth);
     }
     return found;
   }
 
   // Tree and offset settled on each other.
-  [[nodiscard]] FoundTree settle_at(double start_s, double step_s) const {
-    FoundTree found = grow_at(start_s);
+  [[nodiscard]] FoundTree settle_at(double start_s, double step_s,
+                                    const GrowthOptions& options) const {
+    FoundTree found = grow_at(start_s, options);
     for (int growth = 1; has_driven_joint(found.tree); ++growth) {
       const TimeOffset refined = refine_offset(found, step_s);
       const bool moved = std::abs(refined.value_s - found.offset.value_s) > kOffsetMoved;
       if (moved && growth < kMostGrowths) {
-        found = grow_at(refined.value_s);
+        found = grow_at(refined.value_s, options);
       } else {
         found.readings =
             readings_like(found.readings, log_, thin_, refined.value_s, options_.max_gap_s);
@@ -174,7 +179,8 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
       return std::abs(f.offset.value_s - start_s) < 0.5 * scan.step_s;
     });
     if (known) continue;
-    found.push_back(search.settle_at(start_s, scan.step_s));
+    // Joints in series without markers between are a long search: not at every offset.
+    found.push_back(search.settle_at(start_s, scan.step_s, {.paths_of_several_joints = false}));
     if (explains_all(found.back().tree)) return std::move(found.back());
   }
   std::ranges::stable_sort(found, {},
@@ -183,7 +189,8 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
   for (std::size_t k = 1; k < found.size(); ++k) {
     if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
   }
-  return std::move(found[best]);
+  if (!has_free_body(found[best].tree)) return std::move(found[best]);
+  return search.settle_at(found[best].offset.value_s, scan.step_s, {});
 }
 
 }  // namespace kinescope::structure_search
