@@ -5,7 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/Cholesky>
+
 #include "kinematics/structure/coupling.h"
+#include "kinematics/structure/linear_motion.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
@@ -360,12 +363,22 @@ Attachment refit(const Attachment& attachment, const Body& body, const LinkPath&
   return a;
 }
 
-double free_cost(const Body& body, const Readings& readings) {
+FreeCost free_cost(const Body& body, const Readings& readings) {
   const LinkPath camera = camera_path(static_cast<int>(body.at.size()));
   const RelativeMotion relative = relative_motion(body, camera, readings);
-  if (relative.motion.empty()) return 0.0;
-  const Eigen::MatrixXd none(readings.value.rows(), 0);
-  return screen_motion(relative.motion, none, {}, {.coordinate_free = false}).free_cost;
+  if (relative.motion.empty()) return {};
+  const LinearMotion linear = linear_motion(relative.motion);
+  const double size = motion_size(relative.motion);
+  Vector6d spread;
+  spread << Eigen::Vector3d::Constant(size / kLever), Eigen::Vector3d::Constant(size);
+  spread /= std::sqrt(6.0);
+  FreeCost cost{free_motion_cost(linear), 0.0};
+  for (const Matrix6d& W : linear.own) {
+    const Matrix6d scaled = W * spread.asDiagonal();
+    const Eigen::LLT<Matrix6d> factor(Matrix6d::Identity() + scaled * scaled.transpose());
+    cost.everywhere += 6.0 + 2.0 * Matrix6d(factor.matrixL()).diagonal().array().log().sum();
+  }
+  return cost;
 }
 
 LinkPath camera_path(int instants) {

@@ -78,8 +78,13 @@ struct RelativeMotion {
 [[nodiscard]] Attachment refit(const Attachment& attachment, const Body& body, const LinkPath& path,
                                const Readings& readings);
 
-/// The cost of a body that moves freely in the camera's frame.
-[[nodiscard]] double free_cost(const Body& body, const Readings& readings);
+/// What a body costs that moves freely in the camera's frame.
+struct FreeCost {
+  double as_seen = 0.0;     ///< a Gaussian with the covariance that the motion happens to have
+  double everywhere = 0.0;  ///< as far in every direction as in the mean of all: a free body has no
+                            ///< reason to keep to a line
+};
+[[nodiscard]] FreeCost free_cost(const Body& body, const Readings& readings);
 
 /// The path of the body that hangs on `parent` by this attachment.
 [[nodiscard]] LinkPath path_of(const Attachment& attachment, const Body& body,

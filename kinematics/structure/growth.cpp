@@ -33,7 +33,9 @@ class Grower {
         usable_(moving_channels(readings)) {
     tree_.bodies.resize(series.bodies.size());
     for (std::size_t b = 0; b < series.bodies.size(); ++b) {
-      tree_.bodies[b].free_cost = free_cost(series.bodies[b], readings);
+      const FreeCost free = free_cost(series.bodies[b], readings);
+      tree_.bodies[b].free_cost = free.as_seen;
+      tree_.bodies[b].everywhere_cost = std::max(free.as_seen, free.everywhere);
     }
     GrownLink camera;
     camera.path = camera_path(series.size());
@@ -80,6 +82,7 @@ class Grower {
     g.rests_on = link;
     // Nothing that moves freely stays where it is.
     g.free_cost = std::max(g.free_cost, rest->data_cost + kNeverFree);
+    g.everywhere_cost = std::max(g.everywhere_cost, g.free_cost);
     g.alternatives.push_back(*rest);
   }
 
@@ -151,8 +154,9 @@ class Grower {
   bool acceptable(std::size_t b, const Attachment& a) const {
     if (a.at_rest() && tree_.bodies[b].rests_on == a.parent) return true;
     const GrownBody& g = tree_.bodies[b];
-    if (a.data_cost >= g.free_cost) return false;
     const double ratio = a.explained_ratio();
+    const bool followed = a.driven() && ratio > options_.accept_ratio;
+    if (a.data_cost >= g.free_cost && !followed) return false;
     const bool clean = a.fit.variance <= options_.accept_variance || ratio > options_.accept_ratio;
     if (a.at_rest() || a.driven()) return clean;
     // A joint without a channel has to leave much less than it explains, or free bodies pass as

@@ -28,8 +28,9 @@ struct GrownBody {
   int link = -1;                         ///< -1: free
   Attachment attachment;                 ///< on `link` at rest, or the founder's
   std::vector<Attachment> alternatives;  ///< all looked at (against all links), without paths
-  double free_cost = 0.0;
-  int rests_on = -1;  ///< link on which it plainly rests; -1: on none
+  double free_cost = 0.0;                ///< of moving freely, along whatever directions were seen
+  double everywhere_cost = 0.0;          ///< of moving freely, as far in every direction
+  int rests_on = -1;                     ///< link on which it plainly rests; -1: on none
 };
 
 struct GrownTree {
@@ -40,7 +41,7 @@ struct GrownTree {
 struct GrowthOptions {
   double accept_variance = 16.0;  ///< of the residual across a joint, over the declared one; or
   double accept_ratio = 40.0;     ///< the motion over what is left of it, beyond the noise
-  double free_ratio = 10.0;       ///< the same that a joint without a channel needs at least
+  double free_ratio = 25.0;       ///< the same that a joint without a channel needs at least
   bool paths_of_several_joints = true;
 };
 

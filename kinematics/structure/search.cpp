@@ -11,9 +11,11 @@
 namespace kinescope::structure_search {
 namespace {
 
-// A tree is grown again when its offset moved by more than this (s): less changes no joint.
+// A tree is grown again when its offset moved by more than this (s), or this many of its standard
+// deviations: joints and the odds of their alternatives stand for the offset they are told with.
 constexpr double kOffsetMoved = 3e-3;
-constexpr int kMostGrowths = 3;
+constexpr double kSameSigmas = 2.0;
+constexpr int kMostGrowths = 4;
 // How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
 constexpr double kClearly = 25.0;
 // Variances over the declared ones up to which a tree explains all there is.
@@ -102,18 +104,13 @@ class Search {
   [[nodiscard]] FoundTree settle_at(double start_s, double step_s,
                                     const GrowthOptions& options) const {
     FoundTree found = grow_at(start_s, options);
-    for (int growth = 1; has_driven_joint(found.tree); ++growth) {
+    for (int growth = 1; growth < kMostGrowths && has_driven_joint(found.tree); ++growth) {
       const TimeOffset refined = refine_offset(found, step_s);
-      const bool moved = std::abs(refined.value_s - found.offset.value_s) > kOffsetMoved;
-      if (moved && growth < kMostGrowths) {
-        found = grow_at(refined.value_s, options);
-      } else {
-        found.readings =
-            readings_like(found.readings, log_, thin_, refined.value_s, options_.max_gap_s);
-        found.tree = refit_tree(found.tree, thin_, found.readings);
-      }
-      found.offset = refined;
-      if (!moved || growth >= kMostGrowths) break;
+      const double moved = std::abs(refined.value_s - found.offset.value_s);
+      found.offset.sigma_s = refined.sigma_s;
+      if (moved < std::min(kOffsetMoved, kSameSigmas * refined.sigma_s)) break;
+      found = grow_at(refined.value_s, options);
+      found.offset.sigma_s = refined.sigma_s;
     }
     return found;
   }
@@ -121,8 +118,8 @@ class Search {
  private:
   // Walks downhill to a minimum of the tree's cost, then narrows it by parabolas down to its sigma.
   [[nodiscard]] TimeOffset refine_offset(const FoundTree& found, double step_s) const {
-    constexpr double kFinest = 5e-4;  // s
-    constexpr int kMostSteps = 16;
+    constexpr double kFinest = 1e-5;  // s
+    constexpr int kMostSteps = 24;
     std::map<double, double> known;
     const auto cost_at = [&](double value_s) {
       const auto [place, is_new] = known.try_emplace(value_s, 0.0);

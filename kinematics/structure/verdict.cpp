@@ -99,7 +99,7 @@ class Judge {
       alternative.link = own_link(b);
       out.push_back(std::move(alternative));
     }
-    const double free_loss = body.free_cost / correlation - now;
+    const double free_loss = body.everywhere_cost / correlation - now;
     out.push_back({std::max(0.0, free_loss),
                    fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1,
                    own_link(b)});
