@@ -30,7 +30,8 @@ class Grower {
       : series_(series),
         readings_(readings),
         options_(options),
-        usable_(moving_channels(readings)) {
+        usable_(moving_channels(readings)),
+        moves_freely_(series.bodies.size(), 0) {
     tree_.bodies.resize(series.bodies.size());
     for (std::size_t b = 0; b < series.bodies.size(); ++b) {
       const FreeCost free = free_cost(series.bodies[b], readings);
@@ -48,6 +49,8 @@ class Grower {
       }
     } while (options_.paths_of_several_joints && attach_through_unseen_links());
     for (int round = 0; round < kMostRounds && rearrange(); ++round) {
+    }
+    while (give_up_contradicted_joint()) {
     }
     return std::move(tree_);
   }
@@ -76,6 +79,7 @@ class Grower {
     const auto rest = practical_rest(b, link);
     for (Attachment& a : found) {
       if (rest && !a.driven()) continue;
+      if (moves_freely_[b] != 0 && !a.at_rest() && !a.driven()) continue;
       g.alternatives.push_back(std::move(a));
     }
     if (!rest) return;
@@ -250,6 +254,57 @@ class Grower {
       return true;
     }
     return false;
+  }
+
+  // A joint that no channel drives stands on one marker's word: that its motion has one direction.
+  // Where another marker of the same rigid body moves by no joint, the body only happened to keep
+  // to a line while the first one was seen, and is free. True when such a joint was taken out.
+  bool give_up_contradicted_joint() {
+    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
+      if (tree_.links[l].attachment.driven()) continue;
+      const auto founder = static_cast<std::size_t>(tree_.links[l].founder);
+      for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+        if (tree_.bodies[b].link >= 0 || !rest_on_each_other(founder, b)) continue;
+        set_free(static_cast<int>(l));
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // Whether two bodies keep one relative pose wherever both are seen.
+  bool rest_on_each_other(std::size_t a, std::size_t b) const {
+    constexpr std::size_t kFewest = 12;
+    constexpr double kNoiseOnly = 4.0;  // variance over the declared one
+    LinkPath path = camera_path(series_.size());
+    path.covariance.assign(path.pose.size(), Matrix6d::Zero());
+    for (std::size_t i = 0; i < path.pose.size(); ++i) {
+      const Sighting& s = body(a).at[i];
+      path.valid[i] = s.seen ? 1 : 0;
+      if (!s.seen) continue;
+      path.pose[i] = s.pose;
+      path.covariance[i] = s.covariance;
+    }
+    const RelativeMotion relative = relative_motion(body(b), path, readings_);
+    if (relative.motion.size() < kFewest) return false;
+    ChainModel model;
+    model.mount = relative.motion[relative.motion.size() / 2].pose;
+    return fit_chain(relative.motion, readings_.value, model).variance < kNoiseOnly;
+  }
+
+  // Takes out a link and everything on it; its bodies may no longer hang by joints without
+  // channels.
+  void set_free(int link) {
+    const int founder = tree_.links[static_cast<std::size_t>(link)].founder;
+    for (std::size_t b = 0; b < tree_.bodies.size(); ++b) {
+      if (tree_.bodies[b].link < 0 || !is_below(tree_.bodies[b].link, founder)) continue;
+      if (tree_.bodies[b].link == link) moves_freely_[b] = 1;
+      tree_.bodies[b].link = -1;
+    }
+    static_cast<void>(remove_links_without_bodies());
+    relist();
+    while (attach_next()) {
+    }
   }
 
   // Moves single bodies to better places, then deals out the channels; true when anything changed.
@@ -522,6 +577,7 @@ class Grower {
   const Readings& readings_;
   GrowthOptions options_;
   std::vector<char> usable_;
+  std::vector<char> moves_freely_;  // bodies whose joint without a channel was given up
   GrownTree tree_;
 };
 

@@ -78,6 +78,29 @@ TEST(WithoutLog, FreeBodiesAreNoJoints) {
   }
 }
 
+// A board moved by hand: while one of its markers is seen it happens to turn about one axis.
+TEST(WithoutLog, AMarkerOfTheSameBoardContradictsAJoint) {
+  Scene scene = make_scene("Board", {.joints = 1}, noisy());
+  Rng rng = Rng::from_name("Board", 1);
+  const std::vector<double>& times = scene.recording.tracks.times_s;
+  PoseTrack whole = wandering(TagId{50}, times, rng, true);
+  PoseTrack part = whole;
+  part.id = TagId{51};
+  std::erase_if(part.samples,
+                [&](const PoseSample& s) { return s.frame >= static_cast<int>(times.size() / 4); });
+  for (PoseSample& s : part.samples) {
+    Vector6d noise;
+    noise << rng.normal3(0.5 * kDegree), rng.normal3(3e-3);
+    const Pose beside{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.06, 0.0, 0.0)};
+    s.T_camera_marker = s.T_camera_marker * beside * exp_pose(noise);
+  }
+  scene.recording.tracks.tracks.push_back(whole);
+  scene.recording.tracks.tracks.push_back(part);
+  const Structure s = find_structure(scene.recording.tracks, JointLog{});
+  EXPECT_EQ(s.free_markers, (std::vector{TagId{50}, TagId{51}}));
+  EXPECT_EQ(s.joints.size(), 1U);
+}
+
 TEST(WithoutLog, AFreeBodyBesideALoggedRobotIsFree) {
   Scene scene = make_scene("FreeBesideRobot", {.joints = 3}, noisy());
   Rng rng = Rng::from_name("FreeBesideRobot", 1);

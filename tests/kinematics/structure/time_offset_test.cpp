@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The clock offset from the structure search. tests/experiments/structure_lag has many more cases.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/kinematics/structure/scenes.h"
+
+namespace kinescope {
+namespace {
+
+struct OffsetCase {
+  const char* name;
+  double lag_s;
+  double prismatic_share;
+  double lowest_hz;
+  double highest_hz;
+  double corner_px;
+  double flip_share;
+};
+
+class ClockOffset : public testing::TestWithParam<OffsetCase> {};
+
+TEST_P(ClockOffset, IsFoundToMilliseconds) {
+  const OffsetCase& c = GetParam();
+  RecordingOptions o = noisy();
+  o.frames = 360;
+  o.lag_s = c.lag_s;
+  o.lowest_hz = c.lowest_hz;
+  o.highest_hz = c.highest_hz;
+  o.corner_px = c.corner_px;
+  o.flip_share = c.flip_share;
+  o.idle_channels = 1;
+  const Scene scene = make_scene(c.name, {.joints = 4, .prismatic_share = c.prismatic_share}, o);
+  const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_EQ(described(s, scene.robot), described(scene));
+  // Slow joints tell it to 2 ms; another basin is 50 ms away at least.
+  EXPECT_NEAR(s.time_offset_s, c.lag_s, std::max(3e-3, 5.0 * s.time_offset_sigma_s));
+  EXPECT_LT(s.time_offset_sigma_s, 6e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cases, ClockOffset,
+    testing::Values(OffsetCase{"OffsetSlow", -0.9, 0.3, 0.02, 0.08, 0.0, 0.0},
+                    OffsetCase{"OffsetGantry", -0.04, 1.0, 0.05, 0.25, 0.15, 0.0},
+                    OffsetCase{"OffsetFlips", 0.5, 0.3, 0.05, 0.25, 0.0, 0.05},
+                    OffsetCase{"OffsetFast", 0.9, 0.0, 0.3, 1.2, 0.0, 0.0},
+                    OffsetCase{"OffsetFastTargets", -0.17, 0.3, 0.3, 1.2, 0.25, 0.02}),
+    [](const auto& tested) { return std::string(tested.param.name); });
+
+// A joint that moves little, but well above the noise, is a joint: resting in practice is for
+// markers whose corners err alike, and no channel tells how.
+TEST(LittleMotion, IsFoundWhereAChannelTellsIt) {
+  RecordingOptions o;
+  o.sigma_m = 2e-4;
+  o.sigma_rad = 0.03 * kDegree;
+  o.amplitude_rad = 0.02;
+  const Scene scene = make_scene("LittleMotion", {.joints = 3, .prismatic_share = 0.0}, o);
+  const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_EQ(described(s, scene.robot), described(scene));
+}
+
+}  // namespace
+}  // namespace kinescope
