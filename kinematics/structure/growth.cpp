@@ -275,7 +275,9 @@ class Grower {
   // Whether two bodies keep one relative pose wherever both are seen.
   bool rest_on_each_other(std::size_t a, std::size_t b) const {
     constexpr std::size_t kFewest = 12;
-    constexpr double kNoiseOnly = 4.0;  // variance over the declared one
+    constexpr double kNoiseOnly = 4.0;  // variance over the declared one; or
+    constexpr double kOfMotion = 0.1;   // what is left over how far they move
+    constexpr double kLever = 0.3;      // m, at which turns are compared with shifts
     LinkPath path = camera_path(series_.size());
     path.covariance.assign(path.pose.size(), Matrix6d::Zero());
     for (std::size_t i = 0; i < path.pose.size(); ++i) {
@@ -289,7 +291,9 @@ class Grower {
     if (relative.motion.size() < kFewest) return false;
     ChainModel model;
     model.mount = relative.motion[relative.motion.size() / 2].pose;
-    return fit_chain(relative.motion, readings_.value, model).variance < kNoiseOnly;
+    const ChainFit fit = fit_chain(relative.motion, readings_.value, model);
+    const double left = std::hypot(fit.translation_rms, kLever * fit.rotation_rms);
+    return fit.variance < kNoiseOnly || left < kOfMotion * tree_.bodies[a].attachment.motion_size;
   }
 
   // Takes out a link and everything on it; its bodies may no longer hang by joints without
