@@ -168,18 +168,23 @@ bool is_not_negative(TermKind kind) {
          kind != TermKind::kInertial;
 }
 
-/// Upper root of the information that the base parameters carry: white information, less what
-/// colour takes.
-Eigen::MatrixXd information_root(const Identification& fit) {
-  Eigen::MatrixXd covariance = fit.covariance;
-  for (const int k : fit.undetermined) {
-    covariance.row(k).setZero();
-    covariance.col(k).setZero();
+/// How much wider than for white noise the parameters scatter: the median of their variance ratios.
+/// The jackknife's matrix itself has too few blocks to be inverted.
+double colour_of(const Identification& fit) {
+  std::vector<double> ratios;
+  for (Eigen::Index k = 0; k < fit.parameters.size(); ++k) {
+    const double ratio = fit.covariance(k, k) / fit.white_covariance(k, k);
+    if (std::isfinite(ratio)) ratios.push_back(ratio);
   }
-  const auto p = static_cast<double>(fit.parameters.size());
-  const double inflation = (fit.information * covariance).trace() / p;
-  const Eigen::MatrixXd information = fit.information / std::max(1.0, inflation);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  if (ratios.empty()) return 1.0;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::ranges::nth_element(ratios, middle);
+  return std::max(1.0, *middle);
+}
+
+/// Root of the information that the base parameters carry: R' R = information / colour.
+Eigen::MatrixXd information_root(const Identification& fit) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(fit.information / colour_of(fit));
   return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
          eigen.eigenvectors().transpose();
 }
