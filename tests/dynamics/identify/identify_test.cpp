@@ -188,7 +188,7 @@ TEST(Identify, RefusesWhatCannotWork) {
   bad.torque(7, 1) = std::nan("");
   EXPECT_THROW(static_cast<void>(identify_dynamics(model, bad)), Error);
   EXPECT_THROW(
-      static_cast<void>(identify_dynamics(model, torque_log_of(model, {.samples = 30}, rng))),
+      static_cast<void>(identify_dynamics(model, torque_log_of(model, {.samples = 15}, rng))),
       Error);
   IdentifyOptions options;
   options.drives.coulomb_width_rad_s = std::nan("");
