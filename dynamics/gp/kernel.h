@@ -62,7 +62,8 @@ class Kernel {
 
 enum class LengthScales { kOneEach, kCommon };
 enum class Amplitude { kFree, kUnit };
-/// v exp(-1/2 sum_d (x_d - y_d)^2 / l_d^2): squared exponential.
+/// v exp(-1/2 sum_d (x_d - y_d)^2 / l_d^2): squared exponential. Length scales start at the root of
+/// the number of features.
 [[nodiscard]] Kernel rbf(FeatureMap map, LengthScales scales = LengthScales::kOneEach,
                          Amplitude amplitude = Amplitude::kFree);
 

@@ -118,13 +118,17 @@ class RbfNode : public KernelNode {
 
 Kernel rbf(FeatureMap map, LengthScales scales, Amplitude amplitude) {
   KINESCOPE_CHECK(map.size() > 0, "at least one feature");
+  // Distances of standardised inputs grow with the root of their number; starting shorter, every
+  // sample stands alone and the search may take all for noise.
+  const double start = std::sqrt(static_cast<double>(map.size()));
   std::vector<Parameter> parameters;
   if (amplitude == Amplitude::kFree) parameters.push_back({.name = "rbf variance"});
   if (scales == LengthScales::kCommon) {
-    parameters.push_back({.name = "rbf length scale", .lower = 1e-2, .upper = 1e3});
+    parameters.push_back({.name = "rbf length scale", .value = start, .lower = 1e-2, .upper = 1e3});
   } else {
     for (const std::string& name : map.names) {
-      parameters.push_back({.name = "rbf length scale " + name, .lower = 1e-2, .upper = 1e3});
+      parameters.push_back(
+          {.name = "rbf length scale " + name, .value = start, .lower = 1e-2, .upper = 1e3});
     }
   }
   return {std::make_shared<RbfNode>(std::move(map), scales, amplitude), std::move(parameters)};
