@@ -31,7 +31,8 @@ FeatureMap accelerations_and_velocity_products(int joints) {
     for (int j = i; j < joints; ++j) out.names.push_back(fmt::format("dq{} dq{}", i, j));
   }
   out.map = [joints](const Inputs& inputs, Features features) {
-    features.leftCols(joints) = inputs.middleCols(2 * joints, joints);
+    const Eigen::Index n = joints;
+    features.leftCols(n) = inputs.middleCols(2 * n, n);
     Eigen::Index at = joints;
     for (int i = 0; i < joints; ++i) {
       for (int j = i; j < joints; ++j) {

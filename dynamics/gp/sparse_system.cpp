@@ -16,12 +16,14 @@ Index chunk_for(Index features) { return std::max<Index>(1024, 2 * features); }
 
 bool factorise(Workers& workers, const Covariance& covariance, const Prepared& inducing,
                double max_jitter, Eigen::MatrixXd& factor, double& jitter) {
-  for (double relative = 1e-14; relative <= max_jitter * 1.0001; relative *= 10.0) {
+  double relative = 1e-14;
+  while (relative <= max_jitter) {
     factor = covariance.lower(workers, inducing);
     jitter = relative * factor.diagonal().mean();
     factor.diagonal().array() += jitter;
     if (!factor.diagonal().allFinite()) return false;
     if (tiled_cholesky(workers, factor) == 0) return true;
+    relative *= 10.0;
   }
   return false;
 }

@@ -91,26 +91,4 @@ void tiled_invert_lower(Workers& workers, Block l) {
   }
 }
 
-namespace {
-
-template <typename Solve>
-void solve_columns(Workers& workers, Block b, Solve solve) {
-  constexpr Index kColumns = 64;
-  const Index tasks = (b.cols() + kColumns - 1) / kColumns;
-  workers.run(tasks, [&](Index task, Scratch&) {
-    const Range range = tile(task, kColumns, b.cols());
-    solve(b.middleCols(range.begin, range.size));
-  });
-}
-
-}  // namespace
-
-void tiled_solve_lower(Workers& workers, const ConstBlock& l, Block b) {
-  solve_columns(workers, b, [&](Block part) { solve_lower(l, part); });
-}
-
-void tiled_solve_lower_transposed(Workers& workers, const ConstBlock& l, Block b) {
-  solve_columns(workers, b, [&](Block part) { solve_lower_transposed(l, part); });
-}
-
 }  // namespace kinescope::gp

@@ -16,8 +16,4 @@ namespace kinescope::gp {
 /// rows x 256 beside it.
 void tiled_invert_lower(Workers& workers, Block l);
 
-/// b = l^-1 b and b = l'^-1 b for many right-hand sides.
-void tiled_solve_lower(Workers& workers, const ConstBlock& l, Block b);
-void tiled_solve_lower_transposed(Workers& workers, const ConstBlock& l, Block b);
-
 }  // namespace kinescope::gp
