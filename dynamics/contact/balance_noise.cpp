@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/contact/balance_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+constexpr std::size_t kFewestSamples = 200;
+/// Mean square of the smaller 95 % of the absolute values of a standard normal variable.
+constexpr double kTrimmedVariance = 0.7588;
+/// Sum of squared coefficients of a third difference.
+constexpr double kThirdDifference = 20.0;
+constexpr double kLongestWindow_s = 4.0;
+
+double trimmed_variance(std::vector<double> squares) {
+  if (squares.empty()) return 0.0;
+  const std::size_t kept = std::max<std::size_t>(1, squares.size() * 95 / 100);
+  std::nth_element(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(kept - 1),
+                   squares.end());
+  const double sum =
+      std::accumulate(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(kept), 0.0);
+  return sum / static_cast<double>(kept) / kTrimmedVariance;
+}
+
+/// For each sample the first of the unbroken stretch it stands in; a sample left out stands alone.
+std::vector<std::size_t> stretches(const std::vector<BalanceSample>& samples,
+                                   const std::vector<char>& use, double step_s) {
+  std::vector<std::size_t> first(samples.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const bool joined =
+        k > 0 && (use.empty() || (use[k] != 0 && use[k - 1] != 0)) && is_finite(samples[k]) &&
+        is_finite(samples[k - 1]) && samples[k].stamp_s > samples[k - 1].stamp_s &&
+        samples[k].stamp_s - samples[k - 1].stamp_s < 10.0 * step_s;
+    first[k] = joined ? first[k - 1] : k;
+  }
+  return first;
+}
+
+template <typename Signal>
+double white_sigma(const std::vector<std::size_t>& first, const Signal& signal) {
+  std::vector<double> squares;
+  double smallest = 0.0;
+  for (std::size_t k = 3; k < first.size(); ++k) {
+    if (first[k] + 3 > k) continue;
+    const double d = signal(k) - 3.0 * signal(k - 1) + 3.0 * signal(k - 2) - signal(k - 3);
+    squares.push_back(d * d);
+    const double step = std::abs(signal(k) - signal(k - 1));
+    if (step > 0.0 && (smallest == 0.0 || step < smallest)) smallest = step;
+  }
+  // A signal that rarely leaves its quantum has that quantum's noise.
+  return std::max(std::sqrt(trimmed_variance(std::move(squares)) / kThirdDifference),
+                  smallest / std::sqrt(12.0));
+}
+
+/// Accumulated imbalance, p(t) - p(0) - integral of drive dt, samples x joints.
+Eigen::MatrixXd imbalance(const std::vector<BalanceSample>& samples,
+                          const std::vector<std::size_t>& first) {
+  Eigen::MatrixXd out =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples.size()), samples[0].drive.size());
+  for (std::size_t k = 1; k < samples.size(); ++k) {
+    if (first[k] == k) continue;
+    const BalanceSample& a = samples[k - 1];
+    const BalanceSample& b = samples[k];
+    const double half_step = 0.5 * (b.stamp_s - a.stamp_s);
+    const auto row = static_cast<Eigen::Index>(k);
+    out.row(row) = out.row(row - 1) + (b.momentum - a.momentum).transpose() -
+                   half_step * (a.drive + b.drive).transpose();
+  }
+  return out;
+}
+
+/// Variance of one joint's imbalance over a window: measured, and its known part.
+struct WindowVariance {
+  double length_s = 0.0;
+  double measured = 0.0;
+  double white = 0.0;
+  double weight = 0.0;  ///< independent windows
+};
+
+/// Mean square of an integrated Ornstein-Uhlenbeck process of unit variance.
+double integrated_error(double length_s, double time_s) {
+  const double x = length_s / time_s;
+  return x < 1e-3 ? length_s * length_s * (1.0 - x / 3.0)
+                  : 2.0 * time_s * time_s * (x - 1.0 + std::exp(-x));
+}
+
+struct ModelError {
+  double sigma = 0.0;
+  double time_s = 0.0;
+};
+
+/// Least squares of the variances' logarithms over a grid; both are scales, a few per cent do not
+/// matter.
+ModelError fit_model_error(const std::vector<WindowVariance>& windows, double step_s,
+                           double torque_sigma) {
+  ModelError best;
+  double best_cost = std::numeric_limits<double>::infinity();
+  for (double time = 2.0 * step_s; time < 2.0 * kLongestWindow_s; time *= 1.5) {
+    for (double sigma = 1e-3 * torque_sigma; sigma < 1e3 * torque_sigma; sigma *= 1.12) {
+      double cost = 0.0;
+      for (const WindowVariance& window : windows) {
+        const double expected =
+            window.white + sigma * sigma * integrated_error(window.length_s, time);
+        const double miss = std::log(window.measured / expected);
+        cost += window.weight * miss * miss;
+      }
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = {.sigma = sigma, .time_s = time};
+      }
+    }
+  }
+  return best;
+}
+
+std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& samples,
+                                             const std::vector<std::size_t>& first,
+                                             const Eigen::MatrixXd& imbalances, Eigen::Index joint,
+                                             const BalanceNoise& noise, double step_s) {
+  std::vector<WindowVariance> out;
+  const std::size_t n = samples.size();
+  for (std::size_t length = 1; static_cast<double>(length) * step_s <= kLongestWindow_s;
+       length *= 2) {
+    std::vector<double> squares;
+    double white = 0.0;
+    const std::size_t stride = std::max<std::size_t>(1, length / 8);
+    for (std::size_t k = length; k < n; k += stride) {
+      if (first[k] + length > k) continue;
+      const double d = imbalances(static_cast<Eigen::Index>(k), joint) -
+                       imbalances(static_cast<Eigen::Index>(k - length), joint);
+      squares.push_back(d * d);
+      if (samples[k].mass.size() > 0) {
+        white += 2.0 * samples[k].mass.row(joint).cwiseAbs2().dot(noise.velocity_sigma.cwiseAbs2());
+      }
+    }
+    const auto count = static_cast<double>(squares.size());
+    const double independent = count * static_cast<double>(stride) / static_cast<double>(length);
+    if (independent < 8.0) break;
+    const double torque = step_s * noise.torque_sigma[joint];
+    out.push_back({.length_s = static_cast<double>(length) * step_s,
+                   .measured = trimmed_variance(std::move(squares)),
+                   .white = white / count + static_cast<double>(length) * torque * torque,
+                   .weight = std::min(independent, 100.0)});
+  }
+  return out;
+}
+
+}  // namespace
+
+double median_step_s(const std::vector<BalanceSample>& samples) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < samples.size(); ++k) {
+    const double step = samples[k].stamp_s - samples[k - 1].stamp_s;
+    if (step > 0.0 && std::isfinite(step)) steps.push_back(step);
+  }
+  if (steps.empty()) {
+    throw undetermined("contact", "a log without two samples in time", "record a longer log");
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
+                            const std::vector<char>& use) {
+  KINESCOPE_CHECK(use.empty() || use.size() == samples.size(), "one mark a sample");
+  const double step_s = median_step_s(samples);
+  const std::vector<std::size_t> first = stretches(samples, use, step_s);
+  std::size_t usable = 0;
+  for (std::size_t k = 0; k < first.size(); ++k) usable += first[k] != k ? 1U : 0U;
+  if (usable < kFewestSamples) {
+    throw undetermined("contact", "too few samples without contact: " + std::to_string(usable),
+                       "record at least some seconds of free motion");
+  }
+  const Eigen::Index n = samples[0].drive.size();
+  BalanceNoise noise{.velocity_sigma = Eigen::VectorXd::Zero(n),
+                     .torque_sigma = Eigen::VectorXd::Zero(n),
+                     .model_sigma = Eigen::VectorXd::Zero(n),
+                     .model_time_s = Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index j = 0; j < n; ++j) {
+    noise.torque_sigma[j] = white_sigma(first, [&](std::size_t k) { return samples[k].drive[j]; });
+    if (noise.torque_sigma[j] <= 0.0) {
+      throw undetermined("contact", "the torque of joint " + std::to_string(j + 1) + " is constant",
+                         "log the measured torque");
+    }
+    if (samples[0].velocity.size() == 0) continue;
+    noise.velocity_sigma[j] =
+        white_sigma(first, [&](std::size_t k) { return samples[k].velocity[j]; });
+  }
+  const Eigen::MatrixXd imbalances = imbalance(samples, first);
+  Eigen::VectorXd mean_square = Eigen::VectorXd::Zero(n);
+  for (const BalanceSample& sample : samples) {
+    if (sample.sigma.allFinite()) mean_square += sample.sigma.cwiseAbs2();
+  }
+  mean_square /= static_cast<double>(samples.size());
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const ModelError error =
+        fit_model_error(window_variances(samples, first, imbalances, j, noise, step_s), step_s,
+                        noise.torque_sigma[j]);
+    noise.model_sigma[j] = error.sigma / std::sqrt(mean_square[j]);
+    noise.model_time_s[j] = error.time_s;
+  }
+  return noise;
+}
+
+}  // namespace kinescope

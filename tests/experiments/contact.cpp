@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Contact detection on recordings of others, beside the momentum observer at the same false-alarm
+// rate. Needs the shared data; prints a table each. build/test/contact [ur6] [ur5] [push]
+#include <cstdio>
+#include <set>
+#include <string>
+
+#include "kinematics/core/error.h"
+#include "tests/experiments/contact_sets.h"
+
+int main(int argc, char** argv) {
+  const std::set<std::string> wanted(argv + 1, argv + argc);
+  const auto asked = [&](const char* name) { return wanted.empty() || wanted.contains(name); };
+  try {
+    if (asked("ur6")) kinescope::contact_on_ur6();
+    if (asked("ur5")) kinescope::contact_on_ur5();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
