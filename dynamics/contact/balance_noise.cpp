@@ -119,6 +119,21 @@ ModelError fit_model_error(const std::vector<WindowVariance>& windows, double st
   return best;
 }
 
+/// Median: a model that doubts itself much at a few samples must not seem better at all others.
+double usual_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joint) {
+  std::vector<double> sigmas;
+  for (const BalanceSample& sample : samples) {
+    if (std::isfinite(sample.sigma[joint])) sigmas.push_back(sample.sigma[joint]);
+  }
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  if (*middle <= 0.0) {
+    throw bad_request("contact", "a predictive sigma that is not positive",
+                      "give the model's standard deviation");
+  }
+  return *middle;
+}
+
 std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& samples,
                                              const std::vector<std::size_t>& first,
                                              const Eigen::MatrixXd& imbalances, Eigen::Index joint,
@@ -194,16 +209,11 @@ BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
         white_sigma(first, [&](std::size_t k) { return samples[k].velocity[j]; });
   }
   const Eigen::MatrixXd imbalances = imbalance(samples, first);
-  Eigen::VectorXd mean_square = Eigen::VectorXd::Zero(n);
-  for (const BalanceSample& sample : samples) {
-    if (sample.sigma.allFinite()) mean_square += sample.sigma.cwiseAbs2();
-  }
-  mean_square /= static_cast<double>(samples.size());
   for (Eigen::Index j = 0; j < n; ++j) {
     const ModelError error =
         fit_model_error(window_variances(samples, first, imbalances, j, noise, step_s), step_s,
                         noise.torque_sigma[j]);
-    noise.model_sigma[j] = error.sigma / std::sqrt(mean_square[j]);
+    noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
     noise.model_time_s[j] = error.time_s;
   }
   return noise;

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/contact/link_evidence.h"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "kinematics/core/rng.h"
+
+namespace kinescope {
+namespace {
+
+constexpr int kJoints = 5;
+constexpr double kLevel = 0.01;
+constexpr int kTrials = 2000;
+
+Eigen::MatrixXd random_covariance(Rng& rng) {
+  Eigen::MatrixXd A(kJoints, kJoints);
+  for (Eigen::Index i = 0; i < A.size(); ++i) A.data()[i] = rng.normal();
+  return A * A.transpose() + 0.1 * Eigen::MatrixXd::Identity(kJoints, kJoints);
+}
+
+Eigen::VectorXd normals(Rng& rng) {
+  Eigen::VectorXd out(kJoints);
+  for (double& value : out) value = rng.normal();
+  return out;
+}
+
+/// A strong contact on each link: at the stated level it is put on too far a link as often as the
+/// level says for each joint beyond, at most.
+TEST(LinkEvidence, ErrsAtTheStatedLevel) {
+  Rng rng = Rng::from_name("link_evidence");
+  for (int link = 0; link < kJoints; ++link) {
+    int too_far = 0;
+    int too_near = 0;
+    double probability = 0.0;
+    for (int t = 0; t < kTrials; ++t) {
+      const Eigen::MatrixXd S = random_covariance(rng);
+      Eigen::VectorXd torque = S.llt().matrixL() * normals(rng);
+      torque.head(link + 1) += 300.0 * normals(rng);
+      torque[link] += 300.0;
+      const std::array looks{JointAnswers{.squares = joint_answers(torque, S).cwiseAbs2(), .count = 1}};
+      const LinkEvidence evidence = link_evidence(looks, kLevel);
+      too_far += evidence.link > link ? 1 : 0;
+      too_near += evidence.link < link ? 1 : 0;
+      probability += evidence.probability[link] / kTrials;
+      ASSERT_NEAR(evidence.probability.sum(), 1.0, 1e-12);
+    }
+    // Four sigma of a count about (joints beyond) x level x trials.
+    const double expected = (kJoints - 1 - link) * kLevel * kTrials;
+    EXPECT_LE(too_far, expected + 4.0 * std::sqrt(expected) + 1.0) << link;
+    EXPECT_LE(too_near, 0.02 * kTrials) << link;
+    EXPECT_GT(probability, 0.7) << link;
+  }
+}
+
+/// A torque that changes its sign has no mean; its segments tell.
+TEST(LinkEvidence, SegmentsShowWhatTheMeanHides) {
+  JointAnswers mean{.squares = Eigen::VectorXd::Zero(3), .count = 1};
+  mean.squares << 400.0, 400.0, 1.0;
+  JointAnswers segments{.squares = Eigen::VectorXd::Zero(3), .count = 6};
+  segments.squares << 2000.0, 2000.0, 900.0;
+  EXPECT_EQ(link_evidence(std::array{mean}, kLevel).link, 1);
+  EXPECT_EQ(link_evidence(std::array{mean, segments}, kLevel).link, 2);
+}
+
+}  // namespace
+}  // namespace kinescope
