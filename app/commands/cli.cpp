@@ -62,7 +62,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     remedy = did_you_mean(argv[1], known_words(app, nullptr));
   } else if (command == nullptr) {
     message = "name a command";
-    remedy = "run, dynamics, inspect or camera; see kinescope --help";
+    remedy = "run, dynamics, contact, inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -96,6 +96,12 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
     }
     return dynamics_command(line.dynamics, console);
+  }
+  if (app.got_subcommand("contact")) {
+    if (line.contact.output.empty()) {
+      line.contact.output = log_name(line.contact.logs.front()) + "_contact";
+    }
+    return contact_command(line.contact, console);
   }
   if (app.got_subcommand("inspect")) return inspect_command(line.inspect, console);
   return camera_command(line.camera, console);
@@ -137,6 +143,7 @@ int run_program(int argc, const char* const* argv) {
   CommandLine line;
   line.run.command_line = join_arguments(argc, argv);
   line.dynamics.command_line = line.run.command_line;
+  line.contact.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

@@ -205,17 +205,35 @@ void add_log_options(CLI::App& command, TorqueDataOptions& data) {
       ->type_name("HZ");
 }
 
+void add_robot(CLI::App& command, std::filesystem::path& robot) {
+  command
+      .add_option_function<std::string>(
+          "--robot", [&robot](const std::string& text) { robot = text; },
+          "The robot (URDF), from kinescope run or any other")
+      ->required()
+      ->type_name("FILE");
+}
+
+void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2) {
+  command
+      .add_option_function<std::vector<double>>(
+          "--gravity",
+          [&gravity_m_s2](const std::vector<double>& g) {
+            gravity_m_s2 = Eigen::Vector3d(g[0], g[1], g[2]);
+          },
+          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.80665)")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(number_in(-100, 100))
+      ->type_name("X,Y,Z");
+}
+
 void add_dynamics(CLI::App& app, CommandLine& line) {
   CLI::App& command =
       *app.add_subcommand("dynamics", "From a log with torques and a URDF to a torque model");
   DynamicsOptions& dynamics = line.dynamics;
   add_files(command, "LOG", dynamics.logs, "Joint logs with torques: CSV, also gzipped", true);
-  command
-      .add_option_function<std::string>(
-          "--robot", [&dynamics](const std::string& text) { dynamics.robot = text; },
-          "The robot (URDF), from kinescope run or any other")
-      ->required()
-      ->type_name("FILE");
+  add_robot(command, dynamics.robot);
   add_files(command, "--test", dynamics.test_logs,
             "Logs to judge on (default: the last part of the log)", false);
   command
@@ -223,17 +241,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
                   "parametric, rbf, gip, model_based, semi_parametric, lip (default: all)")
       ->delimiter(',')
       ->type_name("LIST");
-  command
-      .add_option_function<std::vector<double>>(
-          "--gravity",
-          [&dynamics](const std::vector<double>& g) {
-            dynamics.gravity_m_s2 = Eigen::Vector3d(g[0], g[1], g[2]);
-          },
-          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.80665)")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(number_in(-100, 100))
-      ->type_name("X,Y,Z");
+  add_gravity(command, dynamics.gravity_m_s2);
   command.add_flag("--gains", dynamics.models_options.identify.gains,
                    "Estimate a gain a joint: currents, or doubtful drive constants");
   command.add_flag("--learning-curve", dynamics.learning_curve,
@@ -245,13 +253,44 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       ->capture_default_str()
       ->type_name("N");
   add_log_options(command, dynamics.data);
-  command.add_option_function<std::string>(
-             "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
-             "Folder for the results (default: <first log's name>_dynamics here)")
+  command
+      .add_option_function<std::string>(
+          "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
+          "Folder for the results (default: <first log's name>_dynamics here)")
       ->type_name("FOLDER");
   add_output_options(command, line.output);
   command.footer(fmt::format(
       "Example:\n  kinescope dynamics log.csv --robot robot.urdf --test log_test.csv\n\n{}",
+      kExitCodes));
+}
+
+void add_contact(CLI::App& app, CommandLine& line) {
+  CLI::App& command =
+      *app.add_subcommand("contact", "From a log with torques and a robot to the contacts in it");
+  ContactCommandOptions& contact = line.contact;
+  add_files(command, "LOG", contact.logs, "Joint logs with torques: CSV, also gzipped", true);
+  add_robot(command, contact.robot);
+  add_files(command, "--learn", contact.learn_logs,
+            "Logs of free motion to learn the noise from (default: the log itself)", false);
+  command.add_flag("--identify", contact.identify,
+                   "Masses and friction from the log to learn from (always so where the URDF has "
+                   "none)");
+  command
+      .add_option("--false-alarms", contact.contact.false_alarms_per_hour,
+                  "False alarms an hour that are allowed")
+      ->check(number_in(1e-3, 3600))
+      ->capture_default_str()
+      ->type_name("N");
+  add_gravity(command, contact.gravity_m_s2);
+  add_log_options(command, contact.data);
+  command
+      .add_option_function<std::string>(
+          "--output", [&contact](const std::string& text) { contact.output = text; },
+          "Folder for the results (default: <first log's name>_contact here)")
+      ->type_name("FOLDER");
+  add_output_options(command, line.output);
+  command.footer(fmt::format(
+      "Example:\n  kinescope contact log.csv --robot robot.urdf --learn free_motion.csv\n\n{}",
       kExitCodes));
 }
 
@@ -351,6 +390,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
                   kExitCodes));
   add_run(app, line);
   add_dynamics(app, line);
+  add_contact(app, line);
   add_inspect(app, line);
   add_camera(app, line);
 }

@@ -19,6 +19,7 @@ struct OutputOptions {
 struct CommandLine {
   RunOptions run;
   DynamicsOptions dynamics;
+  ContactCommandOptions contact;
   InspectOptions inspect;
   CameraOptions camera;
   OutputOptions output;

@@ -13,6 +13,7 @@
 #include "calib/bundle/calibrate.h"
 #include "calib/vision/board.h"
 #include "calib/vision/detect.h"
+#include "dynamics/contact/contact.h"
 #include "dynamics/data/torque_data.h"
 #include "dynamics/models/torque_model.h"
 #include "kinematics/core/error.h"
@@ -56,6 +57,21 @@ struct DynamicsOptions {
 };
 
 [[nodiscard]] ExitCode dynamics_command(const DynamicsOptions& options, const Console& console);
+
+struct ContactCommandOptions {
+  std::vector<std::filesystem::path> logs;
+  std::vector<std::filesystem::path> learn_logs;  ///< noise and masses; empty: the logs themselves
+  std::filesystem::path robot;                    ///< URDF
+  std::filesystem::path output;                   ///< folder
+  TorqueDataOptions data;
+  ContactOptions contact;
+  bool identify = false;  ///< masses and friction from the log although the URDF has some
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.80665 down z
+  std::string command_line;                     ///< for the report
+};
+
+[[nodiscard]] ExitCode contact_command(const ContactCommandOptions& options,
+                                       const Console& console);
 
 struct InspectOptions {
   RecordingPaths recording;

@@ -57,7 +57,7 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
     summary.train = summary.data.samples;
-    summary.test = read_torque_data(options.test_logs, movable_joints(model.tree), data).samples;
+    summary.test = read_torque_data(options.test_logs, wanted_joints(model.tree), data).samples;
     summary.split = "the unseen log " + file_list(options.test_logs);
     return;
   }
@@ -209,7 +209,7 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
     summary.joints.push_back(joint.name);
     summary.types.push_back(joint.type);
   }
-  summary.data = read_torque_data(options.logs, movable_joints(model.tree), options.data);
+  summary.data = read_torque_data(options.logs, wanted_joints(model.tree), options.data);
   check_scale(model, summary);
   split_samples(options, model, summary);
   clock.lap("read", summary.times);

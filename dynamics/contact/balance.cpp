@@ -10,7 +10,7 @@ namespace kinescope {
 
 std::vector<DriveFriction> friction_of(const DynamicModel& model) {
   std::vector<DriveFriction> out;
-  for (const JointId joint : movable_joints(model.tree)) {
+  for (const JointId joint : moving_joints(model.tree)) {
     const JointDynamics& own = model.joints[joint.index()];
     out.push_back({.viscous = own.viscous, .coulomb = own.coulomb});
   }

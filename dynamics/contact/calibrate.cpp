@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kMaxRounds = 8;
 constexpr double kSecondsPerHour = 3600.0;
-/// Thresholds of the first round, where nothing is left out yet: this many medians of the statistic.
+/// Thresholds of the first round, where nothing is left out yet: this many medians of the
+/// statistic.
 constexpr double kFirstMedians = 12.0;
 
 double median(std::vector<double> values) {
@@ -50,7 +51,8 @@ void set_thresholds(const contact::StatisticLog& log, const std::vector<char>& u
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
     calibration.tails.push_back(
         fit_tail({.values = octave_values(log, o, use), .step_s = calibration.step_s}));
-    shape += calibration.tails.back().own_shape / static_cast<double>(calibration.thresholds.size());
+    shape +=
+        calibration.tails.back().own_shape / static_cast<double>(calibration.thresholds.size());
   }
   // One shape for all: extrapolation is sensitive to it, and a single tail says little of it.
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
@@ -58,8 +60,9 @@ void set_thresholds(const contact::StatisticLog& log, const std::vector<char>& u
     tail.set_shape(shape);
     calibration.thresholds[o] = tail.quantile(rate_per_s);
   }
-  calibration.joint_tail = fit_tail(
-      {.values = contact::largest_ratio(log, calibration.thresholds, use), .step_s = calibration.step_s});
+  calibration.joint_tail =
+      fit_tail({.values = contact::largest_ratio(log, calibration.thresholds, use),
+                .step_s = calibration.step_s});
   calibration.thresholds *= calibration.joint_tail.quantile(rate_per_s);
   calibration.exposure_s = calibration.joint_tail.exposure_s;
 }
@@ -73,8 +76,7 @@ void set_first_thresholds(const std::vector<BalanceSample>& samples,
   const double least =
       3.0 * contact::chi_square_quantile(static_cast<int>(calibration.joints()), 5.2);
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
-    calibration.thresholds[o] =
-        std::max(least, kFirstMedians * median(octave_values(log, o, all)));
+    calibration.thresholds[o] = std::max(least, kFirstMedians * median(octave_values(log, o, all)));
   }
 }
 
@@ -119,11 +121,11 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
     const std::vector<char> all(samples.size(), 1);
     set_thresholds(contact::log_statistics(calibration, samples), all, calibration);
     calibration.iterations = 1;
-    calibration.status = CalibrationStatus::kSettled;
+    calibration.status = ContactCalibrationStatus::kSettled;
     return calibration;
   }
   set_first_thresholds(samples, calibration);
-  calibration.status = CalibrationStatus::kIterationLimit;
+  calibration.status = ContactCalibrationStatus::kIterationLimit;
   for (calibration.iterations = 1; calibration.iterations <= kMaxRounds; ++calibration.iterations) {
     const contact::StatisticLog log = contact::log_statistics(calibration, samples);
     const std::vector<TimeSpan> spans = spans_of(log.events);
@@ -133,7 +135,7 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
     const std::vector<char> use = contact::outside(samples, spans, options.guard_s);
     if (settled) {
       set_thresholds(log, use, calibration);
-      calibration.status = CalibrationStatus::kSettled;
+      calibration.status = ContactCalibrationStatus::kSettled;
       break;
     }
     calibration.noise = estimate_noise(samples, use);

@@ -2,10 +2,12 @@
 //
 // Takes   the balance of momentum of a log (balance.h: from a rigid-body model, or from a predicted
 //         torque with its predictive sigma), without labels; then samples, one at a time or a log.
-// Gives   ContactEvents: onset, end, link, external joint torque with covariance; false alarms as declared.
-// Units   s, N m, N (A where torques are currents). External torque is what the contact exerts on the
+// Gives   ContactEvents: onset, end, link, external joint torque with covariance; false alarms as
+// declared. Units   s, N m, N (A where torques are currents). External torque is what the contact
+// exerts on the
 //         robot, J' F: measured torque = M ddq + C dq + g + friction - external torque.
-// Method  Willsky and Jones 1976 on the innovations of a momentum filter (balance_filter.h); thresholds by
+// Method  Willsky and Jones 1976 on the innovations of a momentum filter (balance_filter.h);
+// thresholds by
 //         peaks over threshold (tail.h). Not here: the torque model (rigid, identify, gp).
 #pragma once
 
@@ -20,11 +22,12 @@ namespace kinescope {
 struct ContactOptions {
   double false_alarms_per_hour = 1.0;  ///< declared; fewer mean later alarms
   double longest_window_s = 0.25;      ///< a contact that stays hidden for longer is not found
-  double end_window_s = 0.04;          ///< that long without external torque, and the contact is over
-  /// Level of the hypothesis "joints beyond the link answer nothing": the share of contacts that are
-  /// put on too far a link.
+  double end_window_s = 0.04;  ///< that long without external torque, and the contact is over
+  /// Level of the hypothesis "joints beyond the link answer nothing": the share of contacts that
+  /// are put on too far a link.
   double link_level = 0.001;
-  /// The calibration log may itself hold contacts that nobody declared: what stands out is left out.
+  /// The calibration log may itself hold contacts that nobody declared: what stands out is left
+  /// out.
   bool may_contain_contacts = true;
   double guard_s = 0.15;  ///< left out before and after such a contact
 };
@@ -38,7 +41,7 @@ struct TimeSpan {
   double end_s = 0.0;
 };
 
-enum class CalibrationStatus {
+enum class ContactCalibrationStatus {
   kNotRun,
   kSettled,
   kIterationLimit  ///< which spans hold contacts still changed; thresholds are usable
@@ -46,23 +49,24 @@ enum class CalibrationStatus {
 
 /// What a detector needs to know of a robot and its model.
 struct ContactCalibration {
-  CalibrationStatus status = CalibrationStatus::kNotRun;
+  ContactCalibrationStatus status = ContactCalibrationStatus::kNotRun;
   ContactOptions options{};
   BalanceNoise noise{};
   double step_s = 0.0;
-  /// One an octave of window lengths (1 step, 2 to 3, 4 to 7, ..): a statistic above it is an alarm.
+  /// One an octave of window lengths (1 step, 2 to 3, 4 to 7, ..): a statistic above it is an
+  /// alarm.
   Eigen::VectorXd thresholds{};
   std::vector<TailFit> tails{};  ///< behind each of them
   TailFit joint_tail{};          ///< of the largest ratio of statistic to threshold of all octaves
   std::vector<TimeSpan> excluded{};  ///< taken for contacts in the calibration log
-  double exposure_s = 0.0;         ///< free motion that was learned from
+  double exposure_s = 0.0;           ///< free motion that was learned from
   int iterations = 0;
 
   [[nodiscard]] Eigen::Index joints() const { return noise.torque_sigma.size(); }
 };
 
-/// Noise and thresholds from a log. Deterministic. Throws bad_request for an option, undetermined for
-/// a log that is too short or has no free motion.
+/// Noise and thresholds from a log. Deterministic. Throws bad_request for an option, undetermined
+/// for a log that is too short or has no free motion.
 [[nodiscard]] ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
                                                     const ContactOptions& options = {});
 
@@ -76,11 +80,11 @@ struct ContactEvent {
   /// (ContactOptions::link_level), minus one: index of the joint whose link was touched, or of one
   /// beyond where its joint is in line with the force.
   int link = -1;
-  Eigen::VectorXd link_probability{};   ///< one a joint's link
-  Eigen::VectorXd beyond_p_value{};     ///< of "the joints beyond answer nothing", one a joint's link
-  Eigen::VectorXd torque{};             ///< external, mean from onset to end
+  Eigen::VectorXd link_probability{};  ///< one a joint's link
+  Eigen::VectorXd beyond_p_value{};  ///< of "the joints beyond answer nothing", one a joint's link
+  Eigen::VectorXd torque{};          ///< external, mean from onset to end
   Eigen::MatrixXd torque_covariance{};  ///< noise and the model's error
-  double statistic = 0.0;             ///< at the alarm, in units of its threshold
+  double statistic = 0.0;               ///< at the alarm, in units of its threshold
 };
 
 /// All contacts of a log: a ContactDetector over its samples.

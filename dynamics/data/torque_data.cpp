@@ -75,7 +75,7 @@ TorqueLogReport read_and_check(const std::vector<std::filesystem::path>& files,
 
 }  // namespace
 
-std::vector<WantedJoint> movable_joints(const KinematicTree& tree) {
+std::vector<WantedJoint> wanted_joints(const KinematicTree& tree) {
   std::vector<WantedJoint> out;
   for (const Joint& joint : tree.joints) {
     if (joint.type == JointType::kFixed) continue;

@@ -42,7 +42,7 @@ struct TorqueData {
 };
 
 /// The movable joints of a tree in its order, as the log is asked for them.
-[[nodiscard]] std::vector<WantedJoint> movable_joints(const KinematicTree& tree);
+[[nodiscard]] std::vector<WantedJoint> wanted_joints(const KinematicTree& tree);
 
 /// Reads, checks, filters. `joints` empty: all joints of the log, as named there. Throws Error for
 /// what cannot be read and for findings that are refusals.

@@ -17,7 +17,7 @@ TEST(Cli, VersionAndHelp) {
   const Outcome version = run({"--version"});
   EXPECT_EQ(version.code, 0);
   EXPECT_TRUE(version.out.starts_with("kinescope ")) << version.out;
-  for (const std::string command : {"run", "dynamics", "inspect", "camera"}) {
+  for (const std::string command : {"run", "dynamics", "contact", "inspect", "camera"}) {
     const Outcome help = run({command, "--help"});
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example:\n  kinescope " + command), std::string::npos) << help.out;

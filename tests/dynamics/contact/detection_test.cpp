@@ -48,7 +48,7 @@ const Arm& arm() {
 
 TEST(Detection, CalibrationLeavesOutUndeclaredContacts) {
   const ContactCalibration& calibration = arm().calibration;
-  EXPECT_EQ(calibration.status, CalibrationStatus::kSettled);
+  EXPECT_EQ(calibration.status, ContactCalibrationStatus::kSettled);
   EXPECT_EQ(calibration.excluded.size(), arm().log.labels.size());
   Rng rng = Rng::from_name("contact.arm");
   const ContactWorld clean = contact_world(arm().model, {}, rng);
@@ -123,7 +123,8 @@ TEST(Detection, HardContactsWithinTwelveMilliseconds) {
                                  .contact_s = 0.04,
                                  .force_n = 100.0,
                                  .shape = ContactShape::kHalfSine};
-  const ContactWorld free = contact_world(arm().model, {.duration_s = 15.0, .rate_hz = 1000.0}, rng);
+  const ContactWorld free =
+      contact_world(arm().model, {.duration_s = 15.0, .rate_hz = 1000.0}, rng);
   const ContactCalibration calibration = calibrate_contacts(balance_of(arm().model, free));
   const ContactWorld world = contact_world(arm().model, hard, rng);
   const ContactScore score = score_contacts(
@@ -140,8 +141,8 @@ TEST(Detection, ReversalsAreNotContacts) {
   Rng rng = Rng::from_name("contact.reversal");
   constexpr double kFriction_nm = 0.3;
   constexpr double kDoubt = 5.0;
-  const ContactWorld log = contact_world(
-      arm().model, {.duration_s = 40.0, .undeclared_coulomb_nm = kFriction_nm}, rng);
+  const ContactWorld log =
+      contact_world(arm().model, {.duration_s = 40.0, .undeclared_coulomb_nm = kFriction_nm}, rng);
   const ContactCalibration calibration =
       calibrate_contacts(balance_of(arm().model, log, kDoubt), {.may_contain_contacts = false});
   const ContactWorld world = contact_world(arm().model,

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope contact`: from a log with torques and a robot with masses to the contacts in it.
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
+#include "app/commands/stopwatch.h"
+#include "app/io/sha256.h"
+#include "app/report/contact_summary.h"
+#include "dynamics/contact/momentum_observer.h"
+#include "dynamics/identify/consistent_model.h"
+#include "kinematics/urdf/dynamic_urdf.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
+
+std::string file_list(const std::vector<fs::path>& files) {
+  std::vector<std::string> names;
+  for (const fs::path& file : files) names.push_back(file.filename().string());
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// Velocities as the slope between the neighbouring positions, where the log has none.
+Eigen::MatrixXd velocities(const TorqueLog& log) {
+  if (log.dq.cols() > 0) return log.dq;
+  Eigen::MatrixXd dq = Eigen::MatrixXd::Zero(log.q.rows(), log.q.cols());
+  const Eigen::Index last = log.rows() - 1;
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    Eigen::Index a = std::max<Eigen::Index>(0, i - 1);
+    Eigen::Index b = std::min(last, i + 1);
+    if (log.trajectory[a] != log.trajectory[i]) a = i;
+    if (log.trajectory[b] != log.trajectory[i]) b = i;
+    if (a < b) dq.row(i) = (log.q.row(b) - log.q.row(a)) / (log.t_s[b] - log.t_s[a]);
+  }
+  return dq;
+}
+
+// The log as it was measured, each trajectory by itself.
+std::vector<TorqueSamples> unfiltered(const TorqueLog& log) {
+  const Eigen::MatrixXd dq = velocities(log);
+  const std::vector<Eigen::Index> bounds = log.bounds();
+  std::vector<TorqueSamples> out;
+  for (std::size_t k = 0; k + 1 < bounds.size(); ++k) {
+    const Eigen::Index from = bounds[k];
+    const Eigen::Index count = bounds[k + 1] - from;
+    TorqueSamples part;
+    part.t_s = log.t_s.segment(from, count);
+    part.q = log.q.middleRows(from, count);
+    part.dq = dq.middleRows(from, count);
+    part.torque = log.torque.middleRows(from, count);
+    part.trajectory = Eigen::VectorXi::Zero(count);
+    part.torque_unit = log.torque_unit;
+    out.push_back(std::move(part));
+  }
+  return out;
+}
+
+TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel& model,
+                         const TorqueDataOptions& options) {
+  TorqueLogReport log = look_at_torque_log(files, wanted_joints(model.tree), options);
+  throw_refusals(log.findings);
+  if (log.log.torque.cols() == 0) {
+    throw bad_input(files.front().string(), "has no torque columns",
+                    "name them with --torque, or log motor currents with --torque-unit A");
+  }
+  return log;
+}
+
+bool has_masses(const DynamicModel& model) {
+  return std::ranges::any_of(model.links,
+                             [](const InertialParameters& link) { return link.mass_kg > 0.0; });
+}
+
+// The masses of the URDF, or those that the log to learn from shows.
+RigidBalance make_balance(const ContactCommandOptions& options, const DynamicModel& model,
+                          ContactSummary& summary) {
+  const auto& learn = options.learn_logs.empty() ? options.logs : options.learn_logs;
+  if (has_masses(model) && !options.identify) {
+    summary.model = "those of " + options.robot.filename().string();
+    return RigidBalance(make_rigid_model(model), friction_of(model));
+  }
+  const TorqueData data = read_torque_data(learn, wanted_joints(model.tree), options.data);
+  const Identification found = identify_dynamics(model, data.samples);
+  const ConsistentModel consistent = consistent_model(found);
+  summary.model =
+      fmt::format("identified from {} samples of {}", data.samples.size(), file_list(learn));
+  std::vector<DriveFriction> friction = friction_of(consistent.model);
+  for (std::size_t k = 0; k < found.terms.size(); ++k) {
+    const TorqueTerm& term = found.terms[k];
+    if (term.kind == TermKind::kOffset) {
+      friction[static_cast<std::size_t>(term.index)].offset =
+          consistent.terms[static_cast<Eigen::Index>(k)];
+    }
+  }
+  return RigidBalance(make_rigid_model(consistent.model), friction);
+}
+
+std::vector<BalanceSample> balance_of(const RigidBalance& balance, const TorqueLog& log) {
+  std::vector<BalanceSample> out;
+  for (const TorqueSamples& part : unfiltered(log)) {
+    const std::vector<BalanceSample> samples = balance_samples(balance, part);
+    out.insert(out.end(), samples.begin(), samples.end());
+  }
+  return out;
+}
+
+void print_result(const ContactSummary& summary, const OutputFolder& folder,
+                  const Console& console) {
+  if (console.json) {
+    fmt::print("{}\n", contact_json(summary).dump(2));
+    return;
+  }
+  fmt::print("{}\ncontacts  {}\nreport    {}\n", contact_verdict(summary),
+             folder.file("contacts.csv").string(), folder.file("contact.html").string());
+}
+
+}  // namespace
+
+ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
+  Stopwatch clock;
+  ContactSummary summary;
+  DynamicModel model = read_dynamic_urdf(options.robot);
+  if (options.gravity_m_s2) model.gravity_m_s2 = *options.gravity_m_s2;
+  validate(options.contact);
+  const OutputFolder folder(options.output);
+  summary.robot = model.tree.name;
+  summary.log = "Log " + file_list(options.logs);
+  summary.version = program_version();
+  summary.command = options.command_line;
+  for (const auto& files : {options.logs, options.learn_logs, {options.robot}}) {
+    for (const fs::path& file : files) {
+      summary.inputs.push_back({file.filename().string(), sha256_of_file(file)});
+    }
+  }
+  for (const Joint& joint : model.tree.joints) {
+    if (joint.type == JointType::kFixed) continue;
+    summary.joints.push_back(joint.name);
+    summary.links.push_back(model.tree.links[joint.child.index()].name);
+  }
+  const TorqueLogReport log = read_log(options.logs, model, options.data);
+  summary.findings = log.findings;
+  summary.torque_unit = log.log.torque_unit;
+  clock.lap("read", summary.times);
+
+  const RigidBalance balance = make_balance(options, model, summary);
+  const std::vector<BalanceSample> samples = balance_of(balance, log.log);
+  const bool apart = !options.learn_logs.empty();
+  summary.learned = apart ? file_list(options.learn_logs) : "the log itself";
+  summary.calibration = calibrate_contacts(
+      apart ? balance_of(balance, read_log(options.learn_logs, model, options.data).log) : samples,
+      options.contact);
+  clock.lap("learn", summary.times);
+
+  summary.events = detect_contacts(summary.calibration, samples);
+  std::vector<TimeSpan> spans;
+  for (const ContactEvent& event : summary.events) spans.push_back({event.onset_s, event.end_s});
+  summary.check = check_false_alarms(summary.calibration, samples, spans);
+  summary.external_torque = observe_momentum(samples, kObserverGain);
+  summary.t_s.resize(static_cast<Eigen::Index>(samples.size()));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    summary.t_s[static_cast<Eigen::Index>(i)] = samples[i].stamp_s;
+  }
+  clock.lap("detect", summary.times);
+
+  folder.write("contacts.csv", contacts_csv(summary));
+  folder.write("contacts.json", contact_json(summary).dump(1) + "\n");
+  folder.write("contact.html", contact_report_html(summary));
+  print_result(summary, folder, console);
+  return ExitCode::kDone;
+}
+
+}  // namespace kinescope

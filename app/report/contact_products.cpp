@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/report/contact_summary.h"
+#include "app/report/result_values.h"
+
+namespace kinescope {
+namespace {
+
+using nlohmann::json;
+using report::number;
+using report::text;
+
+json numbers(const Eigen::VectorXd& values) {
+  json out = json::array();
+  for (const double value : values) out.push_back(number(value));
+  return out;
+}
+
+std::string link_name(const ContactSummary& summary, int link) {
+  const auto at = static_cast<std::size_t>(link);
+  return link >= 0 && at < summary.links.size() ? summary.links[at] : "unknown";
+}
+
+double link_probability(const ContactEvent& event) {
+  return event.link >= 0 && event.link < event.link_probability.size()
+             ? event.link_probability[event.link]
+             : 0.0;
+}
+
+json event_json(const ContactSummary& summary, const ContactEvent& event) {
+  return {{"onset_s", number(event.onset_s)},
+          {"end_s", number(event.end_s)},
+          {"alarm_s", number(event.alarm_s)},
+          {"link", text(link_name(summary, event.link))},
+          {"probability", number(link_probability(event))},
+          {"open", event.open},
+          {"torque", numbers(event.torque)},
+          {"torque_sigma", numbers(event.torque_covariance.diagonal().cwiseMax(0.0).cwiseSqrt())},
+          {"statistic", number(event.statistic)}};
+}
+
+json calibration_json(const ContactCalibration& calibration) {
+  json excluded = json::array();
+  for (const TimeSpan& span : calibration.excluded) {
+    excluded.push_back({{"begin_s", number(span.begin_s)}, {"end_s", number(span.end_s)}});
+  }
+  return {{"declared_per_hour", number(calibration.options.false_alarms_per_hour)},
+          {"thresholds", numbers(calibration.thresholds)},
+          {"exposure_s", number(calibration.exposure_s)},
+          {"excluded", excluded},
+          {"noise",
+           {{"velocity_sigma", numbers(calibration.noise.velocity_sigma)},
+            {"torque_sigma", numbers(calibration.noise.torque_sigma)},
+            {"model_sigma", numbers(calibration.noise.model_sigma)},
+            {"model_time_s", numbers(calibration.noise.model_time_s)}}}};
+}
+
+}  // namespace
+
+std::string contacts_csv(const ContactSummary& summary) {
+  std::string out = "onset_s,end_s,alarm_s,link,probability,open";
+  for (const std::string& joint : summary.joints) {
+    out += fmt::format(",torque_{},sigma_{}", joint, joint);
+  }
+  out += "\n";
+  for (const ContactEvent& event : summary.events) {
+    out += fmt::format("{},{},{},{},{},{}", event.onset_s, event.end_s, event.alarm_s,
+                       link_name(summary, event.link), link_probability(event), event.open ? 1 : 0);
+    for (Eigen::Index j = 0; j < event.torque.size(); ++j) {
+      out += fmt::format(",{},{}", event.torque[j],
+                         std::sqrt(std::max(0.0, event.torque_covariance(j, j))));
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+json contact_json(const ContactSummary& summary) {
+  json events = json::array();
+  for (const ContactEvent& event : summary.events) events.push_back(event_json(summary, event));
+  json inputs = json::array();
+  for (const InputFile& input : summary.inputs) {
+    inputs.push_back({{"name", text(input.name)}, {"sha256", text(input.sha256)}});
+  }
+  json findings = json::array();
+  for (const LogFinding& finding : summary.findings) findings.push_back(text(to_line(finding)));
+  return {{"schema", "kinescope.contact"},
+          {"schema_version", 1},
+          {"robot", text(summary.robot)},
+          {"version", text(summary.version)},
+          {"unit", text(summary.torque_unit)},
+          {"joints", report::texts(summary.joints)},
+          {"links", report::texts(summary.links)},
+          {"learned", text(summary.learned)},
+          {"model", text(summary.model)},
+          {"inputs", inputs},
+          {"findings", findings},
+          {"calibration", calibration_json(summary.calibration)},
+          {"check",
+           {{"hours", number(summary.check.hours)},
+            {"alarms", summary.check.alarms},
+            {"extrapolated_per_hour", number(summary.check.extrapolated_per_hour)}}},
+          {"contacts", events}};
+}
+
+std::string contact_verdict(const ContactSummary& summary) {
+  const double declared = summary.calibration.options.false_alarms_per_hour;
+  if (summary.events.empty()) {
+    return fmt::format("No contact in {:.1f} s, at a declared rate of {:g} false alarms an hour.",
+                       3600.0 * summary.check.hours, declared);
+  }
+  std::string out = fmt::format(
+      "{} contact{} at a declared rate of {:g} false alarms an hour:", summary.events.size(),
+      summary.events.size() == 1 ? "" : "s", declared);
+  for (const ContactEvent& event : summary.events) {
+    out += fmt::format(" {:.3f} to {:.3f} s at {};", event.onset_s, event.end_s,
+                       link_name(summary, event.link));
+  }
+  out.back() = '.';
+  return out;
+}
+
+}  // namespace kinescope

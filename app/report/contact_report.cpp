@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "app/report/contact_summary.h"
+#include "app/report/html.h"
+#include "app/report/page.h"
+#include "app/report/plot.h"
+#include "app/report/sections.h"
+
+namespace kinescope {
+namespace {
+
+using namespace report;
+
+constexpr Eigen::Index kMostPoints = 1200;  // of one curve
+constexpr std::array<ContentsEntry, 4> kContents = {{
+    {"verdict", "Verdict"},
+    {"timeline", "Contact time line"},
+    {"calibration", "Noise and thresholds"},
+    {"reproduce", "How to reproduce"},
+}};
+
+std::string contact_table(const ContactSummary& summary, const nlohmann::json& document) {
+  if (summary.events.empty()) return "";
+  Table table("contacts-table", fmt::format("Contacts; external torque in {}", summary.torque_unit),
+              document);
+  std::vector<std::string> head = {"Onset, s", "End, s", "Known after, ms", "Link",
+                                   "Probability, %"};
+  head.insert(head.end(), summary.joints.begin(), summary.joints.end());
+  table.header(head);
+  for (std::size_t k = 0; k < summary.events.size(); ++k) {
+    const ContactEvent& event = summary.events[k];
+    const std::string at = fmt::format("/contacts/{}", k);
+    table.begin_row();
+    table.number(at + "/onset_s", Quantity::kTime);
+    table.number(at + "/end_s", Quantity::kTime);
+    table.text(fmt::format("{:.0f}", 1e3 * (event.alarm_s - event.onset_s)));
+    table.text(document.at("contacts")[k].at("link").get<std::string>());
+    table.number(at + "/probability", Quantity::kPercent);
+    for (Eigen::Index j = 0; j < event.torque.size(); ++j) {
+      table.number(fmt::format("{}/torque/{}", at, j), Quantity::kPlain);
+    }
+  }
+  return table.str();
+}
+
+// External torque of one joint over time; contacts as bands.
+std::string joint_plot(const ContactSummary& summary, Eigen::Index joint) {
+  const Eigen::Index samples = summary.t_s.size();
+  const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
+  std::vector<Eigen::Vector2d> points;
+  double low = 0.0;
+  double high = 0.0;
+  for (Eigen::Index i = 0; i < samples; i += step) {
+    // The largest of each piece, so that short contacts stay visible.
+    Eigen::Index peak = i;
+    for (Eigen::Index k = i; k < std::min(samples, i + step); ++k) {
+      if (std::abs(summary.external_torque(joint, k)) >
+          std::abs(summary.external_torque(joint, peak))) {
+        peak = k;
+      }
+    }
+    points.emplace_back(summary.t_s[peak], summary.external_torque(joint, peak));
+    low = std::min(low, points.back().y());
+    high = std::max(high, points.back().y());
+  }
+  pad_range(low, high, 0.1);
+  double begin = summary.t_s[0];
+  double end = summary.t_s[samples - 1];
+  pad_range(begin, end, 0.01);
+  const std::string& name = summary.joints[static_cast<std::size_t>(joint)];
+  Plot plot(
+      fmt::format("External torque of {}", name),
+      {.label = "time, s", .lower = begin, .upper = end},
+      {.label = fmt::format("{}, {}", name, summary.torque_unit), .lower = low, .upper = high},
+      {.width = 940.0, .height = 150.0});
+  for (const ContactEvent& event : summary.events) {
+    plot.band({event.onset_s, event.end_s}, {low, low}, {high, high}, series_class(1));
+  }
+  plot.line(points, series_class(0));
+  return figure(plot.str(), "", "wide");
+}
+
+std::string timeline(const ContactSummary& summary) {
+  std::string out = section_head("timeline", "Contact time line");
+  if (summary.t_s.size() < 2) return out + "</section>\n";
+  out += paragraph(
+      "External torque as a momentum observer (25 per s) follows it; the bands are the contacts "
+      "found, from onset to end.");
+  for (Eigen::Index j = 0; j < summary.external_torque.rows(); ++j) out += joint_plot(summary, j);
+  return out + "</section>\n";
+}
+
+std::string calibration_section(const ContactSummary& summary, const nlohmann::json& document) {
+  std::string out = section_head("calibration", "Noise and thresholds");
+  const FalseAlarmCheck& check = summary.check;
+  out += paragraph(fmt::format(
+      "Noise and thresholds were learned from {} ({:.1f} s of free motion; {} spans that look like "
+      "contacts were left out). Masses and friction: {}. Declared: {:g} false alarms an hour; "
+      "outside the contacts found, the tail of the statistic promises {:.2g} an hour.",
+      summary.learned, summary.calibration.exposure_s, summary.calibration.excluded.size(),
+      summary.model, summary.calibration.options.false_alarms_per_hour,
+      check.extrapolated_per_hour));
+  Table table("noise-table", "Noise without contact", document);
+  table.header({"Joint", "Velocity, per s", fmt::format("Torque, {}", summary.torque_unit),
+                fmt::format("Model, {}", summary.torque_unit), "Model, correlation time, s"});
+  for (std::size_t j = 0; j < summary.joints.size(); ++j) {
+    table.begin_row();
+    table.text(summary.joints[j]);
+    for (const char* key : {"velocity_sigma", "torque_sigma", "model_sigma", "model_time_s"}) {
+      table.number(fmt::format("/calibration/noise/{}/{}", key, j), Quantity::kPlain);
+    }
+  }
+  out += table.str();
+  for (const LogFinding& finding : summary.findings) out += paragraph(to_line(finding), "note");
+  return out + "</section>\n";
+}
+
+std::string reproduce(const ContactSummary& summary) {
+  std::string out = section_head("reproduce", "How to reproduce");
+  out += "<pre id=\"command\">" + escaped(summary.command) + "</pre>\n<ul>";
+  for (const InputFile& input : summary.inputs) {
+    out += "<li>" + escaped(input.name) + " <code class=\"hash\">" + escaped(input.sha256) +
+           "</code></li>";
+  }
+  return out + "</ul></section>\n";
+}
+
+}  // namespace
+
+std::string contact_report_html(const ContactSummary& summary) {
+  const nlohmann::json document = contact_json(summary);
+  return page_begin("contact report", summary.robot, summary.log, summary.version, kContents) +
+         "<main>\n" + section_head("verdict", "Verdict") + paragraph(contact_verdict(summary)) +
+         contact_table(summary, document) + "</section>\n" + timeline(summary) +
+         calibration_section(summary, document) + reproduce(summary) +
+         "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace kinescope

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// All products of contact detection on one log, gathered for its report.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "app/report/run_summary.h"
+#include "dynamics/contact/contact.h"
+#include "dynamics/data/log_findings.h"
+
+namespace kinescope {
+
+struct ContactSummary {
+  std::string robot;
+  std::string log;      ///< what was looked at, in words
+  std::string learned;  ///< what the noise was learned from, in words
+  std::string model;    ///< where the masses come from, in words
+  std::string version;
+  std::string command;
+  std::vector<InputFile> inputs;
+  std::vector<StageTime> times;
+  std::vector<LogFinding> findings;
+
+  std::vector<std::string> joints;
+  std::vector<std::string> links;  ///< the link that each joint moves
+  std::string torque_unit = "Nm";
+  ContactCalibration calibration;
+  FalseAlarmCheck check;  ///< on what was looked at, outside the contacts found
+  std::vector<ContactEvent> events;
+  Eigen::VectorXd t_s;              ///< of every sample looked at
+  Eigen::MatrixXd external_torque;  ///< joints x samples, as the momentum observer follows it
+};
+
+/// onset_s,end_s,alarm_s,link,probability,open, then the torque of each joint and its sigma.
+[[nodiscard]] std::string contacts_csv(const ContactSummary& summary);
+
+/// contacts.json: schema "kinescope.contact". Torques in `unit`, times in s on the log's clock.
+///
+///   robot, version, unit, joints, links, learned, model, inputs, findings
+///   calibration  declared_per_hour, thresholds, exposure_s, excluded [begin_s, end_s], noise
+///                {velocity_sigma, torque_sigma, model_sigma, model_time_s}
+///   check        hours, alarms, extrapolated_per_hour
+///   contacts     [onset_s, end_s, alarm_s, link, probability, open, torque, torque_sigma,
+///   statistic]
+[[nodiscard]] nlohmann::json contact_json(const ContactSummary& summary);
+
+/// What was found, in one or two sentences.
+[[nodiscard]] std::string contact_verdict(const ContactSummary& summary);
+
+[[nodiscard]] std::string contact_report_html(const ContactSummary& summary);
+
+}  // namespace kinescope
