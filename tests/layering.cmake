@@ -40,7 +40,6 @@ set(third_parties
     "libav: calib/vision"
     "libsw: calib/vision"
     "ceres/: calib/bundle dynamics/identify dynamics/gp"
-    "ceres/: calib/bundle dynamics/gp dynamics/identify"
     "cblas: dynamics/gp"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"

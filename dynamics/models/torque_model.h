@@ -42,7 +42,7 @@ struct TorqueModelOptions {
   int samples = 1500;
   int samples_of_all_joints = 400;   ///< the same for kLip, whose matrix is joints times as wide
   int hyperparameter_samples = 600;  ///< of them, for the search
-  int starts = 2;
+  int starts = 3;
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: all of the machine; never changes a result
 };
