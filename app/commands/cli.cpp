@@ -8,6 +8,7 @@
 
 #include "app/commands/command_line.h"
 #include "app/commands/progress_line.h"
+#include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
 
 namespace kinescope {
@@ -76,6 +77,35 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   return static_cast<int>(ExitCode::kBadRequest);
 }
 
+// What the settings file says of the log, the command line's words first.
+TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::path& log,
+                               const TorqueDataOptions& words) {
+  const std::filesystem::path beside = log.parent_path() / "recording.yaml";
+  TorqueDataOptions out;
+  if (line.settings) {
+    out = read_dynamics_settings(*line.settings);
+  } else if (std::filesystem::exists(beside)) {
+    out = read_dynamics_settings(beside);
+  }
+  const auto take = [](auto& value, const auto& word) {
+    if (!word.empty()) value = word;
+  };
+  LogMapping& mapping = out.mapping;
+  take(mapping.time, words.mapping.time);
+  take(mapping.time_unit, words.mapping.time_unit);
+  take(mapping.position, words.mapping.position);
+  take(mapping.velocity, words.mapping.velocity);
+  take(mapping.acceleration, words.mapping.acceleration);
+  take(mapping.torque, words.mapping.torque);
+  take(mapping.position_unit, words.mapping.position_unit);
+  take(mapping.velocity_unit, words.mapping.velocity_unit);
+  take(mapping.torque_unit, words.mapping.torque_unit);
+  take(mapping.torque_factor, words.mapping.torque_factor);
+  if (words.mapping.rate_hz > 0.0) mapping.rate_hz = words.mapping.rate_hz;
+  if (words.motion.cutoff_hz > 0.0) out.motion.cutoff_hz = words.motion.cutoff_hz;
+  return out;
+}
+
 // "log" of "folder/log.csv.gz".
 std::string log_name(const std::filesystem::path& log) {
   const std::string name = log.filename().string();
@@ -95,12 +125,14 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     if (line.dynamics.output.empty()) {
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
     }
+    line.dynamics.data = log_settings(line, line.dynamics.logs.front(), line.dynamics.data);
     return dynamics_command(line.dynamics, console);
   }
   if (app.got_subcommand("contact")) {
     if (line.contact.output.empty()) {
       line.contact.output = log_name(line.contact.logs.front()) + "_contact";
     }
+    line.contact.data = log_settings(line, line.contact.logs.front(), line.contact.data);
     return contact_command(line.contact, console);
   }
   if (app.got_subcommand("inspect")) return inspect_command(line.inspect, console);

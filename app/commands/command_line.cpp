@@ -169,9 +169,15 @@ void add_files(CLI::App& command, const char* name, Path& paths, const char* hel
       ->type_name("FILE");
 }
 
-void add_log_options(CLI::App& command, TorqueDataOptions& data) {
+void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& data) {
   const char* group = "What the log's columns are (default: by their names)";
   LogMapping& mapping = data.mapping;
+  command
+      .add_option_function<std::string>(
+          "--settings", [&line](const std::string& text) { line.settings = text; },
+          "File with the key dynamics (default: recording.yaml beside the first log)")
+      ->type_name("FILE")
+      ->group(group);
   const auto list = [&](const char* name, std::vector<std::string>& words, const char* help) {
     command.add_option(name, words, help)->delimiter(',')->type_name("LIST")->group(group);
   };
@@ -252,7 +258,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       ->check(number_in(50, 20000))
       ->capture_default_str()
       ->type_name("N");
-  add_log_options(command, dynamics.data);
+  add_log_options(command, line, dynamics.data);
   command
       .add_option_function<std::string>(
           "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
@@ -282,7 +288,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
       ->capture_default_str()
       ->type_name("N");
   add_gravity(command, contact.gravity_m_s2);
-  add_log_options(command, contact.data);
+  add_log_options(command, line, contact.data);
   command
       .add_option_function<std::string>(
           "--output", [&contact](const std::string& text) { contact.output = text; },

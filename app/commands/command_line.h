@@ -3,6 +3,9 @@
 // What the command line can say, and the help that explains it. Private to cli.cpp: shows CLI11.
 #pragma once
 
+#include <filesystem>
+#include <optional>
+
 #include <CLI/CLI.hpp>
 
 #include "app/commands/commands.h"
@@ -22,6 +25,7 @@ struct CommandLine {
   ContactCommandOptions contact;
   InspectOptions inspect;
   CameraOptions camera;
+  std::optional<std::filesystem::path> settings;  ///< recording.yaml of a torque log
   OutputOptions output;
   bool no_time_offset = false;
 };

@@ -98,8 +98,11 @@ TEST_F(DynamicsCommand, TorquesInTheWrongUnitAreNamed) {
   TorqueSamples wrong = samples_;
   wrong.torque *= 1000.0;
   folder_.write("log.csv", log_csv(wrong));
-  const std::string line = expect_refusal(words(), ExitCode::kBadInput, "1000");
-  EXPECT_NE(line.find("--torque"), std::string::npos) << line;
+  const std::string line = expect_refusal(words(), ExitCode::kBadInput, "torque of joint");
+  EXPECT_NE(line.find("mNm"), std::string::npos) << line;
+  EXPECT_EQ(run(words({"--torque-unit", "mNm"})).code, 0);
+  folder_.write("recording.yaml", "dynamics: {torque_unit: [mNm]}\n");
+  EXPECT_EQ(run(words()).code, 0) << "the settings beside the log count too";
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+#include <unistd.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
@@ -89,7 +91,8 @@ std::string LogWorld::csv() const {
 }
 
 std::filesystem::path write_log(const std::string& name, const std::string& text) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "kinescope_logs";
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("kinescope_logs_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   write_file_atomically(folder / name, text);
   return folder / name;
