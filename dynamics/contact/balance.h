@@ -19,13 +19,13 @@ namespace kinescope {
 /// Vectors have one entry a joint. Torques in the unit of the log (N m, N or A), momentum times s.
 struct BalanceSample {
   double stamp_s = 0.0;
-  Eigen::VectorXd momentum{};  ///< zero without a rigid-body model
-  Eigen::VectorXd drive{};     ///< what changes momentum but for a contact
-  Eigen::VectorXd velocity{};  ///< measured; empty without a rigid-body model
-  Eigen::MatrixXd mass{};      ///< d momentum / d velocity: noise of the velocity; empty without one
-  /// Standard deviation of the model's torque as predicted by the model itself, without the sensor's
-  /// noise. Only its ratios count: the scale of each joint is calibrated.
-  Eigen::VectorXd sigma{};
+  Eigen::VectorXd momentum;  ///< zero without a rigid-body model
+  Eigen::VectorXd drive;     ///< what changes momentum but for a contact
+  Eigen::VectorXd velocity;  ///< measured; empty without a rigid-body model
+  Eigen::MatrixXd mass;      ///< d momentum / d velocity: noise of the velocity; empty without one
+  /// Standard deviation of the model's torque as predicted by the model itself, without the
+  /// sensor's noise. Only its ratios count: the scale of each joint is calibrated.
+  Eigen::VectorXd sigma;
 };
 
 /// Friction and offset of a drive, as part of its measured torque:
@@ -35,8 +35,8 @@ struct DriveFriction {
   double coulomb = 0.0;
   double offset = 0.0;
   double coulomb_width = 0.01;  ///< rad/s or m/s
-  /// Doubt of the friction about its reversal, as a share of `coulomb`: adds to sigma^2 the square of
-  /// coulomb * reversal_doubt / sigma_unit within a few widths of standstill.
+  /// Doubt of the friction about its reversal, as a share of `coulomb`: adds to sigma^2 the square
+  /// of coulomb * reversal_doubt / sigma_unit within a few widths of standstill.
   double reversal_doubt = 0.0;
   double sigma_unit = 1.0;  ///< torque that counts as sigma = 1
 };
@@ -57,7 +57,7 @@ class RigidBalance {
 
  private:
   MomentumRecursion recursion_;
-  std::vector<DriveFriction> friction_{};
+  std::vector<DriveFriction> friction_;
   BalanceSample sample_;
 };
 
@@ -66,8 +66,8 @@ class RigidBalance {
 [[nodiscard]] std::vector<BalanceSample> balance_samples(RigidBalance balance,
                                                          const TorqueSamples& samples);
 
-/// Of a torque that some model predicts, samples x joints; `sigma` its predictive standard deviation
-/// without the sensor's noise, or empty where there is none.
+/// Of a torque that some model predicts, samples x joints; `sigma` its predictive standard
+/// deviation without the sensor's noise, or empty where there is none.
 [[nodiscard]] std::vector<BalanceSample> balance_samples(const Eigen::VectorXd& t_s,
                                                          const Eigen::MatrixXd& measured,
                                                          const Eigen::MatrixXd& predicted,

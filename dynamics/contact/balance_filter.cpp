@@ -57,8 +57,7 @@ BalanceFilter::BalanceFilter(BalanceNoise noise) : noise_(std::move(noise)) {
   for (Eigen::VectorXd* v : {&drive_, &sigma_, &p_, &d_, &innovation_, &decay_, &new_sigma_}) {
     *v = Eigen::VectorXd::Zero(n);
   }
-  for (Eigen::MatrixXd* m :
-       {&P_pp_, &P_pd_, &P_dd_, &S_, &whitener_, &gain_p_, &gain_d_}) {
+  for (Eigen::MatrixXd* m : {&P_pp_, &P_pd_, &P_dd_, &S_, &whitener_, &gain_p_, &gain_d_}) {
     *m = Eigen::MatrixXd::Zero(n, n);
   }
 }

@@ -33,10 +33,10 @@ std::vector<std::size_t> stretches(const std::vector<BalanceSample>& samples,
                                    const std::vector<char>& use, double step_s) {
   std::vector<std::size_t> first(samples.size());
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    const bool joined =
-        k > 0 && (use.empty() || (use[k] != 0 && use[k - 1] != 0)) && is_finite(samples[k]) &&
-        is_finite(samples[k - 1]) && samples[k].stamp_s > samples[k - 1].stamp_s &&
-        samples[k].stamp_s - samples[k - 1].stamp_s < 10.0 * step_s;
+    const bool joined = k > 0 && (use.empty() || (use[k] != 0 && use[k - 1] != 0)) &&
+                        is_finite(samples[k]) && is_finite(samples[k - 1]) &&
+                        samples[k].stamp_s > samples[k - 1].stamp_s &&
+                        samples[k].stamp_s - samples[k - 1].stamp_s < 10.0 * step_s;
     first[k] = joined ? first[k - 1] : k;
   }
   return first;

@@ -14,10 +14,10 @@ namespace kinescope {
 /// The model's error is an Ornstein-Uhlenbeck process with standard deviation model_sigma times the
 /// sample's own sigma.
 struct BalanceNoise {
-  Eigen::VectorXd velocity_sigma{};  ///< rad/s or m/s a sample; 0 without a rigid-body model
-  Eigen::VectorXd torque_sigma{};    ///< a sample
-  Eigen::VectorXd model_sigma{};     ///< times BalanceSample::sigma, torque
-  Eigen::VectorXd model_time_s{};    ///< correlation time of the model's error
+  Eigen::VectorXd velocity_sigma;  ///< rad/s or m/s a sample; 0 without a rigid-body model
+  Eigen::VectorXd torque_sigma;    ///< a sample
+  Eigen::VectorXd model_sigma;     ///< times BalanceSample::sigma, torque
+  Eigen::VectorXd model_time_s;    ///< correlation time of the model's error
 };
 
 /// White parts from third differences (motion leaves next to nothing in them), the model's error

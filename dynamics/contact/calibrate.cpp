@@ -89,6 +89,7 @@ bool same(const std::vector<TimeSpan>& a, const std::vector<TimeSpan>& b, double
 
 std::vector<TimeSpan> spans_of(const std::vector<ContactEvent>& events) {
   std::vector<TimeSpan> out;
+  out.reserve(events.size());
   for (const ContactEvent& event : events) {
     out.push_back({.begin_s = std::min(event.onset_s, event.alarm_s), .end_s = event.end_s});
   }
@@ -113,7 +114,9 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
                                       const ContactOptions& options) {
   validate(options);
   check_samples(samples);
-  ContactCalibration calibration{.options = options, .step_s = median_step_s(samples)};
+  ContactCalibration calibration;
+  calibration.options = options;
+  calibration.step_s = median_step_s(samples);
   calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
   calibration.noise = estimate_noise(samples);
   if (!options.may_contain_contacts) {

@@ -14,7 +14,8 @@ namespace {
 constexpr double kSecondsPerHour = 3600.0;
 
 void require(bool good, const char* option, const char* remedy) {
-  if (!good) throw bad_request("contact", std::string("option ") + option + " makes no sense", remedy);
+  if (!good)
+    throw bad_request("contact", std::string("option ") + option + " makes no sense", remedy);
 }
 
 /// Poisson mean whose probability of at most `count` (or, `above`, at least `count`) is 2.5 %.
@@ -70,8 +71,7 @@ FalseAlarmCheck check_false_alarms(const ContactCalibration& calibration,
                                    const std::vector<BalanceSample>& samples,
                                    const std::vector<TimeSpan>& contacts) {
   const contact::StatisticLog log = contact::log_statistics(calibration, samples);
-  const std::vector<char> use =
-      contact::outside(samples, contacts, calibration.options.guard_s);
+  const std::vector<char> use = contact::outside(samples, contacts, calibration.options.guard_s);
   FalseAlarmCheck check{.declared_per_hour = calibration.options.false_alarms_per_hour};
   std::size_t counted = 0;
   for (const char c : use) counted += c != 0 ? 1U : 0U;

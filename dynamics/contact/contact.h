@@ -50,16 +50,16 @@ enum class ContactCalibrationStatus {
 /// What a detector needs to know of a robot and its model.
 struct ContactCalibration {
   ContactCalibrationStatus status = ContactCalibrationStatus::kNotRun;
-  ContactOptions options{};
-  BalanceNoise noise{};
+  ContactOptions options;
+  BalanceNoise noise;
   double step_s = 0.0;
   /// One an octave of window lengths (1 step, 2 to 3, 4 to 7, ..): a statistic above it is an
   /// alarm.
-  Eigen::VectorXd thresholds{};
-  std::vector<TailFit> tails{};  ///< behind each of them
-  TailFit joint_tail{};          ///< of the largest ratio of statistic to threshold of all octaves
-  std::vector<TimeSpan> excluded{};  ///< taken for contacts in the calibration log
-  double exposure_s = 0.0;           ///< free motion that was learned from
+  Eigen::VectorXd thresholds;
+  std::vector<TailFit> tails;  ///< behind each of them
+  TailFit joint_tail;          ///< of the largest ratio of statistic to threshold of all octaves
+  std::vector<TimeSpan> excluded;  ///< taken for contacts in the calibration log
+  double exposure_s = 0.0;         ///< free motion that was learned from
   int iterations = 0;
 
   [[nodiscard]] Eigen::Index joints() const { return noise.torque_sigma.size(); }
@@ -80,11 +80,11 @@ struct ContactEvent {
   /// (ContactOptions::link_level), minus one: index of the joint whose link was touched, or of one
   /// beyond where its joint is in line with the force.
   int link = -1;
-  Eigen::VectorXd link_probability{};  ///< one a joint's link
-  Eigen::VectorXd beyond_p_value{};  ///< of "the joints beyond answer nothing", one a joint's link
-  Eigen::VectorXd torque{};          ///< external, mean from onset to end
-  Eigen::MatrixXd torque_covariance{};  ///< noise and the model's error
-  double statistic = 0.0;               ///< at the alarm, in units of its threshold
+  Eigen::VectorXd link_probability;   ///< one a joint's link
+  Eigen::VectorXd beyond_p_value;     ///< of "the joints beyond answer nothing", one a joint's link
+  Eigen::VectorXd torque;             ///< external, mean from onset to end
+  Eigen::MatrixXd torque_covariance;  ///< noise and the model's error
+  double statistic = 0.0;             ///< at the alarm, in units of its threshold
 };
 
 /// All contacts of a log: a ContactDetector over its samples.

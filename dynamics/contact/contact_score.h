@@ -26,15 +26,15 @@ struct DetectedContact {
 };
 
 struct LabelOutcome {
-  int detection = -1;        ///< index of the first that overlaps; -1: missed
-  double delay_s = 0.0;      ///< alarm after the label's begin
+  int detection = -1;    ///< index of the first that overlaps; -1: missed
+  double delay_s = 0.0;  ///< alarm after the label's begin
   double onset_error_s = 0.0;
   double end_error_s = 0.0;  ///< of the last that overlaps
   bool link_right = false;
 };
 
 struct ContactScore {
-  std::vector<LabelOutcome> labels{};  ///< one a label
+  std::vector<LabelOutcome> labels;  ///< one a label
   int found = 0;
   int missed = 0;
   int invented = 0;  ///< detections that overlap no label

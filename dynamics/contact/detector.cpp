@@ -23,8 +23,9 @@ int in_steps(double span_s, double step_s) {
 }
 
 std::size_t record_capacity(const ContactCalibration& c) {
-  return static_cast<std::size_t>(in_steps(c.options.longest_window_s, c.step_s) +
-                                  4 * in_steps(c.options.end_window_s, c.step_s) + 8);
+  const int steps = in_steps(c.options.longest_window_s, c.step_s) +
+                    4 * in_steps(c.options.end_window_s, c.step_s) + 8;
+  return static_cast<std::size_t>(steps);
 }
 
 }  // namespace
@@ -89,12 +90,14 @@ void ContactDetector::watch_onset(const BalanceSample& sample, ContactDecision& 
   }
   if (decision.statistic < 1.0) return;
   decision.alarm = in_contact_ = true;
-  event_ = {.alarm_s = sample.stamp_s, .statistic = decision.statistic};
+  event_ = {};
+  event_.alarm_s = sample.stamp_s;
+  event_.statistic = decision.statistic;
   raise_alarm(age);
 }
 
-/// The bank's onsets are spaced, and its torque is constant: looks again where the impulse along the
-/// torque that was found begins to rise.
+/// The bank's onsets are spaced, and its torque is constant: looks again where the impulse along
+/// the torque that was found begins to rise.
 void ContactDetector::raise_alarm(int age) {
   const std::size_t last = record_.size() - 1;
   const auto back = std::min<std::size_t>(last, static_cast<std::size_t>(age));
@@ -136,7 +139,8 @@ void ContactDetector::expect_error(const contact::RecordEntry& at) {
 }
 
 /// Mean external torque between two entries and its covariance, to mean_ and covariance_.
-void ContactDetector::mean_torque(const contact::RecordEntry& from, const contact::RecordEntry& to) {
+void ContactDetector::mean_torque(const contact::RecordEntry& from,
+                                  const contact::RecordEntry& to) {
   const BalanceNoise& noise = calibration_.noise;
   const double span = to.stamp_s - from.stamp_s;
   const double steps_s2 = to.sigma_steps_s2 - from.sigma_steps_s2;
@@ -146,11 +150,12 @@ void ContactDetector::mean_torque(const contact::RecordEntry& from, const contac
   for (Eigen::Index j = 0; j < mean_.size(); ++j) {
     const double sigma = noise.torque_sigma[j];
     const double time = noise.model_time_s[j];
-    // What is left of the known error, averaged over the span; the rest is correlated over its time.
+    // What is left of the known error, averaged over the span; the rest is correlated over its
+    // time.
     const double span_of_known = std::max(0.0, to.stamp_s - std::max(from.stamp_s, onset_.stamp_s));
     mean_[j] -= error_mean_[j] * time / span * std::expm1(span_of_known / time);
-    covariance_(j, j) += sigma * sigma * steps_s2 +
-                         error_variance_[j] * span * std::min(span, 2.0 * time);
+    covariance_(j, j) +=
+        sigma * sigma * steps_s2 + error_variance_[j] * span * std::min(span, 2.0 * time);
   }
   covariance_ /= span * span;
 }
@@ -161,9 +166,10 @@ void ContactDetector::estimate(std::size_t end) {
   event_.torque = mean_;
   event_.torque_covariance = covariance_;
   const std::array looks{
-      JointAnswers{.squares = joint_answers(mean_, covariance_).cwiseAbs2(), .count = 1}, segments_};
-  LinkEvidence evidence =
-      link_evidence(std::span(looks).first(segments_.count > 0 ? 2U : 1U), calibration_.options.link_level);
+      JointAnswers{.squares = joint_answers(mean_, covariance_).cwiseAbs2(), .count = 1},
+      segments_};
+  LinkEvidence evidence = link_evidence(std::span(looks).first(segments_.count > 0 ? 2U : 1U),
+                                        calibration_.options.link_level);
   event_.link = evidence.link;
   event_.link_probability = std::move(evidence.probability);
   event_.beyond_p_value = std::move(evidence.beyond_p_value);
@@ -183,8 +189,8 @@ void ContactDetector::watch_end(const BalanceSample& sample, ContactDecision& de
 
 /// Seen backwards in time, the impulse begins to change where the contact ended.
 double ContactDetector::end_of_contact() {
-  const auto window = static_cast<std::size_t>(
-      in_steps(calibration_.options.end_window_s, calibration_.step_s));
+  const auto window =
+      static_cast<std::size_t>(in_steps(calibration_.options.end_window_s, calibration_.step_s));
   const std::size_t last = record_.size() - 1;
   const std::size_t first =
       std::max(last - std::min(last, 3 * window), record_.at_or_before(onset_.stamp_s));
@@ -202,8 +208,8 @@ double ContactDetector::end_of_contact() {
 
 /// No external torque in any window up to the end window.
 bool ContactDetector::is_quiet() {
-  const auto window = static_cast<std::size_t>(
-      in_steps(calibration_.options.end_window_s, calibration_.step_s));
+  const auto window =
+      static_cast<std::size_t>(in_steps(calibration_.options.end_window_s, calibration_.step_s));
   const std::size_t last = record_.size() - 1;
   if (last < window || record_[last - window].stamp_s < onset_.stamp_s) return false;
   for (std::size_t length = window; length >= 1; length /= 2) {

@@ -65,12 +65,12 @@ class ContactDetector {
   contact::OnsetBank bank_;
   contact::ImbalanceRecord record_;
   ContactEvent event_;
-  contact::RecordEntry onset_;                 ///< of the contact under way
-  contact::RecordEntry segment_;               ///< begin of the segment under way
-  JointAnswers segments_;                      ///< of the contact's segments
+  contact::RecordEntry onset_;                   ///< of the contact under way
+  contact::RecordEntry segment_;                 ///< begin of the segment under way
+  JointAnswers segments_;                        ///< of the contact's segments
   Eigen::VectorXd error_mean_, error_variance_;  ///< work space of expect_error()
-  Eigen::VectorXd mean_;                       ///< work space: mean torque of a window,
-  Eigen::MatrixXd covariance_;                 ///< and its covariance
+  Eigen::VectorXd mean_;                         ///< work space: mean torque of a window,
+  Eigen::MatrixXd covariance_;                   ///< and its covariance
   std::vector<double> bend_t_, bend_y_;
   double quiet_level_ = 0.0;
   bool in_contact_ = false;

@@ -38,8 +38,8 @@ RecordEntry& ImbalanceRecord::add(const BalanceSample& sample, const BalanceNois
     const RecordEntry& last = back();
     const double step = sample.stamp_s - last.stamp_s;
     entry.sigma_steps_s2 = last.sigma_steps_s2 + step * step;
-    entry.imbalance = last.imbalance + sample.momentum - momentum_ -
-                      0.5 * step * (drive_ + sample.drive);
+    entry.imbalance =
+        last.imbalance + sample.momentum - momentum_ - 0.5 * step * (drive_ + sample.drive);
   }
   entry.model_variance = noise.model_sigma.cwiseProduct(sample.sigma).cwiseAbs2();
   drive_ = sample.drive;

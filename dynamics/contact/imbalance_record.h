@@ -13,10 +13,10 @@ namespace kinescope::contact {
 struct RecordEntry {
   double stamp_s = 0.0;
   double sigma_steps_s2 = 0.0;  ///< sum of squared steps: times torque_sigma^2 the torque's noise
-  Eigen::VectorXd imbalance{};
-  Eigen::MatrixXd momentum_covariance{};
-  Eigen::VectorXd model_variance{};                ///< of the model's error in torque, unconditional
-  Eigen::VectorXd error_mean{}, error_variance{};  ///< of the model's error as filtered up to here
+  Eigen::VectorXd imbalance;
+  Eigen::MatrixXd momentum_covariance;
+  Eigen::VectorXd model_variance;              ///< of the model's error in torque, unconditional
+  Eigen::VectorXd error_mean, error_variance;  ///< of the model's error as filtered up to here
 };
 
 /// A ring of entries; index 0 is the oldest that is kept. Does not allocate after construction.
@@ -41,10 +41,10 @@ class ImbalanceRecord {
  private:
   RecordEntry& add(const BalanceSample& sample, const BalanceNoise& noise);
 
-  std::vector<RecordEntry> entries_{};
+  std::vector<RecordEntry> entries_;
   std::size_t begin_ = 0;
   std::size_t size_ = 0;
-  Eigen::VectorXd drive_, momentum_{};  ///< of the last sample
+  Eigen::VectorXd drive_, momentum_;  ///< of the last sample
 };
 
 }  // namespace kinescope::contact

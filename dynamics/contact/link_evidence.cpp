@@ -27,15 +27,15 @@ double log_mean_exp(const std::vector<double>& logs) {
 double log_answer_ratio(double squares, int count) {
   std::vector<double> logs;
   for (int i = 0; i < kSizes; ++i) {
-    const double size =
-        kSmallestSize * std::pow(kLargestSize / kSmallestSize, (i + 0.5) / kSizes);
+    const double size = kSmallestSize * std::pow(kLargestSize / kSmallestSize, (i + 0.5) / kSizes);
     const double variance = 1.0 + size * size;
     logs.push_back(0.5 * squares * (1.0 - 1.0 / variance) - 0.5 * count * std::log(variance));
   }
   return log_mean_exp(logs);
 }
 
-/// Probability that a chi-square variable of k degrees of freedom exceeds x. Wilson and Hilferty 1931.
+/// Probability that a chi-square variable of k degrees of freedom exceeds x. Wilson and Hilferty
+/// 1931.
 double chi_square_tail(double x, int k) {
   const double c = 2.0 / (9.0 * k);
   const double z = (std::cbrt(x / k) - (1.0 - c)) / std::sqrt(c);
@@ -60,8 +60,8 @@ LinkEvidence link_evidence(std::span<const JointAnswers> looks, double level) {
     const auto beyond = n - 1 - k;
     for (const JointAnswers& look : looks) {
       if (beyond == 0) break;
-      const double p = chi_square_tail(look.squares.tail(beyond).sum(),
-                                       static_cast<int>(beyond) * look.count);
+      const double p =
+          chi_square_tail(look.squares.tail(beyond).sum(), static_cast<int>(beyond) * look.count);
       out.beyond_p_value[k] =
           std::min(out.beyond_p_value[k], static_cast<double>(looks.size()) * p);
     }

@@ -30,8 +30,8 @@ std::vector<double> statistic(const ObserverCalibration& calibration,
 
 }  // namespace
 
-/// r = gain * low-passed derivative of the imbalance, with the exact solution of the low-pass over a
-/// step in which the external torque is constant.
+/// r = gain * low-passed derivative of the imbalance, with the exact solution of the low-pass over
+/// a step in which the external torque is constant.
 Eigen::MatrixXd observe_momentum(const std::vector<BalanceSample>& samples, double gain_per_s) {
   if (!(gain_per_s > 0.0) || !std::isfinite(gain_per_s)) {
     throw bad_request("momentum observer", "a gain that is not positive", "give 5 to 500 per s");
@@ -48,8 +48,7 @@ Eigen::MatrixXd observe_momentum(const std::vector<BalanceSample>& samples, doub
     const double step = b.stamp_s - a.stamp_s;
     const auto column = static_cast<Eigen::Index>(k);
     if (step > 0.0 && step < longest_step) {
-      const Eigen::VectorXd torque =
-          (b.momentum - a.momentum) / step - 0.5 * (a.drive + b.drive);
+      const Eigen::VectorXd torque = (b.momentum - a.momentum) / step - 0.5 * (a.drive + b.drive);
       const double kept = std::exp(-gain_per_s * step);
       out.col(column) = kept * out.col(static_cast<Eigen::Index>(last)) + (1.0 - kept) * torque;
     }
@@ -62,8 +61,10 @@ ObserverCalibration calibrate_observer(const std::vector<BalanceSample>& samples
                                        const std::vector<char>& use, double gain_per_s,
                                        double false_alarms_per_hour, ObserverTest test) {
   const Eigen::MatrixXd observed = observe_momentum(samples, gain_per_s);
-  ObserverCalibration calibration{
-      .gain_per_s = gain_per_s, .test = test, .step_s = median_step_s(samples)};
+  ObserverCalibration calibration;
+  calibration.gain_per_s = gain_per_s;
+  calibration.test = test;
+  calibration.step_s = median_step_s(samples);
   const Eigen::Index n = observed.rows();
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   double count = 0.0;

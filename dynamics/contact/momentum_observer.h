@@ -13,9 +13,9 @@
 
 namespace kinescope {
 
-/// External torque as the observer follows it, joints x samples. Starts from none, also after samples
-/// that are not finite or not later, and after gaps of ten steps. Throws bad_request for a gain that
-/// is not positive.
+/// External torque as the observer follows it, joints x samples. Starts from none, also after
+/// samples that are not finite or not later, and after gaps of ten steps. Throws bad_request for a
+/// gain that is not positive.
 [[nodiscard]] Eigen::MatrixXd observe_momentum(const std::vector<BalanceSample>& samples,
                                                double gain_per_s);
 
@@ -25,15 +25,15 @@ enum class ObserverTest {
   kAllJoints      ///< r' S^-1 r
 };
 
-/// Spread of the observer's output without contact, and the threshold at a declared rate by the same
-/// tail fit as ours.
+/// Spread of the observer's output without contact, and the threshold at a declared rate by the
+/// same tail fit as ours.
 struct ObserverCalibration {
   double gain_per_s = 0.0;
   ObserverTest test = ObserverTest::kLargestJoint;
   double step_s = 0.0;
-  Eigen::MatrixXd spread{};  ///< inverse covariance; of the variances alone for kLargestJoint
+  Eigen::MatrixXd spread;  ///< inverse covariance; of the variances alone for kLargestJoint
   double threshold = 0.0;
-  TailFit tail{};
+  TailFit tail;
 };
 
 /// `use`: one a sample, 0 leaves it out; empty uses all.

@@ -10,8 +10,9 @@ namespace {
 
 /// A standard normal variable passes it with probability 1e-7.
 constexpr double kRare = 5.2;
-/// Onsets kept an octave are 2^this.
+/// Onsets kept an octave are 2^this; the ratio of a growing torque is smoother in its onset.
 constexpr int kPerOctave = 2;
+constexpr int kGrowingPerOctave = 1;
 
 int octave_of(int age) { return static_cast<int>(std::bit_width(static_cast<unsigned>(age))) - 1; }
 
@@ -26,8 +27,9 @@ double chi_square_quantile(int k, double z) {
 OnsetBank::OnsetBank(Eigen::Index joints, int longest_age)
     : n_(joints), longest_age_(std::max(1, longest_age)) {
   const int octaves = octave_of(longest_age_) + 1;
-  const Eigen::Index slots = (octaves + 2) * (1 << kPerOctave);
-  onset_.resize(static_cast<std::size_t>(slots));
+  const Eigen::Index slots =
+      Eigen::Index{octaves + 2} * ((1 << kPerOctave) + (1 << kGrowingPerOctave));
+  candidates_.resize(static_cast<std::size_t>(slots));
   for (Eigen::MatrixXd* m : {&error_p_, &error_d_, &information_, &white_}) {
     *m = Eigen::MatrixXd::Zero(n_, n_ * slots);
   }
@@ -51,15 +53,16 @@ void OnsetBank::clear() {
 void OnsetBank::age_candidates() {
   ++now_;
   for (Eigen::Index s = 0; s < used_;) {
-    const long long onset = onset_[static_cast<std::size_t>(s)];
-    const auto age = static_cast<int>(now_ - onset + 1);
-    const int spacing = 1 << std::max(0, octave_of(age) - kPerOctave);
-    if (age <= longest_age_ && onset % spacing == 0) {
+    Candidate& candidate = candidates_[static_cast<std::size_t>(s)];
+    candidate.age = static_cast<int>(now_ - candidate.onset + 1);
+    const int per_octave = candidate.grows ? kGrowingPerOctave : kPerOctave;
+    const int spacing = 1 << std::max(0, octave_of(candidate.age) - per_octave);
+    if (candidate.age <= longest_age_ && candidate.onset % spacing == 0) {
       ++s;
       continue;
     }
     --used_;
-    onset_[static_cast<std::size_t>(s)] = onset_[static_cast<std::size_t>(used_)];
+    candidate = candidates_[static_cast<std::size_t>(used_)];
     for (Eigen::MatrixXd* m : {&error_p_, &error_d_, &information_}) {
       m->middleCols(s * n_, n_) = m->middleCols(used_ * n_, n_);
     }
@@ -67,20 +70,29 @@ void OnsetBank::age_candidates() {
   }
 }
 
+void OnsetBank::add_candidate(bool grows) {
+  candidates_[static_cast<std::size_t>(used_)] = {.onset = now_, .grows = grows, .age = 1};
+  for (Eigen::MatrixXd* m : {&error_p_, &error_d_, &information_}) {
+    m->middleCols(used_ * n_, n_).setZero();
+  }
+  score_.col(used_).setZero();
+  ++used_;
+}
+
 void OnsetBank::advance(const BalanceFilter& filter) {
   age_candidates();
   const double dt = filter.step_s();
-  const Eigen::Index columns = used_ * n_;
-  error_p_.leftCols(columns) += dt * error_d_.leftCols(columns);
-  for (Eigen::Index j = 0; j < n_; ++j) error_d_.row(j).head(columns) *= filter.decay()[j];
-  // The new candidate's contact acts for the whole step.
-  onset_[static_cast<std::size_t>(used_)] = now_;
-  error_p_.middleCols(columns, n_).setZero();
-  error_d_.middleCols(columns, n_).setZero();
-  information_.middleCols(columns, n_).setZero();
-  score_.col(used_).setZero();
-  ++used_;
-  for (Eigen::Index s = 0; s < used_; ++s) error_p_.middleCols(s * n_, n_).diagonal().array() += dt;
+  const Eigen::Index old = used_ * n_;
+  error_p_.leftCols(old) += dt * error_d_.leftCols(old);
+  for (Eigen::Index j = 0; j < n_; ++j) error_d_.row(j).head(old) *= filter.decay()[j];
+  add_candidate(false);
+  add_candidate(true);
+  // The unit of a growing torque is free: one of a step's mean, times its number.
+  for (Eigen::Index s = 0; s < used_; ++s) {
+    const Candidate& candidate = candidates_[static_cast<std::size_t>(s)];
+    const double torque = candidate.grows ? candidate.age - 0.5 : 1.0;
+    error_p_.middleCols(s * n_, n_).diagonal().array() += dt * torque;
+  }
 
   const Eigen::Index all = used_ * n_;
   white_.leftCols(all).noalias() = filter.whitener() * error_p_.leftCols(all);
@@ -88,7 +100,7 @@ void OnsetBank::advance(const BalanceFilter& filter) {
   error_d_.leftCols(all).noalias() -= filter.gain_d().transpose() * white_.leftCols(all);
   std::ranges::fill(best_, OctaveBest{});
   for (Eigen::Index s = 0; s < used_; ++s) {
-    const auto age = static_cast<int>(now_ - onset_[static_cast<std::size_t>(s)] + 1);
+    const int age = candidates_[static_cast<std::size_t>(s)].age;
     const double statistic = evaluate(s, filter.innovation());
     OctaveBest& best = best_[static_cast<std::size_t>(octave_of(age))];
     if (statistic > best.statistic) best = {.statistic = statistic, .age = age};

@@ -10,8 +10,8 @@
 namespace kinescope::contact {
 
 struct StatisticLog {
-  Eigen::MatrixXd octaves{};  ///< octaves x samples; NaN in contact, and at samples passed over
-  std::vector<ContactEvent> events{};
+  Eigen::MatrixXd octaves;  ///< octaves x samples; NaN in contact, and at samples passed over
+  std::vector<ContactEvent> events;
 };
 
 [[nodiscard]] StatisticLog log_statistics(const ContactCalibration& calibration,

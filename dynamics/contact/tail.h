@@ -11,8 +11,8 @@ namespace kinescope {
 
 /// Exceedances come in clusters; a cluster counts once, with its peak.
 struct TailFit {
-  double level = 0.0;       ///< above it the tail is fitted
-  double rate_per_s = 0.0;  ///< of clusters above the level
+  double level = 0.0;        ///< above it the tail is fitted
+  double rate_per_s = 0.0;   ///< of clusters above the level
   double mean_excess = 0.0;  ///< of the clusters' peaks above the level
   double own_shape = 0.0;    ///< as estimated, of any sign
   double scale = 0.0;
@@ -23,8 +23,8 @@ struct TailFit {
   int peaks = 0;            ///< clusters in the record
   double exposure_s = 0.0;  ///< length of the record
 
-  /// Takes a shape that was found elsewhere (from several tails of one kind together), as if it had been
-  /// estimated here.
+  /// Takes a shape that was found elsewhere (from several tails of one kind together), as if it had
+  /// been estimated here.
   void set_shape(double shape);
   /// The value passed by `rate_per_s` clusters.
   [[nodiscard]] double quantile(double rate_per_s) const;
@@ -32,16 +32,16 @@ struct TailFit {
   [[nodiscard]] double rate_above(double value) const;
 };
 
-/// A statistic over time; values of one stretch are consecutive, NaN separates stretches and does not
-/// count.
+/// A statistic over time; values of one stretch are consecutive, NaN separates stretches and does
+/// not count.
 struct StatisticRecord {
   std::vector<double> values;
   double step_s = 0.0;
   double cluster_gap_s = 0.05;  ///< exceedances that are further apart are two clusters
 };
 
-/// The highest level with 100 peaks, at least the upper half of the values. Throws undetermined where
-/// there are fewer than 10.
+/// The highest level with 100 peaks, at least the upper half of the values. Throws undetermined
+/// where there are fewer than 10.
 [[nodiscard]] TailFit fit_tail(const StatisticRecord& record);
 
 }  // namespace kinescope

@@ -83,8 +83,7 @@ void MomentumRecursion::gather(std::size_t body) {
                         const Eigen::Vector3d& force) {
     return joint.axis_rotation.dot(moment) + joint.axis_translation.dot(force);
   };
-  const Eigen::Vector3d force =
-      c.mass * c.axis_translation + c.axis_rotation.cross(c.first_moment);
+  const Eigen::Vector3d force = c.mass * c.axis_translation + c.axis_rotation.cross(c.first_moment);
   const Eigen::Vector3d moment =
       c.inertia * c.axis_rotation + c.first_moment.cross(c.axis_translation);
   for (int j = static_cast<int>(body); j >= 0;
@@ -104,10 +103,9 @@ void MomentumRecursion::gather(std::size_t body) {
     return;
   }
   Carried& p = carried_[static_cast<std::size_t>(parent)];
-  terms_.velocity_torque[row] =
-      -c.angular_momentum.dot(c.axis_rotation.cross(p.rotation)) -
-      c.linear_momentum.dot(c.axis_translation.cross(p.rotation) +
-                            c.axis_rotation.cross(p.translation));
+  terms_.velocity_torque[row] = -c.angular_momentum.dot(c.axis_rotation.cross(p.rotation)) -
+                                c.linear_momentum.dot(c.axis_translation.cross(p.rotation) +
+                                                      c.axis_rotation.cross(p.translation));
   p.mass += c.mass;
   p.first_moment += c.first_moment;
   p.inertia += c.inertia;

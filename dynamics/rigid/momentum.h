@@ -34,12 +34,12 @@ class MomentumRecursion {
   struct Carried {
     Eigen::Matrix3d R_base_body;
     Eigen::Vector3d p_base_body;
-    Eigen::Vector3d axis_rotation, axis_translation;          ///< the joint's unit twist
-    Eigen::Vector3d rotation, translation;                    ///< the body's twist
-    double mass = 0.0;                                        ///< with what it carries
-    Eigen::Vector3d first_moment;                             ///< with what it carries
-    Eigen::Matrix3d inertia;                                  ///< with what it carries
-    Eigen::Vector3d angular_momentum, linear_momentum;        ///< with what it carries
+    Eigen::Vector3d axis_rotation, axis_translation;    ///< the joint's unit twist
+    Eigen::Vector3d rotation, translation;              ///< the body's twist
+    double mass = 0.0;                                  ///< with what it carries
+    Eigen::Vector3d first_moment;                       ///< with what it carries
+    Eigen::Matrix3d inertia;                            ///< with what it carries
+    Eigen::Vector3d angular_momentum, linear_momentum;  ///< with what it carries
   };
 
   void place(std::size_t body, double q, double dq);

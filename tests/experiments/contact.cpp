@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Contact detection on recordings of others, beside the momentum observer at the same false-alarm
-// rate. Needs the shared data; prints a table each. build/test/contact [ur6] [ur5] [push]
+// rate. Needs the shared data; prints a table each. build/test/contact [ur6] [ur5] [simulated]
 #include <cstdio>
 #include <set>
 #include <string>
@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   try {
     if (asked("ur6")) kinescope::contact_on_ur6();
     if (asked("ur5")) kinescope::contact_on_ur5();
+    if (asked("simulated")) kinescope::contact_simulated();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -11,4 +11,7 @@ void contact_on_ur6();
 /// on the free parts of the other files.
 void contact_on_ur5();
 
+/// Constructed worlds: hard and soft contacts, and free motion.
+void contact_simulated();
+
 }  // namespace kinescope

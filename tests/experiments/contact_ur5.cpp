@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Every file is judged by a model and a calibration that have not seen it: its current is predicted
-// by a model of the other files; the calibration's residuals are those of models that leave the file
-// in question and the one to be judged out.
+// by a model of the other files; the calibration's residuals are those of models that leave the
+// file in question and the one to be judged out.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -28,7 +28,7 @@ constexpr double kBetweenFiles_s = 100.0;
 
 struct Recording {
   std::string name;
-  JointRun run{};
+  JointRun run;
   double stop_s = 0.0;
   double touch_s = std::nan("");  ///< soft sensor's first departure, impacts only
 };
@@ -54,7 +54,8 @@ Recording read_recording(const std::filesystem::path& folder, const std::string&
     }
     return out;
   };
-  Recording out{.name = name};
+  Recording out;
+  out.name = name;
   out.run.t_s = 1e-3 * column("t_ms");
   out.run.q = column("q_deg1");
   out.run.current = column("i1");
@@ -192,8 +193,10 @@ void contact_on_ur5() {
     tests.push_back(residuals(all[k], model, all[k].run.q.size(), 0.0));
   }
   const double gain = best_gain(all, logs, tests);
-  std::printf("ur5_contact, %.0f false alarm/h declared: this room | low-passed residual in sigmas, gain %.0f /s (the best for these files)\n",
-              calibrations[0].options.false_alarms_per_hour, gain);
+  std::printf(
+      "ur5_contact, %.0f false alarm/h declared: this room | low-passed residual in sigmas, gain "
+      "%.0f /s (the best for these files)\n",
+      calibrations[0].options.false_alarms_per_hour, gain);
   for (std::size_t k = 0; k < all.size(); ++k) {
     std::printf("  %-20s stop %7.3f s", all[k].name.c_str(), all[k].stop_s);
     print_outcome(all[k], judge(all[k], detections_of(detect_contacts(calibrations[k], tests[k]))));

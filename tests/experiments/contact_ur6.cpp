@@ -46,9 +46,11 @@ LabelledLog read_log(const std::filesystem::path& folder, const std::string& nam
 }
 
 void print_score(const char* what, const ContactScore& score) {
-  std::printf("  %-34s found %d of %zu, invented %d, repeated %d; delay median %.1f mean %.1f worst %.1f ms",
-              what, score.found, score.labels.size(), score.invented, score.repeated,
-              1e3 * score.median_delay_s, 1e3 * score.mean_delay_s, 1e3 * score.worst_delay_s);
+  std::printf(
+      "  %-34s found %d of %zu, invented %d, repeated %d; delay median %.1f mean %.1f worst %.1f "
+      "ms",
+      what, score.found, score.labels.size(), score.invented, score.repeated,
+      1e3 * score.median_delay_s, 1e3 * score.mean_delay_s, 1e3 * score.worst_delay_s);
 }
 
 void print_events(const LabelledLog& log, const std::vector<ContactEvent>& events,
@@ -82,9 +84,8 @@ std::vector<TimeSpan> spans_of(const std::vector<ContactLabel>& labels) {
 
 /// The observer with the gain that does best on the very data it is judged on.
 void print_observers(const LabelledLog& calibration_log,
-                     const std::vector<BalanceSample>& calibration_samples,
-                     const LabelledLog& log, const std::vector<BalanceSample>& samples,
-                     const ContactOptions& options) {
+                     const std::vector<BalanceSample>& calibration_samples, const LabelledLog& log,
+                     const std::vector<BalanceSample>& samples, const ContactOptions& options) {
   // The observer is told where the contacts are.
   const std::vector<char> use =
       contact::outside(calibration_samples, spans_of(calibration_log.labels), options.guard_s);
@@ -92,8 +93,8 @@ void print_observers(const LabelledLog& calibration_log,
     double best_gain = 0.0;
     ContactScore best;
     for (double gain = 5.0; gain <= 400.0; gain *= 1.2) {
-      const ObserverCalibration observer = calibrate_observer(
-          calibration_samples, use, gain, options.false_alarms_per_hour, test);
+      const ObserverCalibration observer =
+          calibrate_observer(calibration_samples, use, gain, options.false_alarms_per_hour, test);
       const ContactScore score =
           score_contacts(log.labels, detections_of(observer_alarms(observer, samples)));
       if (best_gain == 0.0 || score.found > best.found ||
@@ -123,9 +124,11 @@ void print_log(const char* name, const ContactCalibration& calibration, const La
   print_events(log, events, score);
   print_observers(fit_log, fit_samples, log, samples, calibration.options);
   const FalseAlarmCheck check = check_false_alarms(calibration, samples, spans_of(log.labels));
-  std::printf("  false alarms: declared %.1f /h, observed %d in %.1f s (95 %% up to %.0f /h), by the tail %.2g /h\n",
-              check.declared_per_hour, check.alarms, 3600.0 * check.hours, check.upper_per_hour,
-              check.extrapolated_per_hour);
+  std::printf(
+      "  false alarms: declared %.1f /h, observed %d in %.1f s (95 %% up to %.0f /h), by the tail "
+      "%.2g /h\n",
+      check.declared_per_hour, check.alarms, 3600.0 * check.hours, check.upper_per_hour,
+      check.extrapolated_per_hour);
 }
 
 }  // namespace
@@ -143,8 +146,9 @@ void contact_on_ur6() {
   const std::vector<BalanceSample> train_samples = balance_samples(balance, train.samples);
   const std::vector<BalanceSample> test_samples = balance_samples(balance, test.samples);
   const ContactCalibration calibration = calibrate_contacts(train_samples);
-  std::printf("ur6_contact: calibrated in %d rounds on %.1f s free of %zu spans taken for contacts\n",
-              calibration.iterations, calibration.exposure_s, calibration.excluded.size());
+  std::printf(
+      "ur6_contact: calibrated in %d rounds on %.1f s free of %zu spans taken for contacts\n",
+      calibration.iterations, calibration.exposure_s, calibration.excluded.size());
   for (Eigen::Index j = 0; j < kJoints; ++j) {
     std::printf("  joint %ld: velocity %.2g, torque %.2g, model %.2g over %.2g s\n", long{j} + 1,
                 calibration.noise.velocity_sigma[j], calibration.noise.torque_sigma[j],

@@ -66,8 +66,8 @@ Eigen::VectorXd fit(const Rows& rows, RippleModel& model) {
   model.weights = factor.solve(F.transpose() * rows.y);
   Eigen::VectorXd left = rows.y - F * model.weights;
   model.steady_sigma = std::sqrt(left.squaredNorm() / static_cast<double>(rows.q.size() - d));
-  model.covariance = model.steady_sigma * model.steady_sigma *
-                     factor.solve(Eigen::MatrixXd::Identity(d, d));
+  model.covariance =
+      model.steady_sigma * model.steady_sigma * factor.solve(Eigen::MatrixXd::Identity(d, d));
   return left;
 }
 
@@ -79,7 +79,8 @@ double strongest_frequency(const Rows& rows, const Eigen::VectorXd& left) {
   for (Eigen::Index k = 0; k < left.size(); ++k) {
     sum[static_cast<Eigen::Index>((rows.q[k] - lowest) / kBin)] += left[k];
   }
-  const Eigen::ArrayXd centre = lowest + kBin * (Eigen::ArrayXd::LinSpaced(bins, 0.5, static_cast<double>(bins) - 0.5));
+  const Eigen::ArrayXd centre =
+      lowest + kBin * (Eigen::ArrayXd::LinSpaced(bins, 0.5, static_cast<double>(bins) - 0.5));
   double best = 0.0;
   double frequency = 0.0;
   for (double f = 0.02; f < kHighestFrequency; f += kFrequencyStep) {
@@ -103,13 +104,15 @@ void add_speeds(JointRun& run, double window_s, double settle_s) {
     Eigen::Index first = k;
     while (first > 0 && run.t_s[k] - run.t_s[first] < window_s) --first;
     const auto count = k - first + 1;
-    const Eigen::ArrayXd t = run.t_s.segment(first, count).array() - run.t_s.segment(first, count).mean();
+    const Eigen::ArrayXd t =
+        run.t_s.segment(first, count).array() - run.t_s.segment(first, count).mean();
     run.speed[k] = (t * run.q.segment(first, count).array()).sum() / t.square().sum();
     Eigen::Index begin = k;
     while (begin > 0 && run.t_s[k] - run.t_s[begin] < settle_s) --begin;
     const Eigen::ArrayXd lately = run.speed.segment(begin, k - begin + 1).array();
+    // Only speeding up counts: slowing down is what an obstacle does.
     const bool steady = run.t_s[k] - run.t_s[begin] >= settle_s && std::abs(run.speed[k]) > 0.3 &&
-                        (lately - run.speed[k]).abs().maxCoeff() < 0.2 * std::abs(run.speed[k]) + 0.05;
+                        lately.abs().minCoeff() > 0.75 * std::abs(run.speed[k]) - 0.05;
     run.quiet_speed[k] = steady ? 1.0 : 0.0;
   }
 }
@@ -146,7 +149,8 @@ std::vector<double> find_frequencies(const std::vector<const JointRun*>& runs) {
 
 RippleModel learn_ripple(const std::vector<const JointRun*>& runs,
                          const std::vector<double>& frequencies) {
-  RippleModel model{.frequencies = frequencies};
+  RippleModel model;
+  model.frequencies = frequencies;
   fit(steady_rows(runs), model);
   double squares = 0.0;
   double count = 0.0;

@@ -13,22 +13,24 @@ namespace kinescope {
 /// One run; speeds are causal slopes over a trailing window.
 struct JointRun {
   Eigen::VectorXd t_s, q, current, speed;
-  Eigen::VectorXd quiet_speed;  ///< 1 where the speed has been steady for a while, else 0
-  Eigen::Index free = 0;        ///< samples at the beginning that are surely without contact
+  Eigen::VectorXd
+      quiet_speed;        ///< 1 where it has not been speeding up or turning round lately, else 0
+  Eigen::Index free = 0;  ///< samples at the beginning that are surely without contact
 };
 
 struct RippleModel {
   std::vector<double> frequencies;  ///< cycles per unit of position
-  Eigen::VectorXd weights{};
-  Eigen::MatrixXd covariance{};  ///< of the weights
-  double steady_sigma = 0.0;   ///< rms of what is left in steady motion, A
+  Eigen::VectorXd weights;
+  Eigen::MatrixXd covariance;  ///< of the weights
+  double steady_sigma = 0.0;     ///< rms of what is left in steady motion, A
   double unsteady_sigma = 0.0;
 
   [[nodiscard]] Eigen::VectorXd predict(const JointRun& run) const;
   [[nodiscard]] Eigen::VectorXd sigma(const JointRun& run) const;
 };
 
-/// Slope of q over the trailing `window_s`, and where it has been within 20 % for `settle_s`.
+/// Slope of q over the trailing `window_s`, and where it has not grown by a third within
+/// `settle_s`.
 void add_speeds(JointRun& run, double window_s, double settle_s);
 
 /// From the free parts of the runs.

@@ -64,8 +64,7 @@ Eigen::VectorXd joint_torque(const RigidModel& model, const Eigen::VectorXd& q, 
   const Eigen::Vector3d at = placed.back() * point;
   for (int k = 0; k <= body; ++k) {
     const Pose& T = placed[static_cast<std::size_t>(k)];
-    const Eigen::Vector3d axis =
-        T.rotation * model.bodies[static_cast<std::size_t>(k)].axis;
+    const Eigen::Vector3d axis = T.rotation * model.bodies[static_cast<std::size_t>(k)].axis;
     out[k] = axis.cross(at - T.translation).dot(force);
   }
   return out;
@@ -101,14 +100,13 @@ void add_contact(const RigidModel& model, const Motion& motion, const ContactWor
 }
 
 void add_noise(const ContactWorldOptions& options, TorqueSamples& samples, Rng& rng) {
-  const double quantum = options.noise.position_quantum_rad;
+  const double quantum = options.position_quantum_rad;
   for (Eigen::Index j = 0; j < samples.q.cols(); ++j) {
-    const double rms = std::sqrt(samples.torque.col(j).squaredNorm() /
-                                 static_cast<double>(samples.torque.rows()));
+    const double torque_sigma_nm = options.torque_sigma_nm * std::pow(0.6, static_cast<double>(j));
     for (Eigen::Index k = 0; k < samples.q.rows(); ++k) {
       if (quantum > 0.0) samples.q(k, j) = quantum * std::round(samples.q(k, j) / quantum);
-      samples.dq(k, j) += rng.normal(options.noise.velocity_sigma_rad_s);
-      samples.torque(k, j) += rng.normal(options.noise.torque_sigma_share * rms);
+      samples.dq(k, j) += rng.normal(options.velocity_sigma_rad_s);
+      samples.torque(k, j) += rng.normal(torque_sigma_nm);
     }
   }
 }
@@ -153,7 +151,8 @@ ContactWorld contact_world(const DynamicModel& model, const ContactWorldOptions&
     add_contact(rigid, motion, options, c, world, rng);
   }
   TorqueSamples& samples = world.samples;
-  samples.t_s = Eigen::VectorXd::LinSpaced(count, 0.0, static_cast<double>(count - 1) / options.rate_hz);
+  samples.t_s =
+      Eigen::VectorXd::LinSpaced(count, 0.0, static_cast<double>(count - 1) / options.rate_hz);
   samples.q = motion.q;
   samples.dq = motion.dq;
   samples.ddq = motion.ddq;

@@ -17,12 +17,6 @@ namespace kinescope {
 /// An arm of links in series, moderate masses, axes alternately across and along the links.
 [[nodiscard]] DynamicModel contact_arm(int joints);
 
-struct ContactNoise {
-  double position_quantum_rad = 4.8e-5;
-  double velocity_sigma_rad_s = 1e-3;
-  double torque_sigma_share = 0.005;  ///< of each joint's rms torque
-};
-
 enum class ContactShape { kStep, kTrapezoid, kHalfSine };
 
 struct ContactWorldOptions {
@@ -32,16 +26,18 @@ struct ContactWorldOptions {
   double contact_s = 0.2;
   double force_n = 25.0;
   ContactShape shape = ContactShape::kTrapezoid;
-  bool at_reversal = false;  ///< contacts begin where joint 1 turns round
+  bool at_reversal = false;            ///< contacts begin where joint 1 turns round
   double undeclared_coulomb_nm = 0.0;  ///< friction that the model does not know, all joints
   double missing_share = 0.0;          ///< samples with a NaN in them
-  ContactNoise noise{};
+  double position_quantum_rad = 4.8e-5;
+  double velocity_sigma_rad_s = 1e-3;
+  double torque_sigma_nm = 0.08;  ///< of joint 1; 0.6 times that of the joint before for the others
 };
 
 struct ContactWorld {
-  TorqueSamples samples{};
-  std::vector<ContactLabel> labels{};
-  Eigen::MatrixXd external{};  ///< true external torque, samples x joints
+  TorqueSamples samples;
+  std::vector<ContactLabel> labels;
+  Eigen::MatrixXd external;  ///< true external torque, samples x joints
 };
 
 [[nodiscard]] ContactWorld contact_world(const DynamicModel& model,

@@ -10,7 +10,8 @@ namespace kinescope {
 namespace {
 
 std::vector<BalanceSample> free_motion(const DynamicModel& model, double duration_s, Rng& rng) {
-  const ContactWorld world = contact_world(model, {.duration_s = duration_s, .rate_hz = 250.0}, rng);
+  const ContactWorld world =
+      contact_world(model, {.duration_s = duration_s, .rate_hz = 250.0}, rng);
   return balance_samples(RigidBalance(make_rigid_model(model), friction_of(model)), world.samples);
 }
 
@@ -32,8 +33,8 @@ TEST(FalseAlarms, AreAsDeclared) {
     EXPECT_LE(check.lower_per_hour, check.observed_per_hour);
     EXPECT_GE(check.upper_per_hour, check.observed_per_hour);
   }
-  // 45 alarms are expected. Each calibration knows its own rate within a factor of about 1.7 from 40 s,
-  // six of them within 1.25; with the count's own spread four sigma are a factor of 2.2.
+  // 45 alarms are expected. Each calibration knows its own rate within a factor of about 1.7 from
+  // 40 s, six of them within 1.25; with the count's own spread four sigma are a factor of 2.2.
   const double expected = kDeclared_per_hour * hours;
   RecordProperty("alarms", alarms);
   EXPECT_GT(alarms, expected / 2.2);

@@ -3,9 +3,8 @@
 
 #include <array>
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
+#include <gtest/gtest.h>
 
 #include "kinematics/core/rng.h"
 
@@ -41,7 +40,8 @@ TEST(LinkEvidence, ErrsAtTheStatedLevel) {
       Eigen::VectorXd torque = S.llt().matrixL() * normals(rng);
       torque.head(link + 1) += 300.0 * normals(rng);
       torque[link] += 300.0;
-      const std::array looks{JointAnswers{.squares = joint_answers(torque, S).cwiseAbs2(), .count = 1}};
+      const std::array looks{
+          JointAnswers{.squares = joint_answers(torque, S).cwiseAbs2(), .count = 1}};
       const LinkEvidence evidence = link_evidence(looks, kLevel);
       too_far += evidence.link > link ? 1 : 0;
       too_near += evidence.link < link ? 1 : 0;

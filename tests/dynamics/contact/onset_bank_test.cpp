@@ -3,9 +3,8 @@
 // The recursive likelihood ratio against the same ratio written out for all samples at once.
 #include "dynamics/contact/onset_bank.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
+#include <gtest/gtest.h>
 
 #include "kinematics/core/rng.h"
 
@@ -37,7 +36,8 @@ std::vector<BalanceSample> random_samples(Rng& rng, double mass) {
 }
 
 /// Likelihood ratio of a torque since step `onset` (1 ..), from the covariance of all measurements.
-double whole_ratio(const std::vector<BalanceSample>& samples, const BalanceNoise& noise, int onset) {
+double whole_ratio(const std::vector<BalanceSample>& samples, const BalanceNoise& noise, int onset,
+                   bool grows) {
   const double mass = samples[0].mass(0, 0);
   const double decay = std::exp(-kStep_s / noise.model_time_s[0]);
   Eigen::VectorXd y(kSteps);
@@ -59,7 +59,8 @@ double whole_ratio(const std::vector<BalanceSample>& samples, const BalanceNoise
     const auto& b = samples[static_cast<std::size_t>(k)];
     impulse += 0.5 * kStep_s * (a.drive[0] + b.drive[0]);
     y[k - 1] = b.momentum[0] - samples[0].momentum[0] - impulse;
-    h[k - 1] = kStep_s * std::max(0, k - onset + 1);
+    const double acting = std::max(0, k - onset + 1);
+    h[k - 1] = kStep_s * (grows ? 0.5 * acting * acting : acting);
     for (int m = 1; m <= kSteps; ++m) {
       C(k - 1, m - 1) = error_sum(k, m) + white * std::min(k, m) + ends * (k == m ? 2.0 : 1.0);
     }
@@ -84,17 +85,21 @@ TEST(OnsetBank, AgreesWithTheWholeCovariance) {
          {std::array{0, 1, 1}, std::array{1, 2, 3}, std::array{2, 4, 7}}) {
       double best = 0.0;
       for (int age = youngest; age <= oldest; ++age) {
-        best = std::max(best, whole_ratio(samples, noise, kSteps - age + 1));
+        const int onset = kSteps - age + 1;
+        best = std::max(best, whole_ratio(samples, noise, onset, false));
+        // Of growing torques, every second onset is kept from an age of four on.
+        if (age < 4 || onset % 2 == 0)
+          best = std::max(best, whole_ratio(samples, noise, onset, true));
       }
       EXPECT_NEAR(bank.octave(octave).statistic, best, 1e-8 * (1.0 + best)) << mass;
     }
   }
 }
 
-/// Quantiles from tables, Wilson and Hilferty's form being good to a per cent.
+/// Quantiles from tables, Wilson and Hilferty's form being good to three per cent.
 TEST(OnsetBank, ChiSquareQuantiles) {
-  EXPECT_NEAR(chi_square_quantile(1, 3.0902), 10.83, 0.15);
-  EXPECT_NEAR(chi_square_quantile(6, 3.0902), 22.46, 0.2);
+  EXPECT_NEAR(chi_square_quantile(1, 3.0902), 10.83, 0.35);
+  EXPECT_NEAR(chi_square_quantile(6, 3.0902), 22.46, 0.35);
 }
 
 }  // namespace

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dynamics/contact/contact_score.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/contact/contact_score.h"
 #include "dynamics/contact/momentum_observer.h"
 #include "kinematics/core/error.h"
 
@@ -16,9 +15,9 @@ TEST(ContactScore, CountsFoundMissedInventedRepeated) {
                                          {.begin_s = 5.0, .end_s = 6.0, .link = 1},
                                          {.begin_s = 8.0, .end_s = 9.0, .link = 2}};
   const std::vector<DetectedContact> detections{
-      {.alarm_s = 0.9, .end_s = 1.5, .onset_s = 0.9, .link = 3},    // before it can be known
+      {.alarm_s = 0.9, .end_s = 1.5, .onset_s = 0.9, .link = 3},  // before it can be known
       {.alarm_s = 1.01, .end_s = 1.2, .onset_s = 1.0, .link = 3},
-      {.alarm_s = 1.5, .end_s = 2.1, .onset_s = 1.5, .link = 3},    // the same again
+      {.alarm_s = 1.5, .end_s = 2.1, .onset_s = 1.5, .link = 3},  // the same again
       {.alarm_s = 5.03, .end_s = 5.9, .onset_s = 5.01, .link = 2}};
   const ContactScore score = score_contacts(labels, detections);
   EXPECT_EQ(score.found, 2);

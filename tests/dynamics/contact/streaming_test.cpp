@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dynamics/contact/detector.h"
-
 #include <cstdlib>
 #include <limits>
 #include <new>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/contact/detector.h"
 #include "kinematics/core/error.h"
 #include "tests/truth/contact_world.h"
 
@@ -35,8 +34,8 @@ struct World {
   World() {
     Rng rng = Rng::from_name("contact.streaming");
     world = contact_world(model, {.duration_s = 15.0, .contacts = 4}, rng);
-    samples = balance_samples(RigidBalance(make_rigid_model(model), friction_of(model)),
-                              world.samples);
+    samples =
+        balance_samples(RigidBalance(make_rigid_model(model), friction_of(model)), world.samples);
     calibration = calibrate_contacts(samples);
   }
 };
@@ -54,9 +53,9 @@ TEST(Streaming, DecidesAsTheBatch) {
   std::size_t ended = 0;
   std::size_t alarms = 0;
   for (Eigen::Index k = 0; k < log.size(); ++k) {
-    const ContactDecision decision = detector.update(
-        balance.evaluate(log.t_s[k], log.q.row(k).transpose(), log.dq.row(k).transpose(),
-                         log.torque.row(k).transpose()));
+    const ContactDecision decision =
+        detector.update(balance.evaluate(log.t_s[k], log.q.row(k).transpose(),
+                                         log.dq.row(k).transpose(), log.torque.row(k).transpose()));
     if (decision.alarm) {
       ASSERT_LT(alarms, batch.size());
       EXPECT_EQ(detector.event().alarm_s, batch[alarms].alarm_s);
@@ -131,13 +130,16 @@ TEST(Streaming, ContactsAreCutOffByTheEnd) {
 
 TEST(Streaming, RefusesWhatCannotBeCalibrated) {
   EXPECT_THROW((void)calibrate_contacts({}), Error);
-  EXPECT_THROW((void)calibrate_contacts({world().samples.begin(), world().samples.begin() + 100}), Error);
+  EXPECT_THROW((void)calibrate_contacts({world().samples.begin(), world().samples.begin() + 100}),
+               Error);
   EXPECT_THROW((void)calibrate_contacts(world().samples, {.false_alarms_per_hour = 0.0}), Error);
-  EXPECT_THROW((void)calibrate_contacts(world().samples, {.longest_window_s = std::nan("")}), Error);
+  EXPECT_THROW((void)calibrate_contacts(world().samples, {.longest_window_s = std::nan("")}),
+               Error);
   EXPECT_NO_THROW(validate(ContactOptions{}));
   EXPECT_THROW(RigidBalance(make_rigid_model(world().model), {DriveFriction{}}), Error);
-  EXPECT_THROW((void)balance_samples(Eigen::VectorXd(3), Eigen::MatrixXd(3, 2), Eigen::MatrixXd(3, 1)),
-               Error);
+  EXPECT_THROW(
+      (void)balance_samples(Eigen::VectorXd(3), Eigen::MatrixXd(3, 2), Eigen::MatrixXd(3, 1)),
+      Error);
 }
 
 }  // namespace
