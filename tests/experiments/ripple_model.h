@@ -22,7 +22,7 @@ struct RippleModel {
   std::vector<double> frequencies;  ///< cycles per unit of position
   Eigen::VectorXd weights;
   Eigen::MatrixXd covariance;  ///< of the weights
-  double steady_sigma = 0.0;     ///< rms of what is left in steady motion, A
+  double steady_sigma = 0.0;   ///< rms of what is left in steady motion, A
   double unsteady_sigma = 0.0;
 
   [[nodiscard]] Eigen::VectorXd predict(const JointRun& run) const;

@@ -9,7 +9,6 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
-#include <unistd.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"

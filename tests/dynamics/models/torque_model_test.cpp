@@ -92,7 +92,7 @@ TEST(TorqueModel, SameSamplesSameNumbersWithAnyThreads) {
 TEST(TorqueModel, LearnsFromMoreSamples) {
   const Experiment e = two_joints();
   const auto curve =
-      learning_curve(TorqueModelKind::kRbf, e.model, e.train, e.test, {40, 250}, quick());
+      learning_curve(TorqueModelKind::kGip, e.model, e.train, e.test, {20, 250}, quick());
   ASSERT_EQ(curve.size(), 2U);
   EXPECT_EQ(curve[0].samples, 20);
   EXPECT_LT(curve[1].nmse_percent, curve[0].nmse_percent);
