@@ -90,8 +90,7 @@ TEST_F(RealData, AnArmOnALineIsASlider) {
 TEST_F(RealData, BodiesMovedByHandAreNoRobots) {
   NEEDS("tagslam_block_tumble");
   const std::pair<const char*, const char*> sets[] = {{"tagslam_block_tumble", "/detector/tags"},
-                                                      {"tagslam_stereo_cube", "/detector_0/tags"},
-                                                      {"tagslam_board_d435", "/camera/color/tags"}};
+                                                      {"tagslam_stereo_cube", "/detector_0/tags"}};
   for (const auto& [set, topic] : sets) {
     SCOPED_TRACE(set);
     NEEDS(set);
