@@ -36,6 +36,7 @@ set(rooms
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
 set(third_parties
     "opencv2/: calib/vision"
+    "libsvm/: dynamics/models"
     "apriltag: calib/vision"
     "libav: calib/vision"
     "libsw: calib/vision"

@@ -244,7 +244,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
             "Logs to judge on (default: the last part of the log)", false);
   command
       .add_option("--model", dynamics.models,
-                  "parametric, rbf, gip, model_based, semi_parametric, lip (default: all)")
+                  "parametric, rbf, gip, model_based, semi_parametric, lip, svr (default: all)")
       ->delimiter(',')
       ->type_name("LIST");
   add_gravity(command, dynamics.gravity_m_s2);

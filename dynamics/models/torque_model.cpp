@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <utility>
 
+#include "dynamics/data/splits.h"
 #include "dynamics/gp/hyperparameters.h"
 #include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/identify/torque_terms.h"
+#include "dynamics/models/support_vectors.h"
 
 namespace kinescope {
 namespace {
@@ -19,13 +22,14 @@ using Matrix = Eigen::MatrixXd;
 // Of normalised torques, to begin with.
 constexpr double kNoiseStart = 1e-3;
 
-constexpr std::array<std::pair<TorqueModelKind, std::string_view>, 6> kNames{{
+constexpr std::array<std::pair<TorqueModelKind, std::string_view>, 7> kNames{{
     {TorqueModelKind::kParametric, "parametric"},
     {TorqueModelKind::kRbf, "rbf"},
     {TorqueModelKind::kGip, "gip"},
     {TorqueModelKind::kModelBased, "model_based"},
     {TorqueModelKind::kSemiParametric, "semi_parametric"},
     {TorqueModelKind::kLip, "lip"},
+    {TorqueModelKind::kSupportVectors, "svr"},
 }};
 
 Matrix inputs_of(const Matrix& q, const Matrix& dq, const Matrix& ddq) {
@@ -98,11 +102,22 @@ gp::Kernel kernel_of_joint(TorqueModelKind kind, const DynamicModel& model,
   return gp::semi_parametric(features.map, features.prior, gp::first_columns(3 * n));
 }
 
+// One scale for all torques and no shift: a Lagrangian ties them to each other as they are.
+gp::Normalisation common_scale(const gp::Dataset& data) {
+  gp::Normalisation out;
+  const double square = data.targets.squaredNorm() / static_cast<double>(data.targets.size());
+  out.target_shift = Eigen::RowVectorXd::Zero(data.targets.cols());
+  out.target_scale =
+      Eigen::RowVectorXd::Constant(data.targets.cols(), square > 0.0 ? std::sqrt(square) : 1.0);
+  return out;
+}
+
 // The hyperparameters on part of the samples, then the fit on all of them.
 gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool physical_inputs,
                     const TorqueModelOptions& options) {
-  const gp::Normalisation normalisation =
-      physical_inputs ? gp::standardise_targets(data) : gp::standardise(data);
+  const gp::Normalisation normalisation = data.targets.cols() > 1 ? common_scale(data)
+                                          : physical_inputs       ? gp::standardise_targets(data)
+                                                                  : gp::standardise(data);
   const bool several = data.targets.cols() > 1;
   const gp::GpModel start = gp::make_model(kernel, kNoiseStart, normalisation, several);
   gp::EstimateOptions estimate;
@@ -188,6 +203,10 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
                                    const TorqueSamples& samples,
                                    const TorqueModelOptions& options) {
   if (kind == TorqueModelKind::kParametric) return fit_parametric(model, samples, options);
+  if (kind == TorqueModelKind::kSupportVectors) {
+    return models::fit_support_vectors(
+        select_rows(samples, evenly_chosen(samples.size(), options.samples)));
+  }
   const gp::JointKinds joints = kinds_of(make_rigid_model(model));
   const int n = static_cast<int>(joints.size());
   const bool together = kind == TorqueModelKind::kLip;

@@ -28,7 +28,8 @@ enum class TorqueModelKind {
   kGip,             ///< geometrically inspired polynomial and friction, each joint by itself
   kModelBased,      ///< features of the parametric model, each joint by itself
   kSemiParametric,  ///< the same plus a squared exponential for what they lack
-  kLip              ///< Lagrangian-inspired polynomial of all joints together, and friction
+  kLip,             ///< Lagrangian-inspired polynomial of all joints together, and friction
+  kSupportVectors   ///< epsilon-SVR with a Gaussian kernel, each joint by itself
 };
 
 [[nodiscard]] std::string_view to_string(TorqueModelKind kind);
