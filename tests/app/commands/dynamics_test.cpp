@@ -1,36 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope dynamics` as a user meets it: results, products, refusals.
-#include <cmath>
-
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
+#include "tests/app/commands/torque_log_text.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/truth/torque_world.h"
 
 namespace kinescope {
 namespace {
-
-std::string log_csv(const TorqueSamples& samples) {
-  const auto joints = static_cast<int>(samples.joints());
-  std::string text = "t";
-  for (const char* name : {"q", "dq", "ddq", "tau"}) {
-    for (int j = 1; j <= joints; ++j) text += fmt::format(",{}{}", name, j);
-  }
-  text += "\n";
-  for (Eigen::Index i = 0; i < samples.size(); ++i) {
-    text += fmt::format("{}", samples.t_s[i]);
-    for (const Eigen::MatrixXd* values : {&samples.q, &samples.dq, &samples.ddq, &samples.torque}) {
-      for (int j = 0; j < joints; ++j) text += fmt::format(",{}", (*values)(i, j));
-    }
-    text += "\n";
-  }
-  return text;
-}
 
 class DynamicsCommand : public testing::Test {
  protected:
@@ -39,7 +20,7 @@ class DynamicsCommand : public testing::Test {
     const RandomRobot robot = random_robot({.joints = 2, .prismatic_share = 0.0}, rng);
     model_ = random_masses(robot.tree, {.every_direction = false}, rng);
     samples_ = torque_log_of(model_, {.samples = 1500, .trajectories = 1}, rng);
-    folder_.write("log.csv", log_csv(samples_)).write("robot.urdf", write_urdf(model_));
+    folder_.write("log.csv", torque_log_csv(samples_)).write("robot.urdf", write_urdf(model_));
   }
   [[nodiscard]] std::string path(const char* name) const {
     return (folder_.path() / name).string();
@@ -87,7 +68,7 @@ TEST_F(DynamicsCommand, RefusesWhatCannotBe) {
   expect_refusal(words({"--gravity", "0,0"}), ExitCode::kBadRequest, "gravity");
   folder_.write("log.csv", "t,q1,q2,dq1,dq2\n0,0,0,0,0\n1,0,0,0,0\n");
   expect_refusal(words(), ExitCode::kBadInput, "log.csv");
-  folder_.write("log.csv", log_csv(samples_));
+  folder_.write("log.csv", torque_log_csv(samples_));
   folder_.write("robot.urdf", "<robot name='r'><link name='a'/></robot>");
   const Outcome none = run(words());
   EXPECT_NE(none.code, 0);
@@ -97,7 +78,7 @@ TEST_F(DynamicsCommand, RefusesWhatCannotBe) {
 TEST_F(DynamicsCommand, TorquesInTheWrongUnitAreNamed) {
   TorqueSamples wrong = samples_;
   wrong.torque *= 1000.0;
-  folder_.write("log.csv", log_csv(wrong));
+  folder_.write("log.csv", torque_log_csv(wrong));
   const std::string line = expect_refusal(words(), ExitCode::kBadInput, "torque of joint");
   EXPECT_NE(line.find("mNm"), std::string::npos) << line;
   EXPECT_EQ(run(words({"--torque-unit", "mNm"})).code, 0);

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope contact` as a user meets it: contacts found in a log, products, refusals.
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "kinematics/urdf/dynamic_urdf.h"
+#include "tests/app/commands/program.h"
+#include "tests/app/commands/torque_log_text.h"
+#include "tests/app/io/recording_folder.h"
+#include "tests/truth/contact_world.h"
+
+namespace kinescope {
+namespace {
+
+class ContactCommand : public testing::Test {
+ protected:
+  ContactCommand() {
+    const DynamicModel model = contact_arm(3);
+    Rng rng = Rng::from_name("contact command");
+    const ContactWorld free = contact_world(model, {.duration_s = 10.0}, rng);
+    touched_ = contact_world(model, {.duration_s = 8.0, .contacts = 3}, rng);
+    folder_.write("free.csv", torque_log_csv(free.samples))
+        .write("log.csv", torque_log_csv(touched_.samples))
+        .write("robot.urdf", write_urdf(model));
+  }
+  [[nodiscard]] std::string path(const char* name) const {
+    return (folder_.path() / name).string();
+  }
+  [[nodiscard]] std::vector<std::string> words(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> out{"contact",  path("log.csv"), "--robot", path("robot.urdf"),
+                                 "--output", path("out"),     "--quiet"};
+    out.insert(out.end(), more.begin(), more.end());
+    return out;
+  }
+
+  RecordingFolder folder_;
+  ContactWorld touched_;
+};
+
+TEST_F(ContactCommand, FindsEveryContactAndInventsNone) {
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/contacts.json"));
+  const auto& contacts = document.at("contacts");
+  ASSERT_EQ(contacts.size(), touched_.labels.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    constexpr double kOnset = 0.05;  // s
+    EXPECT_NEAR(contacts[k].at("onset_s").get<double>(), touched_.labels[k].begin_s, kOnset);
+  }
+  EXPECT_TRUE(read_text_file(folder_.path() / "out/contacts.csv").starts_with("onset_s,end_s"));
+  EXPECT_NE(read_text_file(folder_.path() / "out/contact.html").find("Contact time line"),
+            std::string::npos);
+}
+
+TEST_F(ContactCommand, LearnsFromTheLogItself) {
+  const Outcome outcome = run(words());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("3 contacts")) << outcome.out;
+}
+
+TEST_F(ContactCommand, RefusesWhatCannotBe) {
+  expect_refusal(words({"--false-alarms", "0"}), ExitCode::kBadRequest, "0");
+  TorqueSamples without = touched_.samples;
+  without.torque.resize(without.size(), 0);
+  folder_.write("log.csv", torque_log_csv(without));
+  expect_refusal(words(), ExitCode::kBadInput, "torque");
+}
+
+}  // namespace
+}  // namespace kinescope
