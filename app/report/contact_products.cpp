@@ -109,12 +109,12 @@ json contact_json(const ContactSummary& summary) {
 std::string contact_verdict(const ContactSummary& summary) {
   const double declared = summary.calibration.options.false_alarms_per_hour;
   if (summary.events.empty()) {
-    return fmt::format("No contact in {:.1f} s, at a declared rate of {:g} false alarms an hour.",
+    return fmt::format("No contact in {:.1f} s; declared false alarms an hour: {:g}.",
                        3600.0 * summary.check.hours, declared);
   }
-  std::string out = fmt::format(
-      "{} contact{} at a declared rate of {:g} false alarms an hour:", summary.events.size(),
-      summary.events.size() == 1 ? "" : "s", declared);
+  std::string out =
+      fmt::format("{} contact{} (declared false alarms an hour: {:g}):", summary.events.size(),
+                  summary.events.size() == 1 ? "" : "s", declared);
   for (const ContactEvent& event : summary.events) {
     out += fmt::format(" {:.3f} to {:.3f} s at {};", event.onset_s, event.end_s,
                        link_name(summary, event.link));
