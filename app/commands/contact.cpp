@@ -11,8 +11,8 @@
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/stopwatch.h"
+#include "app/commands/torque_stages.h"
 #include "app/io/sha256.h"
-#include "app/report/contact_summary.h"
 #include "dynamics/contact/momentum_observer.h"
 #include "dynamics/identify/consistent_model.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -51,8 +51,11 @@ std::vector<TorqueSamples> unfiltered(const TorqueLog& log) {
   const std::vector<Eigen::Index> bounds = log.bounds();
   std::vector<TorqueSamples> out;
   for (std::size_t k = 0; k + 1 < bounds.size(); ++k) {
-    const Eigen::Index from = bounds[k];
-    const Eigen::Index count = bounds[k + 1] - from;
+    // A slope to one side only, at the ends, has another error than those within.
+    const Eigen::Index ends = log.dq.cols() > 0 ? 0 : 1;
+    const Eigen::Index from = bounds[k] + ends;
+    const Eigen::Index count = bounds[k + 1] - ends - from;
+    if (count < 2) continue;
     TorqueSamples part;
     part.t_s = log.t_s.segment(from, count);
     part.q = log.q.middleRows(from, count);
@@ -126,7 +129,7 @@ void print_result(const ContactSummary& summary, const OutputFolder& folder,
 
 }  // namespace
 
-ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
+ContactSummary find_contacts(const ContactCommandOptions& options) {
   Stopwatch clock;
   ContactSummary summary;
   DynamicModel model = read_dynamic_urdf(options.robot);
@@ -175,7 +178,12 @@ ExitCode contact_command(const ContactCommandOptions& options, const Console& co
   folder.write("contacts.csv", contacts_csv(summary));
   folder.write("contacts.json", contact_json(summary).dump(1) + "\n");
   folder.write("contact.html", contact_report_html(summary));
-  print_result(summary, folder, console);
+  return summary;
+}
+
+ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
+  const ContactSummary summary = find_contacts(options);
+  print_result(summary, OutputFolder(options.output), console);
   return ExitCode::kDone;
 }
 

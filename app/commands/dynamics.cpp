@@ -12,9 +12,9 @@
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/stopwatch.h"
+#include "app/commands/torque_stages.h"
 #include "app/io/nearest_name.h"
 #include "app/io/sha256.h"
-#include "app/report/torque_summary.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/data/torque_scale.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -187,7 +187,7 @@ void print_scores(const TorqueSummary& summary) {
 
 }  // namespace
 
-ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
+TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progress) {
   Stopwatch clock;
   TorqueSummary summary;
   const std::vector<TorqueModelKind> kinds = parse_models(options.models);
@@ -218,19 +218,24 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   summary.consistent = consistent_model(summary.identification);
   summary.drives = drives_of(summary);
   clock.lap("identify", summary.times);
-  compare(kinds, model, options.models_options, console.progress, summary);
+  compare(kinds, model, options.models_options, progress, summary);
   clock.lap("models", summary.times);
   if (options.learning_curve) {
     summary.learning = learning_curves(kinds, model, summary, options.models_options);
     clock.lap("learning curve", summary.times);
   }
 
-  const nlohmann::json document = torque_json(summary);
-  folder.write("dynamics.json", document.dump(1) + "\n");
+  folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
   folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));
   folder.write("dynamics.html", torque_report_html(summary));
+  return summary;
+}
+
+ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
+  const TorqueSummary summary = model_torque(options, console.progress);
+  const OutputFolder folder(options.output);
   if (console.json) {
-    fmt::print("{}\n", document.dump(2));
+    fmt::print("{}\n", torque_json(summary).dump(2));
     return ExitCode::kDone;
   }
   const TorqueVerdict verdict = torque_verdict(summary);

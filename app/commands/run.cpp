@@ -11,6 +11,7 @@
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
+#include "app/commands/torque_stages.h"
 #include "app/io/products.h"
 #include "app/report/report.h"
 #include "calib/quality/error_summary.h"
@@ -52,6 +53,7 @@ void print_result(const RunSummary& run, const RunFolder& folder, const Console&
   }
   const Verdict verdict = make_verdict(run);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  for (const std::string& line : run.torque) fmt::print("{}\n", line);
   fmt::print("urdf    {}\nreport  {}\n", folder.file("robot.urdf").string(),
              folder.file("report.html").string());
 }
@@ -112,6 +114,9 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   folder.write("residuals.csv", residuals_csv(run.calibration));
   folder.write("result.json", result_json(run).dump(2) + "\n");
   clock.lap("write", run.times);
+  run.torque =
+      torque_stages(recording, options, run.calibration.tree, folder.file(""), console.progress);
+  if (!run.torque.empty()) clock.lap("torque", run.times);
   folder.write("report.html", report_html(run, urdf));
   clock.lap("report", run.times);
   folder.write("run.json", run_json(run).dump(2) + "\n");

@@ -35,8 +35,9 @@ std::string sections(const Facts& facts, std::string_view urdf) {
          report::view_section(facts) + report::data_section(facts) +
          report::structure_section(facts) + report::parameters_section(facts) +
          report::errors_section(facts) + report::residuals_section(facts) +
-         report::observability_section(facts) + report::method_section(facts) +
-         report::reproduce_section(facts, urdf) + report::licences_section();
+         report::observability_section(facts) + report::torque_section(facts) +
+         report::method_section(facts) + report::reproduce_section(facts, urdf) +
+         report::licences_section();
 }
 
 }  // namespace

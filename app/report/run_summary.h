@@ -59,6 +59,7 @@ struct RunSummary {
   std::optional<KinematicTree> nominal;
   Calibration calibration;
   ErrorSummary errors;
+  std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without
 };
 
 }  // namespace kinescope

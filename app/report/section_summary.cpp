@@ -118,6 +118,15 @@ std::string identity_section(const Facts& facts) {
   return out + "</div></section>\n";
 }
 
+std::string torque_section(const Facts& facts) {
+  if (facts.run.torque.empty()) return "";
+  std::string out = section_head("torque", "Torques and contacts");
+  for (const std::string& line : facts.run.torque) out += paragraph(line);
+  out +=
+      "<p class=\"note\">Details stand in dynamics.html and contact.html beside this report.</p>";
+  return out + "</section>\n";
+}
+
 std::string method_section(const Facts& facts) {
   const RunSummary& run = facts.run;
   const Calibration& calibration = run.calibration;

@@ -20,6 +20,8 @@ namespace kinescope::report {
 [[nodiscard]] std::string errors_section(const Facts& facts);
 [[nodiscard]] std::string residuals_section(const Facts& facts);
 [[nodiscard]] std::string observability_section(const Facts& facts);
+/// Empty for a log without torques.
+[[nodiscard]] std::string torque_section(const Facts& facts);
 [[nodiscard]] std::string method_section(const Facts& facts);
 [[nodiscard]] std::string reproduce_section(const Facts& facts, std::string_view urdf);
 [[nodiscard]] std::string licences_section();
