@@ -212,35 +212,33 @@ ChainJoint joint_from_twist(const Pose& T0, const Vector6d& twist, JointType typ
   return joint;
 }
 
-Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
-                        const std::vector<char>& usable, const ScreeningOptions& options) {
-  Screening out;
+std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
+                                     const std::vector<char>& usable,
+                                     const ScreeningOptions& options) {
+  std::vector<Candidate> out;
   LinearMotion linear = linear_motion(motion);
   const Eigen::MatrixXd q = readings_of(motion, readings);
-  out.free_cost = free_motion_cost(linear);
-  out.mean_length =
-      std::sqrt(linear.y.squaredNorm() / std::max<double>(1.0, static_cast<double>(motion.size())));
   Regression r = regress(linear, q, usable);
   for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass)
     r = regress(linear, q, usable);
 
-  out.candidates.push_back(rest_candidate(linear));
+  out.push_back(rest_candidate(linear));
   if (linear.widest > kWideTurn) {
-    for (Candidate& c : wide_turn_candidates(motion, q, usable, linear, options.coordinate_free)) {
-      out.candidates.push_back(std::move(c));
+    for (Candidate& c : wide_turn_candidates(motion, q, usable, options.coordinate_free)) {
+      out.push_back(std::move(c));
     }
   }
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
   for (std::size_t k = 0; k < channels; ++k) {
     const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
-    add_candidates(linear, r.driven[k], readings_k, out.candidates);
+    add_candidates(linear, r.driven[k], readings_k, out);
   }
   if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0) {
     const Eigen::VectorXd along =
         linear.y.transpose() * r.principal.slope / r.principal.slope.squaredNorm();
-    add_candidates(linear, r.principal, along, out.candidates);
+    add_candidates(linear, r.principal, along, out);
   }
-  std::ranges::stable_sort(out.candidates, {}, &Candidate::cost);
+  std::ranges::stable_sort(out, {}, &Candidate::cost);
   return out;
 }
 

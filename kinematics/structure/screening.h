@@ -2,11 +2,12 @@
 //
 // Takes   a motion (child in parent) and channel readings.
 // Gives   starts for its possible explanations by rest, one turn or one slide, each with a first
-// cost. Method  y(t) = log(T0^-1 T(t)) is linear in the coordinate when one joint lies between the
-// bodies; so the
-//         six components are regressed on every channel at once (driven joint), or their principal
-//         direction is taken (joint that no channel drives). Turns of more than a quarter of a
-//         circle to either side are unwrapped along the sorted channel (or along time).
+//         cost.
+// Method  y(t) = log(T0^-1 T(t)) is linear in the coordinate when one joint lies between the
+//         bodies; so the six components are regressed on every channel at once (driven joint), or
+//         their principal direction is taken (joint that no channel drives). Turns of more than a
+//         quarter of a circle to either side are unwrapped along the sorted channel (or along
+//         time).
 #pragma once
 
 #include <vector>
@@ -22,21 +23,16 @@ struct Candidate {
   double cost = 0.0;  ///< -2 ln likelihood, linear approximation
 };
 
-struct Screening {
-  std::vector<Candidate> candidates;  ///< by cost
-  double free_cost = 0.0;             ///< of a motion with nothing in common with any joint
-  double mean_length = 0.0;           ///< whitened RMS displacement from the mean pose
-};
-
 struct ScreeningOptions {
   bool coordinate_free = true;  ///< also offer joints without a channel
   int max_channels = 3;         ///< best channels kept
 };
 
-/// `usable[c]`: channel c may be used.
-[[nodiscard]] Screening screen_motion(const Motion& motion, const Eigen::MatrixXd& readings,
-                                      const std::vector<char>& usable,
-                                      const ScreeningOptions& options = {});
+/// By cost. `usable[c]`: channel c may be used.
+[[nodiscard]] std::vector<Candidate> screen_motion(const Motion& motion,
+                                                   const Eigen::MatrixXd& readings,
+                                                   const std::vector<char>& usable,
+                                                   const ScreeningOptions& options = {});
 
 /// A start from a body twist (rotation, translation) per unit coordinate at pose T0 (child in
 /// parent).

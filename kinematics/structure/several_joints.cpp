@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "kinematics/structure/screening.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {

@@ -30,13 +30,6 @@ std::string type_words(const Attachment& a) {
   return a.fit.model.joints.front().type == JointType::kRevolute ? "turning" : "sliding";
 }
 
-bool is_below(const GrownTree& tree, int link, int body) {
-  for (int l = link; l >= 0; l = tree.links[static_cast<std::size_t>(l)].parent) {
-    if (tree.links[static_cast<std::size_t>(l)].founder == body) return true;
-  }
-  return false;
-}
-
 // Same parent, type and main channel: the same answer.
 bool same_answer(const Attachment& a, const Attachment& b) {
   if (a.parent != b.parent || a.fit.model.joints.size() != b.fit.model.joints.size()) return false;
@@ -85,8 +78,7 @@ class Judge {
     const double now = body.attachment.cost(correlation);
     std::vector<const Attachment*> listed;
     for (const Attachment& a : body.alternatives) {
-      if (same_answer(a, body.attachment) || is_below(tree_, a.parent, static_cast<int>(b)))
-        continue;
+      if (same_answer(a, body.attachment) || is_below(tree_, a.parent, b)) continue;
       const bool again =
           std::ranges::any_of(listed, [&](const Attachment* l) { return same_answer(*l, a); });
       if (again) continue;
@@ -96,13 +88,13 @@ class Judge {
       alternative.words = words(b, a);
       alternative.first_channel = body.attachment.channel();
       alternative.second_channel = a.channel();
-      alternative.link = own_link(b);
+      alternative.link = own_link(tree_, b);
       out.push_back(std::move(alternative));
     }
     const double free_loss = body.everywhere_cost / correlation - now;
     out.push_back({std::max(0.0, free_loss),
                    fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1,
-                   own_link(b)});
+                   own_link(tree_, b)});
   }
 
   // What the joint that has the alternative's channel now would lose by giving it up.
@@ -113,10 +105,11 @@ class Judge {
           link.attachment.channel() != a.channel()) {
         continue;
       }
-      const GrownBody& other = tree_.bodies[static_cast<std::size_t>(link.founder)];
+      const auto founder = static_cast<std::size_t>(link.founder);
+      const GrownBody& other = tree_.bodies[founder];
       double least = 200.0;
       for (const Attachment& x : other.alternatives) {
-        if (x.channel() == a.channel() || is_below(tree_, x.parent, link.founder)) continue;
+        if (x.channel() == a.channel() || is_below(tree_, x.parent, founder)) continue;
         const double k = link.attachment.fit.correlation;
         least = std::min(least, x.cost(k) - link.attachment.cost(k));
       }
@@ -127,21 +120,14 @@ class Judge {
 
   void add_orders(std::size_t b, std::vector<Alternative>& out) const {
     const GrownBody& body = tree_.bodies[b];
-    if (own_link(b) < 0) return;
+    if (own_link(tree_, b) < 0) return;
     for (const OrderDoubt& d : body.attachment.order_doubts) {
       out.push_back({d.loss / body.attachment.fit.correlation,
                      fmt::format("the joints of {} and {} in the other order",
                                  channel_words(log_, readings_, d.first),
                                  channel_words(log_, readings_, d.second)),
-                     -1, -1, own_link(b)});
+                     -1, -1, own_link(tree_, b)});
     }
-  }
-
-  int own_link(std::size_t b) const {
-    for (std::size_t l = 1; l < tree_.links.size(); ++l) {
-      if (tree_.links[l].founder == static_cast<int>(b)) return static_cast<int>(l);
-    }
-    return -1;
   }
 
   std::string words(std::size_t b, const Attachment& a) const {

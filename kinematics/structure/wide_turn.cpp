@@ -94,7 +94,6 @@ void turn_mount(ChainModel& model, double angle) {
 
 // Evaluates the start as it stands: no iteration.
 double start_cost(const Motion& motion, const Candidate& c, const Eigen::MatrixXd& q) {
-  Eigen::MatrixXd readings = Eigen::MatrixXd::Zero(0, 0);
   Motion numbered = motion;
   for (std::size_t i = 0; i < numbered.size(); ++i) numbered[i].instant = static_cast<int>(i);
   const ChainFit fit = fit_chain(numbered, q.transpose(), c.start, {.max_iterations = 2});
@@ -104,8 +103,7 @@ double start_cost(const Motion& motion, const Candidate& c, const Eigen::MatrixX
 }  // namespace
 
 std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::MatrixXd& q,
-                                            const std::vector<char>& usable,
-                                            const LinearMotion& linear, bool coordinate_free) {
+                                            const std::vector<char>& usable, bool coordinate_free) {
   std::vector<Candidate> out;
   std::vector<std::size_t> order(motion.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -133,7 +131,6 @@ std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::M
     c.cost = start_cost(motion, c, q);
     out.push_back(std::move(c));
   }
-  static_cast<void>(linear);
   return out;
 }
 

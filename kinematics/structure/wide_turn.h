@@ -6,7 +6,6 @@
 
 #include <vector>
 
-#include "kinematics/structure/linear_motion.h"
 #include "kinematics/structure/screening.h"
 
 namespace kinescope::structure_search {
@@ -18,7 +17,6 @@ inline constexpr double kWideTurn = 2.3;
 [[nodiscard]] std::vector<Candidate> wide_turn_candidates(const Motion& motion,
                                                           const Eigen::MatrixXd& q,
                                                           const std::vector<char>& usable,
-                                                          const LinearMotion& linear,
                                                           bool coordinate_free);
 
 }  // namespace kinescope::structure_search

@@ -69,8 +69,8 @@ TEST_P(OneJoint, IsFoundFromScreeningWithItsScaleAndAxis) {
   const double scale = GetParam() == JointType::kRevolute ? 0.5 : 0.1;
   const ChainModel truth = one_joint(GetParam(), scale, rng);
   const Motion motion = motion_of(truth, q, rng, 1.0);
-  const Screening screening = screen_motion(motion, q, {1, 1, 1});
-  const Candidate& best = screening.candidates.front();
+  const std::vector<Candidate> candidates = screen_motion(motion, q, {1, 1, 1});
+  const Candidate& best = candidates.front();
   EXPECT_EQ(best.channel, 0);
   const ChainFit fit = fit_chain(motion, q, best.start);
   EXPECT_EQ(fit.model.joints.front().type, GetParam());
@@ -113,11 +113,11 @@ TEST_P(OneJoint, WithoutAChannelGivesItsCoordinates) {
   const double scale = GetParam() == JointType::kRevolute ? 0.6 : 0.2;
   const ChainModel truth = one_joint(GetParam(), scale, rng);
   const Motion motion = motion_of(truth, q, rng, 1.0);
-  const Screening screening = screen_motion(motion, Eigen::MatrixXd(kSamples, 0), {});
-  const auto free = std::ranges::find_if(screening.candidates, [&](const Candidate& c) {
+  const std::vector<Candidate> candidates = screen_motion(motion, Eigen::MatrixXd(kSamples, 0), {});
+  const auto free = std::ranges::find_if(candidates, [&](const Candidate& c) {
     return !c.start.joints.empty() && c.start.joints.front().type == GetParam();
   });
-  ASSERT_NE(free, screening.candidates.end());
+  ASSERT_NE(free, candidates.end());
   const ChainFit fit = fit_chain(motion, Eigen::MatrixXd(kSamples, 0), free->start);
   EXPECT_NEAR(fit.variance, 1.0, 0.3);
   // Up to sign and zero, the coordinates are those of the truth: correlation.
@@ -145,10 +145,10 @@ TEST(Chain, RestIsCheaperThanAnyJointWhenNothingMoves) {
   truth.mount = random_pose(rng);
   const Eigen::MatrixXd q = sines(2);
   const Motion motion = motion_of(truth, q, rng, 1.0);
-  const Screening screening = screen_motion(motion, q, {1, 1});
+  const std::vector<Candidate> candidates = screen_motion(motion, q, {1, 1});
   double rest = 0.0;
   double least = 1e300;
-  for (const Candidate& c : screening.candidates) {
+  for (const Candidate& c : candidates) {
     const ChainFit fit = fit_chain(motion, q, c.start);
     if (c.start.joints.empty()) rest = fit.cost;
     // Driven joints have 3 to 5 parameters more and gain one chi-square each.
@@ -167,10 +167,10 @@ TEST(Chain, OutliersDoNotMoveTheFit) {
     motion[i].pose.rotation =
         motion[i].pose.rotation * exp_rotation(Eigen::Vector3d(0.9, 0.0, 0.0));
   }
-  const Screening screening = screen_motion(motion, q, {1});
+  const std::vector<Candidate> candidates = screen_motion(motion, q, {1});
   const auto driven =
-      std::ranges::find_if(screening.candidates, [](const Candidate& c) { return c.channel == 0; });
-  ASSERT_NE(driven, screening.candidates.end());
+      std::ranges::find_if(candidates, [](const Candidate& c) { return c.channel == 0; });
+  ASSERT_NE(driven, candidates.end());
   const ChainFit fit = fit_chain(motion, q, driven->start);
   EXPECT_NEAR(std::abs(fit.model.joints.front().terms.front().scale), 0.5,
               5.0 * fit.scale_sigma.front());
@@ -221,10 +221,10 @@ TEST(Chain, TurnsOfSeveralRevolutionsDoNotWrap) {
   }
   ChainModel truth = one_joint(JointType::kRevolute, 4.0, rng);  // 13.6 rad in all
   const Motion motion = motion_of(truth, q, rng, 1.0);
-  const Screening screening = screen_motion(motion, q, {1, 1});
+  const std::vector<Candidate> candidates = screen_motion(motion, q, {1, 1});
   double least = 1e300;
   ChainFit best;
-  for (const Candidate& c : screening.candidates) {
+  for (const Candidate& c : candidates) {
     ChainFit fit = fit_chain(motion, q, c.start);
     if (c.channel >= 0 && fit.cost < least) {
       least = fit.cost;

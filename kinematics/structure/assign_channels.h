@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every channel is the main one of one joint.
+#pragma once
+
+#include "kinematics/structure/growth_state.h"
+
+namespace kinescope::structure_search {
+
+/// Coupled joints take another channel of theirs where that helps; of two joints that still share
+/// one, the one that loses least takes its next best explanation. True when any joint was replaced.
+bool assign_channels(GrowthState& state);
+
+}  // namespace kinescope::structure_search

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/attachment_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kinematics/structure/tangent.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// Where the last joint stands at one instant, and how well that is known.
+struct Coordinate {
+  double value = 0.0;
+  double variance = 0.0;
+};
+
+// Of a single joint whose channel does not tell all: between what the channel says and what the
+// sighting asks for, by their variances.
+Coordinate corrected_coordinate(const Attachment& attachment, const Sighting& sighting,
+                                const Pose& parent, double start) {
+  const ChainModel& model = attachment.fit.model;
+  const double excess = attachment.fit.axis_variance - 1.0;
+  if (!sighting.seen) return {start, excess / 1e6};
+  const Vector6d u = sighting.whitening * axis_in_child(model, 0.0);
+  const double sight = 1.0 / u.squaredNorm();
+  const double prior = excess * sight;
+  const double gain = attachment.driven() ? prior / (prior + sight) : 1.0;
+  const Pose seen = parent.inverse() * sighting.pose;
+  const int passes = attachment.driven() ? 1 : 6;
+  Coordinate out{start, gain * sight};
+  for (int pass = 0; pass < passes; ++pass) {
+    const Vector6d r =
+        sighting.whitening * fast_log(chain_pose_at(model, {out.value}).inverse() * seen);
+    out.value += gain * u.dot(r) * sight;
+  }
+  return out;
+}
+
+// Adds what the joints' parameters leave open about the path (right perturbations). What is
+// constant in the link's frame does not count: the joints that follow take it up.
+void add_parameter_doubt(const ChainFit& fit, const std::vector<std::vector<double>>& coordinates,
+                         const Readings& readings, LinkPath& path) {
+  if (fit.covariance.size() == 0) return;
+  std::vector<Eigen::MatrixXd> jacobians(coordinates.size());
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(6, fit.covariance.rows());
+  double count = 0.0;
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    if (path.valid[i] == 0) continue;
+    jacobians[i] = chain_jacobian(fit.model, coordinates[i], readings.value, static_cast<int>(i));
+    mean += jacobians[i];
+    count += 1.0;
+  }
+  mean /= std::max(1.0, count);
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    if (path.valid[i] == 0) continue;
+    const Eigen::MatrixXd J = jacobians[i] - mean;
+    path.covariance[i] += fit.correlation * (J * fit.covariance * J.transpose());
+  }
+}
+
+// A path of `instants` at which nothing is known yet.
+LinkPath unknown_path(std::size_t instants) {
+  LinkPath path;
+  path.pose.resize(instants);
+  path.valid.assign(instants, 0);
+  path.covariance.assign(instants, Matrix6d::Zero());
+  return path;
+}
+
+// Coordinates of all joints at one instant as the channels say; `previous` without channels.
+std::vector<double> coordinates_at(const Attachment& attachment, const Readings& readings,
+                                   std::size_t instant, double previous) {
+  std::vector<double> values;
+  for (const ChainJoint& joint : attachment.fit.model.joints) {
+    values.push_back(attachment.driven()
+                         ? chain_coordinate(joint, readings.value, static_cast<int>(instant))
+                         : previous);
+  }
+  return values;
+}
+
+}  // namespace
+
+LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath& parent,
+                 const Readings& readings) {
+  const ChainModel& model = attachment.fit.model;
+  const bool single = model.joints.size() == 1;
+  const bool driven = attachment.driven();
+  const bool inexact = single && (!driven || attachment.fit.axis_variance > kInexact);
+  const std::size_t n = parent.pose.size();
+  LinkPath path = unknown_path(n);
+  if (single && !driven) path.coordinate.assign(n, std::nan(""));
+  const Vector6d axis = single ? axis_in_child(model, 0.0) : Vector6d::Zero();
+  std::vector<std::vector<double>> coordinates(n);
+  double previous = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (parent.valid[i] == 0 || readings.valid[i] == 0) continue;
+    if (!driven && !body.at[i].seen) continue;
+    std::vector<double>& values = coordinates[i];
+    values = coordinates_at(attachment, readings, i, previous);
+    if (inexact) {
+      const Coordinate c =
+          corrected_coordinate(attachment, body.at[i], parent.pose[i], values.front());
+      values.front() = previous = c.value;
+      path.covariance[i] = c.variance * axis * axis.transpose();
+    }
+    if (!driven) path.coordinate[i] = values.front();
+    const Pose relative = chain_pose_at(model, values);
+    path.valid[i] = 1;
+    path.pose[i] = parent.pose[i] * relative;
+    if (parent.covariance.empty()) continue;
+    const Matrix6d ad = adjoint(relative.inverse());
+    path.covariance[i] += ad * parent.covariance[i] * ad.transpose();
+  }
+  add_parameter_doubt(attachment.fit, coordinates, readings, path);
+  return path;
+}
+
+}  // namespace kinescope::structure_search

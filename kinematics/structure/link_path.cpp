@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/link_path.h"
+
+#include <cmath>
+
+namespace kinescope::structure_search {
+namespace {
+
+// ln det of the covariance that W whitens.
+double log_det_of(const Matrix6d& W) {
+  double sum = 0.0;
+  for (int c = 0; c < 6; ++c) sum += std::log(std::abs(W(c, c)));
+  return -2.0 * sum;
+}
+
+}  // namespace
+
+LinkPath camera_path(int instants) {
+  LinkPath path;
+  path.pose.assign(static_cast<std::size_t>(instants), Pose{});
+  path.valid.assign(static_cast<std::size_t>(instants), 1);
+  return path;
+}
+
+RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Readings& readings) {
+  RelativeMotion out;
+  for (std::size_t i = 0; i < body.at.size(); ++i) {
+    const Sighting& s = body.at[i];
+    if (!s.seen || path.valid[i] == 0 || readings.valid[i] == 0) continue;
+    const Pose inverse = path.pose[i].inverse();
+    MotionSample sample{.instant = static_cast<int>(i),
+                        .pose = inverse * s.pose,
+                        .whitening = s.whitening,
+                        .alternative = {},
+                        .alternative_cost = s.alternative_cost};
+    if (s.alternative) sample.alternative = inverse * *s.alternative;
+    if (!path.covariance.empty()) {
+      const Matrix6d ad = adjoint(sample.pose.inverse());
+      sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
+      out.log_det += log_det_of(sample.whitening) - log_det_of(s.whitening);
+    }
+    out.motion.push_back(std::move(sample));
+  }
+  return out;
+}
+
+int seen_with_log(const Body& body, const Readings& readings) {
+  int count = 0;
+  for (std::size_t i = 0; i < body.at.size(); ++i) {
+    count += body.at[i].seen && readings.valid[i] != 0 ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace kinescope::structure_search

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/rest.h"
+
+#include <array>
+#include <cmath>
+
+#include "kinematics/structure/attachment_cost.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// Component by component, so that views spoilt by an occlusion do not matter.
+Pose median_pose(const Motion& motion) {
+  const Pose reference = motion[motion.size() / 2].pose;
+  std::array<std::vector<double>, 6> moves;
+  for (const MotionSample& sample : motion) {
+    const Pose move = reference.inverse() * sample.pose;
+    const Eigen::Vector3d turn = log_rotation(move.rotation);
+    for (std::size_t i = 0; i < 3; ++i) {
+      moves[i].push_back(turn[static_cast<Eigen::Index>(i)]);
+      moves[i + 3].push_back(move.translation[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  Vector6d middle;
+  for (std::size_t i = 0; i < 6; ++i) middle[static_cast<Eigen::Index>(i)] = median_of(moves[i]);
+  return reference * Pose{exp_rotation(middle.head<3>()), middle.tail<3>()};
+}
+
+// Less than a robot moves by, at the distance of the body from the camera.
+bool hardly_moves(const Motion& motion, const Pose& from, const Body& body) {
+  constexpr double kTurn = 0.01;    // rad
+  constexpr double kShift = 0.003;  // of the distance from the camera
+  std::vector<double> turn;
+  std::vector<double> shift;
+  for (const MotionSample& sample : motion) {
+    const Pose left = from.inverse() * sample.pose;
+    turn.push_back(log_rotation(left.rotation).norm());
+    shift.push_back(left.translation.norm());
+  }
+  std::vector<double> distance;
+  for (const Sighting& s : body.at) {
+    if (s.seen) distance.push_back(s.pose.translation.norm());
+  }
+  return median_of(turn) <= kTurn && median_of(shift) <= kShift * median_of(distance);
+}
+
+// The body as if it were a link: where it was seen, as well as it was seen.
+LinkPath seen_path(const Body& body) {
+  LinkPath path = camera_path(static_cast<int>(body.at.size()));
+  path.covariance.assign(path.pose.size(), Matrix6d::Zero());
+  for (std::size_t i = 0; i < path.pose.size(); ++i) {
+    const Sighting& s = body.at[i];
+    path.valid[i] = s.seen ? 1 : 0;
+    if (!s.seen) continue;
+    path.pose[i] = s.pose;
+    path.covariance[i] = s.covariance;
+  }
+  return path;
+}
+
+}  // namespace
+
+std::optional<Attachment> practical_rest(const Body& body, int link, const LinkPath& path,
+                                         const Readings& readings) {
+  constexpr std::size_t kFewest = 5;
+  const RelativeMotion relative = relative_motion(body, path, readings);
+  if (relative.motion.size() < kFewest) return std::nullopt;
+  ChainModel model;
+  model.mount = median_pose(relative.motion);
+  if (!hardly_moves(relative.motion, model.mount, body)) return std::nullopt;
+  return attachment_from(fit_chain(relative.motion, readings.value, model), link, relative, body,
+                         readings);
+}
+
+bool rest_on_each_other(const Body& a, double motion_size, const Body& b,
+                        const Readings& readings) {
+  constexpr std::size_t kFewest = 12;
+  constexpr double kNoiseOnly = 4.0;  // variance over the declared one; or
+  constexpr double kOfMotion = 0.1;   // what is left over how far they move
+  const RelativeMotion relative = relative_motion(b, seen_path(a), readings);
+  if (relative.motion.size() < kFewest) return false;
+  ChainModel model;
+  model.mount = relative.motion[relative.motion.size() / 2].pose;
+  const ChainFit fit = fit_chain(relative.motion, readings.value, model);
+  const double left = std::hypot(fit.translation_rms, kLever * fit.rotation_rms);
+  return fit.variance < kNoiseOnly || left < kOfMotion * motion_size;
+}
+
+}  // namespace kinescope::structure_search
