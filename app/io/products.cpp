@@ -35,34 +35,6 @@ std::string channel_name(const JointLog& log, int channel) {
   return log.channels[static_cast<std::size_t>(channel)];
 }
 
-std::string_view status_name(StructureStatus status) {
-  switch (status) {
-    case StructureStatus::kNotRun:
-      return "not_run";
-    case StructureStatus::kDetermined:
-      return "determined";
-    case StructureStatus::kAmbiguous:
-      return "ambiguous";
-    case StructureStatus::kUndetermined:
-      return "undetermined";
-  }
-  return "unknown";
-}
-
-std::string_view status_name(CalibrationStatus status) {
-  switch (status) {
-    case CalibrationStatus::kNotRun:
-      return "not_run";
-    case CalibrationStatus::kConverged:
-      return "converged";
-    case CalibrationStatus::kNotConverged:
-      return "not_converged";
-    case CalibrationStatus::kUndetermined:
-      return "undetermined";
-  }
-  return "unknown";
-}
-
 json structure_joint_json(const StructureJoint& joint, const std::string& name,
                           const JointLog& log) {
   json out{{"name", name},
@@ -212,7 +184,7 @@ json structure_json(const Structure& structure, const JointLog& log) {
   const KinematicTree tree = structure_tree(structure, log);
   json out{{"schema", "kinescope.structure"},
            {"schema_version", 1},
-           {"status", std::string(status_name(structure.status))},
+           {"status", std::string(to_string(structure.status))},
            {"probability", number(structure.probability)},
            {"runner_up", structure.runner_up},
            {"runner_up_log_odds", number(structure.runner_up_log_odds)},
@@ -247,7 +219,7 @@ json structure_json(const Structure& structure, const JointLog& log) {
 json calibration_json(const Calibration& calibration) {
   json out{{"schema", "kinescope.calibration"},
            {"schema_version", 1},
-           {"status", std::string(status_name(calibration.status))},
+           {"status", std::string(to_string(calibration.status))},
            {"status_reason", calibration.status_reason},
            {"robot", tree_json(calibration.tree)},
            {"T_camera_base", pose_json(calibration.T_camera_base)},

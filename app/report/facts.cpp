@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/report/facts.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kinescope::report {
+namespace {
+
+std::string spaced(std::string_view name) {
+  std::string words(name);
+  std::ranges::replace(words, '_', ' ');
+  return words;
+}
+
+}  // namespace
 
 Facts gather_facts(const RunSummary& run) {
   Analysis analysis = analyse(run);
@@ -51,33 +61,9 @@ double held_out_ratio(const Calibration& calibration) {
   return std::isfinite(ratio) ? ratio : 0.0;
 }
 
-std::string_view to_string(StructureStatus status) {
-  switch (status) {
-    case StructureStatus::kNotRun:
-      return "not run";
-    case StructureStatus::kDetermined:
-      return "determined";
-    case StructureStatus::kAmbiguous:
-      return "ambiguous";
-    case StructureStatus::kUndetermined:
-      return "undetermined";
-  }
-  return "unknown";
-}
+std::string status_words(StructureStatus status) { return spaced(kinescope::to_string(status)); }
 
-std::string_view to_string(CalibrationStatus status) {
-  switch (status) {
-    case CalibrationStatus::kNotRun:
-      return "not run";
-    case CalibrationStatus::kConverged:
-      return "converged";
-    case CalibrationStatus::kNotConverged:
-      return "not converged";
-    case CalibrationStatus::kUndetermined:
-      return "undetermined";
-  }
-  return "unknown";
-}
+std::string status_words(CalibrationStatus status) { return spaced(kinescope::to_string(status)); }
 
 std::string_view to_string(MeasurementKind kind) {
   switch (kind) {

@@ -44,8 +44,8 @@ inline constexpr double kDependenceLimit = 0.15;
 [[nodiscard]] double held_out_ratio(const Calibration& calibration);
 
 /// The words of a state, as the result document and the page show it.
-[[nodiscard]] std::string_view to_string(StructureStatus status);
-[[nodiscard]] std::string_view to_string(CalibrationStatus status);
+[[nodiscard]] std::string status_words(StructureStatus status);
+[[nodiscard]] std::string status_words(CalibrationStatus status);
 [[nodiscard]] std::string_view to_string(MeasurementKind kind);
 
 }  // namespace kinescope::report

@@ -40,7 +40,7 @@ std::string sentence(std::string text) {
 void add_failures(const RunSummary& run, std::vector<Finding>& findings) {
   const Calibration& calibration = run.calibration;
   if (calibration.status == CalibrationStatus::kConverged) return;
-  std::string what = fmt::format("The calibration is {}", to_string(calibration.status));
+  std::string what = fmt::format("The calibration is {}", status_words(calibration.status));
   if (!calibration.status_reason.empty()) what += ": " + calibration.status_reason;
   findings.push_back({kFailure, sentence(what), ""});
 }

@@ -185,7 +185,7 @@ json calibration_json(const RunSummary& run) {
     (sighting.used ? used : left_out) += 1;
   }
   const double ratio = held_out_ratio(calibration);
-  return {{"status", to_string(calibration.status)},
+  return {{"status", status_words(calibration.status)},
           {"reason", text(calibration.status_reason)},
           {"gauge", text(calibration.gauge)},
           {"joints", joints_json(run)},

@@ -150,7 +150,7 @@ json structure_json(const RunSummary& run) {
       idle.push_back(text(run.log.channels[index]));
     }
   }
-  return {{"status", to_string(structure.status)},
+  return {{"status", status_words(structure.status)},
           {"probability", number(structure.probability)},
           {"runner_up", text(structure.runner_up)},
           {"runner_up_log_odds", number(structure.runner_up_log_odds)},

@@ -32,7 +32,7 @@ std::string structure_light(const RunSummary& run) {
   const std::string_view css_class = status == StructureStatus::kDetermined  ? "good"
                                      : status == StructureStatus::kAmbiguous ? "fair"
                                                                              : "poor";
-  return light("Structure", css_class, to_string(status),
+  return light("Structure", css_class, status_words(status),
                "determined: every joint has odds of at least 100 : 1 over its runner-up");
 }
 
@@ -46,7 +46,7 @@ std::string geometry_light(const Facts& facts) {
       "{:.0f} % of the residual follows a joint or the time",
       kRatioLimit, 100.0 * kDependenceLimit);
   if (calibration.status != CalibrationStatus::kConverged) {
-    return light("Geometry", "poor", to_string(calibration.status), rule);
+    return light("Geometry", "poor", status_words(calibration.status), rule);
   }
   if (ratio == 0.0) return light("Geometry", "fair", "not checked on unseen data", rule);
   if (ratio > kRatioLimit) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -84,6 +85,9 @@ struct SightingResidual {
 };
 
 enum class CalibrationStatus { kNotRun, kConverged, kNotConverged, kUndetermined };
+
+/// "not_run", "converged", "not_converged", "undetermined".
+[[nodiscard]] std::string_view to_string(CalibrationStatus status);
 
 struct Calibration {
   CalibrationStatus status = CalibrationStatus::kNotRun;

@@ -21,6 +21,7 @@ using namespace structure_search;  // NOLINT(google-build-using-namespace): this
 constexpr int kInstants = 240;
 // A body has to be seen this often to take part.
 constexpr int kFewestSightings = 8;
+
 void check(const PoseTracks& tracks) {
   for (std::size_t f = 1; f < tracks.times_s.size(); ++f) {
     KINESCOPE_CHECK(tracks.times_s[f] > tracks.times_s[f - 1], "frame times increase");
@@ -42,6 +43,20 @@ Structure nothing(StructureDoubt doubt) {
 }
 
 }  // namespace
+
+std::string_view to_string(StructureStatus status) {
+  switch (status) {
+    case StructureStatus::kNotRun:
+      return "not_run";
+    case StructureStatus::kDetermined:
+      return "determined";
+    case StructureStatus::kAmbiguous:
+      return "ambiguous";
+    case StructureStatus::kUndetermined:
+      return "undetermined";
+  }
+  return "unknown";
+}
 
 Structure find_structure(const PoseTracks& tracks, const JointLog& log,
                          const StructureOptions& options) {

@@ -2,18 +2,17 @@
 //
 // Takes   PoseTracks (marker poses over time) and, where there is one, a JointLog.
 // Gives   Structure: which marker is on which link, what joins what, joint types, driving channels
-// with
-//         sign and scale, a start for the calibration, and how probable that answer is.
+//         with sign and scale, a start for the calibration, and how probable that answer is.
 // Frames  link 0 holds the camera (or tracker) and every marker that never moves against it.
 // Method  Dalla Libera et al. 2019, 2021 in the rigid-body form: relative motion of every pair of
-// bodies
-//         as rest, turn or slide along one coordinate; that coordinate regressed on all channels;
-//         the most probable spanning tree.
+//         bodies as rest, turn or slide along one coordinate; that coordinate regressed on all
+//         channels; the most probable spanning tree.
 // Not here: images, corners, refinement (calib/bundle).
 #pragma once
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "kinematics/log/joint_log.h"
@@ -53,6 +52,9 @@ struct StructureLink {
 };
 
 enum class StructureStatus { kNotRun, kDetermined, kAmbiguous, kUndetermined };
+
+/// "not_run", "determined", "ambiguous", "undetermined".
+[[nodiscard]] std::string_view to_string(StructureStatus status);
 
 /// Something that the recording cannot decide, and what to record instead.
 struct StructureDoubt {
