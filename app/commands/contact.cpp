@@ -6,7 +6,6 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
@@ -23,12 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
-
-std::string file_list(const std::vector<fs::path>& files) {
-  std::vector<std::string> names;
-  for (const fs::path& file : files) names.push_back(file.filename().string());
-  return fmt::format("{}", fmt::join(names, ", "));
-}
 
 // Velocities as the slope between the neighbouring positions, where the log has none.
 Eigen::MatrixXd velocities(const TorqueLog& log) {
@@ -166,6 +159,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
 
   summary.events = detect_contacts(summary.calibration, samples);
   std::vector<TimeSpan> spans;
+  spans.reserve(summary.events.size());
   for (const ContactEvent& event : summary.events) spans.push_back({event.onset_s, event.end_s});
   summary.check = check_false_alarms(summary.calibration, samples, spans);
   summary.external_torque = observe_momentum(samples, kObserverGain);

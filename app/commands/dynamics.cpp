@@ -7,7 +7,6 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
@@ -43,12 +42,6 @@ std::vector<TorqueModelKind> parse_models(const std::vector<std::string>& names)
     kinds.push_back(*kind);
   }
   return kinds;
-}
-
-std::string file_list(const std::vector<fs::path>& files) {
-  std::vector<std::string> names;
-  for (const fs::path& file : files) names.push_back(file.filename().string());
-  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 void split_samples(const DynamicsOptions& options, const DynamicModel& model,
@@ -114,10 +107,8 @@ std::vector<DriveEstimate> drives_of(const TorqueSummary& summary) {
   return out;
 }
 
-std::vector<LearningCurve> learning_curves(const std::vector<TorqueModelKind>& kinds,
-                                           const DynamicModel& model, const TorqueSummary& summary,
-                                           const TorqueModelOptions& options) {
-  std::vector<LearningCurve> curves;
+void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const DynamicModel& model,
+                         const TorqueModelOptions& options, TorqueSummary& summary) {
   for (const TorqueModelKind kind : kinds) {
     if (kind == TorqueModelKind::kLip) continue;  // its sizes are other ones
     std::vector<int> sizes;
@@ -127,13 +118,13 @@ std::vector<LearningCurve> learning_curves(const std::vector<TorqueModelKind>& k
       sizes.push_back(size);
     }
     try {
-      curves.push_back(
+      summary.learning.push_back(
           {kind, learning_curve(kind, model, summary.train, summary.test, sizes, options)});
-    } catch (const Error&) {
-      // Too few samples for this model: its line is missing, its score says why.
+    } catch (const Error& error) {
+      summary.warnings.push_back(
+          fmt::format("no learning curve of {}: {}", to_string(kind), error.what()));
     }
   }
-  return curves;
 }
 
 int best_of(const std::vector<TorqueScore>& scores) {
@@ -221,7 +212,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   compare(kinds, model, options.models_options, progress, summary);
   clock.lap("models", summary.times);
   if (options.learning_curve) {
-    summary.learning = learning_curves(kinds, model, summary, options.models_options);
+    add_learning_curves(kinds, model, options.models_options, summary);
     clock.lap("learning curve", summary.times);
   }
 

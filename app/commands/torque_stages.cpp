@@ -65,6 +65,12 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
 
 }  // namespace
 
+std::string file_list(const std::vector<fs::path>& files) {
+  std::string out;
+  for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + file.filename().string();
+  return out;
+}
+
 std::vector<std::string> torque_stages(const Recording& recording, const RunOptions& options,
                                        const KinematicTree& tree, const fs::path& folder,
                                        const Progress& progress) {

@@ -12,6 +12,9 @@
 
 namespace kinescope {
 
+/// "a.csv, b.csv": names of files without their folders.
+[[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);
+
 /// Writes dynamics.json, robot_dynamics.urdf and dynamics.html.
 [[nodiscard]] TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progress);
 

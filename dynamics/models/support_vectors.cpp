@@ -15,7 +15,7 @@
 namespace kinescope::models {
 namespace {
 
-constexpr int kFolds = 4;
+constexpr Eigen::Index kFolds = 4;
 constexpr Eigen::Index kSearchSamples = 500;
 constexpr double kCacheMegabytes = 200.0;
 

@@ -186,6 +186,7 @@ std::optional<TorqueModelKind> torque_model_kind(std::string_view name) {
 const std::vector<TorqueModelKind>& all_torque_models() {
   static const std::vector<TorqueModelKind> kinds = [] {
     std::vector<TorqueModelKind> out;
+    out.reserve(kNames.size());
     for (const auto& [kind, name] : kNames) out.push_back(kind);
     return out;
   }();
@@ -195,6 +196,7 @@ const std::vector<TorqueModelKind>& all_torque_models() {
 std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count) {
   std::vector<Eigen::Index> rows;
   const auto wanted = std::min<Eigen::Index>(samples, count);
+  rows.reserve(static_cast<std::size_t>(wanted));
   for (Eigen::Index i = 0; i < wanted; ++i) rows.push_back(i * samples / wanted);
   return rows;
 }
@@ -219,6 +221,7 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
   std::vector<gp::FittedGp> fits;
   if (together) {
     std::vector<gp::Kernel> friction;
+    friction.reserve(joints.size());
     for (int j = 0; j < n; ++j) {
       friction.push_back(gp::joint_friction(n, j, options.identify.drives.coulomb_width_rad_s));
     }

@@ -38,7 +38,7 @@ TEST(LinkEvidence, ErrsAtTheStatedLevel) {
     for (int t = 0; t < kTrials; ++t) {
       const Eigen::MatrixXd S = random_covariance(rng);
       Eigen::VectorXd torque = S.llt().matrixL() * normals(rng);
-      torque.head(link + 1) += 300.0 * normals(rng);
+      torque.head(link + 1) += 300.0 * normals(rng).head(link + 1);
       torque[link] += 300.0;
       const std::array looks{
           JointAnswers{.squares = joint_answers(torque, S).cwiseAbs2(), .count = 1}};
