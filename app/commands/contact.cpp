@@ -9,7 +9,6 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
-#include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/sha256.h"
 #include "dynamics/contact/momentum_observer.h"
@@ -123,7 +122,6 @@ void print_result(const ContactSummary& summary, const OutputFolder& folder,
 }  // namespace
 
 ContactSummary find_contacts(const ContactCommandOptions& options) {
-  Stopwatch clock;
   ContactSummary summary;
   DynamicModel model = read_dynamic_urdf(options.robot);
   if (options.gravity_m_s2) model.gravity_m_s2 = *options.gravity_m_s2;
@@ -146,7 +144,6 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   const TorqueLogReport log = read_log(options.logs, model, options.data);
   summary.findings = log.findings;
   summary.torque_unit = log.log.torque_unit;
-  clock.lap("read", summary.times);
 
   const RigidBalance balance = make_balance(options, model, summary);
   const std::vector<BalanceSample> samples = balance_of(balance, log.log);
@@ -155,7 +152,6 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.calibration = calibrate_contacts(
       apart ? balance_of(balance, read_log(options.learn_logs, model, options.data).log) : samples,
       options.contact);
-  clock.lap("learn", summary.times);
 
   summary.events = detect_contacts(summary.calibration, samples);
   std::vector<TimeSpan> spans;
@@ -167,7 +163,6 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   for (std::size_t i = 0; i < samples.size(); ++i) {
     summary.t_s[static_cast<Eigen::Index>(i)] = samples[i].stamp_s;
   }
-  clock.lap("detect", summary.times);
 
   folder.write("contacts.csv", contacts_csv(summary));
   folder.write("contacts.json", contact_json(summary).dump(1) + "\n");

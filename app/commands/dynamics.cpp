@@ -146,7 +146,10 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
     TorqueScore score;
     score.kind = kinds[k];
     try {
-      fitted[k] = fit_torque_model(kinds[k], model, summary.train, options);
+      fitted[k] =
+          kinds[k] == TorqueModelKind::kParametric
+              ? parametric_model(summary.identification, static_cast<int>(summary.train.size()))
+              : fit_torque_model(kinds[k], model, summary.train, options);
       score = score_torque_model(fitted[k], summary.test);
     } catch (const Error& error) {
       score.failure = error.what();

@@ -11,13 +11,8 @@ namespace {
 
 using nlohmann::json;
 using report::number;
+using report::numbers;
 using report::text;
-
-json numbers(const Eigen::VectorXd& values) {
-  json out = json::array();
-  for (const double value : values) out.push_back(number(value));
-  return out;
-}
 
 std::string link_name(const ContactSummary& summary, int link) {
   const auto at = static_cast<std::size_t>(link);
@@ -81,10 +76,6 @@ std::string contacts_csv(const ContactSummary& summary) {
 json contact_json(const ContactSummary& summary) {
   json events = json::array();
   for (const ContactEvent& event : summary.events) events.push_back(event_json(summary, event));
-  json inputs = json::array();
-  for (const InputFile& input : summary.inputs) {
-    inputs.push_back({{"name", text(input.name)}, {"sha256", text(input.sha256)}});
-  }
   json findings = json::array();
   for (const LogFinding& finding : summary.findings) findings.push_back(text(to_line(finding)));
   return {{"schema", "kinescope.contact"},
@@ -96,7 +87,7 @@ json contact_json(const ContactSummary& summary) {
           {"links", report::texts(summary.links)},
           {"learned", text(summary.learned)},
           {"model", text(summary.model)},
-          {"inputs", inputs},
+          {"inputs", report::inputs_json(summary.inputs)},
           {"findings", findings},
           {"calibration", calibration_json(summary.calibration)},
           {"check",

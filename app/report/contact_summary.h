@@ -22,7 +22,6 @@ struct ContactSummary {
   std::string version;
   std::string command;
   std::vector<InputFile> inputs;
-  std::vector<StageTime> times;
   std::vector<LogFinding> findings;
 
   std::vector<std::string> joints;

@@ -25,6 +25,20 @@ json standard(const Sigma& sigma) { return sigma ? number(*sigma) : json(nullptr
 
 json text(std::string_view value) { return clean_text(value); }
 
+json numbers(const Eigen::VectorXd& values) {
+  json out = json::array();
+  for (const double value : values) out.push_back(number(value));
+  return out;
+}
+
+json inputs_json(const std::vector<InputFile>& inputs) {
+  json out = json::array();
+  for (const InputFile& input : inputs) {
+    out.push_back({{"name", text(input.name)}, {"sha256", text(input.sha256)}});
+  }
+  return out;
+}
+
 json texts(const std::vector<std::string>& values) {
   json list = json::array();
   for (const std::string& value : values) list.push_back(text(value));

@@ -179,11 +179,8 @@ json residuals_json(const Analysis& analysis, MeasurementKind kind) {
 }
 
 json run_json(const RunSummary& run) {
-  json inputs = json::array(), options = json::array(), times = json::array();
+  json options = json::array(), times = json::array();
   double total = 0.0;
-  for (const InputFile& input : run.inputs) {
-    inputs.push_back({{"name", text(input.name)}, {"sha256", text(input.sha256)}});
-  }
   for (const auto& [name, value] : run.options) {
     options.push_back({{"name", text(name)}, {"value", text(value)}});
   }
@@ -197,7 +194,7 @@ json run_json(const RunSummary& run) {
           {"kind", to_string(run.calibration.kind)},
           {"version", text(run.version)},
           {"command", text(run.command)},
-          {"inputs", inputs},
+          {"inputs", inputs_json(run.inputs)},
           {"options", options},
           {"times", times},
           {"total_s", number(total)}};

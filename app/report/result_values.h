@@ -14,11 +14,14 @@
 namespace kinescope::report {
 
 [[nodiscard]] nlohmann::json number(double value);
+[[nodiscard]] nlohmann::json numbers(const Eigen::VectorXd& values);
 [[nodiscard]] nlohmann::json standard(const Sigma& sigma);
 /// Twice the standard uncertainty; null where there is none.
 [[nodiscard]] nlohmann::json expanded(const Sigma& sigma);
 [[nodiscard]] nlohmann::json text(std::string_view value);
 [[nodiscard]] nlohmann::json texts(const std::vector<std::string>& values);
+/// [name, sha256] of each.
+[[nodiscard]] nlohmann::json inputs_json(const std::vector<InputFile>& inputs);
 [[nodiscard]] nlohmann::json vector3(const Eigen::Vector3d& v);
 /// Translation, quaternion and URDF's fixed-axis roll, pitch, yaw.
 [[nodiscard]] nlohmann::json pose(const Pose& T);

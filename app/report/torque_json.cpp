@@ -8,22 +8,10 @@ namespace kinescope {
 namespace {
 
 using nlohmann::json;
+using report::inputs_json;
 using report::number;
+using report::numbers;
 using report::text;
-
-json numbers(const Eigen::VectorXd& values) {
-  json out = json::array();
-  for (const double value : values) out.push_back(number(value));
-  return out;
-}
-
-json inputs_json(const std::vector<InputFile>& inputs) {
-  json out = json::array();
-  for (const InputFile& input : inputs) {
-    out.push_back({{"name", text(input.name)}, {"sha256", text(input.sha256)}});
-  }
-  return out;
-}
 
 json findings_json(const std::vector<LogFinding>& findings) {
   json out = json::array();

@@ -150,17 +150,6 @@ TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matr
   return out;
 }
 
-FittedTorqueModel fit_parametric(const DynamicModel& model, const TorqueSamples& samples,
-                                 const TorqueModelOptions& options) {
-  const auto found =
-      std::make_shared<const Identification>(identify_dynamics(model, samples, options.identify));
-  FittedTorqueModel out{TorqueModelKind::kParametric, static_cast<int>(samples.size()), {}};
-  out.predict = [found](const Matrix& q, const Matrix& dq, const Matrix& ddq) {
-    return predict_torque(*found, q, dq, ddq);
-  };
-  return out;
-}
-
 FittedTorqueModel with_gps(TorqueModelKind kind, int samples, std::vector<gp::FittedGp> fits,
                            int threads) {
   FittedTorqueModel out{kind, samples, {}};
@@ -193,6 +182,15 @@ const std::vector<TorqueModelKind>& all_torque_models() {
   return kinds;
 }
 
+FittedTorqueModel parametric_model(const Identification& found, int samples) {
+  const auto shared = std::make_shared<const Identification>(found);
+  FittedTorqueModel out{TorqueModelKind::kParametric, samples, {}};
+  out.predict = [shared](const Matrix& q, const Matrix& dq, const Matrix& ddq) {
+    return predict_torque(*shared, q, dq, ddq);
+  };
+  return out;
+}
+
 std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count) {
   std::vector<Eigen::Index> rows;
   const auto wanted = std::min<Eigen::Index>(samples, count);
@@ -204,7 +202,10 @@ std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count) {
 FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
                                    const TorqueSamples& samples,
                                    const TorqueModelOptions& options) {
-  if (kind == TorqueModelKind::kParametric) return fit_parametric(model, samples, options);
+  if (kind == TorqueModelKind::kParametric) {
+    return parametric_model(identify_dynamics(model, samples, options.identify),
+                            static_cast<int>(samples.size()));
+  }
   if (kind == TorqueModelKind::kSupportVectors) {
     return models::fit_support_vectors(
         select_rows(samples, evenly_chosen(samples.size(), options.samples)));

@@ -62,6 +62,9 @@ struct FittedTorqueModel {
                                                  const TorqueSamples& samples,
                                                  const TorqueModelOptions& options = {});
 
+/// The parametric model of an identification that is already there.
+[[nodiscard]] FittedTorqueModel parametric_model(const Identification& found, int samples);
+
 /// `count` rows at most, evenly spread over the samples.
 [[nodiscard]] std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count);
 
