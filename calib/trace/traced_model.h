@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What tracing needs of a model, whatever it is a model of: its residual, how the residual answers
+// to the model's own parameters and to effects it may lack, and a fit with some effects in it.
+// Rows are whitened; an instant is a frame, a posture or a sample with all its rows.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+namespace kinescope {
+
+/// A model at its solution. Rows are grouped by instant, instants in the order of time.
+struct Linearisation {
+  Eigen::VectorXd residual;      ///< rows, whitened: observed minus predicted
+  Eigen::MatrixXd jacobian;      ///< rows x parameters: d predicted / d parameter; the parameters
+                                 ///< of added effects stand last, in their order
+  Eigen::MatrixXd prior;         ///< parameters x parameters: information of priors; empty: none
+  Eigen::SparseMatrix<double> carriers;  ///< rows x carriers: what effects act through, as
+                                         ///< d predicted / d (a joint's value, a marker's shift ..)
+  std::vector<Eigen::Index> first_row;   ///< of every instant, and one past the last
+  Eigen::VectorXd time_s;                ///< of every instant
+  std::vector<int> fold;  ///< of every instant: unseen postures (or paths) are held out together
+  Eigen::VectorXd unit;   ///< rows: what one whitened unit is in the unit of `unit_name`
+  std::string unit_name;  ///< "px", "m", "N m"
+  /// Instants were taken one by one (postures): noise does not carry over from one to the next.
+  bool independent_instants = false;
+
+  [[nodiscard]] Eigen::Index instants() const { return time_s.size(); }
+};
+
+/// One parameter of an effect: prediction changes by parameter x share(instant) x carrier(row).
+struct EffectColumn {
+  int carrier = 0;
+  Eigen::VectorXd share;  ///< instants; empty: 1 everywhere
+};
+
+struct EffectParameter {
+  std::string name;  ///< "sine", "cosine"
+  std::string unit;
+};
+
+/// What an effect is called and where it sits. The names are fixed (README, "Effects").
+struct EffectId {
+  std::string effect;  ///< "gear_error"
+  std::string place;   ///< "joint3", "tag_12", "camera", "clock"
+  [[nodiscard]] bool operator==(const EffectId&) const = default;
+  [[nodiscard]] auto operator<=>(const EffectId&) const = default;
+};
+
+/// An effect that the model may lack. All of its parameters are zero when it is absent.
+struct Candidate {
+  EffectId id;
+  std::string words;   ///< "the encoder of joint3 runs out of centre"
+  std::string check;   ///< what to look at on the robot
+  std::string record;  ///< what to record so that it shows
+  std::vector<EffectParameter> parameters;
+  /// The size that is reported is the parameter itself where there is one, else
+  /// sqrt(sum of weight x parameter^2), in `size_unit`.
+  Eigen::VectorXd size_weights;
+  std::string size_unit;
+  /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
+  std::vector<double> scan;
+  std::string scan_name;
+  std::string scan_unit;
+  /// One column a parameter, at a value of the scan (0 where there is none).
+  std::function<std::vector<EffectColumn>(double scan)> columns;
+};
+
+/// What an unexplained rest may depend on.
+struct Covariate {
+  std::string name;  ///< "value of joint3", "direction of joint3", "time"
+  std::string unit;
+  Eigen::VectorXd value;  ///< instants
+};
+
+/// Where an unexplained rest may act.
+struct RestPlace {
+  std::string name;  ///< "joint3", "tag_12 across"
+  std::string unit;  ///< of the carrier's factor
+  int carrier = 0;
+};
+
+struct AddedEffect {
+  EffectId id;
+  double scan = 0.0;
+};
+
+/// A model fitted with some effects in it.
+struct TracedFit {
+  bool converged = false;
+  std::string reason;  ///< where it did not
+  Linearisation linear;
+  std::vector<Eigen::VectorXd> values;  ///< of the added effects' parameters
+  /// What the fitted model may still lack; effects that were added are among them and may be added
+  /// again at another value of the scan (a second gear error, a second slip).
+  std::vector<Candidate> candidates;
+  std::vector<Covariate> covariates;
+  std::vector<RestPlace> rest_places;
+};
+
+class TracedModel {
+ public:
+  virtual ~TracedModel() = default;
+  /// Least squares over everything, from the same start every time. Throws nothing for effects that
+  /// `candidates` named.
+  [[nodiscard]] virtual TracedFit fit(const std::vector<AddedEffect>& effects) const = 0;
+
+ protected:
+  TracedModel() = default;
+  TracedModel(const TracedModel&) = default;
+  TracedModel& operator=(const TracedModel&) = default;
+};
+
+}  // namespace kinescope
