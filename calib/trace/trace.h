@@ -35,11 +35,11 @@ struct TraceOptions {
 
 enum class TraceVerdict {
   kNotRun,
-  kEffects,         ///< named, sized, corrected; nothing else is left
-  kAmbiguous,       ///< one of several effects; this recording cannot tell which
-  kUnknown,         ///< structure is left that no known effect explains
-  kClean,           ///< the residual is noise
-  kNothingToSay     ///< the recording is too short, or the model did not converge
+  kEffects,      ///< named, sized, corrected; nothing else is left
+  kAmbiguous,    ///< one of several effects; this recording cannot tell which
+  kUnknown,      ///< structure is left that no known effect explains
+  kClean,        ///< the residual is noise
+  kNothingToSay  ///< the recording is too short, or the model did not converge
 };
 
 /// "not_run", "effects", "ambiguous", "unknown", "clean", "nothing_to_say".
@@ -69,15 +69,15 @@ struct TracedEffect {
   std::string check;
   double size = 0.0;
   std::string unit;
-  Interval interval;  ///< 95 %
-  double explained = 0.0;  ///< share of the residual's sum of squares that it takes away
+  Interval interval;       ///< 95 %
+  double explained = 0.0;  ///< share of the base model's sum of squares that it alone takes away
   std::vector<EffectValue> values;
   double scan = 0.0;
   std::string scan_name;  ///< empty: none
   std::string scan_unit;
-  double p_value = 1.0;  ///< over the whole family of tests
-  HeldOutError held_out_before;  ///< without this effect and those after it
-  HeldOutError held_out_after;
+  double p_value = 1.0;          ///< over the whole family of tests
+  HeldOutError held_out_before;  ///< with all the others, without this one
+  HeldOutError held_out_after;   ///< with all
 };
 
 /// Several effects, each of which explains what the others explain.
@@ -91,8 +91,8 @@ enum class CandidateState {
   kTested,    ///< not significant, or less so than another
   kRefitted,  ///< fitted in full and not chosen
   kAccepted,
-  kRemoved,   ///< accepted at first, did not earn its place in the end
-  kHidden     ///< the model's own parameters take its shape: this recording cannot show it
+  kRemoved,  ///< accepted at first, did not earn its place in the end
+  kHidden    ///< the model's own parameters take its shape: this recording cannot show it
 };
 
 /// "tested", "refitted", "accepted", "removed", "hidden".
@@ -110,7 +110,7 @@ struct TestedCandidate {
   double scan = 0.0;
   double size = 0.0;  ///< as the score test sees it
   std::string unit;
-  std::optional<double> held_out;  ///< error after a refit
+  std::optional<double> held_out;  ///< error after a refit, in the residual's unit
 };
 
 struct NotFoundEffect {
@@ -147,7 +147,7 @@ struct TraceStep {
 
 struct Trace {
   TraceVerdict verdict = TraceVerdict::kNotRun;
-  std::string reason;  ///< in one sentence
+  std::string reason;                  ///< in one sentence
   std::vector<TracedEffect> accepted;  ///< in the order in which they were found
   std::vector<AddedEffect> added;      ///< the same, as TracedModel::fit takes them
   std::vector<Ambiguity> ambiguities;

@@ -14,12 +14,15 @@
 
 namespace kinescope {
 
+/// Rows lie together: an instant's rows are read at once.
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 /// A model at its solution. Rows are grouped by instant, instants in the order of time.
 struct Linearisation {
-  Eigen::VectorXd residual;      ///< rows, whitened: observed minus predicted
-  Eigen::MatrixXd jacobian;      ///< rows x parameters: d predicted / d parameter; the parameters
-                                 ///< of added effects stand last, in their order
-  Eigen::MatrixXd prior;         ///< parameters x parameters: information of priors; empty: none
+  Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
+  RowMatrix jacobian;        ///< rows x parameters: d predicted / d parameter; the parameters
+                             ///< of added effects stand last, in their order
+  Eigen::MatrixXd prior;     ///< parameters x parameters: information of priors; empty: none
   Eigen::SparseMatrix<double> carriers;  ///< rows x carriers: what effects act through, as
                                          ///< d predicted / d (a joint's value, a marker's shift ..)
   std::vector<Eigen::Index> first_row;   ///< of every instant, and one past the last
@@ -29,6 +32,7 @@ struct Linearisation {
   std::string unit_name;  ///< "px", "m", "N m"
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.
   bool independent_instants = false;
+  double correlation_time_s = 0.0;  ///< integral time of the residual's autocorrelation
 
   [[nodiscard]] Eigen::Index instants() const { return time_s.size(); }
 };

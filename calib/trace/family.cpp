@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/family.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/trace/distribution.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::trace {
+namespace {
+
+// Golden-section steps around the best value of a scan: to a hundredth of its spacing.
+constexpr int kRefinements = 10;
+constexpr double kGolden = 0.6180339887498949;
+
+double refine(const NormalSystem& system, const Candidate& candidate, std::size_t best) {
+  const std::vector<double>& scan = candidate.scan;
+  double low = scan[best == 0 ? 0 : best - 1];
+  double high = scan[std::min(best + 1, scan.size() - 1)];
+  const auto gain = [&](double value) { return gain_of(system, candidate.columns(value)); };
+  double left = high - kGolden * (high - low);
+  double right = low + kGolden * (high - low);
+  double at_left = gain(left);
+  double at_right = gain(right);
+  for (int i = 0; i < kRefinements; ++i) {
+    if (at_left > at_right) {
+      high = right;
+      right = left;
+      at_right = at_left;
+      left = high - kGolden * (high - low);
+      at_left = gain(left);
+    } else {
+      low = left;
+      left = right;
+      at_left = at_right;
+      right = low + kGolden * (high - low);
+      at_right = gain(right);
+    }
+  }
+  const double middle = at_left > at_right ? left : right;
+  return std::max(at_left, at_right) > gain(scan[best]) ? middle : scan[best];
+}
+
+double best_scan(const NormalSystem& system, const Candidate& candidate) {
+  if (candidate.scan.empty()) return 0.0;
+  std::size_t best = 0;
+  double most = -1.0;
+  for (std::size_t i = 0; i < candidate.scan.size(); ++i) {
+    const double gain = gain_of(system, candidate.columns(candidate.scan[i]));
+    if (gain > most) {
+      most = gain;
+      best = i;
+    }
+  }
+  return refine(system, candidate, best);
+}
+
+}  // namespace
+
+std::vector<TestedMember> test_family(const NormalSystem& system,
+                                      const std::vector<Candidate>& candidates) {
+  std::vector<TestedMember> out;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& candidate = candidates[i];
+    TestedMember member;
+    member.index = i;
+    member.scan = best_scan(system, candidate);
+    member.columns = candidate.columns(member.scan);
+    KINESCOPE_CHECK(member.columns.size() == candidate.parameters.size(), "one column a parameter");
+    member.score = score_test(system, member.columns);
+    member.tests = static_cast<double>(candidates.size()) *
+                   static_cast<double>(std::max<std::size_t>(1, candidate.scan.size()));
+    member.p_value = std::min(1.0, member.score.p_value * member.tests);
+    out.push_back(std::move(member));
+  }
+  return out;
+}
+
+double size_of(const Candidate& candidate, const Eigen::VectorXd& theta) {
+  if (theta.size() == 1) return theta[0];
+  return std::sqrt(candidate.size_weights.dot(theta.cwiseAbs2()));
+}
+
+double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
+                  const Eigen::MatrixXd& covariance) {
+  if (theta.size() == 1) return std::sqrt(std::max(0.0, covariance(0, 0)));
+  const double size = size_of(candidate, theta);
+  if (!(size > 0.0)) return 0.0;
+  const Eigen::VectorXd slope = candidate.size_weights.cwiseProduct(theta) / size;
+  return std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+}
+
+double smallest_size(const Candidate& candidate, const Score& score, double p_value) {
+  // At the threshold of the test plus the one-sided 95 % quantile of the normal distribution.
+  constexpr double kPower = 1.645;
+  const double k = score.rank;
+  const double threshold =
+      std::sqrt(k * f_quantile(p_value, k, std::max(2.0, score.freedom))) + kPower;
+  double variance = score.covariance(0, 0);
+  if (candidate.parameters.size() > 1) {
+    double counted = 0.0;
+    variance = 0.0;
+    for (Eigen::Index i = 0; i < candidate.size_weights.size(); ++i) {
+      if (!(candidate.size_weights[i] > 0.0)) continue;
+      variance += candidate.size_weights[i] * score.covariance(i, i);
+      counted += 1.0;
+    }
+    variance /= std::max(1.0, counted);
+  }
+  return threshold * std::sqrt(std::max(0.0, variance));
+}
+
+}  // namespace kinescope::trace

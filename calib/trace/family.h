@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// All candidates tested at once, each at the best value of its scan, with the number of tests
+// counted in.
+#pragma once
+
+#include <vector>
+
+#include "calib/trace/score_test.h"
+
+namespace kinescope::trace {
+
+struct TestedMember {
+  std::size_t index = 0;  ///< into the candidates
+  double scan = 0.0;
+  std::vector<EffectColumn> columns;  ///< at that value
+  Score score;
+  double tests = 1.0;    ///< by which the p-value of one test is multiplied
+  double p_value = 1.0;  ///< over the family; Bonferroni over candidates and values of their scans
+};
+
+[[nodiscard]] std::vector<TestedMember> test_family(const NormalSystem& system,
+                                                    const std::vector<Candidate>& candidates);
+
+/// Signed parameter where there is one, else the weighted length.
+[[nodiscard]] double size_of(const Candidate& candidate, const Eigen::VectorXd& theta);
+/// Standard uncertainty of it.
+[[nodiscard]] double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
+                                const Eigen::MatrixXd& covariance);
+/// The size that a test at level `p_value` finds in 95 of 100 recordings.
+[[nodiscard]] double smallest_size(const Candidate& candidate, const Score& score, double p_value);
+
+}  // namespace kinescope::trace

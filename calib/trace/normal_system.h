@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A linearised model as sums: everything that tests of effects need of thousands of rows, by cell.
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "calib/trace/partition.h"
+#include "calib/trace/traced_model.h"
+
+namespace kinescope::trace {
+
+/// J'J, J'r and r'r over the rows of a cell.
+struct CellSums {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  double rr = 0.0;
+};
+
+/// The same of an effect's columns E beside the model's own J: J'E, E'E, E'r.
+struct EffectSums {
+  Eigen::MatrixXd JE;
+  Eigen::MatrixXd EE;
+  Eigen::VectorXd Er;
+};
+
+/// Inverse of a symmetric positive semidefinite matrix whose directions below `floor` of the
+/// largest (diagonal scaled to 1) are left out.
+[[nodiscard]] Eigen::MatrixXd scaled_pseudo_inverse(const Eigen::MatrixXd& matrix, double floor);
+
+class NormalSystem {
+ public:
+  /// Keeps a reference to `linear`.
+  NormalSystem(const Linearisation& linear, Partition partition);
+
+  [[nodiscard]] const Linearisation& linear() const { return *linear_; }
+  [[nodiscard]] const Partition& partition() const { return partition_; }
+  [[nodiscard]] const std::vector<CellSums>& cells() const { return cells_; }
+  [[nodiscard]] const CellSums& total() const { return total_; }
+  /// (J'J + prior)^-1, directions that the data do not show left out.
+  [[nodiscard]] const Eigen::MatrixXd& inverse() const { return inverse_; }
+  [[nodiscard]] Eigen::Index parameters() const { return total_.g.size(); }
+
+  /// Sums over all rows.
+  [[nodiscard]] EffectSums sums(const std::vector<EffectColumn>& columns) const;
+  /// Sums over each cell.
+  [[nodiscard]] std::vector<EffectSums> cell_sums(const std::vector<EffectColumn>& columns) const;
+  /// Rows that the carriers of these columns touch while their share is not zero.
+  [[nodiscard]] double touched_rows(const std::vector<EffectColumn>& columns) const;
+
+ private:
+  // Of one carrier at each instant: carrier'residual, carrier'J, and how many rows it touches.
+  struct CarrierSums {
+    Eigen::VectorXd with_residual;
+    Eigen::MatrixXd with_jacobian;  // instants x parameters
+    Eigen::VectorXd rows;
+  };
+  [[nodiscard]] const CarrierSums& carrier(int index) const;
+  [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;
+  [[nodiscard]] Eigen::VectorXd share_of(const EffectColumn& column) const;
+
+  const Linearisation* linear_;
+  Partition partition_;
+  std::vector<int> instant_;  // of every row
+  std::vector<CellSums> cells_;
+  CellSums total_;
+  Eigen::MatrixXd inverse_;
+  // Filled as candidates ask for them.
+  mutable std::map<int, CarrierSums> carriers_;
+  mutable std::map<std::pair<int, int>, Eigen::VectorXd> products_;
+};
+
+}  // namespace kinescope::trace

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/rest.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "calib/trace/score_test.h"
+
+namespace kinescope::trace {
+namespace {
+
+constexpr std::size_t kTestKnots = 8;       // of the test: few, for power
+constexpr std::size_t kStretchesAKnot = 5;  // fewer knots where few stretches judge them
+constexpr Eigen::Index kCurveKnots =
+    24;  // of the Gaussian process: many, its prior keeps it smooth
+// The variance of the process is looked for from a millionth to a million times its natural scale.
+constexpr std::array<double, 5> kLengths{1.0, 0.5, 0.25, 0.125,
+                                         0.0625};  // of the covariate's range
+constexpr int kVariances = 25;
+
+// Values of the covariate that split the instants evenly; for a covariate of few values, those.
+std::vector<double> even_knots(const Eigen::VectorXd& values, std::size_t most) {
+  std::vector<double> sorted(values.begin(), values.end());
+  std::ranges::sort(sorted);
+  std::vector<double> distinct = sorted;
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  if (distinct.size() <= most) return distinct;
+  std::vector<double> knots;
+  for (std::size_t k = 0; k < most; ++k) {
+    knots.push_back(sorted[k * (sorted.size() - 1) / (most - 1)]);
+  }
+  knots.erase(std::unique(knots.begin(), knots.end()), knots.end());
+  return knots;
+}
+
+std::vector<double> equal_knots(const Eigen::VectorXd& values) {
+  const std::vector<double> few = even_knots(values, kTestKnots);
+  if (few.size() < kTestKnots) return few;
+  std::vector<double> knots;
+  const double low = values.minCoeff();
+  const double step = (values.maxCoeff() - low) / static_cast<double>(kCurveKnots - 1);
+  for (Eigen::Index k = 0; k < kCurveKnots; ++k) {
+    knots.push_back(low + step * static_cast<double>(k));
+  }
+  return knots;
+}
+
+// Piecewise linear functions, 1 on their own knot and 0 on the others.
+std::vector<EffectColumn> hats(int carrier, const Eigen::VectorXd& values,
+                               const std::vector<double>& knots) {
+  std::vector<EffectColumn> out(knots.size(), {carrier, Eigen::VectorXd::Zero(values.size())});
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const auto above = std::ranges::upper_bound(knots, values[i]);
+    if (above == knots.begin()) {
+      out.front().share[i] = 1.0;
+    } else if (above == knots.end()) {
+      out.back().share[i] = 1.0;
+    } else {
+      const auto right = static_cast<std::size_t>(above - knots.begin());
+      const double fraction = (values[i] - knots[right - 1]) / (knots[right] - knots[right - 1]);
+      out[right - 1].share[i] = 1.0 - fraction;
+      out[right].share[i] = fraction;
+    }
+  }
+  return out;
+}
+
+// Squared exponential, variance 1, on the knots.
+Eigen::MatrixXd correlation(const std::vector<double>& knots, double length) {
+  const auto n = static_cast<Eigen::Index>(knots.size());
+  Eigen::MatrixXd K(n, n);
+  for (Eigen::Index a = 0; a < n; ++a) {
+    for (Eigen::Index b = 0; b < n; ++b) {
+      const double d =
+          (knots[static_cast<std::size_t>(a)] - knots[static_cast<std::size_t>(b)]) / length;
+      K(a, b) = std::exp(-0.5 * d * d);
+    }
+  }
+  K.diagonal().array() += 1e-8;
+  return K;
+}
+
+// What the rows say about the knots' values, the model's own parameters taken out.
+struct Evidence {
+  Eigen::MatrixXd S;
+  Eigen::VectorXd score;
+  double noise = 1.0;  // variance of a whitened row, widened for correlation in time
+};
+
+// Posterior over the knots' values.
+struct Posterior {
+  double log_evidence = -std::numeric_limits<double>::infinity();
+  Eigen::MatrixXd prior_information;
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+// Rasmussen and Williams 2006, eq. 2.30, in the space of the knots' values.
+Posterior posterior(const Evidence& evidence, const Eigen::MatrixXd& K) {
+  const Eigen::Index n = K.rows();
+  const Eigen::LLT<Eigen::MatrixXd> factor(K);
+  Posterior out;
+  if (factor.info() != Eigen::Success) return out;
+  const Eigen::MatrixXd L = factor.matrixL();
+  // In the space z with theta = L z the prior is white.
+  const Eigen::MatrixXd A =
+      Eigen::MatrixXd::Identity(n, n) + L.transpose() * evidence.S * L / evidence.noise;
+  const Eigen::LLT<Eigen::MatrixXd> inner(A);
+  if (inner.info() != Eigen::Success) return out;
+  const Eigen::VectorXd b = L.transpose() * evidence.score / evidence.noise;
+  const Eigen::VectorXd z = inner.solve(b);
+  const double log_determinant =
+      2.0 * Eigen::MatrixXd(inner.matrixL()).diagonal().array().log().sum();
+  out.log_evidence = 0.5 * b.dot(z) - 0.5 * log_determinant;
+  out.mean = L * z;
+  out.covariance = L * inner.solve(Eigen::MatrixXd(L.transpose()));
+  out.prior_information = factor.solve(Eigen::MatrixXd::Identity(n, n)) * evidence.noise;
+  return out;
+}
+
+Posterior best_posterior(const Evidence& evidence, const std::vector<double>& knots) {
+  const double range = knots.back() - knots.front();
+  const double natural =
+      evidence.noise * static_cast<double>(knots.size()) / std::max(1e-300, evidence.S.trace());
+  Posterior best;
+  for (const double length : kLengths) {
+    const Eigen::MatrixXd K = correlation(knots, length * std::max(range, 1e-300));
+    for (int v = 0; v < kVariances; ++v) {
+      const double variance = natural * std::pow(10.0, -3.0 + 0.5 * v);
+      Posterior candidate = posterior(evidence, variance * K);
+      if (candidate.log_evidence > best.log_evidence) best = std::move(candidate);
+    }
+  }
+  return best;
+}
+
+Evidence gather(const NormalSystem& system, const std::vector<EffectColumn>& columns,
+                const Score& score) {
+  const EffectSums sums = system.sums(columns);
+  const Eigen::MatrixXd B = system.inverse() * sums.JE;
+  Evidence out;
+  out.S = sums.EE - sums.JE.transpose() * B;
+  out.score = sums.Er - B.transpose() * system.total().g;
+  const double rows = static_cast<double>(system.linear().residual.size());
+  const double white = (system.total().rr - score.gain) /
+                       std::max(1.0, rows - static_cast<double>(system.parameters()));
+  // F of white noise would be gain / rank / white; the stretches say how much less it is.
+  const double classical = score.gain / std::max(1, score.rank) / std::max(1e-300, white);
+  const double widening = score.statistic > 0.0 ? classical / score.statistic : 1.0;
+  out.noise = white * std::clamp(widening, 1.0, 100.0);
+  return out;
+}
+
+Rest describe(const NormalSystem& system, const RestPlace& place, const Covariate& covariate,
+              const std::vector<double>& knots, const Posterior& curve) {
+  Rest rest;
+  rest.place = place.name;
+  rest.unit = place.unit;
+  rest.covariate = covariate.name;
+  rest.covariate_unit = covariate.unit;
+  rest.at =
+      Eigen::Map<const Eigen::VectorXd>(knots.data(), static_cast<Eigen::Index>(knots.size()));
+  rest.mean = curve.mean;
+  rest.sigma = curve.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  rest.instants = Eigen::VectorXd::Zero(system.linear().instants());
+  const std::vector<EffectColumn> columns = hats(place.carrier, covariate.value, knots);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    rest.instants += curve.mean[static_cast<Eigen::Index>(k)] * columns[k].share;
+  }
+  return rest;
+}
+
+}  // namespace
+
+std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector<RestPlace>& places,
+                                   const std::vector<Covariate>& covariates,
+                                   const std::vector<FoundRest>& known, double level,
+                                   double floor) {
+  const double tests = static_cast<double>(places.size() * covariates.size());
+  const std::size_t test_knots = std::clamp<std::size_t>(
+      static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
+  const RestPlace* best_place = nullptr;
+  const Covariate* best_covariate = nullptr;
+  Score best;
+  for (const RestPlace& place : places) {
+    for (const Covariate& covariate : covariates) {
+      const bool taken = std::ranges::any_of(known, [&](const FoundRest& found) {
+        return found.rest.place == place.name && found.rest.covariate == covariate.name;
+      });
+      if (taken) continue;
+      const std::vector<EffectColumn> columns =
+          hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
+      const Score score = score_test(system, columns);
+      if (score.hidden() || score.p_value * tests > level || score.rms < floor) continue;
+      if (best_place != nullptr && score.gain <= best.gain) continue;
+      const Score confirmed = jackknife_test(system, columns);
+      if (confirmed.p_value * tests > level) continue;
+      best = confirmed;
+      best_place = &place;
+      best_covariate = &covariate;
+    }
+  }
+  if (best_place == nullptr) return std::nullopt;
+
+  const std::vector<double> knots = equal_knots(best_covariate->value);
+  FoundRest out;
+  out.columns = hats(best_place->carrier, best_covariate->value, knots);
+  const Posterior curve = best_posterior(gather(system, out.columns, best), knots);
+  out.prior = curve.prior_information;
+  out.rest = describe(system, *best_place, *best_covariate, knots, curve);
+  out.rest.p_value = std::min(1.0, best.p_value * tests);
+  const Linearisation with = extend(system.linear(), out.columns, out.prior);
+  const NormalSystem after(with, system.partition());
+  const Eigen::VectorXd step = after.inverse() * after.total().g;
+  const double left =
+      after.total().rr - 2.0 * step.dot(after.total().g) + step.dot(after.total().H * step);
+  out.rest.explained = 1.0 - left / system.total().rr;
+  out.rest.held_out_before = held_out_error(system, held_out_instants(system));
+  out.rest.held_out_after = held_out_error(after, held_out_instants(after));
+  return out;
+}
+
+}  // namespace kinescope::trace

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Structure that no known effect explains: where it acts, on what it depends, and a Gaussian
+// process over that in place of a formula.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calib/trace/stage.h"
+
+namespace kinescope::trace {
+
+struct FoundRest {
+  Rest rest;
+  std::vector<EffectColumn> columns;  ///< of the Gaussian process: hats on its knots
+  Eigen::MatrixXd prior;              ///< its information, whitened
+};
+
+/// The place and covariate that explain most, where that is significant at `level` over all pairs
+/// of them and moves the prediction by more than `floor`. `known`: those that are in `system`.
+[[nodiscard]] std::optional<FoundRest> find_rest(const NormalSystem& system,
+                                                 const std::vector<RestPlace>& places,
+                                                 const std::vector<Covariate>& covariates,
+                                                 const std::vector<FoundRest>& known, double level,
+                                                 double floor);
+
+}  // namespace kinescope::trace

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/score_test.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "calib/trace/distribution.h"
+#include "calib/trace/normal_equations.h"
+
+namespace kinescope::trace {
+namespace {
+
+// A direction of which less than this share (of its square) is left when the model's own parameters
+// have taken what they can is not shown by the data.
+constexpr double kHidden = 1e-7;
+
+// The effect's columns combined so that they are of unit length and all shown: E -> E T.
+Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& S) {
+  const Eigen::VectorXd scale = sums.EE.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * S *
+                                                             scale.asDiagonal());
+  Eigen::Index first = 0;
+  while (first < S.rows() && !(eigen.eigenvalues()[first] > kHidden)) ++first;
+  return scale.asDiagonal() * eigen.eigenvectors().rightCols(S.rows() - first);
+}
+
+EffectSums combine(const EffectSums& sums, const Eigen::MatrixXd& T) {
+  return {sums.JE * T, T.transpose() * sums.EE * T, T.transpose() * sums.Er};
+}
+
+// The effect beside the model: what is left of it, and the joint least squares solution.
+struct Projected {
+  Eigen::MatrixXd T;
+  EffectSums sums;
+  Eigen::MatrixXd B;  // the model's parameters that imitate the effect
+  Eigen::MatrixXd S;  // normal matrix of what they cannot imitate
+  Eigen::MatrixXd S_inverse;
+  Eigen::VectorXd theta;  // of E T
+  Eigen::VectorXd delta;  // step of the model's parameters
+  double gain = 0.0;
+};
+
+Projected project(const NormalSystem& system, const EffectSums& raw) {
+  Projected out;
+  const Eigen::MatrixXd S_raw = raw.EE - raw.JE.transpose() * system.inverse() * raw.JE;
+  out.T = shown_directions(raw, S_raw);
+  out.sums = combine(raw, out.T);
+  out.B = system.inverse() * out.sums.JE;
+  out.S = out.T.transpose() * S_raw * out.T;
+  out.S_inverse = scaled_pseudo_inverse(out.S, 0.0);
+  const Eigen::VectorXd score = out.sums.Er - out.B.transpose() * system.total().g;
+  out.theta = out.S_inverse * score;
+  out.delta = system.inverse() * system.total().g - out.B * out.theta;
+  out.gain = score.dot(out.theta);
+  return out;
+}
+
+// Rows touched by natural unit: what one whitened unit is on average.
+double mean_unit(const Linearisation& linear) {
+  return std::sqrt(linear.unit.squaredNorm() /
+                   static_cast<double>(std::max<Eigen::Index>(1, linear.unit.size())));
+}
+
+// What the stretches say about the effect, one column each, and how much of it each one carries.
+struct StretchScores {
+  Eigen::MatrixXd scores;
+  Eigen::VectorXd energy;
+};
+
+StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
+                             const std::vector<EffectSums>& raw_cells) {
+  const Eigen::Index k = p.theta.size();
+  const auto stretches = static_cast<Eigen::Index>(system.partition().stretches);
+  StretchScores out{Eigen::MatrixXd::Zero(k, stretches), Eigen::VectorXd::Zero(stretches)};
+  for (std::size_t c = 0; c < raw_cells.size(); ++c) {
+    const EffectSums cell = combine(raw_cells[c], p.T);
+    const CellSums& own = system.cells()[c];
+    const Eigen::VectorXd effect = cell.Er - cell.JE.transpose() * p.delta - cell.EE * p.theta;
+    const Eigen::VectorXd model = own.g - own.H * p.delta - cell.JE * p.theta;
+    const Eigen::MatrixXd cross = p.B.transpose() * cell.JE;
+    const Eigen::MatrixXd left =
+        cell.EE - cross - cross.transpose() + p.B.transpose() * own.H * p.B;
+    const auto s = static_cast<Eigen::Index>(system.partition().cells[c].stretch);
+    out.scores.col(s) += effect - p.B.transpose() * model;
+    out.energy[s] += (p.S_inverse * left).trace();
+  }
+  return out;
+}
+
+void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
+           const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
+           Score& out) {
+  const auto k = static_cast<double>(p.theta.size());
+  const double effective =
+      stretches.energy.squaredNorm() > 0.0
+          ? stretches.energy.sum() * stretches.energy.sum() / stretches.energy.squaredNorm()
+          : 0.0;
+  out.rank = static_cast<int>(p.theta.size());
+  out.theta = p.T * p.theta;
+  out.covariance = p.T * covariance * p.T.transpose();
+  out.gain = p.gain;
+  const double rows = std::max(1.0, system.touched_rows(columns));
+  out.rms =
+      std::sqrt(std::max(0.0, p.theta.dot(p.S * p.theta)) / rows) * mean_unit(system.linear());
+  out.freedom = std::floor(effective) - k;
+  if (out.freedom < 2.0) return;
+  // Of the covariance, directions that no stretch disagrees about are not certain but unknown.
+  const Eigen::MatrixXd inverse = scaled_pseudo_inverse(covariance, 1e-12);
+  out.statistic = p.theta.dot(inverse * p.theta) / k;
+  out.p_value = f_survival(out.statistic, k, out.freedom);
+}
+
+// Scatter of the last `count` parameters when each stretch is left out in turn.
+Eigen::MatrixXd leave_out(const NormalSystem& system, const std::vector<NormalEquations>& cells,
+                          Eigen::Index count) {
+  const Partition& partition = system.partition();
+  const NormalEquations total = total_of(system, cells);
+  std::vector<NormalEquations> stretches(static_cast<std::size_t>(partition.stretches),
+                                         zero_like(total));
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    stretches[static_cast<std::size_t>(partition.cells[c].stretch)] += cells[c];
+  }
+  Eigen::MatrixXd estimates(count, static_cast<Eigen::Index>(stretches.size()));
+  for (std::size_t s = 0; s < stretches.size(); ++s) {
+    estimates.col(static_cast<Eigen::Index>(s)) = solve_without(total, stretches[s]).tail(count);
+  }
+  const Eigen::VectorXd mean = estimates.rowwise().mean();
+  const Eigen::MatrixXd scatter = estimates.colwise() - mean;
+  const auto m = static_cast<double>(stretches.size());
+  return scatter * scatter.transpose() * (partition.widening * (m - 1.0) / m);
+}
+
+}  // namespace
+
+double gain_of(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
+  return project(system, system.sums(columns)).gain;
+}
+
+Score score_test(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
+  const Projected p = project(system, system.sums(columns));
+  Score out;
+  if (p.theta.size() == 0) return out;
+  const StretchScores stretches = stretch_scores(system, p, system.cell_sums(columns));
+  const auto count = static_cast<double>(system.partition().stretches);
+  const Eigen::MatrixXd meat = stretches.scores * stretches.scores.transpose();
+  judge(system, p, stretches,
+        p.S_inverse * meat * p.S_inverse * (system.partition().widening * count / (count - 1.0)),
+        columns, out);
+  return out;
+}
+
+Score jackknife_test(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
+  const Projected p = project(system, system.sums(columns));
+  Score out;
+  if (p.theta.size() == 0) return out;
+  const std::vector<EffectSums> raw_cells = system.cell_sums(columns);
+  std::vector<EffectSums> shown;
+  for (const EffectSums& cell : raw_cells) shown.push_back(combine(cell, p.T));
+  const Eigen::MatrixXd covariance =
+      leave_out(system, augmented_cells(system, shown), p.theta.size());
+  judge(system, p, stretch_scores(system, p, raw_cells), covariance, columns, out);
+  return out;
+}
+
+Eigen::MatrixXd jackknife_covariance(const NormalSystem& system, Eigen::Index count) {
+  return leave_out(system, augmented_cells(system, {}), count);
+}
+
+}  // namespace kinescope::trace

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/stage.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kinescope::trace {
+
+Stage::Stage(std::vector<AddedEffect> effects, TracedFit fitted)
+    : added(std::move(effects)),
+      fit(std::move(fitted)),
+      system(fit.linear, make_partition(fit.linear)),
+      held_out(held_out_instants(system)),
+      error(held_out_error(system, held_out)) {}
+
+double Stage::rms() const {
+  const Linearisation& linear = fit.linear;
+  return std::sqrt(linear.residual.cwiseProduct(linear.unit).squaredNorm() /
+                   static_cast<double>(std::max<Eigen::Index>(1, linear.residual.size())));
+}
+
+StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) {
+  TracedFit fit = model.fit(effects);
+  return std::make_shared<const Stage>(std::move(effects), std::move(fit));
+}
+
+Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
+                     const Eigen::MatrixXd& prior) {
+  Linearisation out = linear;
+  const Eigen::Index p = linear.jacobian.cols();
+  const auto k = static_cast<Eigen::Index>(columns.size());
+  out.jacobian.conservativeResize(Eigen::NoChange, p + k);
+  out.jacobian.rightCols(k).setZero();
+  std::vector<Eigen::Index> instant(static_cast<std::size_t>(linear.residual.size()));
+  for (std::size_t i = 0; i + 1 < linear.first_row.size(); ++i) {
+    std::fill(instant.begin() + linear.first_row[i], instant.begin() + linear.first_row[i + 1],
+              static_cast<Eigen::Index>(i));
+  }
+  for (Eigen::Index a = 0; a < k; ++a) {
+    const EffectColumn& column = columns[static_cast<std::size_t>(a)];
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, column.carrier); entry;
+         ++entry) {
+      const double share = column.share.size() == 0
+                               ? 1.0
+                               : column.share[instant[static_cast<std::size_t>(entry.row())]];
+      out.jacobian(entry.row(), p + a) = share * entry.value();
+    }
+  }
+  if (linear.prior.size() == 0 && prior.size() == 0) return out;
+  out.prior = Eigen::MatrixXd::Zero(p + k, p + k);
+  if (linear.prior.size() > 0) out.prior.topLeftCorner(p, p) = linear.prior;
+  if (prior.size() > 0) out.prior.bottomRightCorner(k, k) = prior;
+  return out;
+}
+
+}  // namespace kinescope::trace

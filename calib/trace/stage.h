@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The model with some effects in it: fitted, summed, its held-out errors known.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "calib/trace/held_out.h"
+
+namespace kinescope::trace {
+
+struct Stage {
+  std::vector<AddedEffect> added;
+  TracedFit fit;
+  NormalSystem system;  ///< refers to fit.linear
+  HeldOutInstants held_out;
+  HeldOutError error;
+
+  Stage(std::vector<AddedEffect> effects, TracedFit fitted);
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+
+  /// Sum of whitened squared errors, held out.
+  [[nodiscard]] double held_out_sum() const { return held_out.whitened.sum(); }
+  /// Root mean square of the residual, in its unit.
+  [[nodiscard]] double rms() const;
+};
+
+using StagePtr = std::shared_ptr<const Stage>;
+
+[[nodiscard]] StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects);
+
+/// The linear model with more columns, and priors on them (empty: none).
+[[nodiscard]] Linearisation extend(const Linearisation& linear,
+                                   const std::vector<EffectColumn>& columns,
+                                   const Eigen::MatrixXd& prior);
+
+}  // namespace kinescope::trace

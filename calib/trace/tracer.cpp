@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/trace/encompassing.h"
+
+namespace kinescope::trace {
+namespace {
+
+// A rival is looked at if it explains at least this share of what the chosen effect explains.
+constexpr double kRivalShare = 0.5;
+constexpr std::size_t kMostRivals = 6;
+// Held-out losses further apart than this (Student's t of the stretches) need no refit to compare.
+constexpr double kClearlyWorse = 3.0;
+
+const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {
+  const auto found = std::ranges::find(fit.candidates, id, &Candidate::id);
+  return found == fit.candidates.end() ? nullptr : &*found;
+}
+
+std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index) {
+  effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(index));
+  return effects;
+}
+
+std::string name_of(const EffectId& id) { return fmt::format("{} at {}", id.effect, id.place); }
+
+}  // namespace
+
+Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress)
+    : model_(&model),
+      options_(options),
+      progress_(progress),
+      level_(0.5 * options.false_alarm_rate) {
+  trace_.false_alarm_rate = options.false_alarm_rate;
+}
+
+Trace Tracer::run() {
+  report(progress_, "trace", 0, 0);
+  base_ = make_stage(*model_, {});
+  now_ = base_;
+  if (!can_say(*base_)) return trace_;
+  add_step(0, "the model as it is", *base_);
+  do {
+    forward();
+  } while (backward());
+  look_for_rest();
+  summarise();
+  list_not_found();
+  conclude();
+  return trace_;
+}
+
+bool Tracer::can_say(const Stage& stage) {
+  trace_.stretches = stage.system.partition().stretches;
+  if (!stage.fit.converged) {
+    trace_.reason = fmt::format("the model itself did not converge: {}", stage.fit.reason);
+  } else if (trace_.stretches < options_.fewest_stretches) {
+    trace_.reason = fmt::format(
+        "{} stretches of independent data are too few to tell an effect from noise: record longer",
+        trace_.stretches);
+  } else if (stage.system.partition().folds < 2) {
+    trace_.reason = "nothing can be held out: record more postures";
+  } else {
+    return true;
+  }
+  trace_.verdict = TraceVerdict::kNothingToSay;
+  return false;
+}
+
+void Tracer::forward() {
+  while (static_cast<int>(now_->added.size()) < options_.max_effects) {
+    ++round_;
+    report(progress_, "trace", round_, 0);
+    const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
+    record(family, *now_, round_);
+    StagePtr next = refit_best(contenders(*now_, family), round_);
+    if (!next) return;
+    now_ = std::move(next);
+    const EffectId& id = now_->added.back().id;
+    mark(round_, id, CandidateState::kAccepted, now_->error.value);
+    add_step(round_, fmt::format("{} added", name_of(id)), *now_);
+  }
+}
+
+std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
+                                                  const std::vector<TestedMember>& family) const {
+  std::vector<Contender> out;
+  for (const TestedMember& member : family) {
+    if (member.score.hidden() || member.p_value > level_ || member.score.rms < options_.floor) {
+      continue;
+    }
+    const EffectId& id = stage.fit.candidates[member.index].id;
+    if (removed_.contains(id)) continue;
+    const Score confirmed = jackknife_test(stage.system, member.columns);
+    if (confirmed.p_value * member.tests > level_) continue;
+    out.push_back({member, id, held_out_cells(stage.system, member.columns)});
+  }
+  std::ranges::stable_sort(out, {},
+                           [](const Contender& contender) { return contender.held_out.sum(); });
+  return out;
+}
+
+StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round) {
+  StagePtr best;
+  int refits = 0;
+  for (const Contender& contender : contenders) {
+    if (refits >= options_.refits) break;
+    const bool clearly_worse = best && paired_t(now_->system.partition(), contender.held_out,
+                                                contenders.front().held_out) > kClearlyWorse;
+    if (clearly_worse) break;
+    ++refits;
+    std::vector<AddedEffect> effects = now_->added;
+    effects.push_back({contender.id, contender.member.scan});
+    StagePtr stage = make_stage(*model_, std::move(effects));
+    mark(round, contender.id, CandidateState::kRefitted, stage->error.value);
+    const double bar = best ? best->held_out_sum() : now_->held_out_sum();
+    if (stage->fit.converged && stage->held_out_sum() < bar) best = std::move(stage);
+  }
+  return best;
+}
+
+bool Tracer::backward() {
+  details_.assign(now_->added.size(), {});
+  trace_.ambiguities.clear();
+  // The latest first: an early one may have stood for several that came after it.
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    if (check(i)) return true;
+  }
+  return false;
+}
+
+bool Tracer::check(std::size_t index) {
+  const AddedEffect effect = now_->added[index];
+  const StagePtr stage = make_stage(*model_, kinescope::trace::without(now_->added, index));
+  const Candidate* candidate = find_candidate(stage->fit, effect.id);
+  if (candidate == nullptr) return false;
+  TestedMember own;
+  own.scan = effect.scan;
+  own.columns = candidate->columns(effect.scan);
+  own.score = jackknife_test(stage->system, own.columns);
+  own.tests = static_cast<double>(stage->fit.candidates.size()) *
+              static_cast<double>(std::max<std::size_t>(1, candidate->scan.size()));
+  own.p_value = std::min(1.0, own.score.p_value * own.tests);
+  TracedEffect& detail = details_[index];
+  detail.p_value = own.p_value;
+  detail.held_out_before = stage->error;
+  detail.held_out_after = now_->error;
+  detail.explained =
+      (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
+  if (own.p_value > level_ || stage->held_out_sum() < now_->held_out_sum()) {
+    removed_.insert(effect.id);
+    mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
+    now_ = make_stage(*model_, kinescope::trace::without(now_->added, index));
+    add_step(round_,
+             fmt::format("{} removed: with the others in, it earns nothing", name_of(effect.id)),
+             *now_);
+    return true;
+  }
+  return settle_rivals(index, *stage, own);
+}
+
+bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
+  const AddedEffect effect = now_->added[index];
+  std::vector<TestedMember> rivals;
+  for (TestedMember& member : test_family(without.system, without.fit.candidates)) {
+    const EffectId& id = without.fit.candidates[member.index].id;
+    const bool in_model =
+        std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
+    if (in_model || removed_.contains(id) || member.p_value > level_) continue;
+    if (member.score.gain < kRivalShare * own.score.gain) continue;
+    rivals.push_back(std::move(member));
+  }
+  std::ranges::stable_sort(rivals, std::greater{},
+                           [](const TestedMember& rival) { return rival.score.gain; });
+  if (rivals.size() > kMostRivals) rivals.resize(kMostRivals);
+  Ambiguity ambiguity;
+  for (const TestedMember& rival : rivals) {
+    const Candidate& candidate = without.fit.candidates[rival.index];
+    switch (compare_effects(without.system, own.columns, rival.columns)) {
+      case Comparison::kFirst:
+        break;
+      case Comparison::kInterchangeable:
+        ambiguity.effects.push_back(candidate.id);
+        ambiguity.words.push_back(candidate.words);
+        if (ambiguity.record.empty()) ambiguity.record = candidate.record;
+        break;
+      case Comparison::kSecond: {
+        std::vector<AddedEffect> effects = now_->added;
+        effects[index] = {candidate.id, rival.scan};
+        StagePtr swapped = make_stage(*model_, std::move(effects));
+        if (!swapped->fit.converged || swapped->held_out_sum() >= now_->held_out_sum()) break;
+        removed_.insert(effect.id);
+        mark(round_, effect.id, CandidateState::kRemoved, now_->error.value);
+        mark(round_, candidate.id, CandidateState::kAccepted, swapped->error.value);
+        now_ = std::move(swapped);
+        add_step(round_,
+                 fmt::format("{} takes the place of {}, which it makes superfluous",
+                             name_of(candidate.id), name_of(effect.id)),
+                 *now_);
+        return true;
+      }
+    }
+  }
+  if (ambiguity.effects.empty()) return false;
+  const Candidate* chosen = find_candidate(without.fit, effect.id);
+  ambiguity.effects.insert(ambiguity.effects.begin(), effect.id);
+  ambiguity.words.insert(ambiguity.words.begin(), chosen->words);
+  if (ambiguity.record.empty()) ambiguity.record = chosen->record;
+  trace_.ambiguities.push_back(std::move(ambiguity));
+  return false;
+}
+
+}  // namespace kinescope::trace

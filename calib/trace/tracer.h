@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The search: forward selection, backward check, what cannot be told apart, what is left.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "calib/trace/family.h"
+#include "calib/trace/rest.h"
+#include "calib/trace/stage.h"
+#include "calib/trace/trace.h"
+
+namespace kinescope::trace {
+
+class Tracer {
+ public:
+  Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress);
+  [[nodiscard]] Trace run();
+
+ private:
+  // A significant candidate with what the linear model says of it, held out.
+  struct Contender {
+    TestedMember member;
+    EffectId id;
+    Eigen::VectorXd held_out;  // by cell
+  };
+
+  [[nodiscard]] bool can_say(const Stage& stage);
+  void forward();
+  [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
+                                                  const std::vector<TestedMember>& family) const;
+  [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
+  [[nodiscard]] bool backward();
+  [[nodiscard]] bool check(std::size_t index);
+  [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
+                                   const TestedMember& own);
+  void look_for_rest();
+  [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
+  void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
+  void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);
+  void add_step(int round, std::string words, const Stage& stage);
+  void summarise();
+  void list_not_found();
+  void conclude();
+
+  const TracedModel* model_;
+  TraceOptions options_;
+  Progress progress_;
+  double level_ = 0.0;  // of all tests of known effects; the same again for the rest
+  StagePtr base_;
+  StagePtr now_;
+  std::vector<TracedEffect> details_;  // beside now_->added, filled by the backward check
+  std::set<EffectId> removed_;
+  std::vector<FoundRest> rests_;
+  int round_ = 0;
+  Trace trace_;
+};
+
+}  // namespace kinescope::trace

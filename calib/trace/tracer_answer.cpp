@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The second half of the search: what is left, and the answer as it is handed on.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/trace/distribution.h"
+#include "calib/trace/tracer.h"
+
+namespace kinescope::trace {
+namespace {
+
+constexpr std::size_t kMostRests = 3;
+// A rest that explains this much of what a named effect at its place explains puts that name in
+// doubt.
+constexpr double kDoubtfulShare = 0.1;
+
+Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRest>& rests) {
+  Linearisation out = linear;
+  for (const FoundRest& found : rests) out = extend(out, found.columns, found.prior);
+  return out;
+}
+
+bool same_place(const std::string& rest, const std::string& effect) {
+  return rest == effect || rest.starts_with(effect + " ");
+}
+
+}  // namespace
+
+void Tracer::look_for_rest() {
+  rests_.clear();
+  while (rests_.size() < kMostRests) {
+    const Linearisation linear = with_rests(now_->fit.linear, rests_);
+    const NormalSystem system(linear, now_->system.partition());
+    std::optional<FoundRest> found = find_rest(system, now_->fit.rest_places, now_->fit.covariates,
+                                               rests_, level_, options_.floor);
+    if (!found) return;
+    if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
+    add_step(
+        round_,
+        fmt::format("structure is left at {}, over {}", found->rest.place, found->rest.covariate),
+        *now_);
+    rests_.push_back(std::move(*found));
+  }
+}
+
+// An effect of the library can stand in for one that is not in it. Then the rest at its place is
+// large, and a curve without the effect predicts no worse than the curve with it.
+bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    const EffectId id = now_->added[i].id;
+    if (!same_place(found.rest.place, id.place)) continue;
+    if (found.rest.explained * now_->system.total().rr <
+        kDoubtfulShare * details_[i].explained * base_->system.total().rr) {
+      continue;
+    }
+    std::vector<AddedEffect> effects = now_->added;
+    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
+    StagePtr stage = make_stage(*model_, std::move(effects));
+    const auto alone = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
+                                 level_, options_.floor);
+    if (!alone || alone->rest.place != found.rest.place ||
+        alone->rest.held_out_after.value > found.rest.held_out_after.interval.high) {
+      continue;
+    }
+    removed_.insert(id);
+    mark(round_, id, CandidateState::kRemoved, stage->error.value);
+    now_ = std::move(stage);
+    add_step(round_,
+             fmt::format("{} at {} removed: a curve over {} explains as much without it", id.effect,
+                         id.place, alone->rest.covariate),
+             *now_);
+    details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+    return true;
+  }
+  return false;
+}
+
+void Tracer::record(const std::vector<TestedMember>& family, const Stage& stage, int round) {
+  for (const TestedMember& member : family) {
+    const Candidate& candidate = stage.fit.candidates[member.index];
+    TestedCandidate tested;
+    tested.round = round;
+    tested.id = candidate.id;
+    tested.state = member.score.hidden() ? CandidateState::kHidden : CandidateState::kTested;
+    tested.statistic = member.score.statistic;
+    tested.parameters = static_cast<int>(candidate.parameters.size());
+    tested.freedom = member.score.freedom;
+    tested.p_value = member.p_value;
+    tested.scan = member.scan;
+    tested.size = member.score.hidden() ? 0.0 : size_of(candidate, member.score.theta);
+    tested.unit = candidate.size_unit;
+    trace_.candidates.push_back(std::move(tested));
+  }
+}
+
+void Tracer::mark(int round, const EffectId& id, CandidateState state,
+                  std::optional<double> held_out) {
+  for (TestedCandidate& tested : trace_.candidates) {
+    if (tested.round != round || tested.id != id) continue;
+    tested.state = state;
+    tested.held_out = held_out;
+  }
+}
+
+void Tracer::add_step(int round, std::string words, const Stage& stage) {
+  trace_.steps.push_back({round, std::move(words), stage.rms(), stage.error});
+}
+
+void Tracer::summarise() {
+  trace_.held_out_before = base_->error;
+  trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
+  trace_.noise = now_->rms();
+  trace_.stretches = now_->system.partition().stretches;
+  for (FoundRest& found : rests_) trace_.rest.push_back(std::move(found.rest));
+  Eigen::Index count = 0;
+  for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
+  if (count == 0) return;
+  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  const double t = t_quantile(0.025, std::max(2.0, trace_.stretches - 1.0));
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    const AddedEffect& added = now_->added[i];
+    const Eigen::VectorXd& values = now_->fit.values[i];
+    const Candidate& candidate =
+        *std::ranges::find(base_->fit.candidates, added.id, &Candidate::id);
+    const Eigen::MatrixXd block = covariance.block(at, at, values.size(), values.size());
+    at += values.size();
+    TracedEffect effect = details_[i];
+    effect.id = added.id;
+    effect.words = candidate.words;
+    effect.check = candidate.check;
+    effect.size = size_of(candidate, values);
+    effect.unit = candidate.size_unit;
+    const double half = t * size_sigma(candidate, values, block);
+    effect.interval = {effect.size - half, effect.size + half};
+    if (values.size() > 1) effect.interval.low = std::max(0.0, effect.interval.low);
+    for (Eigen::Index k = 0; k < values.size(); ++k) {
+      effect.values.push_back({candidate.parameters[static_cast<std::size_t>(k)], values[k],
+                               std::sqrt(std::max(0.0, block(k, k)))});
+    }
+    effect.scan = added.scan;
+    effect.scan_name = candidate.scan_name;
+    effect.scan_unit = candidate.scan_unit;
+    trace_.accepted.push_back(std::move(effect));
+    trace_.added.push_back(added);
+  }
+}
+
+void Tracer::list_not_found() {
+  for (const TestedMember& member : test_family(now_->system, now_->fit.candidates)) {
+    const Candidate& candidate = now_->fit.candidates[member.index];
+    const bool named =
+        std::ranges::any_of(trace_.accepted,
+                            [&](const TracedEffect& e) { return e.id == candidate.id; }) ||
+        std::ranges::any_of(trace_.ambiguities, [&](const Ambiguity& a) {
+          return std::ranges::find(a.effects, candidate.id) != a.effects.end();
+        });
+    if (named) continue;
+    NotFoundEffect missing{candidate.id, member.score.hidden(), 0.0, candidate.size_unit, ""};
+    if (missing.hidden) {
+      missing.record = candidate.record;
+    } else {
+      missing.smallest_size = smallest_size(candidate, member.score, level_ / member.tests);
+      // What lies below the sensor's own errors is not looked for either.
+      const double size = std::abs(size_of(candidate, member.score.theta));
+      if (member.score.rms > 0.0) {
+        missing.smallest_size =
+            std::max(missing.smallest_size, size * options_.floor / member.score.rms);
+      }
+    }
+    trace_.not_found.push_back(std::move(missing));
+  }
+}
+
+void Tracer::conclude() {
+  const auto list = [&] {
+    std::string out;
+    for (const TracedEffect& effect : trace_.accepted) {
+      out += fmt::format("{}{} at {}", out.empty() ? "" : ", ", effect.id.effect, effect.id.place);
+    }
+    return out;
+  };
+  if (!trace_.rest.empty()) {
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
+                                trace_.rest.front().place, trace_.rest.front().covariate);
+  } else if (!trace_.ambiguities.empty()) {
+    trace_.verdict = TraceVerdict::kAmbiguous;
+    const Ambiguity& first = trace_.ambiguities.front();
+    std::string names;
+    for (const EffectId& id : first.effects) {
+      names += fmt::format("{}{} at {}", names.empty() ? "" : " or ", id.effect, id.place);
+    }
+    trace_.reason = fmt::format("{}: this recording cannot tell them apart", names);
+  } else if (!trace_.accepted.empty()) {
+    trace_.verdict = TraceVerdict::kEffects;
+    trace_.reason = fmt::format("the model lacked {}", list());
+  } else {
+    trace_.verdict = TraceVerdict::kClean;
+    trace_.reason =
+        fmt::format("the residual is noise of {:.3g} {}", trace_.noise, trace_.held_out_after.unit);
+  }
+}
+
+}  // namespace kinescope::trace

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/calib/trace/linear_world.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/QR>
+
+#include "kinematics/core/rng.h"
+
+namespace kinescope::truth {
+namespace {
+
+constexpr Eigen::Index kJoints = 2;
+constexpr Eigen::Index kRows = 4;  // an instant
+constexpr double kStep = 1.0 / 30.0;
+
+Eigen::VectorXd smooth_motion(const Eigen::VectorXd& time_s, Rng& rng) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(time_s.size());
+  for (int k = 0; k < 4; ++k) {
+    const double omega = 2.0 * std::numbers::pi * rng.uniform(0.1, 0.5);
+    const double phase = rng.uniform(0.0, 6.0);
+    const double amplitude = rng.uniform(0.6, 1.4);
+    for (Eigen::Index i = 0; i < time_s.size(); ++i) {
+      out[i] += amplitude * std::sin(omega * time_s[i] + phase);
+    }
+  }
+  return out;
+}
+
+Eigen::VectorXd direction_of(const Eigen::VectorXd& q) {
+  Eigen::VectorXd out(q.size());
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
+    const double rise = i + 1 < q.size() ? q[i + 1] - q[i] : q[i] - q[i - 1];
+    out[i] = rise > 0.0 ? 1.0 : -1.0;
+  }
+  return out;
+}
+
+Candidate simple(const std::string& effect, Eigen::Index joint, int parameters) {
+  Candidate out;
+  out.id = {effect, "joint" + std::to_string(joint + 1)};
+  out.words = effect + " of " + out.id.place;
+  out.record = "record " + effect;
+  out.size_unit = "rad";
+  for (int k = 0; k < parameters; ++k) out.parameters.push_back({"p" + std::to_string(k), "rad"});
+  out.size_weights = Eigen::VectorXd::Ones(parameters);
+  return out;
+}
+
+}  // namespace
+
+LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<Injected>& injected)
+    : options_(options) {
+  Rng rng(options.seed);
+  const Eigen::Index n = options.instants;
+  time_s_ = Eigen::VectorXd::LinSpaced(n, 0.0, kStep * static_cast<double>(n - 1));
+  q_.resize(n, kJoints);
+  for (Eigen::Index j = 0; j < kJoints; ++j) q_.col(j) = smooth_motion(time_s_, rng);
+  // Each row answers to each joint in its own way, slowly changing with the posture.
+  gains_.resize(n * kRows, kJoints);
+  for (Eigen::Index row = 0; row < gains_.rows(); ++row) {
+    for (Eigen::Index j = 0; j < kJoints; ++j) {
+      const double angle = static_cast<double>(row % kRows) + static_cast<double>(j);
+      gains_(row, j) = std::cos(angle + 0.5 * q_(row / kRows, 1 - j)) + 0.2;
+    }
+  }
+  observed_ = Eigen::VectorXd::Zero(n * kRows);
+  for (const Injected& effect : injected) {
+    const Eigen::VectorXd change = share(effect);
+    for (Eigen::Index row = 0; row < observed_.size(); ++row) {
+      observed_[row] += effect.size * change[row / kRows] * gains_(row, effect.joint);
+    }
+  }
+  Eigen::VectorXd memory = Eigen::VectorXd::Zero(kRows);
+  const double fresh = std::sqrt(1.0 - options.noise_memory * options.noise_memory);
+  for (Eigen::Index row = 0; row < observed_.size(); ++row) {
+    double& m = memory[row % kRows];
+    m = row < kRows ? rng.normal() : options.noise_memory * m + fresh * rng.normal();
+    observed_[row] += options.noise * m;
+  }
+}
+
+Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
+  const Eigen::VectorXd q = q_.col(effect.joint);
+  const Eigen::VectorXd other = q_.col(kJoints - 1 - effect.joint);
+  if (effect.shape == "scale") return q;
+  if (effect.shape == "sine") return q.array().sin();
+  if (effect.shape == "gear") return (effect.detail * q.array() + 0.7).sin();
+  if (effect.shape == "direction") return direction_of(q);
+  if (effect.shape == "step") return (time_s_.array() >= effect.detail).cast<double>();
+  return (5.0 * (other.array() - 0.2)).tanh();
+}
+
+std::vector<Candidate> LinearWorld::candidates() const {
+  std::vector<Candidate> out;
+  for (Eigen::Index j = 0; j < kJoints; ++j) {
+    const int carrier = static_cast<int>(j);
+    const Eigen::VectorXd q = q_.col(j);
+    const auto add = [&](Candidate candidate, auto columns) {
+      candidate.columns = columns;
+      out.push_back(std::move(candidate));
+    };
+    add(simple("scale", j, 1), [=](double) { return std::vector<EffectColumn>{{carrier, q}}; });
+    add(simple("sine", j, 2), [=](double) {
+      return std::vector<EffectColumn>{{carrier, q.array().sin()}, {carrier, q.array().cos()}};
+    });
+    add(simple("direction", j, 1),
+        [=](double) { return std::vector<EffectColumn>{{carrier, direction_of(q)}}; });
+    Candidate gear = simple("gear", j, 2);
+    for (double n = 3.0; n < 40.0; n += 0.5) gear.scan.push_back(n);
+    add(gear, [=](double n) {
+      return std::vector<EffectColumn>{{carrier, (n * q.array()).sin()},
+                                       {carrier, (n * q.array()).cos()}};
+    });
+    Candidate step = simple("step", j, 1);
+    for (double t = 1.5; t < time_s_[time_s_.size() - 1] - 1.5; t += 0.2) step.scan.push_back(t);
+    const Eigen::VectorXd time = time_s_;
+    add(step, [=](double t) {
+      return std::vector<EffectColumn>{{carrier, (time.array() >= t).cast<double>()}};
+    });
+    add(simple("coupling", j, 1), [=, other = Eigen::VectorXd(q_.col(kJoints - 1 - j))](double) {
+      return std::vector<EffectColumn>{{carrier, other}};
+    });
+  }
+  return out;
+}
+
+TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
+  TracedFit out;
+  out.converged = true;
+  out.candidates = candidates();
+  Linearisation& linear = out.linear;
+  linear.time_s = time_s_;
+  linear.carriers = gains_.sparseView();
+  linear.unit = Eigen::VectorXd::Constant(observed_.size(), options_.noise);
+  linear.unit_name = "px";
+  linear.fold.resize(static_cast<std::size_t>(options_.instants));
+  for (int i = 0; i < options_.instants; ++i) {
+    linear.first_row.push_back(i * kRows);
+    linear.fold[static_cast<std::size_t>(i)] =
+        (i * 3 * options_.folds / options_.instants) % options_.folds;
+  }
+  linear.first_row.push_back(options_.instants * kRows);
+  const double memory = options_.noise_memory;
+  linear.correlation_time_s = kStep * 0.5 * (1.0 + memory) / (1.0 - memory);
+
+  std::vector<EffectColumn> columns{{0, {}}, {1, {}}};  // the joints' zeros
+  for (const AddedEffect& effect : effects) {
+    for (const Candidate& candidate : out.candidates) {
+      if (candidate.id != effect.id) continue;
+      for (EffectColumn& column : candidate.columns(effect.scan)) columns.push_back(column);
+    }
+  }
+  linear.jacobian.resize(observed_.size(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    for (Eigen::Index row = 0; row < observed_.size(); ++row) {
+      const double share = columns[c].share.size() == 0 ? 1.0 : columns[c].share[row / kRows];
+      linear.jacobian(row, static_cast<Eigen::Index>(c)) =
+          share * gains_(row, columns[c].carrier) / options_.noise;
+    }
+  }
+  linear.carriers = linear.carriers / options_.noise;
+  const Eigen::VectorXd whitened = observed_ / options_.noise;
+  const Eigen::VectorXd solution =
+      Eigen::MatrixXd(linear.jacobian).colPivHouseholderQr().solve(whitened);
+  linear.residual = whitened - linear.jacobian * solution;
+  Eigen::Index at = 2;
+  for (const AddedEffect& effect : effects) {
+    for (const Candidate& candidate : out.candidates) {
+      if (candidate.id != effect.id) continue;
+      const auto count = static_cast<Eigen::Index>(candidate.parameters.size());
+      out.values.emplace_back(solution.segment(at, count));
+      at += count;
+    }
+  }
+  for (Eigen::Index j = 0; j < kJoints; ++j) {
+    const std::string name = "joint" + std::to_string(j + 1);
+    out.rest_places.push_back({name, "rad", static_cast<int>(j)});
+    out.covariates.push_back({"value of " + name, "rad", q_.col(j)});
+    out.covariates.push_back({"direction of " + name, "", direction_of(q_.col(j))});
+  }
+  out.covariates.push_back({"time", "s", time_s_});
+  return out;
+}
+
+}  // namespace kinescope::truth

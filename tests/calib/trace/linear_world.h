@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A linear model with two "joints" that move smoothly, known noise, and effects that the base model
+// lacks: what the tracing engine is tested on without a robot.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "calib/trace/traced_model.h"
+
+namespace kinescope::truth {
+
+struct LinearWorldOptions {
+  std::uint64_t seed = 1;
+  int instants = 400;
+  double noise = 1.0;         ///< of a row
+  double noise_memory = 0.0;  ///< AR(1) from instant to instant
+  int folds = 5;
+};
+
+/// What is in the data and not in the model: one term of `LinearWorld::share`.
+struct Injected {
+  int joint = 0;
+  std::string shape;  ///< "scale", "sine", "gear", "direction", "step", "tanh_other"
+  double size = 0.0;
+  double detail = 0.0;  ///< periods of the gear, time of the step in s
+};
+
+class LinearWorld final : public TracedModel {
+ public:
+  LinearWorld(const LinearWorldOptions& options, const std::vector<Injected>& injected);
+  [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
+
+ private:
+  [[nodiscard]] Eigen::VectorXd share(const Injected& effect) const;
+  [[nodiscard]] std::vector<Candidate> candidates() const;
+
+  LinearWorldOptions options_;
+  Eigen::VectorXd time_s_;
+  Eigen::MatrixXd q_;      // instants x joints
+  Eigen::MatrixXd gains_;  // rows x carriers
+  Eigen::VectorXd observed_;
+};
+
+}  // namespace kinescope::truth
