@@ -12,6 +12,7 @@
 #pragma once
 
 #include "calib/bundle/calibration.h"
+#include "calib/bundle/correction.h"
 #include "calib/bundle/measurements.h"
 #include "calib/camera/marker_set.h"
 #include "kinematics/core/progress.h"
@@ -43,6 +44,7 @@ struct CalibrationStart {
   bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
   bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
   std::vector<std::vector<ChannelShare>> couplings;  ///< of every joint; empty: none at all
+  std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
 };
 
 struct CalibrateOptions {

@@ -8,6 +8,7 @@ ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const 
   ChainDerivatives out;
   out.d_joint.resize(joints.size());
   out.d_value.resize(joints.size());
+  out.d_link.resize(joints.size());
   // From the marker inwards; `rest` is everything behind the place that is perturbed.
   Pose rest = T_link_marker;
   for (std::size_t k = joints.size(); k-- > 0;) {
@@ -15,6 +16,8 @@ ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const 
     Vector6d twist = Vector6d::Zero();
     if (joint.type == JointType::kRevolute) twist.head<3>() = joint.axis;
     if (joint.type == JointType::kPrismatic) twist.tail<3>() = joint.axis;
+    out.d_link[k] = adjoint(rest.inverse());
+    if (!joint.correction.isZero(0.0)) rest = exp_pose(joint.correction) * rest;
     out.d_value[k] = adjoint(rest.inverse()) * twist;
     rest = joint_motion(joint.type, joint.axis, joint.value) * rest;
     out.d_joint[k] = adjoint(rest.inverse());

@@ -17,7 +17,8 @@ struct ChainJoint {
   JointType type = JointType::kFixed;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
   Pose T_parent_joint;
-  double value = 0.0;  ///< rad or m
+  double value = 0.0;                      ///< rad or m
+  Vector6d correction = Vector6d::Zero();  ///< a twist behind the motion, in the link's frame
 };
 
 struct ChainDerivatives {
@@ -25,6 +26,7 @@ struct ChainDerivatives {
   Matrix6d d_camera_base;         ///< of a right perturbation of T_camera_base
   std::vector<Matrix6d> d_joint;  ///< of T_parent_joint, from the base outwards
   std::vector<Vector6d> d_value;  ///< of the joint value, per rad or m
+  std::vector<Matrix6d> d_link;   ///< of a right perturbation of the link's frame
   // The mount's derivative is the identity.
 };
 

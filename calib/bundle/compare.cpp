@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Observed against predicted, for corners, poses and points.
-#include "calib/bundle/problem.h"
+#include "calib/bundle/corrected.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -16,13 +16,13 @@ Matrix6d small_adjoint(const Vector6d& d) {
 }
 
 std::optional<SightingError> compare_corners(const Sighting& sighting, const Pose& T_camera_marker,
-                                             const CameraModel& camera) {
+                                             const CameraModel& camera, double size) {
   const auto n = static_cast<Eigen::Index>(sighting.corners_px.size());
   SightingError error{Eigen::VectorXd(2 * n), Eigen::Matrix<double, Eigen::Dynamic, 6>(2 * n, 6),
                       Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>(2 * n, kMaxIntrinsics)};
   const Eigen::Matrix3d R = T_camera_marker.matrix3();
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Vector3d& p = sighting.geometry_m[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d p = size * sighting.geometry_m[static_cast<std::size_t>(i)];
     const auto projection = project_with_derivatives(camera, T_camera_marker * p);
     if (!projection) return std::nullopt;
     Eigen::Matrix<double, 3, 6> d_point;
@@ -69,10 +69,11 @@ int Sighting::dimension() const {
 }
 
 std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_camera_marker,
-                                     const CameraModel& camera, const Eigen::Vector3d* target_m) {
+                                     const CameraModel& camera, const Eigen::Vector3d* target_m,
+                                     double size) {
   switch (sighting.kind) {
     case MeasurementKind::kCorners:
-      return compare_corners(sighting, T_camera_marker, camera);
+      return compare_corners(sighting, T_camera_marker, camera, size);
     case MeasurementKind::kPose:
       return compare_pose(sighting, T_camera_marker);
     case MeasurementKind::kPoint:
@@ -84,12 +85,19 @@ std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_cam
 
 std::optional<SightingError> error_of(const Spec& spec, const State& state,
                                       const Readings& readings, const Sighting& sighting) {
-  const Pose T_camera_marker = predict(spec, state, readings, sighting);
-  if (sighting.target < 0) {
-    return compare(sighting, T_camera_marker, camera_of(spec, state), nullptr);
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  if (sighting.target >= 0) {
+    target = Eigen::Vector3d(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
-  const Eigen::Vector3d target(state.targets[static_cast<std::size_t>(sighting.target)].data());
-  return compare(sighting, T_camera_marker, camera_of(spec, state), &target);
+  const CorrectedSighting corrected =
+      sum_corrections(spec, sighting, corrections_of(spec, sighting), state.corrections.data());
+  const auto at = corrected_error(
+      spec, sighting, corrected, from_block(state.camera_base.data()),
+      chain_of(spec, state, readings, sighting), rates_of(spec, state, readings, sighting),
+      from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data()),
+      camera_of(spec, state), sighting.target >= 0 ? &target : nullptr);
+  if (!at) return std::nullopt;
+  return at->error;
 }
 
 }  // namespace kinescope::bundle

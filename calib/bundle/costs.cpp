@@ -3,6 +3,8 @@
 
 #include <ceres/sized_cost_function.h>
 
+#include "calib/bundle/corrected.h"
+
 namespace kinescope::bundle {
 namespace {
 
@@ -35,29 +37,32 @@ class SightingCost final : public ceres::CostFunction {
     sizes.push_back(1);
     if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
     if (sighting.target >= 0) sizes.push_back(3);
+    corrections_ = corrections_of(spec, sighting);
+    if (!corrections_.empty()) sizes.push_back(static_cast<int>(spec.corrections.size()));
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
     std::vector<ChainJoint> joints(path_->size());
-    for (std::size_t k = 0; k < path_->size(); ++k) joints[k] = joint_at(k, parameters);
+    std::vector<double> rates(path_->size());
+    for (std::size_t k = 0; k < path_->size(); ++k) {
+      joints[k] = joint_at(k, parameters);
+      rates[k] = rate_at(k, parameters);
+    }
     const std::size_t mount = 1 + 2 * path_->size();
-    const Pose T_camera_base = from_block(parameters[0]);
-    const Pose T_link_marker = from_block(parameters[mount]);
-    const ChainDerivatives chain = differentiate_chain(T_camera_base, joints, T_link_marker);
-
     const bool corners = sighting_->kind == MeasurementKind::kCorners;
     const CameraModel camera =
         corners ? camera_from(spec_->camera, parameters[mount + 2]) : spec_->camera;
     Eigen::Vector3d target = Eigen::Vector3d::Zero();
     if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[mount + 2]);
-    const auto error = compare(*sighting_, chain.T_camera_marker, camera,
-                               sighting_->target >= 0 ? &target : nullptr);
-    if (!error || !error->residual.allFinite()) return false;
-    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = error->residual;
-    if (jacobians != nullptr) {
-      fill_jacobians(parameters, joints, chain, *error, jacobians);
-    }
+    const double* values = corrections_.empty() ? nullptr : parameters[correction_block()];
+    const CorrectedSighting corrected = sum_corrections(*spec_, *sighting_, corrections_, values);
+    const auto at = corrected_error(*spec_, *sighting_, corrected, from_block(parameters[0]),
+                                    std::move(joints), rates, from_block(parameters[mount]), camera,
+                                    sighting_->target >= 0 ? &target : nullptr);
+    if (!at || !at->error.residual.allFinite()) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = at->error.residual;
+    if (jacobians != nullptr) fill_jacobians(parameters, corrected, *at, jacobians);
     return true;
   }
 
@@ -74,6 +79,15 @@ class SightingCost final : public ceres::CostFunction {
     return {joint.type, joint.axis, from_block(parameters[1 + 2 * k]), value};
   }
 
+  double rate_at(std::size_t k, double const* const* parameters) const {
+    const int id = (*path_)[k];
+    return spec_->free_value[static_cast<std::size_t>(id)]
+               ? 0.0
+               : parameters[2 + 2 * k][0] * readings_->rate(sighting_->frame, id);
+  }
+
+  [[nodiscard]] std::size_t correction_block() const { return parameter_block_sizes().size() - 1; }
+
   void fill_pose(double* out, const SightingError& error, const Matrix6d& d,
                  const double* pose) const {
     if (out == nullptr) return;
@@ -81,13 +95,13 @@ class SightingCost final : public ceres::CostFunction {
         error.d_marker * (d * minus_jacobian(from_block(pose)));
   }
 
-  void fill_jacobians(double const* const* parameters, const std::vector<ChainJoint>& joints,
-                      const ChainDerivatives& chain, const SightingError& error,
-                      double** jacobians) const {
+  void fill_jacobians(double const* const* parameters, const CorrectedSighting& corrected,
+                      const CorrectedError& at, double** jacobians) const {
     const int rows = num_residuals();
+    const ChainDerivatives& chain = at.chain;
+    const SightingError& error = at.error;
     fill_pose(jacobians[0], error, chain.d_camera_base, parameters[0]);
-    Eigen::VectorXd d_time = Eigen::VectorXd::Zero(rows);
-    for (std::size_t k = 0; k < joints.size(); ++k) {
+    for (std::size_t k = 0; k < path_->size(); ++k) {
       const int id = (*path_)[k];
       fill_pose(jacobians[1 + 2 * k], error, chain.d_joint[k], parameters[1 + 2 * k]);
       const Eigen::VectorXd d_value = error.d_marker * chain.d_value[k];
@@ -101,12 +115,11 @@ class SightingCost final : public ceres::CostFunction {
         d_map.col(0) = d_value * readings_->value(sighting_->frame, id);
         d_map.col(1) = d_value;
       }
-      d_time += d_value * (parameters[2 + 2 * k][0] * readings_->rate(sighting_->frame, id));
     }
-    const std::size_t mount = 1 + 2 * joints.size();
-    fill_pose(jacobians[mount], error, Matrix6d::Identity(), parameters[mount]);
+    const std::size_t mount = 1 + 2 * path_->size();
+    fill_pose(jacobians[mount], error, adjoint(exp_pose(-corrected.marker)), parameters[mount]);
     if (jacobians[mount + 1] != nullptr) {
-      Eigen::Map<Eigen::VectorXd>(jacobians[mount + 1], rows) = d_time;
+      Eigen::Map<Eigen::VectorXd>(jacobians[mount + 1], rows) = at.d_time;
     }
     if (sighting_->kind == MeasurementKind::kCorners && jacobians[mount + 2] != nullptr) {
       Eigen::Map<RowMajor>(jacobians[mount + 2], rows, kMaxIntrinsics) = error.d_intrinsics;
@@ -115,12 +128,22 @@ class SightingCost final : public ceres::CostFunction {
       Eigen::Map<RowMajor>(jacobians[mount + 2], rows, 3) =
           Eigen::Matrix3d::Identity() / sighting_->sigma;
     }
+    if (!corrections_.empty() && jacobians[correction_block()] != nullptr) {
+      Eigen::Map<RowMajor> out(jacobians[correction_block()], rows,
+                               static_cast<Eigen::Index>(spec_->corrections.size()));
+      out.setZero();
+      for (const int c : corrections_) {
+        out.col(c) =
+            d_correction(*spec_, *sighting_, spec_->corrections[static_cast<std::size_t>(c)], at);
+      }
+    }
   }
 
   const Spec* spec_;
   const Sighting* sighting_;
   const Readings* readings_;
   const std::vector<int>* path_;
+  std::vector<int> corrections_;  // that bear on this sighting
 };
 
 // A joint frame that should stay near the nominal one.

@@ -11,8 +11,8 @@ namespace kinescope::bundle {
 
 /// One sighting, whitened. Blocks: T_camera_base (7), then for every joint on the way its frame (7)
 /// and its map (scale, offset) or its value in this frame (1), the mount (7), the time offset (1),
-/// for corners the intrinsics (12), for points in a target its place (3). `readings` must follow
-/// the time offset.
+/// for corners the intrinsics (12), for points in a target its place (3), where corrections bear
+/// on the sighting all of them. `readings` must follow the time offset.
 [[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
                                                       const Readings& readings);
 /// A joint frame that should stay near the nominal one. Block: the frame (7).

@@ -186,6 +186,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
     spec.channel.push_back(channel.value_or(-1));
   }
   add_couplings(start, log, spec);
+  spec.corrections = start.corrections;
   for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
     std::vector<int> path;
     for (const JointId id : spec.tree.path_to(LinkId{static_cast<int>(l)}))

@@ -7,6 +7,7 @@
 #include <ceres/loss_function.h>
 #include <fmt/format.h>
 
+#include "calib/bundle/corrected.h"
 #include "calib/bundle/costs.h"
 #include "kinematics/core/error.h"
 
@@ -70,6 +71,9 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
   state.intrinsics = {c.fx, c.fy, c.cx, c.cy};
   std::copy(c.distortion.begin(), c.distortion.end(), state.intrinsics.begin() + 4);
   state.targets.resize(spec.targets.size());
+  for (const Correction& correction : spec.corrections) {
+    state.corrections.push_back(correction.value);
+  }
   return state;
 }
 
@@ -120,6 +124,18 @@ std::vector<ChainJoint> chain_of(const Spec& spec, const State& state, const Rea
   return joints;
 }
 
+std::vector<double> rates_of(const Spec& spec, const State& state, const Readings& readings,
+                             const Sighting& sighting) {
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  std::vector<double> rates;
+  for (const int id : spec.path[marker.link.index()]) {
+    const auto j = static_cast<std::size_t>(id);
+    rates.push_back(
+        spec.free_value[j] ? 0.0 : state.joint_maps[j][0] * readings.rate(sighting.frame, id));
+  }
+  return rates;
+}
+
 Pose predict(const Spec& spec, const State& state, const Readings& readings,
              const Sighting& sighting) {
   Pose pose = from_block(state.camera_base.data());
@@ -159,6 +175,7 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   if (sighting.target >= 0) {
     blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
+  if (!corrections_of(spec, sighting).empty()) blocks.push_back(state.corrections.data());
   ceres::LossFunction* loss =
       options.robust_width ? new ceres::CauchyLoss(*options.robust_width) : nullptr;
   ids_.push_back(
@@ -265,6 +282,13 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
                  {nullptr, name, {name + " x", name + " y", name + " z"}, {"m", "m", "m"}, {}, -1},
                  frozen);
   }
+  FreeBlock corrections{nullptr, "effects", {}, {}, {}, -1};
+  for (const Correction& correction : spec.corrections) {
+    corrections.names.push_back(correction.name);
+    corrections.units.push_back(correction.unit);
+  }
+  free_numbers(state.corrections.data(), std::vector<bool>(spec.corrections.size(), true),
+               corrections, frozen);
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     // The zero of a joint that no channel drives is free: its value in the first frame stays.
     bool zero_held = frozen;

@@ -68,6 +68,7 @@ struct Spec {
   std::vector<bool> free_value;  ///< joints whose value is unknown in every frame
   bool free_time_offset = false;
   std::array<bool, kMaxIntrinsics> free_intrinsics{};
+  std::vector<Correction> corrections;  ///< all free
   /// Prior on the joint frames (nominal robots): standard deviations of rotation and translation.
   bool has_prior = false;
   double prior_sigma_rad = 0.0;
@@ -84,6 +85,7 @@ struct State {
   std::array<double, kMaxIntrinsics> intrinsics{};
   std::vector<std::array<double, 3>> targets;
   std::vector<std::vector<double>> values;  ///< joint, frame; only where Spec::free_value
+  std::vector<double> corrections;          ///< beside Spec::corrections
 };
 
 [[nodiscard]] State initial_state(const Spec& spec, const CalibrationStart& start);
@@ -110,6 +112,10 @@ class Readings {
 /// The joints on the way to a sighting's marker, at its instant.
 [[nodiscard]] std::vector<ChainJoint> chain_of(const Spec& spec, const State& state,
                                                const Readings& readings, const Sighting& sighting);
+/// Rates of the same joints, rad/s or m/s; 0 where no channel drives the joint.
+[[nodiscard]] std::vector<double> rates_of(const Spec& spec, const State& state,
+                                           const Readings& readings, const Sighting& sighting);
+/// Without corrections.
 [[nodiscard]] Pose predict(const Spec& spec, const State& state, const Readings& readings,
                            const Sighting& sighting);
 
@@ -121,11 +127,12 @@ struct SightingError {
 };
 
 /// Nothing when a corner lies behind the camera. `target_m` takes the place of the measured
-/// position.
+/// position; `size` multiplies the marker's corners.
 [[nodiscard]] std::optional<SightingError> compare(const Sighting& sighting,
                                                    const Pose& T_camera_marker,
                                                    const CameraModel& camera,
-                                                   const Eigen::Vector3d* target_m);
+                                                   const Eigen::Vector3d* target_m,
+                                                   double size = 1.0);
 
 /// The error of one sighting at a state.
 [[nodiscard]] std::optional<SightingError> error_of(const Spec& spec, const State& state,

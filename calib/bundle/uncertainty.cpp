@@ -6,10 +6,9 @@
 #include <map>
 
 #include <Eigen/Eigenvalues>
-#include <ceres/crs_matrix.h>
 #include <fmt/format.h>
 
-#include "kinematics/core/error.h"
+#include "calib/bundle/linearise.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -22,156 +21,8 @@ constexpr double kUnseen = 1e-8;
 // Blocks of the sandwich: no fewer than this many, or its scatter says nothing.
 constexpr int kMinStretches = 12;
 
-// The rows of one frame: derivatives by the global parameters with the frame's own unknowns
-// eliminated.
-struct FrameRows {
-  Eigen::MatrixXd J;
-  Eigen::VectorXd r;
-};
-
-struct Linearisation {
-  std::vector<FreeBlock> blocks;    // global
-  std::map<int, FrameRows> frames;  // by frame; distances between targets under -1
-  Eigen::MatrixXd prior_information;
-};
-
-std::vector<double*> data_of(const std::vector<FreeBlock>& blocks) {
-  std::vector<double*> data;
-  for (const FreeBlock& block : blocks) data.push_back(block.data);
-  return data;
-}
-
-int width_of(const std::vector<FreeBlock>& blocks) {
-  int width = 0;
-  for (const FreeBlock& block : blocks) width += static_cast<int>(block.names.size());
-  return width;
-}
-
-Eigen::MatrixXd dense_rows(const ceres::CRSMatrix& m, int first, int count, int column,
-                           int columns) {
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count, columns);
-  for (int i = 0; i < count; ++i) {
-    const auto row = static_cast<std::size_t>(first + i);
-    for (int k = m.rows[row]; k < m.rows[row + 1]; ++k) {
-      const int c = m.cols[static_cast<std::size_t>(k)] - column;
-      if (c >= 0 && c < columns) out(i, c) = m.values[static_cast<std::size_t>(k)];
-    }
-  }
-  return out;
-}
-
-Eigen::MatrixXd information_of_priors(BuiltProblem& built, const std::vector<double*>& parameters,
-                                      int width) {
-  if (built.prior_ids().empty()) return Eigen::MatrixXd::Zero(width, width);
-  ceres::Problem::EvaluateOptions options;
-  options.parameter_blocks = parameters;
-  options.residual_blocks = built.prior_ids();
-  ceres::CRSMatrix jacobian;
-  KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, nullptr, nullptr, &jacobian),
-                  "priors can be evaluated");
-  const Eigen::MatrixXd J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
-  return J.transpose() * J;
-}
-
-// Takes the frame's own unknowns out: J <- J - L (L'L)^-1 L' J.
-void eliminate(FrameRows& rows, const Eigen::MatrixXd& local) {
-  if (local.cols() == 0) return;
-  Eigen::MatrixXd normal = local.transpose() * local;
-  normal.diagonal().array() += 1e-12 * (normal.diagonal().maxCoeff() + 1e-300);
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  rows.J -= local * factor.solve(local.transpose() * rows.J);
-  rows.r -= local * factor.solve(local.transpose() * rows.r);
-}
-
-Linearisation linearise(const Spec& spec, State& state, const std::vector<int>& used) {
-  BuiltProblem built(spec, state, used, {});
-  Linearisation out;
-  std::map<int, std::vector<FreeBlock>> locals;
-  for (const FreeBlock& block : built.blocks()) {
-    if (block.local_frame < 0) {
-      out.blocks.push_back(block);
-    } else {
-      locals[block.local_frame].push_back(block);
-    }
-  }
-  const int width = width_of(out.blocks);
-  // Frame by frame, so that the memory needed does not depend on the length of the recording.
-  std::map<int, std::vector<ceres::ResidualBlockId>> ids;
-  for (std::size_t i = 0; i < built.sighting_ids().size(); ++i) {
-    const int frame =
-        i < used.size() ? spec.sightings[static_cast<std::size_t>(used[i])].frame : -1;
-    ids[frame].push_back(built.sighting_ids()[i]);
-  }
-  for (const auto& [frame, residual_blocks] : ids) {
-    ceres::Problem::EvaluateOptions options;
-    options.parameter_blocks = data_of(out.blocks);
-    const auto local = locals.find(frame);
-    int local_width = 0;
-    if (local != locals.end()) {
-      for (double* data : data_of(local->second)) options.parameter_blocks.push_back(data);
-      local_width = width_of(local->second);
-    }
-    options.residual_blocks = residual_blocks;
-    options.apply_loss_function = false;
-    std::vector<double> residuals;
-    ceres::CRSMatrix jacobian;
-    KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
-                    "a solution can be evaluated");
-    FrameRows rows;
-    rows.J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
-    rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data(), jacobian.num_rows);
-    eliminate(rows, dense_rows(jacobian, 0, jacobian.num_rows, width, local_width));
-    out.frames.emplace(frame, std::move(rows));
-  }
-  out.prior_information = information_of_priors(built, data_of(out.blocks), width);
-  return out;
-}
-
-// Pooled autocorrelation of the whitened residuals of each marker's coordinates, integrated.
-double correlation_time(const Spec& spec, const State& state, const std::vector<int>& used) {
-  const Readings readings(spec, state.time_offset[0]);
-  std::map<int, std::map<int, Eigen::VectorXd>> by_marker;
-  for (const int index : used) {
-    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
-    if (const auto error = error_of(spec, state, readings, sighting)) {
-      by_marker[sighting.marker][sighting.frame] = error->residual;
-    }
-  }
-  const std::size_t frames = spec.times_s.size();
-  if (frames < 20) return 0.0;
-  const double step_s =
-      (spec.times_s.back() - spec.times_s.front()) / static_cast<double>(frames - 1);
-  double variance = 0.0;
-  for (const auto& [marker, series] : by_marker) {
-    for (const auto& [frame, r] : series)
-      variance += r.squaredNorm() / static_cast<double>(r.size());
-  }
-  std::size_t total = 0;
-  for (const auto& [marker, series] : by_marker) total += series.size();
-  if (total == 0 || variance <= 0.0) return 0.0;
-  variance /= static_cast<double>(total);
-  double sum = 0.5;
-  const int max_lag = static_cast<int>(std::min<std::size_t>(frames / 4, 200));
-  for (int lag = 1; lag <= max_lag; ++lag) {
-    double product = 0.0;
-    int pairs = 0;
-    for (const auto& [marker, series] : by_marker) {
-      for (const auto& [frame, r] : series) {
-        const auto later = series.find(frame + lag);
-        if (later == series.end()) continue;
-        product += r.dot(later->second) / static_cast<double>(r.size());
-        ++pairs;
-      }
-    }
-    const double rho = pairs > 0 ? product / (pairs * variance) : 0.0;
-    if (rho < 0.05) break;
-    sum += rho;
-  }
-  return sum * step_s;
-}
-
 // Which stretch of time each frame belongs to.
-std::map<int, int> stretches(const Spec& spec, const Linearisation& linear, double correlation_s) {
+std::map<int, int> stretches(const Spec& spec, const LinearBundle& linear, double correlation_s) {
   std::map<int, int> out;
   const double begin = spec.times_s.front();
   const double duration = std::max(1e-9, spec.times_s.back() - begin);
@@ -189,7 +40,7 @@ std::map<int, int> stretches(const Spec& spec, const Linearisation& linear, doub
 }
 
 // Factors by which the variances grow because the residuals are not independent.
-Eigen::VectorXd inflation(const Linearisation& linear, const std::map<int, int>& stretch,
+Eigen::VectorXd inflation(const LinearBundle& linear, const std::map<int, int>& stretch,
                           const Eigen::MatrixXd& covariance) {
   std::map<int, Eigen::VectorXd> scores;
   const Eigen::Index n = covariance.rows();
@@ -267,7 +118,7 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
 }  // namespace
 
 Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vector<int>& used) {
-  const Linearisation linear = linearise(spec, state, used);
+  const LinearBundle linear = linearise(spec, state, used);
   Uncertainty out;
   out.blocks = linear.blocks;
   const int n = width_of(out.blocks);

@@ -53,7 +53,7 @@ double best_scan(const NormalSystem& system, const Candidate& candidate) {
       best = i;
     }
   }
-  return refine(system, candidate, best);
+  return candidate.scan_listed ? candidate.scan[best] : refine(system, candidate, best);
 }
 
 }  // namespace

@@ -30,6 +30,8 @@ struct TraceOptions {
   /// Effects that move the prediction by less than this (rms over the rows they touch, in the
   /// residual's unit) are below what the sensor itself gets wrong and are not looked for.
   double floor = 0.0;
+  /// Effects that the model has already: they stay if they earn their place.
+  std::vector<AddedEffect> start;
   int fewest_stretches = 12;  ///< of time; with fewer nothing is said
 };
 
@@ -75,6 +77,7 @@ struct TracedEffect {
   double scan = 0.0;
   std::string scan_name;  ///< empty: none
   std::string scan_unit;
+  std::string scan_words;        ///< "joint2"; empty: the number says it
   double p_value = 1.0;          ///< over the whole family of tests
   HeldOutError held_out_before;  ///< with all the others, without this one
   HeldOutError held_out_after;   ///< with all

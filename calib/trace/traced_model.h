@@ -69,8 +69,10 @@ struct Candidate {
   std::string size_unit;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;
+  bool scan_listed = false;  ///< only the listed values make sense; else those between them too
   std::string scan_name;
   std::string scan_unit;
+  std::function<std::string(double scan)> scan_words;  ///< "joint2"; empty: the number says it
   /// One column a parameter, at a value of the scan (0 where there is none).
   std::function<std::vector<EffectColumn>(double scan)> columns;
 };

@@ -42,9 +42,10 @@ Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Prog
 Trace Tracer::run() {
   report(progress_, "trace", 0, 0);
   base_ = make_stage(*model_, {});
-  now_ = base_;
-  if (!can_say(*base_)) return trace_;
+  now_ = options_.start.empty() ? base_ : make_stage(*model_, options_.start);
+  if (!can_say(*now_)) return trace_;
   add_step(0, "the model as it is", *base_);
+  if (now_ != base_) add_step(0, "with the effects that were known", *now_);
   do {
     forward();
   } while (backward());

@@ -144,6 +144,7 @@ void Tracer::summarise() {
     effect.scan = added.scan;
     effect.scan_name = candidate.scan_name;
     effect.scan_unit = candidate.scan_unit;
+    if (candidate.scan_words) effect.scan_words = candidate.scan_words(added.scan);
     trace_.accepted.push_back(std::move(effect));
     trace_.added.push_back(added);
   }

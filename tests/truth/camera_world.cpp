@@ -168,7 +168,10 @@ CalibrationStart perturbed_start(const World& world, double sigma_rad, double si
     d << rng.normal3(sigma_rad), rng.normal3(sigma_m);
     pose = pose * exp_pose(d);
   };
-  CalibrationStart start{world.tree, world.T_camera_base, world.camera, 0.0, {}, false, true, {}};
+  CalibrationStart start;
+  start.tree = world.tree;
+  start.T_camera_base = world.T_camera_base;
+  start.camera = world.camera;
   perturb(start.T_camera_base);
   for (Joint& joint : start.tree.joints) perturb(joint.T_parent_joint);
   for (Marker& marker : start.tree.markers) {

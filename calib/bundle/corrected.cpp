@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/corrected.h"
+
+#include <algorithm>
+
+namespace kinescope::bundle {
+namespace {
+
+const std::vector<int>& path_of(const Spec& spec, const Sighting& sighting) {
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  return spec.path[marker.link.index()];
+}
+
+double share_at(const Correction& correction, int frame) {
+  return correction.share.size() == 0 ? 1.0 : correction.share[frame];
+}
+
+Vector6d twist_at(const Correction& correction, int frame) {
+  if (correction.twists.rows() > 0) return correction.twists.row(frame).transpose();
+  return share_at(correction, frame) * correction.direction;
+}
+
+CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>& by) {
+  camera.fx += by[0];
+  camera.fy += by[1];
+  camera.cx += by[2];
+  camera.cy += by[3];
+  for (std::size_t i = 4; i < kMaxIntrinsics; ++i) camera.distortion[i - 4] += by[i];
+  return camera;
+}
+
+// Rows of the image between a corner and the middle row.
+double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t corner) {
+  return sighting.corners_px[corner].y() - 0.5 * spec.camera.height;
+}
+
+}  // namespace
+
+std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
+  const std::vector<int>& path = path_of(spec, sighting);
+  std::vector<int> out;
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    const Correction& correction = spec.corrections[c];
+    bool bears = true;
+    switch (correction.part) {
+      case CorrectedPart::kJoint:
+        bears = std::ranges::find(path, correction.index) != path.end();
+        break;
+      case CorrectedPart::kMarker:
+      case CorrectedPart::kMarkerSize:
+        bears = correction.index == sighting.marker;
+        break;
+      case CorrectedPart::kIntrinsic:
+      case CorrectedPart::kReadout:
+        bears = sighting.kind == MeasurementKind::kCorners;
+        break;
+      case CorrectedPart::kCamera:
+      case CorrectedPart::kClock:
+        break;
+    }
+    if (bears) out.push_back(static_cast<int>(c));
+  }
+  return out;
+}
+
+CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
+                                  const std::vector<int>& which, const double* values) {
+  const std::vector<int>& path = path_of(spec, sighting);
+  CorrectedSighting out;
+  out.joints.assign(path.size(), Vector6d::Zero());
+  for (const int c : which) {
+    const Correction& correction = spec.corrections[static_cast<std::size_t>(c)];
+    const Vector6d twist = values[c] * twist_at(correction, sighting.frame);
+    const double amount = values[c] * share_at(correction, sighting.frame);
+    switch (correction.part) {
+      case CorrectedPart::kJoint: {
+        const auto k = std::ranges::find(path, correction.index) - path.begin();
+        out.joints[static_cast<std::size_t>(k)] += twist;
+        break;
+      }
+      case CorrectedPart::kMarker:
+        out.marker += twist;
+        break;
+      case CorrectedPart::kMarkerSize:
+        out.size += amount;
+        break;
+      case CorrectedPart::kCamera:
+        out.camera += twist;
+        break;
+      case CorrectedPart::kIntrinsic:
+        out.intrinsics[static_cast<std::size_t>(correction.index)] += amount;
+        break;
+      case CorrectedPart::kReadout:
+        out.line_delay_s += amount;
+        break;
+      case CorrectedPart::kClock:
+        out.clock_s += amount;
+        break;
+    }
+  }
+  return out;
+}
+
+std::optional<CorrectedError> corrected_error(
+    const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,
+    const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m) {
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    joints[k].value += rates[k] * corrected.clock_s;
+    joints[k].correction = corrected.joints[k];
+  }
+  CorrectedError out;
+  out.chain = differentiate_chain(exp_pose(corrected.camera) * T_camera_base, joints,
+                                  T_link_marker * exp_pose(corrected.marker));
+  auto error = compare(sighting, out.chain.T_camera_marker, changed(camera, corrected.intrinsics),
+                       target_m, corrected.size);
+  if (!error) return std::nullopt;
+  out.error = std::move(*error);
+  Vector6d velocity = Vector6d::Zero();
+  for (std::size_t k = 0; k < joints.size(); ++k) velocity += out.chain.d_value[k] * rates[k];
+  out.d_time = out.error.d_marker * velocity;
+  if (corrected.line_delay_s != 0.0) {
+    for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(2 * i);
+      out.error.residual.segment<2>(row) +=
+          out.d_time.segment<2>(row) * corrected.line_delay_s * rows_from_middle(spec, sighting, i);
+    }
+  }
+  return out;
+}
+
+// To first order in the corrections that are there already, which are small.
+Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
+                             const Correction& correction, const CorrectedError& at) {
+  const double share = share_at(correction, sighting.frame);
+  const Vector6d twist = twist_at(correction, sighting.frame);
+  switch (correction.part) {
+    case CorrectedPart::kJoint: {
+      const std::vector<int>& path = path_of(spec, sighting);
+      const auto k = std::ranges::find(path, correction.index) - path.begin();
+      return at.error.d_marker * (at.chain.d_link[static_cast<std::size_t>(k)] * twist);
+    }
+    case CorrectedPart::kMarker:
+      return at.error.d_marker * twist;
+    case CorrectedPart::kCamera:
+      return at.error.d_marker * (adjoint(at.chain.T_camera_marker.inverse()) * twist);
+    case CorrectedPart::kMarkerSize: {
+      Eigen::VectorXd out = Eigen::VectorXd::Zero(at.error.residual.size());
+      for (std::size_t i = 0; i < sighting.geometry_m.size(); ++i) {
+        const auto row = static_cast<Eigen::Index>(2 * i);
+        out.segment<2>(row) =
+            at.error.d_marker.block<2, 3>(row, 3) * sighting.geometry_m[i] * share;
+      }
+      return out;
+    }
+    case CorrectedPart::kIntrinsic:
+      return at.error.d_intrinsics.col(correction.index) * share;
+    case CorrectedPart::kReadout: {
+      Eigen::VectorXd out = at.d_time * share;
+      for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
+        out.segment<2>(static_cast<Eigen::Index>(2 * i)) *= rows_from_middle(spec, sighting, i);
+      }
+      return out;
+    }
+    case CorrectedPart::kClock:
+      return at.d_time * share;
+  }
+  return Eigen::VectorXd::Zero(at.error.residual.size());
+}
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The corrections that bear on one sighting, summed, and what the sighting's error owes to each.
+#pragma once
+
+#include <vector>
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+/// Corrections that bear on a sighting: indices into Spec::corrections, increasing.
+[[nodiscard]] std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting);
+
+struct CorrectedSighting {
+  Vector6d camera = Vector6d::Zero();
+  std::vector<Vector6d> joints;  ///< beside the path
+  Vector6d marker = Vector6d::Zero();
+  double size = 1.0;
+  std::array<double, kMaxIntrinsics> intrinsics{};  ///< changes
+  double line_delay_s = 0.0;
+  double clock_s = 0.0;
+};
+
+/// `values`: one a correction of the spec.
+[[nodiscard]] CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
+                                                const std::vector<int>& which,
+                                                const double* values);
+
+/// Chain and error of a sighting with its corrections.
+struct CorrectedError {
+  ChainDerivatives chain;
+  SightingError error;
+  Eigen::VectorXd d_time;  ///< of the residual by the log's time, per s
+};
+
+/// `joints` as without corrections, `rates` the rate of each (rad/s, m/s). Nothing when a corner
+/// lies behind the camera.
+[[nodiscard]] std::optional<CorrectedError> corrected_error(
+    const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,
+    const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m);
+
+/// Derivative of the residual by one correction's value.
+[[nodiscard]] Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
+                                           const Correction& correction, const CorrectedError& at);
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What an effect changes in the prediction: one number times a known share in every frame.
+#pragma once
+
+#include <string>
+
+#include <Eigen/Core>
+
+#include "kinematics/core/pose.h"
+
+namespace kinescope {
+
+enum class CorrectedPart {
+  kJoint,       ///< a twist (rad, m) behind the joint's motion, in the link's frame
+  kMarker,      ///< a twist of the marker in its own frame
+  kMarkerSize,  ///< the marker's size over the declared one, minus 1
+  kCamera,      ///< a twist of everything seen, in the camera's frame
+  kIntrinsic,   ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
+  kReadout,     ///< s per image row by which a corner is seen later than the frame's middle row
+  kClock        ///< s by which the joint log's clock is further ahead than the time offset says
+};
+
+/// A parameter of the bundle that is zero where the effect is absent.
+struct Correction {
+  std::string name;   ///< "joint3 backlash width"
+  std::string block;  ///< "joint3", "tag_12", "camera", "clock"
+  std::string unit;
+  CorrectedPart part = CorrectedPart::kJoint;
+  int index = 0;  ///< of the joint or the marker in the tree, or of the intrinsic parameter
+  Vector6d direction = Vector6d::Zero();  ///< twists: rotation, then translation
+  Eigen::VectorXd share;                  ///< frames; empty: 1 everywhere
+  /// Frames x 6: the twist itself, where its direction changes from frame to frame; takes the place
+  /// of direction and share.
+  Eigen::Matrix<double, Eigen::Dynamic, 6> twists;
+  double value = 0.0;  ///< where the search starts
+};
+
+}  // namespace kinescope

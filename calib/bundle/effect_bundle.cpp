@@ -1,0 +1,369 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/effect_bundle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "calib/bundle/folds.h"
+#include "calib/bundle/linearise.h"
+#include "calib/bundle/make_spec.h"
+#include "calib/bundle/solve.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+
+using bundle::FreeBlock;
+using bundle::LinearBundle;
+using bundle::Readings;
+using bundle::Sighting;
+using bundle::Spec;
+using bundle::State;
+
+namespace {
+
+// Neighbours in time on either side that a sighting is compared with.
+constexpr int kNeighbours = 3;
+// A sighting's difference to the median of 2 x 3 neighbours has 1 + pi / 12 of the noise's
+// variance.
+constexpr double kDifferenceVariance = 1.26;
+// Frames beyond this many are thinned evenly: tests of effects gain nothing from more.
+constexpr int kMostFrames = 2500;
+constexpr int kFolds = 5;
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Squared distance, per row, of a sighting's residual to the median of its neighbours'.
+double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
+  const std::size_t first = at < kNeighbours ? 0 : at - kNeighbours;
+  const std::size_t last = std::min(series.size() - 1, at + kNeighbours);
+  const Eigen::VectorXd& own = series[at];
+  double sum = 0.0;
+  for (Eigen::Index row = 0; row < own.size(); ++row) {
+    std::vector<double> others;
+    for (std::size_t i = first; i <= last; ++i) {
+      if (i != at && series[i].size() == own.size()) others.push_back(series[i][row]);
+    }
+    if (others.empty()) return 0.0;
+    const double difference = own[row] - median_of(std::move(others));
+    sum += difference * difference;
+  }
+  return sum / static_cast<double>(own.size()) / kDifferenceVariance;
+}
+
+// Multiplies a sighting's sigma.
+void widen(Sighting& sighting, double factor) {
+  sighting.sigma *= factor;
+  sighting.whitening /= factor;
+}
+
+// Thins and weighs sightings by how they differ from their neighbours in time; gives those that do
+// not stand out.
+std::vector<int> choose_by_neighbours(Spec& spec, const State& state,
+                                      const std::vector<int>& usable, double reject_sigma) {
+  const Readings readings(spec, state.time_offset[0]);
+  std::map<int, std::vector<int>> of_marker;
+  std::map<int, std::vector<Eigen::VectorXd>> residuals;
+  for (const int index : usable) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const auto error = bundle::error_of(spec, state, readings, sighting);
+    if (!error || !error->residual.allFinite()) continue;
+    of_marker[sighting.marker].push_back(index);
+    residuals[sighting.marker].push_back(error->residual);
+  }
+  std::vector<int> used;
+  for (const auto& [marker, indices] : of_marker) {
+    std::vector<double> distance;
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      distance.push_back(stands_out(residuals[marker], i));
+    }
+    const double typical = std::max(median_of(distance), 1e-12);
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      Sighting& sighting = spec.sightings[static_cast<std::size_t>(indices[i])];
+      const double freedom = sighting.dimension();
+      // Median and scatter of a mean of `freedom` squares, to first order.
+      const double noise = typical / (1.0 - 2.0 / (9.0 * freedom));
+      widen(sighting, std::sqrt(noise));
+      if (distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
+        used.push_back(indices[i]);
+      }
+    }
+  }
+  std::ranges::sort(used);
+  return used;
+}
+
+std::vector<int> thin_frames(const Spec& spec, const std::vector<int>& usable) {
+  std::set<int> frames;
+  for (const int index : usable) {
+    frames.insert(spec.sightings[static_cast<std::size_t>(index)].frame);
+  }
+  if (static_cast<int>(frames.size()) <= kMostFrames) return usable;
+  const auto step = (frames.size() + kMostFrames - 1) / kMostFrames;
+  std::set<int> kept;
+  std::size_t n = 0;
+  for (const int frame : frames) {
+    if (n++ % step == 0) kept.insert(frame);
+  }
+  std::vector<int> out;
+  for (const int index : usable) {
+    if (kept.contains(spec.sightings[static_cast<std::size_t>(index)].frame)) out.push_back(index);
+  }
+  return out;
+}
+
+}  // namespace
+
+struct EffectBundle::Impl {
+  Spec spec;  // plain, noise known
+  State start;
+  double offset_start_s = 0.0;
+  std::vector<int> used;
+  std::vector<int> fold;
+
+  [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
+};
+
+EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& markers,
+                           const JointLog& log, const CalibrationStart& start,
+                           const CalibrateOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  Spec& spec = impl_->spec;
+  spec = bundle::make_spec(measurements, markers, log, start, options);
+  // The best plain model shows which sightings stand out; the clock is free for that only.
+  State state = bundle::initial_state(spec, start);
+  bundle::guess_targets(spec, bundle::usable_sightings(spec, state), state);
+  const std::vector<int> usable = thin_frames(spec, bundle::usable_sightings(spec, state));
+  Spec robust = spec;
+  const bundle::RobustSolution solution =
+      bundle::solve_robustly(robust, state, usable, options.reject_sigma, options.max_iterations);
+  if (spec.postures) {
+    spec = std::move(robust);
+    impl_->used = solution.used;
+  } else {
+    impl_->used = choose_by_neighbours(spec, state, usable, options.reject_sigma);
+  }
+  impl_->offset_start_s = state.time_offset[0];
+  impl_->start = state;
+
+  std::set<int> frames;
+  for (const int index : impl_->used) {
+    frames.insert(spec.sightings[static_cast<std::size_t>(index)].frame);
+  }
+  const std::vector<int> driven = driven_joints();
+  const Readings readings(spec, state.time_offset[0]);
+  Eigen::MatrixXd features(static_cast<Eigen::Index>(frames.size()),
+                           static_cast<Eigen::Index>(driven.size()));
+  Eigen::Index row = 0;
+  for (const int frame : frames) {
+    for (std::size_t d = 0; d < driven.size(); ++d) {
+      features(row, static_cast<Eigen::Index>(d)) = readings.value(frame, driven[d]);
+    }
+    ++row;
+  }
+  const std::vector<int> folds = bundle::assign_folds(features, kFolds);
+  impl_->fold.assign(spec.times_s.size(), -1);
+  std::size_t next = 0;
+  for (const int frame : frames) impl_->fold[static_cast<std::size_t>(frame)] = folds[next++];
+}
+
+EffectBundle::~EffectBundle() = default;
+
+namespace {
+
+// Columns of a linearised bundle: the model's own, the change's, the probes'.
+struct Columns {
+  std::vector<Eigen::Index> own;
+  std::vector<Eigen::Index> change;
+  std::vector<Eigen::Index> probes;
+};
+
+Columns sort_columns(const LinearBundle& linear, std::size_t corrections, bool time_offset) {
+  Columns out;
+  Eigen::Index clock = -1;
+  Eigen::Index next = 0;
+  for (const FreeBlock& block : linear.blocks) {
+    for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
+      if (block.block == "effects") {
+        (i < corrections ? out.change : out.probes).push_back(next);
+      } else if (block.block == "clock") {
+        clock = next;
+      } else {
+        out.own.push_back(next);
+      }
+    }
+  }
+  if (time_offset) out.change.push_back(clock);
+  return out;
+}
+
+// What one whitened unit of each row of a sighting is.
+Eigen::VectorXd units_of(const Sighting& sighting) {
+  switch (sighting.kind) {
+    case MeasurementKind::kCorners:
+    case MeasurementKind::kPoint:
+      return Eigen::VectorXd::Constant(sighting.dimension(), sighting.sigma);
+    case MeasurementKind::kPose:
+      break;
+  }
+  return Eigen::VectorXd::Ones(sighting.dimension());
+}
+
+}  // namespace
+
+BundleFit EffectBundle::fit(const BundleChange& change,
+                            const std::vector<Correction>& probes) const {
+  Spec spec = impl_->spec;
+  State state = impl_->start;
+  spec.free_time_offset = change.time_offset;
+  state.time_offset[0] = change.time_offset ? impl_->offset_start_s : 0.0;
+  spec.corrections = change.corrections;
+  state.corrections.clear();
+  for (const Correction& correction : spec.corrections) {
+    state.corrections.push_back(correction.value);
+  }
+  constexpr int kIterations = 60;
+  const bundle::SolveSummary summary = bundle::solve(spec, state, impl_->used, {}, kIterations);
+  BundleFit out;
+  out.converged = summary.converged;
+  out.reason = summary.message;
+  out.time_offset_s = state.time_offset[0];
+  out.values = Eigen::Map<const Eigen::VectorXd>(
+      state.corrections.data(), static_cast<Eigen::Index>(state.corrections.size()));
+  if (change.time_offset) {
+    out.values.conservativeResize(out.values.size() + 1);
+    out.values[out.values.size() - 1] = state.time_offset[0];
+  }
+
+  // Probes stand beside the corrections, at zero.
+  spec.corrections.insert(spec.corrections.end(), probes.begin(), probes.end());
+  state.corrections.resize(spec.corrections.size(), 0.0);
+  const LinearBundle linear = bundle::linearise(spec, state, impl_->used);
+  const Columns columns = sort_columns(linear, change.corrections.size(), change.time_offset);
+  std::vector<Eigen::Index> model = columns.own;
+  model.insert(model.end(), columns.change.begin(), columns.change.end());
+
+  std::map<int, std::vector<int>> sightings;
+  for (const int index : impl_->used) {
+    sightings[spec.sightings[static_cast<std::size_t>(index)].frame].push_back(index);
+  }
+  Eigen::Index rows = 0;
+  for (const auto& [frame, block] : linear.frames) rows += frame < 0 ? 0 : block.r.size();
+  out.residual.resize(rows);
+  out.unit.resize(rows);
+  out.jacobian.resize(rows, static_cast<Eigen::Index>(model.size()));
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::Index row = 0;
+  for (const auto& [frame, block] : linear.frames) {
+    if (frame < 0) continue;  // measured distances are part of the model's prior knowledge
+    out.frames.push_back(frame);
+    out.first_row.push_back(row);
+    const Eigen::Index count = block.r.size();
+    out.residual.segment(row, count) = block.r;
+    out.jacobian.middleRows(row, count) = -block.J(Eigen::all, model);
+    for (std::size_t p = 0; p < columns.probes.size(); ++p) {
+      for (Eigen::Index i = 0; i < count; ++i) {
+        const double value = -block.J(i, columns.probes[p]);
+        if (value != 0.0) entries.emplace_back(row + i, static_cast<Eigen::Index>(p), value);
+      }
+    }
+    Eigen::Index at = row;
+    for (const int index : sightings.at(frame)) {
+      const Eigen::VectorXd units = units_of(spec.sightings[static_cast<std::size_t>(index)]);
+      out.unit.segment(at, units.size()) = units;
+      at += units.size();
+    }
+    row += count;
+  }
+  out.first_row.push_back(row);
+  out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
+  out.probes.setFromTriplets(entries.begin(), entries.end());
+  if (spec.has_prior) out.prior_information = linear.prior_information(model, model);
+  if (const auto distances = linear.frames.find(-1); distances != linear.frames.end()) {
+    const Eigen::MatrixXd J = distances->second.J(Eigen::all, model);
+    if (out.prior_information.size() == 0) {
+      out.prior_information = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+    }
+    out.prior_information += J.transpose() * J;
+  }
+  out.correlation_time_s = spec.postures ? 0.0 : bundle::correlation_time(spec, state, impl_->used);
+  out.tree = spec.tree;
+  for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
+    out.tree.joints[j].T_parent_joint = bundle::from_block(state.joint_frames[j].data());
+    out.tree.joints[j].scale = state.joint_maps[j][0];
+    out.tree.joints[j].offset = state.joint_maps[j][1];
+  }
+  for (std::size_t m = 0; m < out.tree.markers.size(); ++m) {
+    out.tree.markers[m].T_link_marker = bundle::from_block(state.mounts[m].data());
+  }
+  out.T_camera_base = bundle::from_block(state.camera_base.data());
+  return out;
+}
+
+JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s) const {
+  Spec at = spec;
+  at.times_s = times_s;
+  const Readings readings(at, 0.0);
+  const auto rows = static_cast<Eigen::Index>(times_s.size());
+  const auto joints = static_cast<Eigen::Index>(spec.tree.joints.size());
+  JointMotion out{times_s, Eigen::MatrixXd::Zero(rows, joints),
+                  Eigen::MatrixXd::Zero(rows, joints)};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (Eigen::Index j = 0; j < joints; ++j) {
+      const auto map = start.joint_maps[static_cast<std::size_t>(j)];
+      out.value(i, j) = map[0] * readings.value(static_cast<int>(i), static_cast<int>(j)) + map[1];
+      out.rate(i, j) = map[0] * readings.rate(static_cast<int>(i), static_cast<int>(j));
+    }
+  }
+  return out;
+}
+
+const KinematicTree& EffectBundle::tree() const { return impl_->spec.tree; }
+MeasurementKind EffectBundle::kind() const { return impl_->spec.kind; }
+const CameraModel& EffectBundle::camera() const { return impl_->spec.camera; }
+bool EffectBundle::postures() const { return impl_->spec.postures; }
+const std::vector<int>& EffectBundle::fold_of_frame() const { return impl_->fold; }
+const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->spec.times_s; }
+
+JointMotion EffectBundle::motion_at_frames(double time_offset_s) const {
+  std::vector<double> times_s = impl_->spec.times_s;
+  for (double& t : times_s) t += time_offset_s;
+  return impl_->motion(times_s);
+}
+
+JointMotion EffectBundle::motion_of_log(double time_offset_s) const {
+  constexpr double kBeforeFirst = 5.0;  // s of history, for what depends on where a joint came from
+  const Spec& spec = impl_->spec;
+  std::vector<double> times_s;
+  for (const double t : spec.log.times_s) {
+    if (t >= spec.times_s.front() + time_offset_s - kBeforeFirst &&
+        t <= spec.times_s.back() + time_offset_s + 1.0) {
+      times_s.push_back(t);
+    }
+  }
+  return impl_->motion(times_s);
+}
+
+std::vector<int> EffectBundle::driven_joints() const {
+  std::vector<int> out;
+  for (std::size_t j = 0; j < impl_->spec.channel.size(); ++j) {
+    if (impl_->spec.channel[j] >= 0) out.push_back(static_cast<int>(j));
+  }
+  return out;
+}
+
+std::vector<int> EffectBundle::seen_markers() const {
+  std::set<int> seen;
+  for (const int index : impl_->used) {
+    seen.insert(impl_->spec.sightings[static_cast<std::size_t>(index)].marker);
+  }
+  return {seen.begin(), seen.end()};
+}
+
+}  // namespace kinescope

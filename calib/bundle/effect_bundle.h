@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   the same as calibrate().
+// Gives   the bundle's fit with some effects in it, and how its residual answers to others: what
+//         tracing needs. Sightings and their weights are the same in every fit.
+// Method  Sightings that stand out from their neighbours in time are left out, whatever the model
+//         says of them, and the noise is what differs between neighbours: an effect that the model
+//         lacks neither loses its evidence as outliers nor passes for noise.
+// Not here: what the effects are (calib/effects), the search (calib/trace).
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/SparseCore>
+
+#include "calib/bundle/calibrate.h"
+
+namespace kinescope {
+
+/// What a fit has beyond the plain model.
+struct BundleChange {
+  std::vector<Correction> corrections;
+  bool time_offset = false;
+};
+
+/// Which column of the Jacobian belongs to the change, in its order: corrections, then the offset.
+struct BundleFit {
+  bool converged = false;
+  std::string reason;
+  Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
+      jacobian;                       ///< rows x parameters, d predicted; the change's columns last
+  Eigen::MatrixXd prior_information;  ///< of the parameters; empty without priors
+  Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
+  std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
+  std::vector<int> frames;              ///< of every instant
+  Eigen::VectorXd unit;                 ///< rows: natural unit of a whitened one
+  double correlation_time_s = 0.0;
+  Eigen::VectorXd values;  ///< of the change's parameters
+  double time_offset_s = 0.0;
+  KinematicTree tree;
+  Pose T_camera_base;
+};
+
+/// Joint values and rates at some instants, by the model's own idea of the channels' units.
+struct JointMotion {
+  std::vector<double> times_s;
+  Eigen::MatrixXd value;  ///< instants x joints of the tree, rad or m
+  Eigen::MatrixXd rate;
+};
+
+class EffectBundle {
+ public:
+  /// Throws as calibrate().
+  EffectBundle(const Measurements& measurements, const MarkerSet& markers, const JointLog& log,
+               const CalibrationStart& start, const CalibrateOptions& options);
+  ~EffectBundle();
+  EffectBundle(const EffectBundle&) = delete;
+  EffectBundle& operator=(const EffectBundle&) = delete;
+
+  /// Shares of corrections and probes have one entry a frame of the measurements.
+  [[nodiscard]] BundleFit fit(const BundleChange& change,
+                              const std::vector<Correction>& probes) const;
+
+  /// The plain model's start: tree with the units of the channels.
+  [[nodiscard]] const KinematicTree& tree() const;
+  [[nodiscard]] MeasurementKind kind() const;
+  [[nodiscard]] const CameraModel& camera() const;
+  /// Postures at rest, each on its own: no clock, no motion.
+  [[nodiscard]] bool postures() const;
+  /// A fold for every frame, by posture; -1 for frames without a sighting.
+  [[nodiscard]] const std::vector<int>& fold_of_frame() const;
+  [[nodiscard]] const std::vector<double>& frame_times_s() const;
+  /// What the frames show, at a time offset.
+  [[nodiscard]] JointMotion motion_at_frames(double time_offset_s) const;
+  /// The log's own samples, from the first to the last frame and a little beyond.
+  [[nodiscard]] JointMotion motion_of_log(double time_offset_s) const;
+  /// Joints that a channel drives.
+  [[nodiscard]] std::vector<int> driven_joints() const;
+  /// Markers (index into the tree) that are seen.
+  [[nodiscard]] std::vector<int> seen_markers() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace kinescope

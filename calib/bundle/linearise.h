@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The bundle's residuals and their derivatives, frame by frame, at a state.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+/// The rows of one frame, its sightings in their order; what only this frame knows (joint values
+/// without a channel) is eliminated.
+struct FrameRows {
+  Eigen::MatrixXd J;  ///< d residual / d parameter
+  Eigen::VectorXd r;  ///< whitened
+};
+
+struct LinearBundle {
+  std::vector<FreeBlock> blocks;    ///< of the columns
+  std::map<int, FrameRows> frames;  ///< by frame; distances between targets under -1
+  Eigen::MatrixXd prior_information;
+};
+
+[[nodiscard]] int width_of(const std::vector<FreeBlock>& blocks);
+
+[[nodiscard]] LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& used);
+
+/// Pooled autocorrelation of the whitened residuals of each marker's coordinates, integrated, s.
+[[nodiscard]] double correlation_time(const Spec& spec, const State& state,
+                                      const std::vector<int>& used);
+
+}  // namespace kinescope::bundle

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a model of camera and encoders can lack: every effect at every place of a robot, as a
+// candidate for tracing and as corrections of the bundle.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "calib/bundle/effect_bundle.h"
+#include "calib/trace/traced_model.h"
+
+namespace kinescope::effects {
+
+/// What effects are made from: the robot as the plain model has it, and how it moved.
+struct EffectWorld {
+  KinematicTree tree;
+  CameraModel camera;
+  MeasurementKind kind = MeasurementKind::kCorners;
+  bool postures = false;
+  std::vector<int> driven;  ///< joints
+  std::vector<int> seen;    ///< markers
+  JointMotion frames;
+  JointMotion log;                              ///< finer in time; empty for postures
+  std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
+  double first_s = 0.0;                         ///< of the frames
+  double last_s = 0.0;
+  bool clock_free = false;  ///< the log's clock is declared to agree with the camera's
+};
+
+struct CameraEffect {
+  Candidate candidate;  ///< without columns
+  /// One correction a parameter; for the time offset the bundle's own parameter instead.
+  std::function<std::vector<Correction>(double scan)> corrections;
+  bool is_time_offset = false;
+};
+
+/// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,
+/// coupling, helical, curved_slider, axis_wobble.
+[[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
+
+/// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
+/// tag_size, tag_slip, camera_bump.
+[[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
+
+}  // namespace kinescope::effects

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "calib/effects/camera_effects.h"
+#include "calib/effects/joint_shares.h"
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+// Gear errors are looked for up to this many periods a turn, and down to three: below, it is the
+// encoder's eccentricity.
+constexpr double kFewestPeriods = 3.0;
+constexpr double kMostPeriods = 250.0;
+
+// A joint under suspicion and what is needed to suspect it.
+struct Suspect {
+  int joint = 0;
+  std::string name;
+  std::string unit;  // of its value
+  bool turns = true;
+  Vector6d axis = Vector6d::Zero();  // as a twist in the link's frame
+  Eigen::VectorXd value;             // frames
+};
+
+Suspect suspect(const EffectWorld& world, int joint) {
+  const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
+  Suspect out;
+  out.joint = joint;
+  out.name = j.name;
+  out.turns = j.type == JointType::kRevolute;
+  out.unit = out.turns ? "rad" : "m";
+  (out.turns ? out.axis.head<3>() : out.axis.tail<3>()) = j.axis;
+  out.value = world.frames.value.col(joint);
+  return out;
+}
+
+Correction turn(const Suspect& s, std::string name, std::string unit, Eigen::VectorXd share) {
+  Correction out;
+  out.name = s.name + " " + std::move(name);
+  out.block = s.name;
+  out.unit = std::move(unit);
+  out.index = s.joint;
+  out.direction = s.axis;
+  out.share = std::move(share);
+  return out;
+}
+
+CameraEffect effect(const Suspect& s, std::string name, std::string words,
+                    std::vector<EffectParameter> parameters, std::string size_unit) {
+  CameraEffect out;
+  Candidate& c = out.candidate;
+  c.id = {std::move(name), s.name};
+  c.words = std::move(words);
+  c.size_weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(parameters.size()));
+  c.parameters = std::move(parameters);
+  c.size_unit = std::move(size_unit);
+  return out;
+}
+
+CameraEffect encoder_scale(const Suspect& s) {
+  CameraEffect out = effect(s, "encoder_scale",
+                            fmt::format("{} moves by more (or less) than its encoder says, in "
+                                        "proportion",
+                                        s.name),
+                            {{"scale", ""}}, "");
+  out.candidate.check =
+      "gear ratio, ticks a turn, belt, spindle pitch in the driver's configuration";
+  out.candidate.record = fmt::format("move {} over a larger range", s.name);
+  out.corrections = [s](double) { return std::vector{turn(s, "scale error", "", s.value)}; };
+  return out;
+}
+
+std::vector<Correction> sines(const Suspect& s, const std::string& what, double periods) {
+  const Eigen::ArrayXd angle = (s.turns ? periods : periods * kTurn) * s.value.array();
+  return {turn(s, what + " sine", s.unit, angle.sin()),
+          turn(s, what + " cosine", s.unit, angle.cos())};
+}
+
+CameraEffect eccentricity(const Suspect& s) {
+  CameraEffect out =
+      effect(s, "eccentricity",
+             fmt::format("the encoder (or output gear) of {} runs out of centre", s.name),
+             {{"sine", "rad"}, {"cosine", "rad"}}, "rad");
+  out.candidate.scan = {1.0, 2.0};
+  out.candidate.scan_listed = true;
+  out.candidate.scan_name = "periods";
+  out.candidate.scan_unit = "per turn";
+  out.candidate.check = "mounting of the encoder disc or magnet, run-out of the output gear";
+  out.candidate.record = fmt::format("turn {} over a full turn, both ways", s.name);
+  out.corrections = [s](double periods) { return sines(s, "eccentricity", periods); };
+  return out;
+}
+
+// Periods a turn (or a metre) whose waves the recording can tell from slow drifts and from noise.
+std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
+  const double range = s.value.maxCoeff() - s.value.minCoeff();
+  if (!(range > 0.0)) return {};
+  const double turns = s.turns ? range / kTurn : range;
+  // A frame's motion, typically: a wave shorter than twice that cannot be followed.
+  std::vector<double> steps;
+  for (Eigen::Index i = 1; i < s.value.size(); ++i) {
+    steps.push_back(std::abs(s.value[i] - s.value[i - 1]));
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  const double step = (s.turns ? *middle / kTurn : *middle);
+  const double fewest = s.turns ? std::max(kFewestPeriods, 1.0 / turns) : 1.0 / turns;
+  double most = s.turns ? kMostPeriods : kMostPeriods / range;
+  if (!world.postures && step > 0.0) most = std::min(most, 0.5 / step);
+  std::vector<double> out;
+  const double spacing = std::max(0.35 / turns, (most - fewest) / 400.0);
+  for (double n = fewest; n <= most; n += spacing) out.push_back(n);
+  return out;
+}
+
+CameraEffect gear_error(const EffectWorld& world, const Suspect& s) {
+  CameraEffect out =
+      effect(s, "gear_error", fmt::format("the gear of {} runs unevenly, in waves", s.name),
+             {{"sine", s.unit}, {"cosine", s.unit}}, s.unit);
+  out.candidate.scan = wave_numbers(world, s);
+  out.candidate.scan_name = "periods";
+  out.candidate.scan_unit = s.turns ? "per turn" : "per m";
+  out.candidate.check =
+      "teeth, wave generator or spindle; the periods name the part that turns so often";
+  out.candidate.record = fmt::format("move {} slowly over its range", s.name);
+  out.corrections = [s](double periods) { return sines(s, "gear error", periods); };
+  return out;
+}
+
+CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
+  CameraEffect out =
+      effect(s, "backlash", fmt::format("{} has play", s.name), {{"width", s.unit}}, s.unit);
+  const double range = s.value.maxCoeff() - s.value.minCoeff();
+  for (double width = range / 2000.0; width < 0.3 * range; width *= 1.8) {
+    out.candidate.scan.push_back(width);
+  }
+  out.candidate.scan_name = "gap";
+  out.candidate.scan_unit = s.unit;
+  out.candidate.check = "gear mesh, keys, belt tension";
+  out.candidate.record = fmt::format("move {} to the same places from both sides", s.name);
+  const Eigen::VectorXd drive = world.log.value.col(s.joint);
+  out.corrections = [s, drive, log_s = world.log.times_s,
+                     frames_s = world.frames.times_s](double width) {
+    return std::vector{
+        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames_s))};
+  };
+  return out;
+}
+
+Eigen::VectorXd largest_one(const Eigen::VectorXd& values) {
+  const double largest = values.cwiseAbs().maxCoeff();
+  return largest > 1e-9 ? Eigen::VectorXd(values / largest) : Eigen::VectorXd::Zero(values.size());
+}
+
+CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
+  const bool known = world.gravity_base.has_value();
+  std::vector<EffectParameter> parameters{{"largest sag", s.unit}};
+  if (!known) {
+    parameters = {{"sag, gravity along x", s.unit},
+                  {"sag, gravity along y", s.unit},
+                  {"sag, gravity along z", s.unit}};
+  }
+  CameraEffect out = effect(s, "compliance", fmt::format("{} gives way under its load", s.name),
+                            std::move(parameters), s.unit);
+  out.candidate.scan = {0.0, 0.25, 0.5, 0.75, 1.0};
+  out.candidate.scan_listed = true;
+  out.candidate.scan_name = "share of the load at the tip";
+  out.candidate.check = "stiffness of the gear and the link; weight of tool and payload";
+  out.candidate.record = fmt::format(
+      "the same readings of {} with the arm stretched out and folded; declare the direction of "
+      "gravity in recording.yaml",
+      s.name);
+  out.corrections = [s, world](double at_tip) {
+    const auto load = gravity_load(world.tree, world.frames, s.joint, at_tip);
+    std::vector<Correction> corrections;
+    if (world.gravity_base) {
+      corrections.push_back(turn(s, "sag", s.unit, largest_one(load * *world.gravity_base)));
+      return corrections;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      corrections.push_back(
+          turn(s, fmt::format("sag {}", "xyz"[axis]), s.unit, largest_one(load.col(axis))));
+    }
+    return corrections;
+  };
+  return out;
+}
+
+CameraEffect coupling(const EffectWorld& world, const Suspect& s) {
+  CameraEffect out =
+      effect(s, "coupling", fmt::format("another joint moves {} too", s.name), {{"ratio", ""}}, "");
+  std::vector<std::string> names;
+  for (const Joint& joint : world.tree.joints) names.push_back(joint.name);
+  for (const int other : world.driven) {
+    if (other != s.joint) out.candidate.scan.push_back(other);
+  }
+  out.candidate.scan_listed = true;
+  out.candidate.scan_name = "moved by";
+  out.candidate.scan_words = [names](double other) {
+    return names[static_cast<std::size_t>(std::lround(other))];
+  };
+  out.candidate.check = "belts, cables or wrist gears that run past the joint";
+  out.candidate.record = fmt::format("hold {} still and move the others one by one", s.name);
+  out.corrections = [s, values = world.frames.value](double other) {
+    return std::vector{turn(s, "coupling", "", values.col(std::lround(other)))};
+  };
+  return out;
+}
+
+CameraEffect helical(const Suspect& s) {
+  CameraEffect out = effect(s, "helical",
+                            s.turns ? fmt::format("{} shifts along its axis as it turns", s.name)
+                                    : fmt::format("{} turns about its axis as it slides", s.name),
+                            {{s.turns ? "pitch" : "twist", s.turns ? "m/turn" : "rad/m"}},
+                            s.turns ? "m/turn" : "rad/m");
+  out.candidate.check =
+      s.turns ? "axial guidance of the bearing, thread" : "guide rails, spindle nut";
+  out.candidate.record = fmt::format("move {} over a larger range", s.name);
+  out.corrections = [s](double) {
+    Correction along = turn(s, "pitch", s.turns ? "m/turn" : "rad/m",
+                            s.turns ? Eigen::VectorXd(s.value / kTurn) : s.value);
+    along.direction << s.axis.tail<3>(), s.axis.head<3>();
+    return std::vector{along};
+  };
+  return out;
+}
+
+// Two unit vectors across an axis.
+std::array<Eigen::Vector3d, 2> across(const Eigen::Vector3d& axis) {
+  const Eigen::Quaterniond R = rotation_to_axis(axis);
+  return {R * Eigen::Vector3d::UnitX(), R * Eigen::Vector3d::UnitY()};
+}
+
+CameraEffect curved_slider(const Suspect& s) {
+  CameraEffect out = effect(s, "curved_slider", fmt::format("{} runs on a curve", s.name),
+                            {{"curvature across x", "1/m"}, {"curvature across y", "1/m"}}, "1/m");
+  out.candidate.check = "straightness of the guide, supports of the rail";
+  out.candidate.record = fmt::format("move {} over its whole length", s.name);
+  out.corrections = [s](double) {
+    std::vector<Correction> corrections;
+    const Eigen::Vector3d axis = s.axis.tail<3>();
+    for (const Eigen::Vector3d& side : across(axis)) {
+      // On a circle the carriage shifts by q^2 / 2R and turns by q / R towards its centre.
+      Correction bend = turn(s, "curvature", "1/m", {});
+      bend.twists.resize(s.value.size(), 6);
+      for (Eigen::Index i = 0; i < s.value.size(); ++i) {
+        const double q = s.value[i];
+        Vector6d twist;
+        twist << q * axis.cross(side), 0.5 * q * q * side;
+        bend.twists.row(i) = twist.transpose();
+      }
+      corrections.push_back(std::move(bend));
+    }
+    return corrections;
+  };
+  return out;
+}
+
+// The axis tilts by a e^(i n q) + b e^(-i n q) (complex numbers for the two directions across it,
+// fixed in space); seen from the link, which turns on, by a e^(i (n-1) q) + b e^(-i (n+1) q). Of
+// n = 1 the first part stands still in the link and is no error but a crooked link; n = 0 likewise
+// is a crooked axis.
+CameraEffect axis_wobble(const Suspect& s) {
+  CameraEffect out =
+      effect(s, "axis_wobble", fmt::format("the axis of {} tilts as it turns", s.name),
+             {{"tilt, real", "rad"}, {"tilt, imaginary", "rad"}}, "rad");
+  out.candidate.scan = {-2.0, 1.0, -3.0};
+  out.candidate.scan_listed = true;
+  out.candidate.scan_name = "turns of the tilt, seen from the link";
+  out.candidate.scan_words = [](double turns) {
+    return std::string(turns == -2.0 ? "once a turn" : "twice a turn");
+  };
+  out.candidate.check = "bearing seat, run-out of the shaft, loose bearing";
+  out.candidate.record = fmt::format("turn {} over a full turn, both ways", s.name);
+  out.corrections = [s](double turns) {
+    const auto sides = across(s.axis.head<3>());
+    const Eigen::ArrayXd angle = turns * s.value.array();
+    Correction real = turn(s, "wobble real", "rad", {});
+    Correction imaginary = turn(s, "wobble imaginary", "rad", {});
+    for (Correction* tilt : {&real, &imaginary}) tilt->twists.setZero(s.value.size(), 6);
+    for (Eigen::Index i = 0; i < s.value.size(); ++i) {
+      const double c = std::cos(angle[i]);
+      const double d = std::sin(angle[i]);
+      real.twists.row(i).head<3>() = (c * sides[0] + d * sides[1]).transpose();
+      imaginary.twists.row(i).head<3>() = (c * sides[1] - d * sides[0]).transpose();
+    }
+    return std::vector{real, imaginary};
+  };
+  return out;
+}
+
+}  // namespace
+
+std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
+  std::vector<CameraEffect> out;
+  for (const int joint : world.driven) {
+    const Suspect s = suspect(world, joint);
+    if (!(s.value.maxCoeff() > s.value.minCoeff())) continue;
+    out.push_back(encoder_scale(s));
+    if (s.turns) out.push_back(eccentricity(s));
+    if (CameraEffect gear = gear_error(world, s); !gear.candidate.scan.empty()) {
+      out.push_back(std::move(gear));
+    }
+    if (!world.postures) out.push_back(backlash(world, s));
+    out.push_back(compliance(world, s));
+    if (world.driven.size() > 1) out.push_back(coupling(world, s));
+    out.push_back(helical(s));
+    out.push_back(s.turns ? axis_wobble(s) : curved_slider(s));
+  }
+  return out;
+}
+
+}  // namespace kinescope::effects

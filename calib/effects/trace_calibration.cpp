@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/trace_calibration.h"
+
+#include "calib/effects/traced_bundle.h"
+
+namespace kinescope {
+namespace {
+
+// Detectors err by this much in ways that repeat with the view: smaller effects are not told from
+// that.
+constexpr double kCornerFloor = 0.01;  // px
+
+}  // namespace
+
+CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
+                                   const JointLog& log, const CalibrationStart& start,
+                                   const CalibrationTraceOptions& options,
+                                   const Progress& progress) {
+  const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
+  const effects::TracedBundle model(bundle, options);
+  TraceOptions trace_options = options.trace;
+  if (bundle.kind() == MeasurementKind::kCorners && trace_options.floor == 0.0) {
+    trace_options.floor = kCornerFloor;
+  }
+  if (options.calibrate.estimate_time_offset && !bundle.postures()) {
+    trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
+  }
+  CalibrationTrace out;
+  out.trace = trace_effects(model, trace_options, progress);
+  for (std::vector<Correction>& corrections : model.corrections(out.trace.added)) {
+    for (Correction& correction : corrections) out.corrections.push_back(std::move(correction));
+  }
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   what calibrate() takes, the start near its solution.
+// Gives   CalibrationTrace: the effects of camera, encoders and mechanics that the calibration
+//         lacks, and the corrections that put them into it.
+// Units   m, rad, s, px.
+// Method  calib/trace over the bundle (calib/bundle/effect_bundle.h); the plain model trusts the
+//         clocks, the channels' units, the declared camera and markers, and rigid links.
+// Not here: torques (dynamics/effects).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calib/bundle/calibrate.h"
+#include "calib/trace/trace.h"
+
+namespace kinescope {
+
+struct CalibrationTraceOptions {
+  TraceOptions trace;
+  CalibrateOptions calibrate;
+  /// Unit vector in the base frame along which things fall, where it is known.
+  std::optional<Eigen::Vector3d> gravity_base;
+};
+
+struct CalibrationTrace {
+  Trace trace;
+  /// Of all accepted effects but the time offset, in their order: for CalibrationStart.
+  std::vector<Correction> corrections;
+};
+
+/// Throws as calibrate().
+[[nodiscard]] CalibrationTrace trace_calibration(const Measurements& measurements,
+                                                 const MarkerSet& markers, const JointLog& log,
+                                                 const CalibrationStart& start,
+                                                 const CalibrationTraceOptions& options,
+                                                 const Progress& progress = {});
+
+}  // namespace kinescope

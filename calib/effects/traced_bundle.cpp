@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/traced_bundle.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope::effects {
+namespace {
+
+// Probes without a share, each once: what columns of candidates act through.
+class Carriers {
+ public:
+  // The column of a correction: a carrier, and the share of each instant.
+  EffectColumn column(const Correction& correction, const std::vector<int>& frames) {
+    EffectColumn out;
+    if (correction.twists.rows() > 0) {
+      // A direction that changes is a carrier of its own; the same one comes once.
+      for (const auto& [index, twists] : moving_) {
+        if (same_part(probes_[static_cast<std::size_t>(index)], correction) &&
+            twists == correction.twists) {
+          out.carrier = index;
+          return out;
+        }
+      }
+      out.carrier = static_cast<int>(probes_.size());
+      moving_.emplace_back(out.carrier, correction.twists);
+      probes_.push_back(correction);
+      return out;
+    }
+    out.carrier = still(correction);
+    if (correction.share.size() > 0) {
+      out.share.resize(static_cast<Eigen::Index>(frames.size()));
+      for (std::size_t i = 0; i < frames.size(); ++i) {
+        out.share[static_cast<Eigen::Index>(i)] = correction.share[frames[i]];
+      }
+    }
+    return out;
+  }
+
+  int still(Correction correction) {
+    for (std::size_t i = 0; i < probes_.size(); ++i) {
+      const Correction& known = probes_[i];
+      if (known.twists.rows() == 0 && same_part(known, correction) &&
+          known.direction == correction.direction) {
+        return static_cast<int>(i);
+      }
+    }
+    correction.share.resize(0);
+    correction.value = 0.0;
+    probes_.push_back(std::move(correction));
+    return static_cast<int>(probes_.size()) - 1;
+  }
+
+  [[nodiscard]] const std::vector<Correction>& probes() const { return probes_; }
+
+ private:
+  static bool same_part(const Correction& a, const Correction& b) {
+    return a.part == b.part && a.index == b.index;
+  }
+
+  std::vector<Correction> probes_;
+  std::vector<std::pair<int, Eigen::Matrix<double, Eigen::Dynamic, 6>>> moving_;
+};
+
+std::vector<CameraEffect> all_effects(const EffectWorld& world) {
+  std::vector<CameraEffect> out = camera_effects(world);
+  for (CameraEffect& effect : joint_effects(world)) out.push_back(std::move(effect));
+  return out;
+}
+
+const CameraEffect& effect_of(const std::vector<CameraEffect>& library, const EffectId& id) {
+  const auto found = std::ranges::find_if(
+      library, [&](const CameraEffect& effect) { return effect.candidate.id == id; });
+  KINESCOPE_CHECK(found != library.end(), "an added effect is in the library");
+  return *found;
+}
+
+BundleChange change_of(const std::vector<CameraEffect>& library,
+                       const std::vector<AddedEffect>& effects) {
+  BundleChange out;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    if (effect.is_time_offset) {
+      out.time_offset = true;
+      continue;
+    }
+    for (Correction& correction : effect.corrections(added.scan)) {
+      out.corrections.push_back(std::move(correction));
+    }
+  }
+  return out;
+}
+
+// Where each effect's parameters stand among those of the change.
+std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<CameraEffect>& library,
+                                                        const std::vector<AddedEffect>& effects,
+                                                        Eigen::Index corrections) {
+  std::vector<std::vector<Eigen::Index>> out;
+  Eigen::Index next = 0;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    std::vector<Eigen::Index>& places = out.emplace_back();
+    for (std::size_t k = 0; k < effect.candidate.parameters.size(); ++k) {
+      places.push_back(effect.is_time_offset ? corrections : next++);
+    }
+  }
+  return out;
+}
+
+std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector<int>& frames) {
+  std::vector<Covariate> out;
+  const auto at_instants = [&](const Eigen::VectorXd& by_frame) {
+    Eigen::VectorXd values(static_cast<Eigen::Index>(frames.size()));
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      values[static_cast<Eigen::Index>(i)] = by_frame[frames[i]];
+    }
+    return values;
+  };
+  for (const int joint : world.driven) {
+    const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
+    const std::string unit = j.type == JointType::kRevolute ? "rad" : "m";
+    out.push_back({"value of " + j.name, unit, at_instants(world.frames.value.col(joint))});
+    if (world.postures) continue;
+    const Eigen::VectorXd rate = at_instants(world.frames.rate.col(joint));
+    out.push_back({"speed of " + j.name, unit + "/s", rate});
+    out.push_back({"direction of " + j.name, "",
+                   rate.unaryExpr([](double v) { return v > 0.0 ? 1.0 : -1.0; })});
+  }
+  if (!world.postures) {
+    out.push_back({"time", "s",
+                   at_instants(Eigen::Map<const Eigen::VectorXd>(
+                       world.frames.times_s.data(),
+                       static_cast<Eigen::Index>(world.frames.times_s.size())))});
+  }
+  return out;
+}
+
+std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carriers) {
+  std::vector<RestPlace> out;
+  for (const int joint : world.driven) {
+    const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
+    Correction value;
+    value.index = joint;
+    const bool turns = j.type == JointType::kRevolute;
+    (turns ? value.direction.head<3>() : value.direction.tail<3>()) = j.axis;
+    out.push_back({j.name, turns ? "rad" : "m", carriers.still(value)});
+  }
+  for (const int marker : world.seen) {
+    const Marker& m = world.tree.markers[static_cast<std::size_t>(marker)];
+    for (int axis = 0; axis < 2; ++axis) {
+      Correction shift;
+      shift.part = CorrectedPart::kMarker;
+      shift.index = marker;
+      shift.direction = Vector6d::Unit(3 + axis);
+      out.push_back(
+          {fmt::format("tag_{} along {}", m.id.value, "xy"[axis]), "m", carriers.still(shift)});
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options)
+    : bundle_(&bundle), options_(options) {}
+
+EffectWorld TracedBundle::world_at(double time_offset_s) const {
+  EffectWorld world;
+  world.tree = bundle_->tree();
+  world.camera = bundle_->camera();
+  world.kind = bundle_->kind();
+  world.postures = bundle_->postures();
+  world.driven = bundle_->driven_joints();
+  world.seen = bundle_->seen_markers();
+  world.frames = bundle_->motion_at_frames(time_offset_s);
+  if (!world.postures) world.log = bundle_->motion_of_log(time_offset_s);
+  world.gravity_base = options_.gravity_base;
+  world.clock_free = options_.calibrate.estimate_time_offset;
+  world.first_s = world.frames.times_s.front();
+  world.last_s = world.frames.times_s.back();
+  return world;
+}
+
+TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
+  // Shares are taken where the joints are at the time offset that the fit finds: once more where it
+  // is not the plain model's.
+  EffectWorld world = world_at(0.0);
+  std::vector<CameraEffect> library = all_effects(world);
+  BundleChange change = change_of(library, effects);
+  if (change.time_offset) {
+    world = world_at(bundle_->fit(change, {}).time_offset_s);
+    library = all_effects(world);
+    change = change_of(library, effects);
+  }
+  // Carriers of all candidates at one value of their scans: the same for the others, unless a
+  // direction changes with the scan.
+  Carriers carriers;
+  std::vector<int> no_frames;
+  for (const CameraEffect& effect : library) {
+    const std::vector<double> scan =
+        effect.candidate.scan.empty() ? std::vector<double>{0.0} : effect.candidate.scan;
+    const std::size_t values = effect.candidate.scan_listed ? scan.size() : 1;
+    for (std::size_t v = 0; v < values; ++v) {
+      for (const Correction& correction : effect.corrections(scan[v])) {
+        static_cast<void>(carriers.column(correction, no_frames));
+      }
+    }
+  }
+  TracedFit out;
+  out.rest_places = rest_places_of(world, carriers);
+  BundleFit fit = bundle_->fit(change, carriers.probes());
+  out.converged = fit.converged;
+  out.reason = fit.reason;
+  const auto places =
+      parameter_places(library, effects, static_cast<Eigen::Index>(change.corrections.size()));
+  // The change's columns stand in the bundle's order: put them into that of the effects.
+  const Eigen::Index own = fit.jacobian.cols() - fit.values.size();
+  std::vector<Eigen::Index> order;
+  for (Eigen::Index c = 0; c < own; ++c) order.push_back(c);
+  for (const std::vector<Eigen::Index>& effect : places) {
+    Eigen::VectorXd& values = out.values.emplace_back(static_cast<Eigen::Index>(effect.size()));
+    for (std::size_t k = 0; k < effect.size(); ++k) {
+      order.push_back(own + effect[k]);
+      values[static_cast<Eigen::Index>(k)] = fit.values[effect[k]];
+    }
+  }
+  Linearisation& linear = out.linear;
+  linear.jacobian = fit.jacobian(Eigen::all, order);
+  if (fit.prior_information.size() > 0) linear.prior = fit.prior_information(order, order);
+  linear.residual = std::move(fit.residual);
+  linear.carriers = std::move(fit.probes);
+  linear.first_row = std::move(fit.first_row);
+  linear.unit = std::move(fit.unit);
+  linear.unit_name = world.kind == MeasurementKind::kCorners ? "px"
+                     : world.kind == MeasurementKind::kPoint ? "m"
+                                                             : "sigma";
+  linear.independent_instants = world.postures;
+  linear.correlation_time_s = fit.correlation_time_s;
+  linear.time_s.resize(static_cast<Eigen::Index>(fit.frames.size()));
+  for (std::size_t i = 0; i < fit.frames.size(); ++i) {
+    const auto frame = static_cast<std::size_t>(fit.frames[i]);
+    linear.time_s[static_cast<Eigen::Index>(i)] = world.frames.times_s[frame];
+    linear.fold.push_back(bundle_->fold_of_frame()[frame]);
+  }
+  const auto shared = std::make_shared<Carriers>(std::move(carriers));
+  for (CameraEffect& effect : library) {
+    Candidate candidate = effect.candidate;
+    candidate.columns = [shared, frames = fit.frames,
+                         corrections = effect.corrections](double scan) {
+      std::vector<EffectColumn> columns;
+      for (const Correction& correction : corrections(scan)) {
+        columns.push_back(shared->column(correction, frames));
+      }
+      return columns;
+    };
+    out.candidates.push_back(std::move(candidate));
+  }
+  out.covariates = covariates_of(world, fit.frames);
+  return out;
+}
+
+std::vector<std::vector<Correction>> TracedBundle::corrections(
+    const std::vector<AddedEffect>& effects) const {
+  EffectWorld world = world_at(0.0);
+  std::vector<CameraEffect> library = all_effects(world);
+  const BundleFit fit = bundle_->fit(change_of(library, effects), {});
+  library = all_effects(world_at(fit.time_offset_s));
+  std::vector<std::vector<Correction>> out;
+  Eigen::Index next = 0;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    std::vector<Correction>& corrections = out.emplace_back();
+    if (effect.is_time_offset) continue;
+    corrections = effect.corrections(added.scan);
+    for (Correction& correction : corrections) correction.value = fit.values[next++];
+  }
+  return out;
+}
+
+}  // namespace kinescope::effects
