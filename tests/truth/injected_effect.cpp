@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/truth/injected_effect.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "tests/truth/mechanics.h"
+
+namespace kinescope::truth {
+namespace {
+
+constexpr double kFocal = 900.0;  // px, of the worlds' camera
+
+// What one degree of an angle's effect is: in radians on a revolute joint, in metres on a slide.
+enum class Unit { kPlain, kAngle };
+
+struct Strength {
+  std::string_view effect;
+  double size = 0.0;  ///< angles: rad, and on slides as many times the world's m per rad
+  Unit kind = Unit::kPlain;
+};
+
+constexpr std::array<Strength, 19> kWeakest{{
+    {"time_offset", 0.5e-3},
+    {"clock_drift", 5e-5},  // 0.5 ms rms over 33 s
+    {"encoder_scale", 500e-6},
+    {"eccentricity", 0.03 * kRadPerDegree},
+    {"gear_error", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"backlash", 0.05 * kRadPerDegree, Unit::kAngle},
+    {"compliance", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"coupling", 0.002},
+    {"helical", 0.05e-3},
+    {"curved_slider", 0.005},  // turns the carriage by 0.03 deg at the end of 0.1 m
+    {"axis_wobble", 0.03 * kRadPerDegree},
+    {"lens_distortion", 0.002},
+    {"rolling_shutter", 1e-6},
+    {"tag_size", 1e-3},  // 0.05 mm of 50 mm
+    {"tag_slip", 0.3e-3},
+    {"camera_bump", 0.3 / kFocal},
+    {"own_tanh", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"own_speed", 0.06 * kRadPerDegree, Unit::kAngle},
+    {"own_chequer", 0.03},
+}};
+
+constexpr std::array<std::string_view, 11> kOnJoints{
+    "encoder_scale", "eccentricity",  "gear_error",  "backlash", "compliance", "coupling",
+    "helical",       "curved_slider", "axis_wobble", "own_tanh", "own_speed"};
+constexpr std::array<std::string_view, 3> kOnRevolute{"eccentricity", "helical", "axis_wobble"};
+// A load that hardly changes sags by an offset, which is the joint's zero.
+constexpr double kChangingLoad = 0.3;
+
+bool among(const auto& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+const Strength& strength_of(std::string_view effect) {
+  const auto found = std::ranges::find(kWeakest, effect, &Strength::effect);
+  if (found == kWeakest.end()) throw std::logic_error("an effect has a known name");
+  return *found;
+}
+
+// Details that differ from place to place and robot to robot.
+double detail_of(std::string_view effect, const Joint* joint, Rng& rng) {
+  if (effect == "clock_drift" || effect == "rolling_shutter") return 0.5;
+  if (effect == "eccentricity") return 1.0 + rng.index(2);
+  if (effect == "axis_wobble") return -1.0;
+  if (effect == "tag_slip" || effect == "camera_bump") return rng.uniform(0.25, 0.75);
+  if (effect == "own_chequer") return rng.uniform(60.0, 120.0);
+  if (effect != "gear_error") return 0.0;
+  return joint->type == JointType::kPrismatic ? rng.uniform(15.0, 60.0) : rng.uniform(6.0, 40.0);
+}
+
+bool load_changes(const FilmedRobot& robot, std::size_t joint) {
+  const TorqueRange range = gravity_range(robot, joint);
+  return range.highest - range.lowest > kChangingLoad * range.largest();
+}
+
+std::vector<InjectedEffect> on_joint(std::string_view effect, const FilmedRobot& robot,
+                                     std::size_t j) {
+  const Strength& strength = strength_of(effect);
+  const auto unit = [&robot](const Joint& joint) {
+    return joint.type == JointType::kPrismatic ? robot.prismatic_m_per_rad : 1.0;
+  };
+  const Joint& joint = robot.tree.joints[j];
+  if (!can_have(joint.type, effect)) return {};
+  if (effect == "compliance" && !load_changes(robot, j)) return {};
+  Rng rng = Rng::from_name(fmt::format("weakest {} {}", effect, joint.name), robot.seed);
+  InjectedEffect out{std::string(effect), joint.name, strength.size,
+                     detail_of(effect, &joint, rng)};
+  if (strength.kind == Unit::kAngle) out.size *= unit(joint);
+  if (effect != "coupling" && !effect.starts_with("own_")) return {out};
+  std::vector<InjectedEffect> pairs;
+  for (const Joint& other : robot.tree.joints) {
+    if (other.name == joint.name) continue;
+    out.with = other.name;
+    if (effect == "coupling") out.size = strength.size * unit(joint) / unit(other);
+    pairs.push_back(out);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+const std::vector<std::string>& library_effects() {
+  static const std::vector<std::string> names{
+      "time_offset",     "clock_drift", "encoder_scale", "eccentricity",
+      "gear_error",      "backlash",    "compliance",    "coupling",
+      "helical",         "axis_wobble", "curved_slider", "lens_distortion",
+      "rolling_shutter", "tag_size",    "tag_slip",      "camera_bump"};
+  return names;
+}
+
+const std::vector<std::string>& own_effects() {
+  static const std::vector<std::string> names{"own_tanh", "own_speed", "own_chequer"};
+  return names;
+}
+
+bool sits_on_joint(std::string_view effect) { return among(kOnJoints, effect); }
+
+bool can_have(JointType type, std::string_view effect) {
+  if (type == JointType::kFixed || !sits_on_joint(effect)) return false;
+  if (effect == "curved_slider") return type == JointType::kPrismatic;
+  return type == JointType::kRevolute || !among(kOnRevolute, effect);
+}
+
+std::string_view size_unit(std::string_view effect, JointType type) {
+  if (effect == "time_offset" || effect == "rolling_shutter") return "s";
+  if (effect == "clock_drift") return "s/s";
+  if (effect == "helical" || effect == "tag_slip") return "m";
+  if (effect == "curved_slider") return "1/m";
+  if (effect == "axis_wobble" || effect == "camera_bump") return "rad";
+  if (effect == "own_chequer") return "px";
+  if (effect == "encoder_scale" || effect == "coupling" || !sits_on_joint(effect)) return "";
+  return type == JointType::kPrismatic ? "m" : "rad";
+}
+
+std::vector<InjectedEffect> weakest_effects(std::string_view effect, const FilmedRobot& robot) {
+  std::vector<InjectedEffect> out;
+  if (sits_on_joint(effect)) {
+    for (std::size_t j = 0; j < robot.tree.joints.size(); ++j) {
+      std::ranges::move(on_joint(effect, robot, j), std::back_inserter(out));
+    }
+    return out;
+  }
+  std::vector<std::string> places;
+  if (effect.starts_with("tag_")) {
+    for (const Marker& marker : robot.tree.markers)
+      places.push_back(fmt::format("tag_{}", marker.id.value));
+  } else {
+    places.emplace_back(effect == "time_offset" || effect == "clock_drift" ? "clock" : "camera");
+  }
+  for (const std::string& place : places) {
+    Rng rng = Rng::from_name(fmt::format("weakest {} {}", effect, place), robot.seed);
+    out.push_back(
+        {std::string(effect), place, strength_of(effect).size, detail_of(effect, nullptr, rng)});
+  }
+  return out;
+}
+
+}  // namespace kinescope::truth
