@@ -11,7 +11,8 @@
 namespace kinescope::truth {
 namespace {
 
-constexpr double kExactPx = 1e-9;  // px: projections of up to 1000 px in double
+constexpr double kExactPx = 1e-9;          // px: projections of up to 1000 px in double
+constexpr double kInterpolationPx = 1e-4;  // px: the joint log between its samples, 200 Hz, cubic
 
 EffectWorldOptions short_world(std::vector<InjectedEffect> effects = {}) {
   EffectWorldOptions options;
@@ -277,6 +278,22 @@ TEST(CameraEffects, TagsAreSeenMostOfTheTime) {
     }
     EXPECT_GT(seen, 0.9) << to_string(kind);
     EXPECT_GT(least, 0.5) << to_string(kind);
+  }
+}
+
+// What false alarms are judged on holds nothing that the declared model lacks.
+TEST(CameraEffects, WithoutEffectsTheDeclaredModelExplainsEverything) {
+  for (const RobotKind kind : kRobotKinds) {
+    EffectWorldOptions options = exact_world();
+    options.kind = kind;
+    options.frames = 150;
+    options.frame_rate_hz = 5.0;
+    const World world = make_effect_world(options);
+    const Calibration found = calibrate(world.measurements, world.markers, world.log,
+                                        perturbed_start(world, 0.005, 0.001, 1), {.folds = 0});
+    EXPECT_EQ(found.status, CalibrationStatus::kConverged);
+    EXPECT_LT(found.final_rms, kInterpolationPx) << to_string(kind);
+    EXPECT_NEAR(found.time_offset_s, 0.0, 1e-6);
   }
 }
 

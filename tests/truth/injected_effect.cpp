@@ -147,8 +147,11 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
   }
   std::vector<std::string> places;
   if (effect.starts_with("tag_")) {
-    for (const Marker& marker : robot.tree.markers)
+    for (const Marker& marker : robot.tree.markers) {
+      // A tag that never moves may as well be larger and further away.
+      if (effect == "tag_size" && marker.link == LinkId{0}) continue;
       places.push_back(fmt::format("tag_{}", marker.id.value));
+    }
   } else {
     places.emplace_back(effect == "time_offset" || effect == "clock_drift" ? "clock" : "camera");
   }

@@ -47,9 +47,7 @@ struct InjectedEffect {
   std::string place;
   double size = 0.0;
   double detail = 0.0;
-  // g++ wants the initializer (-Wmissing-field-initializers).
-  std::string with =
-      {};  // NOLINT(readability-redundant-member-init)  ///< the other joint, or a variant
+  std::string with = {};  ///< the other joint, or a variant
 };
 
 /// The names of the library of effects, and those of the test's own making.
