@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/effects/base_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "dynamics/data/statistics.h"
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kUnseen = 1e-10;  // share of the largest direction's square, columns of length 1
+constexpr int kRobustSteps = 8;
+constexpr double kHuber = 1.345;
+
+/// Least squares over joints that share columns: H and g sum up.
+struct Normal {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+
+  explicit Normal(Eigen::Index n) : H(Eigen::MatrixXd::Zero(n, n)), g(Eigen::VectorXd::Zero(n)) {}
+  void add(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
+    H.selfadjointView<Eigen::Lower>().rankUpdate(X.transpose());
+    g.noalias() += X.transpose() * y;
+  }
+  [[nodiscard]] Eigen::VectorXd solve() const {
+    const Eigen::MatrixXd full = H.selfadjointView<Eigen::Lower>();
+    const Eigen::VectorXd diagonal = full.diagonal();
+    const Eigen::VectorXd scale =
+        (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * full *
+                                                               scale.asDiagonal());
+    const Eigen::VectorXd& values = eigen.eigenvalues();
+    const double least = kUnseen * std::max(values[values.size() - 1], 1e-300);
+    const Eigen::VectorXd inverse =
+        values.unaryExpr([least](double v) { return v > least ? 1.0 / v : 0.0; });
+    const Eigen::VectorXd turned = eigen.eigenvectors().transpose() * (scale.asDiagonal() * g);
+    return scale.asDiagonal() * (eigen.eigenvectors() * inverse.cwiseProduct(turned));
+  }
+};
+
+double robust_sigma(const Eigen::VectorXd& residual, Eigen::Index parameters) {
+  constexpr double kNormal = 1.4826;  // standard deviations in a median of absolute deviations
+  const auto rows = static_cast<double>(residual.size());
+  const double freedom = std::max(1.0, rows - static_cast<double>(parameters));
+  return kNormal * median_of(to_vector(residual.cwiseAbs())) * std::sqrt(rows / freedom);
+}
+
+Eigen::MatrixXd columns_that_act(const Eigen::MatrixXd& all) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index c = 0; c < all.cols(); ++c) {
+    if (!all.col(c).isZero(0.0)) kept.push_back(c);
+  }
+  return all(Eigen::all, kept);
+}
+
+Eigen::VectorXd robust_residual(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, double& sigma) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(y.size());
+  Eigen::VectorXd residual = y;
+  for (int step = 0; step < kRobustSteps; ++step) {
+    Normal normal(X.cols());
+    normal.add(weights.asDiagonal() * X, weights.cwiseProduct(y));
+    residual = y - X * normal.solve();
+    sigma = robust_sigma(residual, X.cols());
+    if (!(sigma > 0.0)) break;
+    const Eigen::ArrayXd size = residual.array().abs() / (kHuber * sigma);
+    weights = size.max(1.0).inverse().sqrt().matrix();
+  }
+  return residual;
+}
+
+/// Columns of one joint in a system in which the drives of all joints stand side by side after the
+/// shared columns.
+Eigen::MatrixXd system_columns(const BaseData& data, std::size_t joint,
+                               const std::vector<Eigen::MatrixXd>& shared) {
+  Eigen::Index drives = 0;
+  Eigen::Index first = 0;
+  for (std::size_t j = 0; j < data.drives.size(); ++j) {
+    if (j == joint) first = drives;
+    drives += data.drives[j].cols();
+  }
+  const Eigen::MatrixXd& own = shared[joint];
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(data.torque.rows(), own.cols() + drives);
+  out.leftCols(own.cols()) = own;
+  out.middleCols(own.cols() + first, data.drives[joint].cols()) = data.drives[joint];
+  return out;
+}
+
+/// Held-out root mean square of `target` (instants x joints, whitened by sigma).
+double held_out(const BaseData& data, const Eigen::MatrixXd& target,
+                const std::vector<Eigen::MatrixXd>& shared, const Eigen::VectorXd& sigma) {
+  const int folds = 1 + *std::ranges::max_element(data.fold);
+  std::vector<std::vector<Eigen::Index>> rows(static_cast<std::size_t>(folds));
+  for (std::size_t i = 0; i < data.fold.size(); ++i) {
+    rows[static_cast<std::size_t>(data.fold[i])].push_back(static_cast<Eigen::Index>(i));
+  }
+  std::vector<Eigen::MatrixXd> X;
+  for (std::size_t j = 0; j < shared.size(); ++j) {
+    X.push_back(system_columns(data, j, shared) / sigma[static_cast<Eigen::Index>(j)]);
+  }
+  std::vector<Normal> parts;
+  Normal total(X.front().cols());
+  for (const auto& chosen : rows) {
+    Normal part(X.front().cols());
+    for (std::size_t j = 0; j < X.size(); ++j) {
+      const auto c = static_cast<Eigen::Index>(j);
+      part.add(X[j](chosen, Eigen::all), target(chosen, c) / sigma[c]);
+    }
+    total.H += part.H;
+    total.g += part.g;
+    parts.push_back(std::move(part));
+  }
+  std::vector<double> squares;
+  for (std::size_t f = 0; f < rows.size(); ++f) {
+    Normal others(total.g.size());
+    others.H = total.H - parts[f].H;
+    others.g = total.g - parts[f].g;
+    const Eigen::VectorXd solution = others.solve();
+    for (std::size_t j = 0; j < X.size(); ++j) {
+      const auto c = static_cast<Eigen::Index>(j);
+      const Eigen::VectorXd error =
+          target(rows[f], c) / sigma[c] - X[j](rows[f], Eigen::all) * solution;
+      for (const double e : error) squares.push_back(e * e);
+    }
+  }
+  // Contacts and outliers must not decide: the bulk does.
+  constexpr double kBulk = 0.9;
+  const double limit = quantile(squares, kBulk);
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (const double s : squares) {
+    if (s > limit) continue;
+    sum += s;
+    ++count;
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, count)));
+}
+
+}  // namespace
+
+WidestFit widest_fit(const BaseData& data) {
+  WidestFit out{Eigen::MatrixXd(data.torque.rows(), data.torque.cols()),
+                Eigen::VectorXd(data.torque.cols())};
+  for (Eigen::Index j = 0; j < data.torque.cols(); ++j) {
+    const auto joint = static_cast<std::size_t>(j);
+    const Eigen::MatrixXd rigid = columns_that_act(data.rigid[joint]);
+    Eigen::MatrixXd X(rigid.rows(), rigid.cols() + data.drives[joint].cols());
+    X << rigid, data.drives[joint];
+    const Eigen::VectorXd residual = robust_residual(X, data.torque.col(j), out.sigma[j]);
+    // A torque that is described exactly (no noise at all) still needs a scale.
+    const double size = data.torque.col(j).norm() / std::sqrt(static_cast<double>(X.rows()));
+    out.sigma[j] = std::max({out.sigma[j], 1e-9 * size, 1e-12});
+    out.residual.col(j) = residual / out.sigma[j];
+  }
+  return out;
+}
+
+BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma) {
+  return {.declared = held_out(data, data.torque - data.declared, data.common, sigma),
+          .identified = held_out(data, data.torque, data.rigid, sigma)};
+}
+
+Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma) {
+  Normal normal(system_columns(data, 0, data.rigid).cols());
+  for (std::size_t j = 0; j < data.rigid.size(); ++j) {
+    const auto c = static_cast<Eigen::Index>(j);
+    normal.add(system_columns(data, j, data.rigid) / sigma[c], data.torque.col(c) / sigma[c]);
+  }
+  return normal.solve().head(data.rigid.front().cols());
+}
+
+}  // namespace kinescope::effects

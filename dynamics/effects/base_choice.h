@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which rigid bodies a log's torques are measured against, and how much each joint's torque
+// scatters. Internal to this room.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "dynamics/effects/traced_torque.h"
+
+namespace kinescope::effects {
+
+/// The log at the instants, ready for regressions.
+struct BaseData {
+  Eigen::MatrixXd q, dq, ddq, torque;  ///< instants x joints
+  Eigen::MatrixXd declared;            ///< torque of the model as declared, friction and all
+  std::vector<Eigen::MatrixXd> rigid;  ///< regressor of each joint, instants x 10 bodies
+  std::vector<Eigen::MatrixXd> drives; ///< columns that a joint's drive may add
+  std::vector<Eigen::MatrixXd> common; ///< of each joint: a payload and gravity, shared parameters
+  std::vector<int> fold;
+};
+
+/// Every joint's columns, each joint alone: residuals and noise (by their median size).
+struct WidestFit {
+  Eigen::MatrixXd residual;  ///< instants x joints, whitened
+  Eigen::VectorXd sigma;
+};
+[[nodiscard]] WidestFit widest_fit(const BaseData& data);
+
+/// Held-out error of rigid bodies as declared and identified, drives and common terms free for
+/// both: root mean square, whitened.
+struct BaseErrors {
+  double declared = 0.0;
+  double identified = 0.0;
+};
+[[nodiscard]] BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma);
+
+/// Parameters of the bodies that explain the torque best beside the drives (least squares, whitened,
+/// directions that the log does not show left at zero), 10 bodies.
+[[nodiscard]] Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma);
+
+}  // namespace kinescope::effects

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What is wrong with masses and gravity: these act on many joints at once.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "dynamics/effects/candidates.h"
+#include "kinematics/model/inertial_parameters.h"
+
+namespace kinescope::effects {
+namespace {
+
+/// All ten parameters: its mass and centre are what is asked for, its inertia must not be in the
+/// way.
+Candidate payload(const SharedContext& c, int tip, int body) {
+  const Carriers carriers{static_cast<Eigen::Index>(c->joints.size())};
+  Candidate out;
+  const std::string& link = c->rigid.bodies[static_cast<std::size_t>(body)].name;
+  out.id = {"payload", link};
+  out.words = fmt::format("{} carries a mass that the model lacks", link);
+  out.check = "tools, cables, sensors and loads at the link; its mass in the model";
+  out.record = "tilt the link all ways under gravity, and repeat the motion without the load";
+  const bool kilograms = c->torque_unit == "Nm";
+  out.size_unit = kilograms ? "kg" : "A per N m x kg";
+  constexpr const char* kUnits[] = {"kg", "kg m", "kg m^2"};
+  for (int k = 0; k < 10; ++k) {
+    const char* unit = kUnits[k == 0 ? 0 : k < 4 ? 1 : 2];
+    out.parameters.push_back({std::string(kInertialNames[static_cast<std::size_t>(k)]), unit});
+  }
+  out.size_weights = Eigen::VectorXd::Unit(10, 0);
+  out.columns = [c, carriers, tip](double) {
+    std::vector<EffectColumn> columns;
+    for (int k = 0; k < 10; ++k) columns.push_back({carriers.body(tip, k), {}});
+    return columns;
+  };
+  return out;
+}
+
+Candidate gravity_direction(const SharedContext& c) {
+  const Carriers carriers{static_cast<Eigen::Index>(c->joints.size())};
+  Candidate out;
+  out.id = {"gravity_direction", "base"};
+  out.words = "the base does not stand as the model says: gravity points elsewhere";
+  out.check = "mounting of the base: on a wall, a ceiling, a slope";
+  out.record = "measure the base with a spirit level";
+  out.size_unit = "deg";
+  out.parameters = {{"tilt_1", "deg"}, {"tilt_2", "deg"}};
+  out.size_weights = Eigen::Vector2d::Ones();
+  out.columns = [carriers](double) {
+    return std::vector<EffectColumn>{{carriers.gravity(0), {}}, {carriers.gravity(1), {}}};
+  };
+  return out;
+}
+
+}  // namespace
+
+std::vector<int> tips(const RigidModel& rigid) {
+  std::vector<int> out;
+  for (int b = 0; b < static_cast<int>(rigid.bodies.size()); ++b) {
+    const bool carries =
+        std::ranges::any_of(rigid.bodies, [b](const RigidBody& other) { return other.parent == b; });
+    if (!carries) out.push_back(b);
+  }
+  return out;
+}
+
+void add_bodies(const SharedContext& context, std::vector<Candidate>& out) {
+  const std::vector<int> bodies = tips(context->rigid);
+  for (std::size_t t = 0; t < bodies.size(); ++t) {
+    out.push_back(payload(context, static_cast<int>(t), bodies[t]));
+  }
+  if (context->rigid.gravity_m_s2.norm() > 0.0) out.push_back(gravity_direction(context));
+}
+
+}  // namespace kinescope::effects

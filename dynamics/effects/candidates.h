@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pieces of the library, by what causes them. Internal to this room.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "dynamics/effects/effect_library.h"
+
+namespace kinescope::effects {
+
+using SharedContext = std::shared_ptr<const EffectContext>;
+
+/// Carriers by name; see effect_library.h for the rows.
+struct Carriers {
+  Eigen::Index joints = 0;
+  [[nodiscard]] int joint(std::size_t j) const { return static_cast<int>(j); }
+  /// Joints j and j + 1 as one drive turns them: the sum of their motion, or the difference.
+  [[nodiscard]] int pair(std::size_t j, bool sum) const {
+    return static_cast<int>(joints) + 2 * static_cast<int>(j) + (sum ? 0 : 1);
+  }
+  [[nodiscard]] int gravity(int axis) const {
+    return static_cast<int>(joints + 2 * (joints - 1)) + axis;
+  }
+  [[nodiscard]] int body(int tip, int parameter) const { return gravity(2) + 10 * tip + parameter; }
+  [[nodiscard]] int count(int tips) const { return body(tips, 0); }
+};
+
+/// A joint's friction, low-passed: a function of the fine path, kept by name.
+[[nodiscard]] Eigen::VectorXd joint_column(
+    const EffectContext& context, std::size_t joint, const std::string& name,
+    const std::function<Eigen::ArrayXd(const FinePath&)>& torque);
+
+/// Smoothed sign of the speed, as Coulomb friction has it.
+[[nodiscard]] Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
+                                       const Eigen::ArrayXd& dq);
+[[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint);
+
+/// Range and root mean square speed of a joint in the log; speeds at 95 % are its high ones.
+struct JointTravel {
+  double lowest = 0.0;
+  double range = 0.0;
+  double rms_speed = 0.0;
+  double high_speed = 0.0;
+};
+[[nodiscard]] JointTravel travel_of(const EffectContext& context, std::size_t joint);
+
+/// `count` values from `first` to `last` in equal ratios.
+[[nodiscard]] std::vector<double> ratios(double first, double last, int count);
+
+/// Periods a turn (or a metre) that a log can show.
+[[nodiscard]] std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint);
+
+void add_friction(const SharedContext& context, std::vector<Candidate>& out);
+void add_drives(const SharedContext& context, std::vector<Candidate>& out);
+void add_sensors(const SharedContext& context, std::vector<Candidate>& out);
+void add_bodies(const SharedContext& context, std::vector<Candidate>& out);
+
+/// Bodies that carry no other.
+[[nodiscard]] std::vector<int> tips(const RigidModel& rigid);
+
+}  // namespace kinescope::effects

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a drive adds beside friction: its own inertia, springs, ripple, and all that changes as it
+// runs warm.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "dynamics/effects/candidates.h"
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kFullTurn = 6.283185307179586;
+
+Candidate motor_inertia(const SharedContext& c, std::size_t j) {
+  Candidate out;
+  out.id = {"motor_inertia", c->joints[j]};
+  out.words = fmt::format("the motor of {} has an inertia that the model lacks", c->joints[j]);
+  out.check = "rotor inertia times the gear ratio squared in the data sheet of the drive";
+  out.record = "accelerate the joint hard in many postures of the others";
+  out.size_unit = fmt::format("{} s^2/{}", c->unit(j), c->angle(j));
+  if (c->torque_unit == "Nm") out.size_unit = c->turns[j] != 0 ? "kg m^2" : "kg";
+  out.parameters = {{"inertia", out.size_unit}};
+  out.columns = [c, j](double) {
+    return std::vector<EffectColumn>{
+        {static_cast<int>(j),
+         c->motion->at_instants(c->motion->samples().ddq.col(static_cast<Eigen::Index>(j)))}};
+  };
+  return out;
+}
+
+/// stiffness (q - rest): the rest is found by the second parameter, the torque at q = 0.
+Candidate spring(const SharedContext& c, std::size_t j) {
+  Candidate out;
+  out.id = {"spring", c->joints[j]};
+  out.words = fmt::format("a spring pulls at {}", c->joints[j]);
+  out.check = "balancing springs, cable bundles and hoses at the joint";
+  out.record = "hold or move the joint slowly all over its travel";
+  out.size_unit = fmt::format("{}/{}", c->unit(j), c->angle(j));
+  out.parameters = {{"stiffness", out.size_unit}, {"torque_at_zero", c->unit(j)}};
+  out.size_weights = Eigen::Vector2d(1.0, 0.0);
+  out.columns = [c, j](double) {
+    const auto column = static_cast<Eigen::Index>(j);
+    return std::vector<EffectColumn>{
+        {static_cast<int>(j), c->motion->at_instants(c->motion->samples().q.col(column))},
+        {static_cast<int>(j), Eigen::VectorXd::Ones(c->instants())}};
+  };
+  return out;
+}
+
+Candidate ripple(const SharedContext& c, std::size_t j) {
+  Candidate out;
+  out.id = {"ripple", c->joints[j]};
+  out.words = fmt::format("torque of {} ripples with its position", c->joints[j]);
+  out.check = "cogging of the motor, teeth of the gear: compare the periods with poles and ratio";
+  out.record = "move the joint slowly and evenly over a long way";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"sine", out.size_unit}, {"cosine", out.size_unit}};
+  out.size_weights = Eigen::Vector2d::Ones();
+  out.scan = ripple_periods(*c, j);
+  out.scan_name = c->turns[j] != 0 ? "periods a turn" : "periods a metre";
+  const double wave = c->turns[j] != 0 ? 1.0 : kFullTurn;
+  out.columns = [c, j, wave](double periods) {
+    const double w = wave * periods;
+    return std::vector<EffectColumn>{
+        {static_cast<int>(j), joint_column(*c, j, fmt::format("ripple sin {:.17g}", w),
+                                           [&](const FinePath& p) { return (w * p.q).sin().eval(); })},
+        {static_cast<int>(j), joint_column(*c, j, fmt::format("ripple cos {:.17g}", w),
+                                           [&](const FinePath& p) { return (w * p.q).cos().eval(); })}};
+  };
+  return out;
+}
+
+/// From 0 at the start to 1 at the end, settling with a time constant; long ones are straight.
+Eigen::VectorXd drift_shape(const Eigen::VectorXd& time_s, double constant_s) {
+  const double begin = time_s[0];
+  const double duration = std::max(time_s[time_s.size() - 1] - begin, 1e-12);
+  const Eigen::ArrayXd t = time_s.array() - begin;
+  return ((1.0 - (-t / constant_s).exp()) / (1.0 - std::exp(-duration / constant_s))).matrix();
+}
+
+Candidate drift_by(const SharedContext& c, std::size_t j,
+                   const std::function<Eigen::VectorXd(double)>& shape) {
+  Candidate out;
+  out.id = {"drift", c->joints[j]};
+  out.size_unit = c->unit(j);
+  out.parameters = {{"offset", out.size_unit},
+                    {"coulomb", out.size_unit},
+                    {"viscous_at_high_speed", out.size_unit}};
+  out.size_weights = Eigen::Vector3d::Ones();
+  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
+  out.columns = [c, j, shape, high](double scan) {
+    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::VectorXd s = shape(scan);
+    const Eigen::VectorXd speed = c->motion->at_instants(c->motion->samples().dq.col(column)) / high;
+    return std::vector<EffectColumn>{{static_cast<int>(j), s},
+                                     {static_cast<int>(j), s.cwiseProduct(direction_column(*c, j))},
+                                     {static_cast<int>(j), s.cwiseProduct(speed)}};
+  };
+  return out;
+}
+
+Candidate drift(const SharedContext& c, std::size_t j) {
+  const Eigen::VectorXd time_s = c->motion->at_instants(c->motion->time_s());
+  Candidate out = drift_by(c, j, [time_s](double constant_s) { return drift_shape(time_s, constant_s); });
+  out.words = fmt::format("torque and friction of {} drift while it runs", c->joints[j]);
+  out.check = "temperature of the joint; warm up before recording";
+  out.record = "repeat one motion cold and warm";
+  const double duration = time_s[time_s.size() - 1] - time_s[0];
+  out.scan = {0.07 * duration, 0.2 * duration, 0.6 * duration, 8.0 * duration};
+  out.scan_name = "time constant";
+  out.scan_unit = "s";
+  return out;
+}
+
+/// The temperature's own scale: what it does over the whole range of the log.
+Candidate temperature_drift(const SharedContext& c, std::size_t j) {
+  const double low = c->temperature_c.minCoeff();
+  const double range = std::max(c->temperature_c.maxCoeff() - low, 1e-12);
+  const Eigen::VectorXd shape = (c->temperature_c.array() - low).matrix() / range;
+  Candidate out = drift_by(c, j, [shape](double) { return shape; });
+  out.id.place += " with temperature";
+  out.words = fmt::format("torque and friction of {} change with its temperature", c->joints[j]);
+  out.check = "lubrication of the joint; warm up before recording";
+  out.record = "repeat one motion cold and warm, and then cold again";
+  return out;
+}
+
+/// Both joints are turned by one more drive (a wrist): its friction and inertia act on their sum,
+/// or difference.
+Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
+  Candidate out;
+  const char* sign = sum ? " + " : " - ";
+  out.id = {"cross_talk", c->joints[j] + sign + c->joints[j + 1]};
+  out.words = fmt::format("one drive turns with {}{}{}: the joints are coupled", c->joints[j], sign,
+                          c->joints[j + 1]);
+  out.check = "transmission of the wrist: a motor that also turns when the other joint moves";
+  out.record = "move both joints together, then each alone";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"coulomb", c->unit(j)}, {"viscous_at_high_speed", c->unit(j)},
+                    {"inertia", c->unit(j) + " s^2/" + c->angle(j)}};
+  out.size_weights = Eigen::Vector3d(1.0, 1.0, 0.0);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c->joints.size()));
+  weights[static_cast<Eigen::Index>(j)] = 1.0;
+  weights[static_cast<Eigen::Index>(j) + 1] = sum ? 1.0 : -1.0;
+  const int carrier =
+      Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
+  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
+  out.columns = [c, j, sum, weights, carrier, high](double) {
+    const std::string name = fmt::format("pair {} {}", j, sum ? "sum" : "difference");
+    const Eigen::VectorXd& way = c->cache->get(name, [&] {
+      return c->motion->column(weights, [&](const FinePath& p) { return direction(*c, j, p.dq); });
+    });
+    const TorqueSamples& samples = c->motion->samples();
+    return std::vector<EffectColumn>{
+        {carrier, way},
+        {carrier, c->motion->at_instants(samples.dq * weights) / high},
+        {carrier, c->motion->at_instants(samples.ddq * weights)}};
+  };
+  return out;
+}
+
+}  // namespace
+
+void add_drives(const SharedContext& context, std::vector<Candidate>& out) {
+  for (std::size_t j = 0; j < context->joints.size(); ++j) {
+    for (const auto& make : {motor_inertia, spring, ripple, drift}) {
+      out.push_back(make(context, j));
+    }
+    if (context->temperature_c.size() > 0) out.push_back(temperature_drift(context, j));
+    if (j + 1 == context->joints.size() || context->turns[j] == 0 || context->turns[j + 1] == 0) {
+      continue;
+    }
+    out.push_back(coupled_drive(context, j, true));
+    out.push_back(coupled_drive(context, j, false));
+  }
+}
+
+}  // namespace kinescope::effects

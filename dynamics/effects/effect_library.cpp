@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/effects/effect_library.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "dynamics/data/statistics.h"
+#include "dynamics/effects/candidates.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "dynamics/rigid/regressor.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+using effects::Carriers;
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+void put(Triplets& triplets, int carrier, Eigen::Index joint, Eigen::Index joints,
+         const Eigen::VectorXd& values) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values[i] != 0.0) {
+      triplets.emplace_back(static_cast<int>(i * joints + joint), carrier, values[i]);
+    }
+  }
+}
+
+void put_joints(const EffectContext& context, const Carriers& carriers, Triplets& triplets) {
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(context.instants());
+  for (Eigen::Index j = 0; j < carriers.joints; ++j) {
+    const auto joint = static_cast<std::size_t>(j);
+    put(triplets, carriers.joint(joint), j, carriers.joints, ones);
+    if (j + 1 == carriers.joints) continue;
+    for (const bool sum : {true, false}) {
+      put(triplets, carriers.pair(joint, sum), j, carriers.joints, ones);
+      put(triplets, carriers.pair(joint, sum), j + 1, carriers.joints, sum ? ones : -ones);
+    }
+  }
+}
+
+/// Torque a degree of tilt: d torque / d gravity times the way gravity moves.
+void put_gravity(const EffectContext& context, const Eigen::MatrixXd& q, const Carriers& carriers,
+                 Triplets& triplets) {
+  const Eigen::Vector3d& gravity = context.rigid.gravity_m_s2;
+  if (!(gravity.norm() > 0.0)) return;
+  const Eigen::Matrix<double, 3, 2> axes = tilt_axes(gravity);
+  Eigen::Matrix<double, 3, 2> moved;
+  for (int a = 0; a < 2; ++a) moved.col(a) = kDegree * axes.col(a).cross(gravity);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const Eigen::MatrixXd torque = gravity_jacobian(context.rigid, q.row(i).transpose()) * moved;
+    for (int a = 0; a < 2; ++a) {
+      for (Eigen::Index j = 0; j < carriers.joints; ++j) {
+        triplets.emplace_back(static_cast<int>(i * carriers.joints + j), carriers.gravity(a),
+                              torque(j, a));
+      }
+    }
+  }
+}
+
+void put_bodies(const EffectContext& context, const TorqueSamples& rows, const Carriers& carriers,
+                Triplets& triplets) {
+  const std::vector<Eigen::MatrixXd> Y =
+      regressors_of_samples(context.rigid, rows.q, rows.dq, rows.ddq);
+  const std::vector<int> bodies = effects::tips(context.rigid);
+  for (std::size_t t = 0; t < bodies.size(); ++t) {
+    for (int k = 0; k < 10; ++k) {
+      for (Eigen::Index j = 0; j < carriers.joints; ++j) {
+        put(triplets, carriers.body(static_cast<int>(t), k), j, carriers.joints,
+            Y[static_cast<std::size_t>(j)].col(10 * bodies[t] + k));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+namespace effects {
+
+Eigen::VectorXd joint_column(const EffectContext& context, std::size_t joint,
+                             const std::string& name,
+                             const std::function<Eigen::ArrayXd(const FinePath&)>& torque) {
+  return context.cache->get(fmt::format("{} {}", joint, name), [&] {
+    return context.motion->column(static_cast<Eigen::Index>(joint), torque);
+  });
+}
+
+Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
+                         const Eigen::ArrayXd& dq) {
+  const double width = context.turns[joint] != 0 ? context.widths.rad_s : context.widths.m_s;
+  if (width == 0.0) return dq.sign();
+  return (dq / width).tanh();
+}
+
+Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint) {
+  return joint_column(context, joint, "direction", [&](const FinePath& path) {
+    return direction(context, joint, path.dq);
+  });
+}
+
+JointTravel travel_of(const EffectContext& context, std::size_t joint) {
+  const auto j = static_cast<Eigen::Index>(joint);
+  const Eigen::VectorXd q = context.motion->at_instants(context.motion->samples().q.col(j));
+  const Eigen::VectorXd dq = context.motion->at_instants(context.motion->samples().dq.col(j));
+  if (q.size() == 0) return {};
+  return {.lowest = q.minCoeff(),
+          .range = q.maxCoeff() - q.minCoeff(),
+          .rms_speed = std::sqrt(dq.squaredNorm() / static_cast<double>(dq.size())),
+          .high_speed = quantile(to_vector(dq.cwiseAbs()), 0.95)};
+}
+
+std::vector<double> ratios(double first, double last, int count) {
+  std::vector<double> out;
+  for (int k = 0; k < count; ++k) {
+    out.push_back(first * std::pow(last / first, static_cast<double>(k) / (count - 1)));
+  }
+  return out;
+}
+
+std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint) {
+  constexpr double kLowest = 3.0;   // slower waves are what gravity and springs look like
+  constexpr int kMost = 400;
+  const JointTravel travel = travel_of(context, joint);
+  const bool turns = context.turns[joint] != 0;
+  const double turn = turns ? 2.0 * std::numbers::pi : std::max(travel.range, 1e-9);
+  // Faster than the low-pass at most speeds: nothing of it is left.
+  const double cutoff_hz = context.motion->filter().cutoff_hz;
+  const double highest =
+      cutoff_hz > 0.0 ? 2.0 * cutoff_hz * turn / std::max(travel.rms_speed, 1e-12) : kMost;
+  std::vector<double> out;
+  for (int n = 1; n <= kMost; n += n < 60 ? 1 : n < 120 ? 2 : 10) {
+    if (n < kLowest || n > highest) continue;
+    out.push_back(turns ? n : n / turn);
+  }
+  return out;
+}
+
+}  // namespace effects
+
+const Eigen::VectorXd& ColumnCache::get(const std::string& name,
+                                        const std::function<Eigen::VectorXd()>& make) {
+  const auto found = columns_.find(name);
+  if (found != columns_.end()) return found->second;
+  return columns_.emplace(name, make()).first->second;
+}
+
+std::string EffectContext::unit(std::size_t joint) const {
+  if (torque_unit != "Nm") return torque_unit;
+  return turns[joint] != 0 ? "N m" : "N";
+}
+
+const Candidate* EffectLibrary::find(const EffectId& id) const {
+  const auto found = std::ranges::find(candidates, id, &Candidate::id);
+  return found == candidates.end() ? nullptr : &*found;
+}
+
+EffectLibrary make_effect_library(const EffectContext& context) {
+  KINESCOPE_CHECK(context.motion != nullptr && context.cache != nullptr, "a motion and a cache");
+  const auto shared = std::make_shared<const EffectContext>(context);
+  EffectLibrary out;
+  effects::add_friction(shared, out.candidates);
+  effects::add_drives(shared, out.candidates);
+  effects::add_sensors(shared, out.candidates);
+  effects::add_bodies(shared, out.candidates);
+  const Carriers carriers{static_cast<Eigen::Index>(context.joints.size())};
+  TorqueSamples rows;
+  rows.q = context.motion->rows_at_instants(context.motion->samples().q);
+  rows.dq = context.motion->rows_at_instants(context.motion->samples().dq);
+  rows.ddq = context.motion->rows_at_instants(context.motion->samples().ddq);
+  Triplets triplets;
+  put_joints(context, carriers, triplets);
+  put_gravity(context, rows.q, carriers, triplets);
+  put_bodies(context, rows, carriers, triplets);
+  out.carriers.resize(context.instants() * carriers.joints,
+                      carriers.count(static_cast<int>(effects::tips(context.rigid).size())));
+  out.carriers.setFromTriplets(triplets.begin(), triplets.end());
+  return out;
+}
+
+Eigen::MatrixXd effect_torque(const EffectLibrary& library, const Candidate& candidate, double scan,
+                              const Eigen::VectorXd& values, Eigen::Index joints) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(library.carriers.rows() / joints, joints);
+  const std::vector<EffectColumn> columns = candidate.columns(scan);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const EffectColumn& column = columns[k];
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(library.carriers, column.carrier); entry;
+         ++entry) {
+      const Eigen::Index instant = entry.row() / joints;
+      const double share = column.share.size() > 0 ? column.share[instant] : 1.0;
+      out(instant, entry.row() % joints) +=
+          values[static_cast<Eigen::Index>(k)] * share * entry.value();
+    }
+  }
+  return out;
+}
+
+Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity) {
+  const Eigen::Vector3d down = gravity.normalized();
+  Eigen::Index least = 0;
+  down.cwiseAbs().minCoeff(&least);
+  const Eigen::Vector3d first =
+      (Eigen::Vector3d::Unit(least) - down[least] * down).normalized();
+  Eigen::Matrix<double, 3, 2> out;
+  out << first, down.cross(first);
+  return out;
+}
+
+Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt_deg) {
+  const Eigen::Vector3d turn = kDegree * tilt_axes(gravity) * tilt_deg;
+  const double angle = turn.norm();
+  if (!(angle > 0.0)) return gravity;
+  return Eigen::AngleAxisd(angle, turn / angle) * gravity;
+}
+
+}  // namespace kinescope

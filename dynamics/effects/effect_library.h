@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The effects that a model of rigid bodies lacks, as candidates for calib/trace: what each one adds
+// to the torque that the actuators must give (friction, springs, a payload) or to what their
+// sensors say (offset, gain, delay), per unit of its parameters.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+#include "calib/trace/traced_model.h"
+#include "dynamics/effects/effect_motion.h"
+#include "dynamics/rigid/rigid_model.h"
+
+namespace kinescope {
+
+/// Speeds within which Coulomb friction turns round, as in dynamics/identify.
+struct FrictionWidths {
+  double rad_s = 0.01;
+  double m_s = 0.002;
+};
+
+/// Columns that were asked for once. Shared by the candidates of all fits of one model.
+class ColumnCache {
+ public:
+  /// The column of this name, made where it is not there yet.
+  const Eigen::VectorXd& get(const std::string& name, const std::function<Eigen::VectorXd()>& make);
+
+ private:
+  std::map<std::string, Eigen::VectorXd> columns_;
+};
+
+/// What effects are made from. Matrices are instants x joints, in the samples' unit of torque.
+struct EffectContext {
+  std::shared_ptr<const EffectMotion> motion;
+  std::shared_ptr<ColumnCache> cache;  ///< of columns that depend on the motion only
+  std::vector<std::string> joints;
+  std::vector<char> turns;  ///< revolute
+  RigidModel rigid;         ///< bodies, and gravity as it is believed to be
+  Eigen::MatrixXd load;     ///< torque of the rigid bodies
+  Eigen::MatrixXd torque;   ///< torque of the model
+  Eigen::MatrixXd measured_rate;  ///< d/dt of the measured torque
+  Eigen::VectorXd temperature_c;  ///< instants; empty: not logged
+  FrictionWidths widths;
+  std::string torque_unit = "Nm";  ///< "Nm" or "A"
+
+  [[nodiscard]] std::string unit(std::size_t joint) const;  ///< of the joint's torque
+  [[nodiscard]] std::string angle(std::size_t joint) const { return turns[joint] ? "rad" : "m"; }
+  [[nodiscard]] Eigen::Index instants() const { return motion->instants(); }
+};
+
+/// Candidates and what they act through. Row i * joints + j of the carriers is joint j at instant
+/// i; the first carriers are the joints themselves.
+struct EffectLibrary {
+  std::vector<Candidate> candidates;
+  Eigen::SparseMatrix<double> carriers;  ///< rows x carriers, unit of torque a carrier's unit
+
+  [[nodiscard]] const Candidate* find(const EffectId& id) const;
+};
+
+/// All effects of the library for one log. The context is copied into the candidates.
+[[nodiscard]] EffectLibrary make_effect_library(const EffectContext& context);
+
+/// Torque of an effect at the instants, instants x joints.
+[[nodiscard]] Eigen::MatrixXd effect_torque(const EffectLibrary& library, const Candidate& candidate,
+                                            double scan, const Eigen::VectorXd& values,
+                                            Eigen::Index joints);
+
+/// Two axes across gravity (columns), about which it may be tilted; deterministic.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity);
+/// Gravity turned by a rotation vector about these axes, degrees.
+[[nodiscard]] Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt_deg);
+
+}  // namespace kinescope

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a joint rubs. Armstrong-Helouvry, Dupont, Canudas de Wit 1994; pre-sliding: Dahl 1968.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "dynamics/effects/candidates.h"
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kFullTurn = 6.283185307179586;
+
+/// A joint's effect whose parameters act on that joint alone.
+Candidate joint_effect(const EffectContext& context, std::size_t joint, const std::string& name) {
+  Candidate out;
+  out.id = {name, context.joints[joint]};
+  return out;
+}
+
+std::vector<EffectColumn> one_column(std::size_t joint, Eigen::VectorXd share) {
+  return {{static_cast<int>(joint), std::move(share)}};
+}
+
+Candidate viscous(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "viscous");
+  out.words = fmt::format("{} has viscous friction", c->joints[j]);
+  out.check = "lubrication and seals of the joint; the drive's own damping";
+  out.record = "move the joint at several speeds, both ways";
+  out.size_unit = fmt::format("{} s/{}", c->unit(j), c->angle(j));
+  out.parameters = {{"viscous", out.size_unit}};
+  out.columns = [c, j](double) {
+    return one_column(j, c->motion->at_instants(c->motion->samples().dq.col(
+                             static_cast<Eigen::Index>(j))));
+  };
+  return out;
+}
+
+Candidate coulomb(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "coulomb");
+  out.words = fmt::format("{} has Coulomb friction", c->joints[j]);
+  out.check = "gear, bearings and brake of the joint: preload, a brake that drags";
+  out.record = "move the joint both ways at low speed";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"coulomb", out.size_unit}};
+  out.columns = [c, j](double) { return one_column(j, direction_column(*c, j)); };
+  return out;
+}
+
+/// A difference of the constant part between the directions is an offset while the joint moves, and
+/// is called that; what is told apart is a difference that grows with the speed.
+Candidate asymmetric(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "asymmetric");
+  out.words = fmt::format("{} rubs more one way than the other", c->joints[j]);
+  out.check = "preload of the gear, a cable or hose that drags one way";
+  out.record = "move the joint at several speeds, both ways alike";
+  out.size_unit = fmt::format("{} s/{}", c->unit(j), c->angle(j));
+  out.parameters = {{"half_difference", out.size_unit}};
+  out.columns = [c, j](double) {
+    return one_column(
+        j, joint_column(*c, j, "asymmetric", [](const FinePath& p) { return p.dq.abs().eval(); }));
+  };
+  return out;
+}
+
+Candidate stribeck(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "stribeck");
+  out.words = fmt::format("{} rubs more at low speed (Stribeck)", c->joints[j]);
+  out.check = "lubrication of the joint: friction falls when the film of grease builds up";
+  out.record = "move the joint slowly for a while, with many reversals";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"excess_at_rest", out.size_unit}};
+  out.scan = ratios(0.03 * travel_of(*c, j).rms_speed, 0.7 * travel_of(*c, j).rms_speed, 10);
+  out.scan_name = "Stribeck speed";
+  out.scan_unit = c->angle(j) + "/s";
+  out.columns = [c, j](double speed) {
+    return one_column(j, joint_column(*c, j, fmt::format("stribeck {:.17g}", speed),
+                                      [&](const FinePath& p) {
+                                        return (direction(*c, j, p.dq) *
+                                                (-(p.dq / speed).square()).exp())
+                                            .eval();
+                                      }));
+  };
+  return out;
+}
+
+/// High speed to another power than 1: 3 as in a polynomial, 2 for drag, 1/2 for thin films.
+Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "cubic_viscous");
+  out.words = fmt::format("friction of {} is not proportional to its speed", c->joints[j]);
+  out.check = "lubrication of the joint: grease that thins out with speed";
+  out.record = "move the joint up to its highest speed";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"at_high_speed", out.size_unit}};
+  out.scan = {0.5, 2.0, 3.0};
+  out.scan_name = "power of the speed";
+  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
+  out.columns = [c, j, high](double power) {
+    return one_column(j, joint_column(*c, j, fmt::format("power {:.17g}", power),
+                                      [&](const FinePath& p) {
+                                        return (p.dq.sign() * (p.dq.abs() / high).pow(power)).eval();
+                                      }));
+  };
+  return out;
+}
+
+Candidate load_friction(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "load_friction");
+  out.words = fmt::format("friction of {} grows with its load", c->joints[j]);
+  out.check = "efficiency of the gear: losses in proportion to the torque it passes on";
+  out.record = "move the joint both ways under little and under much load";
+  out.size_unit = "";
+  out.parameters = {{"share_of_load", ""}};
+  out.columns = [c, j](double) {
+    const auto column = static_cast<Eigen::Index>(j);
+    return one_column(j, direction_column(*c, j).cwiseProduct(c->load.col(column).cwiseAbs()));
+  };
+  return out;
+}
+
+Candidate position_friction(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "position_friction");
+  out.words = fmt::format("friction of {} depends on its position", c->joints[j]);
+  out.check = "alignment of the gear, cables and hoses along the joint's travel";
+  out.record = "sweep the joint slowly over its whole travel, both ways";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"cosine", out.size_unit}, {"sine", out.size_unit}};
+  out.size_weights = Eigen::Vector2d::Ones();
+  const JointTravel travel = travel_of(*c, j);
+  const double turn = c->turns[j] != 0 ? kFullTurn : std::max(travel.range, 1e-9);
+  out.scan = {0.5, 1.0, 2.0, 3.0, 4.0};
+  if (c->turns[j] == 0) {
+    for (double& periods : out.scan) periods /= turn;
+  }
+  out.scan_name = c->turns[j] != 0 ? "periods a turn" : "periods a metre";
+  const double wave = c->turns[j] != 0 ? 1.0 : kFullTurn;
+  out.columns = [c, j, wave](double periods) {
+    const double w = wave * periods;
+    return std::vector<EffectColumn>{
+        {static_cast<int>(j), joint_column(*c, j, fmt::format("position cos {:.17g}", w),
+                                           [&](const FinePath& p) {
+                                             return (direction(*c, j, p.dq) * (w * p.q).cos()).eval();
+                                           })},
+        {static_cast<int>(j), joint_column(*c, j, fmt::format("position sin {:.17g}", w),
+                                           [&](const FinePath& p) {
+                                             return (direction(*c, j, p.dq) * (w * p.q).sin()).eval();
+                                           })}};
+  };
+  return out;
+}
+
+/// Dahl's state z, between -1 and 1: dz/dq = (1 - z sign(dq)) / length. Solved exactly over each
+/// step, in which the joint turns one way.
+Eigen::ArrayXd dahl_state(const Eigen::ArrayXd& q, double length) {
+  Eigen::ArrayXd z(q.size());
+  double state = 0.0;
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    const double moved = k > 0 ? q(k) - q(k - 1) : 0.0;
+    const double way = moved < 0.0 ? -1.0 : 1.0;
+    if (moved != 0.0) state = way + (state - way) * std::exp(-std::abs(moved) / length);
+    z(k) = state;
+  }
+  return z;
+}
+
+Candidate hysteresis(const SharedContext& c, std::size_t j) {
+  Candidate out = joint_effect(*c, j, "hysteresis");
+  out.words = fmt::format("{} sticks before it slides (hysteresis)", c->joints[j]);
+  out.check = "elastic pre-sliding in gear, seals and cables after each reversal";
+  out.record = "reverse the joint often, with small motions among large ones";
+  out.size_unit = c->unit(j);
+  out.parameters = {{"friction", out.size_unit}};
+  const double range = std::max(travel_of(*c, j).range, 1e-9);
+  out.scan = ratios(2e-4 * range, 0.2 * range, 13);
+  out.scan_name = "pre-sliding length";
+  out.scan_unit = c->angle(j);
+  out.columns = [c, j](double length) {
+    return one_column(j, joint_column(*c, j, fmt::format("dahl {:.17g}", length),
+                                      [&](const FinePath& p) { return dahl_state(p.q, length); }));
+  };
+  return out;
+}
+
+}  // namespace
+
+void add_friction(const SharedContext& context, std::vector<Candidate>& out) {
+  for (std::size_t j = 0; j < context->joints.size(); ++j) {
+    for (const auto& make : {viscous, coulomb, asymmetric, stribeck, cubic_viscous, load_friction,
+                             position_friction, hysteresis}) {
+      out.push_back(make(context, j));
+    }
+  }
+}
+
+}  // namespace kinescope::effects

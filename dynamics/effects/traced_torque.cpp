@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/effects/traced_torque.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "dynamics/data/splits.h"
+#include "dynamics/effects/base_choice.h"
+#include "dynamics/effects/candidates.h"
+#include "dynamics/effects/torque_parts.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "dynamics/rigid/regressor.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+using effects::BaseData;
+
+constexpr int kFewestPaths = 5;       // to hold out whole trajectories
+constexpr Eigen::Index kFewestInstants = 60;
+
+/// Of every sample: trajectories of one path together where there are enough paths, else stretches
+/// of equal length.
+std::vector<int> folds_of(const TorqueSamples& samples, int folds) {
+  std::vector<int> out(static_cast<std::size_t>(samples.size()), 0);
+  std::vector<int> paths = repeated_paths(samples);
+  std::ranges::sort(paths);
+  const auto distinct = std::ranges::unique(paths);
+  const auto count = static_cast<int>(paths.size() - distinct.size());
+  if (count >= kFewestPaths) {
+    const Folds split = split_folds(samples, {.folds = std::min(folds, count)});
+    for (std::size_t f = 0; f < split.folds.size(); ++f) {
+      for (const Eigen::Index row : split.folds[f].test) {
+        out[static_cast<std::size_t>(row)] = static_cast<int>(f);
+      }
+    }
+    return out;
+  }
+  for (Eigen::Index row = 0; row < samples.size(); ++row) {
+    out[static_cast<std::size_t>(row)] = static_cast<int>(row * folds / samples.size());
+  }
+  return out;
+}
+
+/// Masses that a robot can have: every moving body has some and no distribution forbids it.
+bool has_masses(const RigidModel& rigid) {
+  constexpr double kRounding = 1e-6;  // URDF writers round
+  return std::ranges::all_of(rigid.bodies, [](const RigidBody& body) {
+    return body.inertia.mass_kg > 0.0 && is_consistent(body.inertia, kRounding);
+  });
+}
+
+Eigen::MatrixXd declared_drives(const DynamicModel& model, const EffectContext& context,
+                                const Eigen::MatrixXd& dq) {
+  const std::vector<JointId> joints = moving_joints(model.tree);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(dq.rows(), dq.cols());
+  for (Eigen::Index j = 0; j < dq.cols(); ++j) {
+    const JointDynamics& joint = model.joints[joints[static_cast<std::size_t>(j)].index()];
+    if (joint.viscous != 0.0) out.col(j) += joint.viscous * dq.col(j);
+    if (joint.coulomb != 0.0) {
+      out.col(j) += joint.coulomb * effects::direction_column(context, static_cast<std::size_t>(j));
+    }
+  }
+  return out;
+}
+
+/// What a joint's drive and sensor may add, linearly: for noise levels and for choosing the base,
+/// not for naming anything.
+Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data, Eigen::Index j) {
+  const auto joint = static_cast<std::size_t>(j);
+  const effects::JointTravel travel = effects::travel_of(context, joint);
+  const double high = std::max(travel.high_speed, 1e-12);
+  const double slow = std::max(0.1 * travel.rms_speed, 1e-12);
+  const Eigen::ArrayXd v = data.dq.col(j).array() / high;
+  const Eigen::VectorXd way = effects::direction_column(context, joint);
+  const Eigen::VectorXd dip =
+      effects::joint_column(context, joint, "base stribeck", [&](const FinePath& p) {
+        return (effects::direction(context, joint, p.dq) * (-(p.dq / slow).square()).exp()).eval();
+      });
+  const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
+  const double duration = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-12);
+  Eigen::MatrixXd out(v.size(), 12);
+  out << Eigen::VectorXd::Ones(v.size()), v.matrix(), way, data.ddq.col(j), data.q.col(j),
+      v.abs().matrix(), (v * v.abs()).matrix(), v.cube().matrix(), dip,
+      (time_s.array() - time_s[0]).matrix() / duration, context.measured_rate.col(j),
+      way.cwiseProduct(context.load.col(j).cwiseAbs());
+  return out;
+}
+
+BaseData base_data(const EffectContext& context, const RigidModel& rigid) {
+  BaseData data;
+  const TorqueSamples& samples = context.motion->samples();
+  data.q = context.motion->rows_at_instants(samples.q);
+  data.dq = context.motion->rows_at_instants(samples.dq);
+  data.ddq = context.motion->rows_at_instants(samples.ddq);
+  data.torque = context.motion->rows_at_instants(samples.torque);
+  data.rigid = regressors_of_samples(rigid, data.q, data.dq, data.ddq);
+  const std::vector<int> tips = effects::tips(rigid);
+  for (Eigen::Index j = 0; j < data.q.cols(); ++j) {
+    data.drives.push_back(drive_columns(context, data, j));
+    Eigen::MatrixXd common(data.q.rows(), 3 + 10 * static_cast<Eigen::Index>(tips.size()));
+    for (std::size_t t = 0; t < tips.size(); ++t) {
+      common.middleCols(3 + 10 * static_cast<Eigen::Index>(t), 10) =
+          data.rigid[static_cast<std::size_t>(j)].middleCols(10 * tips[t], 10);
+    }
+    data.common.push_back(std::move(common));
+  }
+  for (Eigen::Index i = 0; i < data.q.rows(); ++i) {
+    const Eigen::MatrixXd gravity = gravity_jacobian(rigid, data.q.row(i).transpose());
+    for (Eigen::Index j = 0; j < data.q.cols(); ++j) {
+      data.common[static_cast<std::size_t>(j)].row(i).head<3>() = gravity.row(j);
+    }
+  }
+  return data;
+}
+
+}  // namespace
+
+std::string_view to_string(TorqueBaseKind kind) {
+  switch (kind) {
+    case TorqueBaseKind::kDeclared:
+      return "declared";
+    case TorqueBaseKind::kIdentified:
+      return "identified";
+    default:
+      return "auto";
+  }
+}
+
+TorqueTracedModel::~TorqueTracedModel() = default;
+
+TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamples& samples,
+                                     const TorqueModelOptions& options)
+    : parts_(std::make_unique<Parts>()) {
+  if (options.folds < 2 || options.most_instants < kFewestInstants ||
+      !(options.trust_factor >= 1.0)) {
+    throw bad_request("trace", "folds below 2, too few instants, or a trust factor below 1",
+                      "leave them out for the defaults");
+  }
+  Parts& p = *parts_;
+  p.model = model;
+  p.options = options;
+  p.base.rigid = make_rigid_model(model);
+  if (samples.joints() != p.base.rigid.size()) {
+    throw bad_request("torque samples",
+                      fmt::format("{} joints, the model moves {}", samples.joints(),
+                                  p.base.rigid.size()),
+                      "give one column a movable joint of the model");
+  }
+  p.motion = std::make_shared<EffectMotion>(
+      samples, EffectMotionOptions{.filter = options.filter, .most_instants = options.most_instants});
+  if (p.motion->instants() < kFewestInstants) {
+    throw undetermined("trace", fmt::format("only {} independent samples", p.motion->instants()),
+                       "record a longer motion");
+  }
+  p.fold = folds_of(samples, options.folds);
+  p.context.widths = options.widths;
+  p.context.torque_unit = samples.torque_unit;
+  p.context.rigid = p.base.rigid;
+  for (const RigidBody& body : p.base.rigid.bodies) {
+    p.context.joints.push_back(body.joint);
+    p.context.turns.push_back(body.type == JointType::kRevolute ? 1 : 0);
+  }
+  p.refresh();
+}
+
+void TorqueTracedModel::Parts::refresh() {
+  const TorqueSamples& samples = motion->samples();
+  context.motion = motion;
+  context.cache = std::make_shared<ColumnCache>();
+  q = motion->rows_at_instants(samples.q);
+  dq = motion->rows_at_instants(samples.dq);
+  ddq = motion->rows_at_instants(samples.ddq);
+  context.measured_rate.resize(q.rows(), q.cols());
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    context.measured_rate.col(j) = motion->at_instants(motion->rate(samples.torque.col(j)));
+  }
+  if (options.temperature_c.size() > 0) {
+    context.temperature_c = motion->at_instants(options.temperature_c);
+  }
+  const RigidModel declared = make_rigid_model(model);
+  context.load = inverse_dynamics_of_samples(declared, q, dq, ddq);
+  drives = declared_drives(model, context, dq);
+  BaseData data = base_data(context, declared);
+  data.declared = context.load + drives;
+  for (const Eigen::Index row : motion->kept()) {
+    data.fold.push_back(fold[static_cast<std::size_t>(row)]);
+  }
+  effects::WidestFit described = effects::widest_fit(data);
+  base.sigma = described.sigma;
+  widest = std::move(described.residual);
+  choose_base(data, has_masses(declared));
+  if (base.kind == TorqueBaseKind::kIdentified) {
+    const RigidModel identified =
+        with_body_parameters(declared, effects::identified_bodies(data, base.sigma));
+    context.load = inverse_dynamics_of_samples(identified, q, dq, ddq);
+    // Where gravity may pull is known only for masses that are: declared ones serve better.
+    if (!has_masses(declared)) context.rigid = identified;
+  }
+  context.torque = context.load;
+}
+
+void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool masses) {
+  base.declared_error = std::numeric_limits<double>::quiet_NaN();
+  base.identified_error = base.declared_error;
+  if (options.base != TorqueBaseKind::kAuto) {
+    base.kind = options.base;
+    base.reason = "as asked for";
+    return;
+  }
+  base.kind = TorqueBaseKind::kIdentified;
+  base.reason = "the model has no masses that a robot can have";
+  if (!masses) return;
+  const effects::BaseErrors errors = effects::compare_bases(data, base.sigma);
+  base.declared_error = errors.declared;
+  base.identified_error = errors.identified;
+  const bool trusted = errors.declared <= options.trust_factor * errors.identified;
+  if (trusted) base.kind = TorqueBaseKind::kDeclared;
+  base.reason = fmt::format(
+      "declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g}",
+      errors.declared, errors.identified);
+}
+
+TracedFit TorqueTracedModel::fit(const std::vector<AddedEffect>& effects) const {
+  return effects::TorqueFitter(*parts_, effects).run();
+}
+
+const TorqueBase& TorqueTracedModel::base() const { return parts_->base; }
+const EffectMotion& TorqueTracedModel::motion() const { return *parts_->motion; }
+
+void TorqueTracedModel::leave_out(const std::vector<char>& wanted) {
+  KINESCOPE_CHECK(static_cast<Eigen::Index>(wanted.size()) == parts_->motion->samples().size(),
+                  "one flag a sample");
+  parts_->motion->leave_out(wanted);
+  if (parts_->motion->instants() < kFewestInstants) {
+    throw undetermined("trace", "hardly anything is left when contacts are left out",
+                       "record a longer motion without contact");
+  }
+  parts_->refresh();
+}
+
+Eigen::MatrixXd TorqueTracedModel::residual_torque(const TracedFit& fit) const {
+  const Eigen::Index joints = parts_->motion->joints();
+  const Eigen::VectorXd rows = fit.linear.residual.cwiseProduct(fit.linear.unit);
+  return rows.reshaped(joints, rows.size() / joints).transpose();
+}
+
+RigidModel TorqueTracedModel::fitted_rigid(const std::vector<AddedEffect>& effects) const {
+  effects::TorqueFitter fitter(*parts_, effects);
+  static_cast<void>(fitter.run());
+  return fitter.rigid();
+}
+
+Eigen::MatrixXd TorqueTracedModel::widest_residual() const { return parts_->widest; }
+
+}  // namespace kinescope

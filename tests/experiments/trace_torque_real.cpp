@@ -1,0 +1,44 @@
+#include <fmt/format.h>
+#include <chrono>
+#include "dynamics/data/torque_data.h"
+#include "dynamics/effects/traced_torque.h"
+#include "calib/trace/trace.h"
+#include "kinematics/urdf/dynamic_urdf.h"
+#include "tests/truth/shared_data.h"
+using namespace kinescope;
+int main(int argc, char** argv) {
+  for (int a = 1; a < argc; ++a) {
+    const auto folder = shared_data(std::string("synthetic_dynamics/") + argv[a]);
+    DynamicModel model = read_dynamic_urdf(*folder / "nominal.urdf");
+    model.gravity_m_s2 = {0, 0, -9.81};
+    auto t0 = std::chrono::steady_clock::now();
+    const auto lap = [&](const char* what) {
+      auto t1 = std::chrono::steady_clock::now();
+      fmt::print("  [{} {:.2f} s]\n", what, std::chrono::duration<double>(t1 - t0).count());
+      std::fflush(stdout);
+      t0 = t1;
+    };
+    const TorqueData data = read_torque_data({*folder / "log.csv.gz"}, wanted_joints(model.tree));
+    fmt::print("{}: {} samples {:.1f} Hz, cutoff {:.2f}\n", argv[a], data.samples.size(), data.rate_hz, data.cutoff.cutoff_hz);
+    lap("read");
+    TorqueModelOptions options;
+    options.filter = {data.filter, data.cutoff.cutoff_hz};
+    const TorqueTracedModel traced(model, data.samples, options);
+    lap("model");
+    fmt::print("base {}: {}  instants {}\n", to_string(traced.base().kind), traced.base().reason, traced.motion().instants());
+    for (double s : traced.base().sigma) fmt::print(" {:.4g}", s);
+    fmt::print("\n");
+    const TracedFit fit = traced.fit({});
+    lap("fit");
+    TraceOptions o;
+    o.max_effects = 60;
+    const Trace trace = trace_effects(traced, o, [&](std::string_view, int r, int) { fmt::print("round {} ", r); lap(""); });
+    lap("trace");
+    fmt::print("{}: {}\nheld out {:.4g} -> {:.4g}  stretches {}\n", to_string(trace.verdict), trace.reason, trace.held_out_before.value, trace.held_out_after.value, trace.stretches);
+    for (const auto& e : trace.accepted) {
+      fmt::print("  {:<18} {:<12} {:9.4g} [{:.4g}, {:.4g}] {} {} {:.4g}  explained {:.3g} p {:.2g}\n", e.id.effect, e.id.place, e.size, e.interval.low, e.interval.high, e.unit, e.scan_name, e.scan, e.explained, e.p_value);
+    }
+    for (const auto& s : trace.steps) fmt::print("   step {} {} {:.4g}\n", s.round, s.words, s.held_out.value);
+    for (const auto& am : trace.ambiguities) { fmt::print("  ambiguous:"); for (auto& e : am.effects) fmt::print(" {}@{}", e.effect, e.place); fmt::print("\n"); }
+  }
+}
