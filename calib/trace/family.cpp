@@ -42,6 +42,8 @@ double refine(const NormalSystem& system, const Candidate& candidate, std::size_
   return std::max(at_left, at_right) > gain(scan[best]) ? middle : scan[best];
 }
 
+}  // namespace
+
 double best_scan(const NormalSystem& system, const Candidate& candidate) {
   if (candidate.scan.empty()) return 0.0;
   std::size_t best = 0;
@@ -55,8 +57,6 @@ double best_scan(const NormalSystem& system, const Candidate& candidate) {
   }
   return candidate.scan_listed ? candidate.scan[best] : refine(system, candidate, best);
 }
-
-}  // namespace
 
 std::vector<TestedMember> test_family(const NormalSystem& system,
                                       const std::vector<Candidate>& candidates) {

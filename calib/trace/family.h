@@ -19,6 +19,9 @@ struct TestedMember {
   double p_value = 1.0;  ///< over the family; Bonferroni over candidates and values of their scans
 };
 
+/// The value of the scan at which the effect explains most; 0 where there is none.
+[[nodiscard]] double best_scan(const NormalSystem& system, const Candidate& candidate);
+
 [[nodiscard]] std::vector<TestedMember> test_family(const NormalSystem& system,
                                                     const std::vector<Candidate>& candidates);
 

@@ -62,6 +62,9 @@ struct Candidate {
   std::string words;   ///< "the encoder of joint3 runs out of centre"
   std::string check;   ///< what to look at on the robot
   std::string record;  ///< what to record so that it shows
+  /// Effects that this one refines: it waits while one of them helps, and gives way to one that
+  /// says as much (friction before a friction curve; Chipman 1996, heredity).
+  std::vector<EffectId> refines;
   std::vector<EffectParameter> parameters;
   /// The size that is reported is the parameter itself where there is one, else
   /// sqrt(sum of weight x parameter^2), in `size_unit`.

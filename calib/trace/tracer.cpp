@@ -27,6 +27,10 @@ std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t i
   return effects;
 }
 
+bool refines(const Candidate& candidate, const EffectId& id) {
+  return std::ranges::find(candidate.refines, id) != candidate.refines.end();
+}
+
 std::string name_of(const EffectId& id) { return fmt::format("{} at {}", id.effect, id.place); }
 
 }  // namespace
@@ -85,6 +89,31 @@ void Tracer::forward() {
     const EffectId& id = now_->added.back().id;
     mark(round_, id, CandidateState::kAccepted, now_->error.value);
     add_step(round_, fmt::format("{} added", name_of(id)), *now_);
+    search_again(id.place);
+  }
+}
+
+// The value of a scan was the best beside the effects that were known then. Everywhere, or at one
+// place.
+void Tracer::search_again(const std::optional<std::string>& place) {
+  constexpr double kNoticeable = 1e-6;  // of what the effect explains
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    const AddedEffect effect = now_->added[i];
+    if (place && effect.id.place != *place) continue;
+    const Candidate* known = find_candidate(base_->fit, effect.id);
+    if (known == nullptr || known->scan.empty()) continue;
+    const StagePtr stage = make_stage(*model_, kinescope::trace::without(now_->added, i));
+    const Candidate* candidate = find_candidate(stage->fit, effect.id);
+    if (candidate == nullptr) continue;
+    const double scan = best_scan(stage->system, *candidate);
+    const double before = gain_of(stage->system, candidate->columns(effect.scan));
+    if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * before) continue;
+    std::vector<AddedEffect> effects = now_->added;
+    effects[i].scan = scan;
+    StagePtr moved = make_stage(*model_, std::move(effects));
+    if (moved->fit.converged && moved->held_out_sum() < now_->held_out_sum()) {
+      now_ = std::move(moved);
+    }
   }
 }
 
@@ -101,6 +130,12 @@ std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
     if (confirmed.p_value * member.tests > level_) continue;
     out.push_back({member, id, held_out_cells(stage.system, member.columns)});
   }
+  const std::vector<Contender> all = out;
+  std::erase_if(out, [&](const Contender& contender) {
+    const Candidate& candidate = stage.fit.candidates[contender.member.index];
+    return std::ranges::any_of(
+        all, [&](const Contender& other) { return refines(candidate, other.id); });
+  });
   std::ranges::stable_sort(out, {},
                            [](const Contender& contender) { return contender.held_out.sum(); });
   return out;
@@ -126,6 +161,7 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
 }
 
 bool Tracer::backward() {
+  search_again(std::nullopt);
   details_.assign(now_->added.size(), {});
   trace_.ambiguities.clear();
   // The latest first: an early one may have stood for several that came after it.
@@ -173,6 +209,8 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const bool in_model =
         std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
     if (in_model || removed_.contains(id) || member.p_value > level_) continue;
+    // What it says beyond the effect, the forward search would have found.
+    if (refines(without.fit.candidates[member.index], effect.id)) continue;
     if (member.score.gain < kRivalShare * own.score.gain) continue;
     rivals.push_back(std::move(member));
   }

@@ -3,6 +3,7 @@
 // The search: forward selection, backward check, what cannot be told apart, what is left.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,6 +33,7 @@ class Tracer {
   [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
+  void search_again(const std::optional<std::string>& place);
   [[nodiscard]] bool backward();
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
