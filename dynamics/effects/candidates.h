@@ -35,7 +35,12 @@ struct Carriers {
 /// Smoothed sign of the speed, as Coulomb friction has it.
 [[nodiscard]] Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
                                        const Eigen::ArrayXd& dq);
+[[nodiscard]] Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width);
 [[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint);
+[[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint,
+                                               double width);
+/// Friction in its simplest form, which all that refines it waits for.
+[[nodiscard]] std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t joint);
 
 /// Range and root mean square speed of a joint in the log; speeds at 95 % are its high ones.
 struct JointTravel {

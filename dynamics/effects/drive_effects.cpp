@@ -40,6 +40,7 @@ Candidate spring(const SharedContext& c, std::size_t j) {
   out.size_unit = fmt::format("{}/{}", c->unit(j), c->angle(j));
   out.parameters = {{"stiffness", out.size_unit}, {"torque_at_zero", c->unit(j)}};
   out.size_weights = Eigen::Vector2d(1.0, 0.0);
+  out.refines = {{"torque_offset", c->joints[j]}};
   out.columns = [c, j](double) {
     const auto column = static_cast<Eigen::Index>(j);
     return std::vector<EffectColumn>{
@@ -89,10 +90,13 @@ Candidate drift_by(const SharedContext& c, std::size_t j,
                     {"coulomb", out.size_unit},
                     {"viscous_at_high_speed", out.size_unit}};
   out.size_weights = Eigen::Vector3d::Ones();
+  out.refines = plain_friction(*c, j);
+  out.refines.push_back({"torque_offset", c->joints[j]});
   const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
   out.columns = [c, j, shape, high](double scan) {
     const auto column = static_cast<Eigen::Index>(j);
-    const Eigen::VectorXd s = shape(scan);
+    // About its mean: friction that does not drift is no matter of this effect.
+    const Eigen::VectorXd s = shape(scan).array() - shape(scan).mean();
     const Eigen::VectorXd speed = c->motion->at_instants(c->motion->samples().dq.col(column)) / high;
     return std::vector<EffectColumn>{{static_cast<int>(j), s},
                                      {static_cast<int>(j), s.cwiseProduct(direction_column(*c, j))},
@@ -108,7 +112,7 @@ Candidate drift(const SharedContext& c, std::size_t j) {
   out.check = "temperature of the joint; warm up before recording";
   out.record = "repeat one motion cold and warm";
   const double duration = time_s[time_s.size() - 1] - time_s[0];
-  out.scan = {0.07 * duration, 0.2 * duration, 0.6 * duration, 8.0 * duration};
+  out.scan = {0.1 * duration, 0.3 * duration, 1.0 * duration, 8.0 * duration};
   out.scan_name = "time constant";
   out.scan_unit = "s";
   return out;
@@ -137,6 +141,8 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
                           c->joints[j + 1]);
   out.check = "transmission of the wrist: a motor that also turns when the other joint moves";
   out.record = "move both joints together, then each alone";
+  out.refines = plain_friction(*c, j);
+  for (EffectId& id : plain_friction(*c, j + 1)) out.refines.push_back(std::move(id));
   out.size_unit = c->unit(j);
   out.parameters = {{"coulomb", c->unit(j)}, {"viscous_at_high_speed", c->unit(j)},
                     {"inertia", c->unit(j) + " s^2/" + c->angle(j)}};
@@ -148,7 +154,8 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
       Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
   const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
   out.columns = [c, j, sum, weights, carrier, high](double) {
-    const std::string name = fmt::format("pair {} {}", j, sum ? "sum" : "difference");
+    const std::string name = fmt::format("pair {} {} {:.17g}", j, sum ? "sum" : "difference",
+                                         c->widths[static_cast<Eigen::Index>(j)]);
     const Eigen::VectorXd& way = c->cache->get(name, [&] {
       return c->motion->column(weights, [&](const FinePath& p) { return direction(*c, j, p.dq); });
     });

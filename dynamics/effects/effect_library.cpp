@@ -85,22 +85,30 @@ namespace effects {
 Eigen::VectorXd joint_column(const EffectContext& context, std::size_t joint,
                              const std::string& name,
                              const std::function<Eigen::ArrayXd(const FinePath&)>& torque) {
-  return context.cache->get(fmt::format("{} {}", joint, name), [&] {
+  // All that knows a direction depends on the width of its turning round.
+  const double width = context.widths[static_cast<Eigen::Index>(joint)];
+  return context.cache->get(fmt::format("{} {:.17g} {}", joint, width, name), [&] {
     return context.motion->column(static_cast<Eigen::Index>(joint), torque);
   });
 }
 
 Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
                          const Eigen::ArrayXd& dq) {
-  const double width = context.turns[joint] != 0 ? context.widths.rad_s : context.widths.m_s;
+  return direction(dq, context.widths[static_cast<Eigen::Index>(joint)]);
+}
+
+Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width) {
   if (width == 0.0) return dq.sign();
   return (dq / width).tanh();
 }
 
 Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint) {
-  return joint_column(context, joint, "direction", [&](const FinePath& path) {
-    return direction(context, joint, path.dq);
-  });
+  return direction_column(context, joint, context.widths[static_cast<Eigen::Index>(joint)]);
+}
+
+Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint, double width) {
+  return joint_column(context, joint, fmt::format("direction {:.17g}", width),
+                      [&](const FinePath& path) { return direction(path.dq, width); });
 }
 
 JointTravel travel_of(const EffectContext& context, std::size_t joint) {

@@ -20,7 +20,8 @@
 
 namespace kinescope {
 
-/// Speeds within which Coulomb friction turns round, as in dynamics/identify.
+/// Speeds within which Coulomb friction turns round, as in dynamics/identify; that of a joint is
+/// searched for with its Coulomb friction.
 struct FrictionWidths {
   double rad_s = 0.01;
   double m_s = 0.002;
@@ -47,7 +48,7 @@ struct EffectContext {
   Eigen::MatrixXd torque;   ///< torque of the model
   Eigen::MatrixXd measured_rate;  ///< d/dt of the measured torque
   Eigen::VectorXd temperature_c;  ///< instants; empty: not logged
-  FrictionWidths widths;
+  Eigen::VectorXd widths;   ///< of each joint's sign of the speed, rad/s or m/s
   std::string torque_unit = "Nm";  ///< "Nm" or "A"
 
   [[nodiscard]] std::string unit(std::size_t joint) const;  ///< of the joint's torque

@@ -16,6 +16,7 @@ constexpr double kFullTurn = 6.283185307179586;
 Candidate joint_effect(const EffectContext& context, std::size_t joint, const std::string& name) {
   Candidate out;
   out.id = {name, context.joints[joint]};
+  if (name != "viscous" && name != "coulomb") out.refines = plain_friction(context, joint);
   return out;
 }
 
@@ -44,7 +45,11 @@ Candidate coulomb(const SharedContext& c, std::size_t j) {
   out.record = "move the joint both ways at low speed";
   out.size_unit = c->unit(j);
   out.parameters = {{"coulomb", out.size_unit}};
-  out.columns = [c, j](double) { return one_column(j, direction_column(*c, j)); };
+  const double width = c->widths[static_cast<Eigen::Index>(j)];
+  out.scan = {0.1 * width, 0.3 * width, width, 3.0 * width};
+  out.scan_name = "width of the turn";
+  out.scan_unit = c->angle(j) + "/s";
+  out.columns = [c, j](double turn) { return one_column(j, direction_column(*c, j, turn)); };
   return out;
 }
 
@@ -85,7 +90,7 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   return out;
 }
 
-/// High speed to another power than 1: 3 as in a polynomial, 2 for drag, 1/2 for thin films.
+/// A power of the speed beside the first: growing (drag), or taking away (grease that thins out).
 Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
   Candidate out = joint_effect(*c, j, "cubic_viscous");
   out.words = fmt::format("friction of {} is not proportional to its speed", c->joints[j]);
@@ -93,7 +98,7 @@ Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
   out.record = "move the joint up to its highest speed";
   out.size_unit = c->unit(j);
   out.parameters = {{"at_high_speed", out.size_unit}};
-  out.scan = {0.5, 2.0, 3.0};
+  out.scan = {2.0, 3.0};
   out.scan_name = "power of the speed";
   const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
   out.columns = [c, j, high](double power) {
@@ -183,6 +188,10 @@ Candidate hysteresis(const SharedContext& c, std::size_t j) {
 }
 
 }  // namespace
+
+std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t joint) {
+  return {{"coulomb", context.joints[joint]}, {"viscous", context.joints[joint]}};
+}
 
 void add_friction(const SharedContext& context, std::vector<Candidate>& out) {
   for (std::size_t j = 0; j < context->joints.size(); ++j) {

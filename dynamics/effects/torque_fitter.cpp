@@ -42,8 +42,19 @@ TorqueFitter::TorqueFitter(const TorqueTracedModel::Parts& parts,
     : parts_(parts),
       joints_(parts.motion->joints()),
       rows_(parts.motion->instants() * parts.motion->joints()) {
+  read_widths(effects);
   set_gravity(Eigen::Vector2d::Zero());
   read(effects);
+}
+
+/// Friction that refines a joint's Coulomb friction turns round as that does.
+void TorqueFitter::read_widths(const std::vector<AddedEffect>& effects) {
+  widths_ = parts_.context.widths;
+  for (const AddedEffect& effect : effects) {
+    if (effect.id.effect != "coulomb") continue;
+    const auto& names = parts_.context.joints;
+    widths_[std::ranges::find(names, effect.id.place) - names.begin()] = effect.scan;
+  }
 }
 
 void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
@@ -79,6 +90,7 @@ void TorqueFitter::set_gravity(const Eigen::Vector2d& tilt_deg) {
   rigid_.gravity_m_s2 = gravity;
   context_ = parts_.context;
   context_.rigid.gravity_m_s2 = gravity;
+  context_.widths = widths_;
   if (!tilt_deg.isZero(0.0)) {
     context_.load = inverse_dynamics_of_samples(context_.rigid, parts_.q, parts_.dq, parts_.ddq);
   }
@@ -280,6 +292,12 @@ TracedFit TorqueFitter::run() {
   return read_back(converged && residual_.allFinite());
 }
 
+/// Only waves may come several times: of all else a second one would mend the first one's shape.
+bool TorqueFitter::is_open(const EffectId& id) const {
+  if (id.effect == "ripple") return true;
+  return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
+}
+
 TracedFit TorqueFitter::read_back(bool converged) const {
   TracedFit out;
   out.converged = converged;
@@ -310,7 +328,9 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   for (const Added& added : added_) out.values.push_back(added.values);
   EffectContext now = context_;
   now.torque = as_matrix(physical(), joints_);
-  out.candidates = make_effect_library(now).candidates;
+  for (Candidate& candidate : make_effect_library(now).candidates) {
+    if (is_open(candidate.id)) out.candidates.push_back(std::move(candidate));
+  }
   const auto& names = parts_.context.joints;
   for (std::size_t j = 0; j < names.size(); ++j) {
     const auto c = static_cast<Eigen::Index>(j);

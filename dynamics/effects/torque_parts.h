@@ -49,7 +49,9 @@ class TorqueFitter {
     Eigen::VectorXd values;
   };
 
+  void read_widths(const std::vector<AddedEffect>& effects);
   void read(const std::vector<AddedEffect>& effects);
+  [[nodiscard]] bool is_open(const EffectId& id) const;
   void set_gravity(const Eigen::Vector2d& tilt_deg);
   void choose_gravity_start(Added& gravity);
   [[nodiscard]] double step();
@@ -67,6 +69,7 @@ class TorqueFitter {
   Eigen::Index rows_ = 0;
   std::vector<Added> added_;
   Eigen::Index effect_parameters_ = 0;
+  Eigen::VectorXd widths_;
   Eigen::Vector2d tilt_deg_ = Eigen::Vector2d::Zero();
   // Under the present gravity.
   RigidModel rigid_;             ///< declared bodies, or those of the reference

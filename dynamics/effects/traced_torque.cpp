@@ -158,12 +158,15 @@ TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamp
                        "record a longer motion");
   }
   p.fold = folds_of(samples, options.folds);
-  p.context.widths = options.widths;
+  p.context.widths.resize(p.base.rigid.size());
   p.context.torque_unit = samples.torque_unit;
   p.context.rigid = p.base.rigid;
   for (const RigidBody& body : p.base.rigid.bodies) {
     p.context.joints.push_back(body.joint);
-    p.context.turns.push_back(body.type == JointType::kRevolute ? 1 : 0);
+    const bool turns = body.type == JointType::kRevolute;
+    p.context.turns.push_back(turns ? 1 : 0);
+    p.context.widths[static_cast<Eigen::Index>(p.context.turns.size()) - 1] =
+        turns ? options.widths.rad_s : options.widths.m_s;
   }
   p.refresh();
 }
