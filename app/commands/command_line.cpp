@@ -1,34 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/command_line.h"
 
-#include <cmath>
-
 #include <fmt/format.h>
 
+#include "app/commands/command_options.h"
+#include "app/commands/torque_command_line.h"
 #include "app/io/nearest_name.h"
 #include "kinematics/core/csv.h"
 
 namespace kinescope {
 namespace {
-
-constexpr const char* kExitCodes =
-    "Exit codes:\n"
-    "  0  done\n"
-    "  1  internal error\n"
-    "  2  the command line or a setting makes no sense, or the output cannot be written\n"
-    "  3  an input cannot be read\n"
-    "  4  the data cannot determine what was asked; the message says what to record instead\n"
-    "  5  done, but outside a limit set with --fail-on";
-
-/// A finite number in a range. CLI::Range lets NaN through.
-CLI::Validator number_in(double least, double most) {
-  return {[least, most](const std::string& text) -> std::string {
-            const std::optional<double> value = parse_number(text);
-            if (value && std::isfinite(*value) && *value >= least && *value <= most) return {};
-            return fmt::format("'{}' is not a number from {} to {}", text, least, most);
-          },
-          fmt::format("{} to {}", least, most)};
-}
 
 /// A finite length above zero, m. Nothing on a board is larger than 10 m: that would be mm.
 CLI::Validator length_m() {
@@ -55,11 +36,6 @@ CLI::Option* add_choice(CLI::App& command, const char* name,
       .add_option_function<std::string>(
           name, [&value, words](const std::string& text) { value = words.at(text); }, help)
       ->check(check);
-}
-
-void add_output_options(CLI::App& command, OutputOptions& output) {
-  command.add_flag("--json", output.json, "Print the result as JSON");
-  command.add_flag("--quiet", output.quiet, "No progress on standard error");
 }
 
 void add_path(CLI::App& command, const char* name, std::optional<std::filesystem::path>& path,
@@ -154,150 +130,6 @@ void add_run(CLI::App& app, CommandLine& line) {
   add_output_options(run, line.output);
   run.footer(fmt::format(
       "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}", kExitCodes));
-}
-
-template <typename Path>
-void add_files(CLI::App& command, const char* name, Path& paths, const char* help, bool required) {
-  command
-      .add_option_function<std::vector<std::string>>(
-          name,
-          [&paths](const std::vector<std::string>& texts) {
-            paths.assign(texts.begin(), texts.end());
-          },
-          help)
-      ->required(required)
-      ->type_name("FILE");
-}
-
-void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& data) {
-  const char* group = "What the log's columns are (default: by their names)";
-  LogMapping& mapping = data.mapping;
-  command
-      .add_option_function<std::string>(
-          "--settings", [&line](const std::string& text) { line.settings = text; },
-          "File with the key dynamics (default: recording.yaml beside the first log)")
-      ->type_name("FILE")
-      ->group(group);
-  const auto list = [&](const char* name, std::vector<std::string>& words, const char* help) {
-    command.add_option(name, words, help)->delimiter(',')->type_name("LIST")->group(group);
-  };
-  list("--position", mapping.position, "Columns of the joint positions, or one with *");
-  list("--velocity", mapping.velocity, "Columns of the velocities");
-  list("--acceleration", mapping.acceleration, "Columns of the accelerations");
-  list("--torque", mapping.torque, "Columns of the torques or motor currents");
-  list("--position-unit", mapping.position_unit, "rad, deg, m or mm; one for all or one a joint");
-  list("--velocity-unit", mapping.velocity_unit, "rad/s, deg/s, m/s or mm/s");
-  list("--torque-unit", mapping.torque_unit, "Nm, N, mNm, kNm, A or mA");
-  command
-      .add_option("--torque-factor", mapping.torque_factor,
-                  "Joint torque per logged value: sign, gear or drive gain")
-      ->delimiter(',')
-      ->type_name("LIST")
-      ->group(group);
-  command.add_option("--time", mapping.time, "Column of the stamps")
-      ->type_name("NAME")
-      ->group(group);
-  command.add_option("--time-unit", mapping.time_unit, "s, ms, us or ns")
-      ->type_name("UNIT")
-      ->group(group);
-  command.add_option("--rate", mapping.rate_hz, "Samples per second of a log without stamps")
-      ->check(number_in(0.1, 1e6))
-      ->type_name("HZ")
-      ->group(group);
-  command
-      .add_option("--cutoff", data.motion.cutoff_hz,
-                  "Cut-off of the low-pass for motion and torque (default: chosen from the log)")
-      ->check(number_in(1e-3, 1e6))
-      ->type_name("HZ");
-}
-
-void add_robot(CLI::App& command, std::filesystem::path& robot) {
-  command
-      .add_option_function<std::string>(
-          "--robot", [&robot](const std::string& text) { robot = text; },
-          "The robot (URDF), from kinescope run or any other")
-      ->required()
-      ->type_name("FILE");
-}
-
-void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2) {
-  command
-      .add_option_function<std::vector<double>>(
-          "--gravity",
-          [&gravity_m_s2](const std::vector<double>& g) {
-            gravity_m_s2 = Eigen::Vector3d(g[0], g[1], g[2]);
-          },
-          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.80665)")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(number_in(-100, 100))
-      ->type_name("X,Y,Z");
-}
-
-void add_dynamics(CLI::App& app, CommandLine& line) {
-  CLI::App& command =
-      *app.add_subcommand("dynamics", "From a log with torques and a URDF to a torque model");
-  DynamicsOptions& dynamics = line.dynamics;
-  add_files(command, "LOG", dynamics.logs, "Joint logs with torques: CSV, also gzipped", true);
-  add_robot(command, dynamics.robot);
-  add_files(command, "--test", dynamics.test_logs,
-            "Logs to judge on (default: the last part of the log)", false);
-  command
-      .add_option("--model", dynamics.models,
-                  "parametric, rbf, gip, model_based, semi_parametric, lip, svr (default: all)")
-      ->delimiter(',')
-      ->type_name("LIST");
-  add_gravity(command, dynamics.gravity_m_s2);
-  command.add_flag("--gains", dynamics.models_options.identify.gains,
-                   "Estimate a gain a joint: currents, or doubtful drive constants");
-  command.add_flag("--learning-curve", dynamics.learning_curve,
-                   "The score of every model against the number of samples (slow)");
-  command
-      .add_option("--samples", dynamics.models_options.samples,
-                  "Training samples of a Gaussian process")
-      ->check(number_in(50, 20000))
-      ->capture_default_str()
-      ->type_name("N");
-  add_log_options(command, line, dynamics.data);
-  command
-      .add_option_function<std::string>(
-          "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
-          "Folder for the results (default: <first log's name>_dynamics here)")
-      ->type_name("FOLDER");
-  add_output_options(command, line.output);
-  command.footer(fmt::format(
-      "Example:\n  kinescope dynamics log.csv --robot robot.urdf --test log_test.csv\n\n{}",
-      kExitCodes));
-}
-
-void add_contact(CLI::App& app, CommandLine& line) {
-  CLI::App& command =
-      *app.add_subcommand("contact", "From a log with torques and a robot to the contacts in it");
-  ContactCommandOptions& contact = line.contact;
-  add_files(command, "LOG", contact.logs, "Joint logs with torques: CSV, also gzipped", true);
-  add_robot(command, contact.robot);
-  add_files(command, "--learn", contact.learn_logs,
-            "Logs of free motion to learn the noise from (default: the log itself)", false);
-  command.add_flag("--identify", contact.identify,
-                   "Masses and friction from the log to learn from (always so where the URDF has "
-                   "none)");
-  command
-      .add_option("--false-alarms", contact.contact.false_alarms_per_hour,
-                  "False alarms an hour that are allowed")
-      ->check(number_in(1e-3, 3600))
-      ->capture_default_str()
-      ->type_name("N");
-  add_gravity(command, contact.gravity_m_s2);
-  add_log_options(command, line, contact.data);
-  command
-      .add_option_function<std::string>(
-          "--output", [&contact](const std::string& text) { contact.output = text; },
-          "Folder for the results (default: <first log's name>_contact here)")
-      ->type_name("FOLDER");
-  add_output_options(command, line.output);
-  command.footer(fmt::format(
-      "Example:\n  kinescope contact log.csv --robot robot.urdf --learn free_motion.csv\n\n{}",
-      kExitCodes));
 }
 
 void add_inspect(CLI::App& app, CommandLine& line) {

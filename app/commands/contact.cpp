@@ -10,7 +10,6 @@
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/torque_stages.h"
-#include "app/io/sha256.h"
 #include "dynamics/contact/momentum_observer.h"
 #include "dynamics/identify/consistent_model.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -131,13 +130,9 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.log = "Log " + file_list(options.logs);
   summary.version = program_version();
   summary.command = options.command_line;
-  for (const auto& files : {options.logs, options.learn_logs, {options.robot}}) {
-    for (const fs::path& file : files) {
-      summary.inputs.push_back({file.filename().string(), sha256_of_file(file)});
-    }
-  }
-  for (const Joint& joint : model.tree.joints) {
-    if (joint.type == JointType::kFixed) continue;
+  summary.inputs = hashed_inputs({options.logs, options.learn_logs, {options.robot}});
+  for (const JointId id : moving_joints(model.tree)) {
+    const Joint& joint = model.tree.joints[id.index()];
     summary.joints.push_back(joint.name);
     summary.links.push_back(model.tree.links[joint.child.index()].name);
   }

@@ -13,7 +13,6 @@
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/nearest_name.h"
-#include "app/io/sha256.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/data/torque_scale.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -193,13 +192,9 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   summary.version = program_version();
   summary.command = options.command_line;
   summary.gravity_m_s2 = model.gravity_m_s2;
-  for (const auto& files : {options.logs, options.test_logs, {options.robot}}) {
-    for (const fs::path& file : files) {
-      summary.inputs.push_back({file.filename().string(), sha256_of_file(file)});
-    }
-  }
-  for (const Joint& joint : model.tree.joints) {
-    if (joint.type == JointType::kFixed) continue;
+  summary.inputs = hashed_inputs({options.logs, options.test_logs, {options.robot}});
+  for (const JointId id : moving_joints(model.tree)) {
+    const Joint& joint = model.tree.joints[id.index()];
     summary.joints.push_back(joint.name);
     summary.types.push_back(joint.type);
   }

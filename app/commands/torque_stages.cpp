@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/io/dynamics_settings.h"
+#include "app/io/sha256.h"
 #include "kinematics/core/csv.h"
 
 namespace kinescope {
@@ -68,6 +69,16 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
 std::string file_list(const std::vector<fs::path>& files) {
   std::string out;
   for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + file.filename().string();
+  return out;
+}
+
+std::vector<InputFile> hashed_inputs(const std::vector<std::vector<fs::path>>& lists) {
+  std::vector<InputFile> out;
+  for (const auto& files : lists) {
+    for (const fs::path& file : files) {
+      out.push_back({file.filename().string(), sha256_of_file(file)});
+    }
+  }
   return out;
 }
 

@@ -44,12 +44,6 @@ namespace {
 
 using Eigen::Index;
 
-Eigen::MatrixXd by_sample(const Eigen::VectorXd& sample_major, Index outputs) {
-  return Eigen::Map<const Eigen::MatrixXd>(sample_major.data(), outputs,
-                                           sample_major.size() / outputs)
-      .transpose();
-}
-
 Eigen::RowVectorXd target_scale(const FittedGp& fitted) {
   const Eigen::RowVectorXd& scale = fitted.model.normalisation.target_scale;
   if (scale.size() > 0) return scale;

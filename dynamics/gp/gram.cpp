@@ -13,13 +13,6 @@ constexpr Index kTileRows = 256;
 // Samples in a tile come in strips of so many (lip_pairs.h).
 constexpr Index kStrip = 8;
 
-struct Tile {
-  Index row;
-  Index rows;
-  Index col;
-  Index cols;
-};
-
 std::vector<Tile> make_tiles(Index rows, Index cols, Index width, bool lower) {
   std::vector<Tile> tiles;
   for (Index col = 0; col < cols; col += width) {
@@ -30,33 +23,32 @@ std::vector<Tile> make_tiles(Index rows, Index cols, Index width, bool lower) {
   return tiles;
 }
 
-// Output-major tile to sample-major block and back.
-void scatter(const ConstBlock& tile, Index outputs, Block out) {
-  const Index rows = tile.rows() / outputs;
-  const Index cols = tile.cols() / outputs;
+// Calls f(row and column in sample-major order, row and column in output-major order) for every
+// entry of a block of rows x cols.
+template <typename F>
+void for_each_entry(Index rows, Index cols, Index outputs, F f) {
+  const Index row_samples = rows / outputs;
+  const Index col_samples = cols / outputs;
   for (Index b = 0; b < outputs; ++b) {
-    for (Index j = 0; j < cols; ++j) {
+    for (Index j = 0; j < col_samples; ++j) {
       for (Index a = 0; a < outputs; ++a) {
-        for (Index i = 0; i < rows; ++i) {
-          out(i * outputs + a, j * outputs + b) = tile(a * rows + i, b * cols + j);
+        for (Index i = 0; i < row_samples; ++i) {
+          f(i * outputs + a, j * outputs + b, a * row_samples + i, b * col_samples + j);
         }
       }
     }
   }
 }
 
+// Output-major tile to sample-major block and back.
+void scatter(const ConstBlock& tile, Index outputs, Block out) {
+  for_each_entry(tile.rows(), tile.cols(), outputs,
+                 [&](Index r, Index c, Index tr, Index tc) { out(r, c) = tile(tr, tc); });
+}
+
 void gather(const ConstBlock& block, Index outputs, Block tile) {
-  const Index rows = tile.rows() / outputs;
-  const Index cols = tile.cols() / outputs;
-  for (Index b = 0; b < outputs; ++b) {
-    for (Index j = 0; j < cols; ++j) {
-      for (Index a = 0; a < outputs; ++a) {
-        for (Index i = 0; i < rows; ++i) {
-          tile(a * rows + i, b * cols + j) = block(i * outputs + a, j * outputs + b);
-        }
-      }
-    }
-  }
+  for_each_entry(tile.rows(), tile.cols(), outputs,
+                 [&](Index r, Index c, Index tr, Index tc) { tile(tr, tc) = block(r, c); });
 }
 
 // In the order of the tiles, whoever worked on them.
@@ -95,14 +87,18 @@ void Covariance::tile(Samples a, Samples b, Scratch& scratch, Block out) const {
   scatter(own, outputs_, out);
 }
 
-void Covariance::lower(Workers& workers, const Prepared& x, Eigen::MatrixXd& out) const {
-  const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
+void Covariance::fill_tiles(Workers& workers, const std::vector<Tile>& tiles, const Prepared& x,
+                            const Prepared& y, Eigen::MatrixXd& out) const {
   const Index m = outputs_;
   workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
     const Tile& t = tiles[static_cast<std::size_t>(task)];
-    tile({x, t.row, t.rows}, {x, t.col, t.cols}, scratch,
+    tile({x, t.row, t.rows}, {y, t.col, t.cols}, scratch,
          out.block(t.row * m, t.col * m, t.rows * m, t.cols * m));
   });
+}
+
+void Covariance::lower(Workers& workers, const Prepared& x, Eigen::MatrixXd& out) const {
+  fill_tiles(workers, make_tiles(x.samples, x.samples, tile_samples_, true), x, x, out);
 }
 
 Eigen::MatrixXd Covariance::lower(Workers& workers, const Prepared& x) const {
@@ -112,14 +108,8 @@ Eigen::MatrixXd Covariance::lower(Workers& workers, const Prepared& x) const {
 }
 
 Eigen::MatrixXd Covariance::cross(Workers& workers, const Prepared& x, const Prepared& y) const {
-  const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
-  const Index m = outputs_;
-  Eigen::MatrixXd out(x.samples * m, y.samples * m);
-  workers.run(static_cast<Index>(tiles.size()), [&](Index task, Scratch& scratch) {
-    const Tile& t = tiles[static_cast<std::size_t>(task)];
-    tile({x, t.row, t.rows}, {y, t.col, t.cols}, scratch,
-         out.block(t.row * m, t.col * m, t.rows * m, t.cols * m));
-  });
+  Eigen::MatrixXd out(x.samples * outputs_, y.samples * outputs_);
+  fill_tiles(workers, make_tiles(x.samples, y.samples, tile_samples_, false), x, y, out);
   return out;
 }
 
@@ -149,25 +139,9 @@ void Covariance::contract_tile(Samples a, Samples b, const ConstBlock& q, Scratc
   node_->contract(theta_, a, b, own, scratch, out);
 }
 
-Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
+Eigen::VectorXd Covariance::contract_tiles(Workers& workers, const std::vector<Tile>& tiles,
+                                           const Prepared& x, const Prepared& y,
                                            const Weights& weights) const {
-  const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
-  Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
-  const Index m = outputs_;
-  workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
-    const Tile& t = tiles[static_cast<std::size_t>(task)];
-    const Scratch::Frame frame(scratch);
-    Eigen::Map<Eigen::MatrixXd> q = scratch.take(t.rows * m, t.cols * m);
-    weights(t.row * m, t.col * m, scratch, q);
-    if (t.row != t.col) q *= 2.0;
-    contract_tile({x, t.row, t.rows}, {x, t.col, t.cols}, q, scratch, parts.col(task));
-  });
-  return add_columns(parts);
-}
-
-Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const Prepared& y,
-                                     const Weights& weights) const {
-  const std::vector<Tile> tiles = make_tiles(x.samples, y.samples, tile_samples_, false);
   Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
   const Index m = outputs_;
   workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
@@ -178,6 +152,22 @@ Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const 
     contract_tile({x, t.row, t.rows}, {y, t.col, t.cols}, q, scratch, parts.col(task));
   });
   return add_columns(parts);
+}
+
+Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
+                                           const Weights& weights) const {
+  // What lies above the diagonal counts with what lies below.
+  const auto both = [&](Index row, Index col, Scratch& scratch, Block q) {
+    weights(row, col, scratch, q);
+    if (row != col) q *= 2.0;
+  };
+  return contract_tiles(workers, make_tiles(x.samples, x.samples, tile_samples_, true), x, x, both);
+}
+
+Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const Prepared& y,
+                                     const Weights& weights) const {
+  return contract_tiles(workers, make_tiles(x.samples, y.samples, tile_samples_, false), x, y,
+                        weights);
 }
 
 Eigen::VectorXd Covariance::contract_diagonal(Workers& workers, const Prepared& x,

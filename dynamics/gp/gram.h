@@ -4,10 +4,19 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "dynamics/gp/kernel_node.h"
 
 namespace kinescope::gp {
+
+/// A block of samples against samples.
+struct Tile {
+  Eigen::Index row;
+  Eigen::Index rows;
+  Eigen::Index col;
+  Eigen::Index cols;
+};
 
 /// A kernel with its parameters, ready for large matrices. Rows and columns of all matrices are
 /// sample-major: sample * outputs + output.
@@ -45,6 +54,11 @@ class Covariance {
   [[nodiscard]] Eigen::Index tile_samples() const { return tile_samples_; }
 
  private:
+  void fill_tiles(Workers& workers, const std::vector<Tile>& tiles, const Prepared& x,
+                  const Prepared& y, Eigen::MatrixXd& out) const;
+  [[nodiscard]] Eigen::VectorXd contract_tiles(Workers& workers, const std::vector<Tile>& tiles,
+                                               const Prepared& x, const Prepared& y,
+                                               const Weights& weights) const;
   void contract_tile(Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                      Gradient out) const;
 

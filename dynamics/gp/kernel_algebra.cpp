@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <functional>
 
 #include "dynamics/gp/kernel_node.h"
 #include "kinematics/core/error.h"
@@ -41,6 +42,16 @@ class Composite : public KernelNode {
     return gradient.segment(starts_[child], children_[child]->parameter_count());
   }
   [[nodiscard]] Index start(std::size_t child) const { return starts_[child]; }
+  /// Of all children, from the count of none; nothing when one has no features.
+  template <typename Combine>
+  [[nodiscard]] std::optional<double> combined_features(double total, Combine combine) const {
+    for (const NodePtr& child : children_) {
+      const std::optional<double> count = child->feature_count();
+      if (!count) return std::nullopt;
+      total = combine(total, *count);
+    }
+    return total;
+  }
 
  private:
   std::vector<NodePtr> children_;
@@ -75,13 +86,7 @@ class SumNode : public Composite {
   }
 
   [[nodiscard]] std::optional<double> feature_count() const override {
-    double total = 0.0;
-    for (const NodePtr& child : children()) {
-      const std::optional<double> count = child->feature_count();
-      if (!count) return std::nullopt;
-      total += *count;
-    }
-    return total;
+    return combined_features(0.0, std::plus<>{});
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
@@ -141,13 +146,7 @@ class ProductNode : public Composite {
   }
 
   [[nodiscard]] std::optional<double> feature_count() const override {
-    double total = 1.0;
-    for (const NodePtr& child : children()) {
-      const std::optional<double> count = child->feature_count();
-      if (!count) return std::nullopt;
-      total *= *count;
-    }
-    return total;
+    return combined_features(1.0, std::multiplies<>{});
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
@@ -199,13 +198,7 @@ class IndependentNode : public Composite {
   }
 
   [[nodiscard]] std::optional<double> feature_count() const override {
-    double total = 0.0;
-    for (const NodePtr& child : children()) {
-      const std::optional<double> count = child->feature_count();
-      if (!count) return std::nullopt;
-      total += *count;
-    }
-    return total;
+    return combined_features(0.0, std::plus<>{});
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {

@@ -9,17 +9,8 @@
 #include "kinematics/core/error.h"
 
 namespace kinescope::gp {
-namespace {
 
 using Eigen::Index;
-
-Eigen::MatrixXd by_sample(const Eigen::VectorXd& sample_major, Index outputs) {
-  return Eigen::Map<const Eigen::MatrixXd>(sample_major.data(), outputs,
-                                           sample_major.size() / outputs)
-      .transpose();
-}
-
-}  // namespace
 
 LeaveOut leave_out(const FittedGp& fitted, const Dataset& dataset, const std::vector<int>& fold_of,
                    int threads) {

@@ -11,6 +11,14 @@
 
 namespace kinescope::gp {
 
+/// One row a sample from sample-major values.
+[[nodiscard]] inline Eigen::MatrixXd by_sample(const Eigen::VectorXd& sample_major,
+                                               Eigen::Index outputs) {
+  return Eigen::Map<const Eigen::MatrixXd>(sample_major.data(), outputs,
+                                           sample_major.size() / outputs)
+      .transpose();
+}
+
 struct Moments {
   Eigen::VectorXd mean;
   Eigen::VectorXd variance;  ///< empty where not asked for

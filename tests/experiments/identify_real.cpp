@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/motion.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/identify/consistent_model.h"
 #include "dynamics/identify/identify.h"
 #include "dynamics/identify/prediction.h"
@@ -67,14 +68,7 @@ TorqueSamples rows_between(const TorqueSamples& samples, double from_s, double t
   for (Eigen::Index t = 0; t < samples.size(); ++t) {
     if (samples.t_s[t] >= from_s && samples.t_s[t] < to_s) rows.push_back(t);
   }
-  TorqueSamples out = samples;
-  out.t_s = samples.t_s(rows);
-  out.q = samples.q(rows, Eigen::all);
-  out.dq = samples.dq(rows, Eigen::all);
-  out.ddq = samples.ddq(rows, Eigen::all);
-  out.torque = samples.torque(rows, Eigen::all);
-  out.trajectory = samples.trajectory(rows);
-  return out;
+  return select_rows(samples, rows);
 }
 
 TorqueSamples filtered(const TorqueLog& log, double cutoff_hz) {

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/command_options.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/csv.h"
+
+namespace kinescope {
+
+CLI::Validator number_in(double least, double most) {
+  return {[least, most](const std::string& text) -> std::string {
+            const std::optional<double> value = parse_number(text);
+            if (value && std::isfinite(*value) && *value >= least && *value <= most) return {};
+            return fmt::format("'{}' is not a number from {} to {}", text, least, most);
+          },
+          fmt::format("{} to {}", least, most)};
+}
+
+void add_output_options(CLI::App& command, OutputOptions& output) {
+  command.add_flag("--json", output.json, "Print the result as JSON");
+  command.add_flag("--quiet", output.quiet, "No progress on standard error");
+}
+
+}  // namespace kinescope

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What several commands say on the command line. Shows CLI11, as command_line.h does.
+#pragma once
+
+#include "app/commands/command_line.h"
+
+namespace kinescope {
+
+/// Stands at the end of every command's help.
+inline constexpr const char* kExitCodes =
+    "Exit codes:\n"
+    "  0  done\n"
+    "  1  internal error\n"
+    "  2  the command line or a setting makes no sense, or the output cannot be written\n"
+    "  3  an input cannot be read\n"
+    "  4  the data cannot determine what was asked; the message says what to record instead\n"
+    "  5  done, but outside a limit set with --fail-on";
+
+/// A finite number in a range. CLI::Range lets NaN through.
+[[nodiscard]] CLI::Validator number_in(double least, double most);
+
+/// --json and --quiet.
+void add_output_options(CLI::App& command, OutputOptions& output);
+
+}  // namespace kinescope

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The commands that work on a torque log. Shows CLI11, as command_line.h does.
+#pragma once
+
+#include "app/commands/command_line.h"
+
+namespace kinescope {
+
+void add_dynamics(CLI::App& app, CommandLine& line);
+void add_contact(CLI::App& app, CommandLine& line);
+
+}  // namespace kinescope
