@@ -34,7 +34,7 @@ double coordinate_cost(const ChainFit& fit, const Motion& motion) {
   if (fit.model.joints.size() != 1 || !fit.model.joints.front().terms.empty()) return 0.0;
   const double variance = coordinate_variance(fit.model);
   double sum = 0.0;
-  const Vector6d axis = axis_in_child(fit.model, 0.0);
+  const Vector6d axis = axis_in_child(fit.model);
   for (const MotionSample& s : motion) {
     const double lever = (s.whitening.triangularView<Eigen::Upper>() * axis).norm();
     sum += 1.0 + std::log1p(variance * lever * lever);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
@@ -17,12 +18,11 @@ struct Coordinate {
 
 // Of a single joint whose channel does not tell all: between what the channel says and what the
 // sighting asks for, by their variances.
-Coordinate corrected_coordinate(const Attachment& attachment, const Sighting& sighting,
-                                const Pose& parent, double start) {
-  const ChainModel& model = attachment.fit.model;
+Coordinate corrected_coordinate(const Attachment& attachment, const ChainKinematics& chain,
+                                const Sighting& sighting, const Pose& parent, double start) {
   const double excess = attachment.fit.axis_variance - 1.0;
   if (!sighting.seen) return {start, excess / 1e6};
-  const Vector6d u = sighting.whitening * axis_in_child(model, 0.0);
+  const Vector6d u = sighting.whitening * chain.last_axis();
   const double sight = 1.0 / u.squaredNorm();
   const double prior = excess * sight;
   const double gain = attachment.driven() ? prior / (prior + sight) : 1.0;
@@ -30,8 +30,7 @@ Coordinate corrected_coordinate(const Attachment& attachment, const Sighting& si
   const int passes = attachment.driven() ? 1 : 6;
   Coordinate out{start, gain * sight};
   for (int pass = 0; pass < passes; ++pass) {
-    const Vector6d r =
-        sighting.whitening * fast_log(chain_pose_at(model, {out.value}).inverse() * seen);
+    const Vector6d r = sighting.whitening * fast_log(chain.left_over(&out.value, seen));
     out.value += gain * u.dot(r) * sight;
   }
   return out;
@@ -39,23 +38,29 @@ Coordinate corrected_coordinate(const Attachment& attachment, const Sighting& si
 
 // Adds what the joints' parameters leave open about the path (right perturbations). What is
 // constant in the link's frame does not count: the joints that follow take it up.
-void add_parameter_doubt(const ChainFit& fit, const std::vector<std::vector<double>>& coordinates,
+void add_parameter_doubt(const ChainFit& fit, const ChainKinematics& chain,
+                         const std::vector<std::vector<double>>& coordinates,
                          const Readings& readings, LinkPath& path) {
   if (fit.covariance.size() == 0) return;
-  std::vector<Eigen::MatrixXd> jacobians(coordinates.size());
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(6, fit.covariance.rows());
+  const Eigen::Index parameters = fit.covariance.rows();
+  const Eigen::MatrixXd covariance = fit.correlation * fit.covariance;
+  std::vector<ChainJacobian> jacobians(coordinates.size());
+  ChainJacobian mean = ChainJacobian::Zero(6, parameters);
   double count = 0.0;
   for (std::size_t i = 0; i < coordinates.size(); ++i) {
     if (path.valid[i] == 0) continue;
-    jacobians[i] = chain_jacobian(fit.model, coordinates[i], readings.value, static_cast<int>(i));
+    jacobians[i].resize(6, parameters);
+    chain.jacobian(coordinates[i].data(), readings.value, static_cast<int>(i), jacobians[i]);
     mean += jacobians[i];
     count += 1.0;
   }
   mean /= std::max(1.0, count);
+  ChainJacobian product(6, parameters);
   for (std::size_t i = 0; i < coordinates.size(); ++i) {
     if (path.valid[i] == 0) continue;
-    const Eigen::MatrixXd J = jacobians[i] - mean;
-    path.covariance[i] += fit.correlation * (J * fit.covariance * J.transpose());
+    jacobians[i] -= mean;
+    product.noalias() = jacobians[i].lazyProduct(covariance);
+    path.covariance[i] += product.lazyProduct(jacobians[i].transpose());
   }
 }
 
@@ -91,7 +96,7 @@ LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath&
   const std::size_t n = parent.pose.size();
   LinkPath path = unknown_path(n);
   if (single && !driven) path.coordinate.assign(n, std::nan(""));
-  const Vector6d axis = single ? axis_in_child(model, 0.0) : Vector6d::Zero();
+  const ChainKinematics chain(model);
   std::vector<std::vector<double>> coordinates(n);
   double previous = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -101,19 +106,19 @@ LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath&
     values = coordinates_at(attachment, readings, i, previous);
     if (inexact) {
       const Coordinate c =
-          corrected_coordinate(attachment, body.at[i], parent.pose[i], values.front());
+          corrected_coordinate(attachment, chain, body.at[i], parent.pose[i], values.front());
       values.front() = previous = c.value;
-      path.covariance[i] = c.variance * axis * axis.transpose();
+      path.covariance[i] = c.variance * chain.last_axis() * chain.last_axis().transpose();
     }
     if (!driven) path.coordinate[i] = values.front();
-    const Pose relative = chain_pose_at(model, values);
+    const Pose relative = chain.pose(values.data());
     path.valid[i] = 1;
     path.pose[i] = parent.pose[i] * relative;
     if (parent.covariance.empty()) continue;
     const Matrix6d ad = adjoint(relative.inverse());
     path.covariance[i] += ad * parent.covariance[i] * ad.transpose();
   }
-  add_parameter_doubt(attachment.fit, coordinates, readings, path);
+  add_parameter_doubt(attachment.fit, chain, coordinates, readings, path);
   return path;
 }
 

@@ -5,9 +5,9 @@
 // Frames  pose(t) = prod_k [F_k exp(z theta_k(t)) F_k^-1] M, all in the frame of the first body;
 //         theta_k = sum over terms of scale * reading, readings centred and scaled to unit RMS.
 // Method  robust Gauss-Newton (Levenberg-Marquardt damping) on whitened pose residuals. The
-// residual is
-//         split into the part along the joint, where a channel may be inexact (backlash, coupling),
-//         and the rest; each part has its own noise scale, at least that of the sightings.
+//         residual is split into the part along the joint, where a channel may be inexact
+//         (backlash, coupling), and the rest; each part has its own noise scale, at least that of
+//         the sightings.
 #pragma once
 
 #include <optional>
@@ -60,8 +60,8 @@ struct ChainFit {
   double rotation_rms = 0.0;  ///< rad, m: robust size of what is left (across the joint)
   double translation_rms = 0.0;
   std::vector<double> scale_sigma;  ///< of every term in order, per RMS of the channel
-  Eigen::MatrixXd covariance;       ///< of the parameters in chain_jacobian()'s order, as if the
-                                    ///< samples erred independently
+  Eigen::MatrixXd covariance;  ///< of the parameters in the order of ChainKinematics::jacobian(),
+                               ///< as if the samples erred independently
   std::vector<Vector6d> residuals;  ///< whitened, one a sample
 };
 
@@ -82,17 +82,12 @@ struct ChainFitOptions {
 [[nodiscard]] double chain_coordinate(const ChainJoint& joint, const Eigen::MatrixXd& readings,
                                       int instant);
 
-/// d(right perturbation of the last body) / d(tilts, shifts and scales of every joint, mount).
-[[nodiscard]] Eigen::MatrixXd chain_jacobian(const ChainModel& model,
-                                             const std::vector<double>& coordinates,
-                                             const Eigen::MatrixXd& readings, int instant);
-
 /// Refines `start`. `readings`: instants x channels.
 [[nodiscard]] ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings,
                                  ChainModel start, const ChainFitOptions& options = {});
 
-/// The axis of the (last) joint as a body twist of the child at one posture; unit rotation or
-/// translation.
-[[nodiscard]] Vector6d axis_in_child(const ChainModel& model, double coordinate);
+/// The axis of the (last) joint as a body twist of the child, unit rotation or translation; the
+/// joint's own motion leaves it where it is.
+[[nodiscard]] Vector6d axis_in_child(const ChainModel& model);
 
 }  // namespace kinescope::structure_search

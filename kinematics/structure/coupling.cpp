@@ -25,7 +25,7 @@ struct AxisResidual {
 AxisResidual axis_residual(const ChainFit& fit, const Motion& motion) {
   AxisResidual out{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(motion.size())),
                    Eigen::VectorXd::Zero(static_cast<Eigen::Index>(motion.size()))};
-  const Vector6d axis = axis_in_child(fit.model, 0.0);
+  const Vector6d axis = axis_in_child(fit.model);
   const double limit = 25.0 * fit.axis_variance;
   for (std::size_t i = 0; i < motion.size(); ++i) {
     const Vector6d u = motion[i].whitening.triangularView<Eigen::Upper>() * axis;

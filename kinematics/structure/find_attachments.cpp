@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "kinematics/structure/attachment_path.h"
+#include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/coupling.h"
 #include "kinematics/structure/follow_channel.h"
 #include "kinematics/structure/screening.h"
@@ -72,13 +73,13 @@ class Refiner {
 // each started from the one before.
 std::vector<double> coordinates_from(const Motion& motion, const ChainModel& model) {
   std::vector<double> coordinates(motion.size(), 0.0);
-  const Vector6d axis = axis_in_child(model, 0.0);
+  const ChainKinematics chain(model);
+  double value = 0.0;
   for (std::size_t i = 0; i < motion.size(); ++i) {
-    double value = i > 0 ? coordinates[i - 1] : 0.0;
+    const Matrix6d& W = motion[i].whitening;
+    const Vector6d u = W * chain.last_axis();
     for (int pass = 0; pass < 6; ++pass) {
-      const Matrix6d& W = motion[i].whitening;
-      const Vector6d u = W * axis;
-      const Vector6d r = W * fast_log(chain_pose_at(model, {value}).inverse() * motion[i].pose);
+      const Vector6d r = W * fast_log(chain.left_over(&value, motion[i].pose));
       value += u.dot(r) / u.squaredNorm();
     }
     coordinates[i] = value;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// SE(3) logarithm in closed form for inner loops (kinematics/core/pose.h solves a linear system).
+// Products and logarithms of poses for inner loops.
 #pragma once
 
 #include <cmath>
@@ -9,25 +9,39 @@
 
 namespace kinescope::structure_search {
 
-/// Translation part of the logarithm for a known rotation vector (any length but multiples of 2
-/// pi): V^-1 p = p - w x p / 2 + c w x (w x p). Barfoot 2017, eq. 7.80 and 7.86.
-[[nodiscard]] inline Eigen::Vector3d log_translation(const Eigen::Vector3d& w,
-                                                     const Eigen::Vector3d& p) {
-  const double squared = w.squaredNorm();
-  double c = 1.0 / 12.0 + squared / 720.0;
-  if (squared > 1e-4) {
-    const double angle = std::sqrt(squared);
-    c = (1.0 - angle * std::sin(angle) / (2.0 * (1.0 - std::cos(angle)))) / squared;
-  }
-  const Eigen::Vector3d wp = w.cross(p);
-  return p - 0.5 * wp + c * w.cross(wp);
+/// T_a_b * T_b_c without making the rotation unit again: its length drifts by 1e-16 a product.
+[[nodiscard]] inline Pose compose(const Pose& T_a_b, const Pose& T_b_c) {
+  return {T_a_b.rotation * T_b_c.rotation, T_a_b.translation + T_a_b.rotation * T_b_c.translation};
 }
 
-/// As log_pose().
+/// asin(s) / s by its series, exact to double precision below 0.1.
+[[nodiscard]] inline double small_asin_over(double s) {
+  const double x = s * s;
+  return 1.0 +
+         x * (1.0 / 6.0 +
+              x * (3.0 / 40.0 +
+                   x * (5.0 / 112.0 +
+                        x * (35.0 / 1152.0 +
+                             x * (63.0 / 2816.0 + x * (231.0 / 13312.0 + x * 143.0 / 10240.0))))));
+}
+
+/// As log_pose(), in closed form: the translation is V^-1 p = p - w x p / 2 + c w x (w x p) with
+/// c = (1 - h cot h) / (2 h)^2 at half the angle h. Barfoot 2017, eq. 7.80 and 7.86.
 [[nodiscard]] inline Vector6d fast_log(const Pose& pose) {
+  const double sign = pose.rotation.w() < 0.0 ? -1.0 : 1.0;
+  const double cosine = sign * pose.rotation.w();
+  const Eigen::Vector3d v = sign * pose.rotation.vec();
+  const double sine = v.norm();
+  const double half_over_sine =
+      sine < 0.1 ? small_asin_over(sine) : std::atan2(sine, cosine) / sine;
+  const double half = half_over_sine * sine;
+  const double squared = 4.0 * half * half;
+  const double c =
+      squared > 1e-4 ? (1.0 - half_over_sine * cosine) / squared : 1.0 / 12.0 + squared / 720.0;
+  const Eigen::Vector3d w = 2.0 * half_over_sine * v;
+  const Eigen::Vector3d wp = w.cross(pose.translation);
   Vector6d d;
-  const Eigen::Vector3d w = log_rotation(pose.rotation);
-  d << w, log_translation(w, pose.translation);
+  d << w, pose.translation - 0.5 * wp + c * w.cross(wp);
   return d;
 }
 
