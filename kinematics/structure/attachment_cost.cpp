@@ -130,8 +130,9 @@ FreeCost free_cost(const Body& body, const Readings& readings) {
   spread << Eigen::Vector3d::Constant(size / kLever), Eigen::Vector3d::Constant(size);
   spread /= std::sqrt(6.0);
   FreeCost cost{free_motion_cost(linear), 0.0};
-  for (const Matrix6d& W : linear.own) {
-    const Matrix6d scaled = W * spread.asDiagonal();
+  for (std::size_t i = 0; i < relative.motion.size(); ++i) {
+    const Vector6d y = linear.tangent.col(static_cast<Eigen::Index>(i));
+    const Matrix6d scaled = tangent_whitening(relative.motion[i], y) * spread.asDiagonal();
     const Eigen::LLT<Matrix6d> factor(Matrix6d::Identity() + scaled * scaled.transpose());
     cost.everywhere += 6.0 + 2.0 * Matrix6d(factor.matrixL()).diagonal().array().log().sum();
   }

@@ -5,10 +5,7 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 
-#include "kinematics/structure/residual_scale.h"
-#include "kinematics/structure/series.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
@@ -47,120 +44,12 @@ Matrix6d average_whitening(const Motion& motion) {
   return Eigen::LLT<Matrix6d>(information / count).matrixU();
 }
 
-using Matrix12d = Eigen::Matrix<double, 12, 12>;
-using Vector12d = Eigen::Matrix<double, 12, 1>;
-
-// Residuals of a line and what is along its slope.
-ResidualParts line_residuals(const LinearMotion& linear, const Eigen::VectorXd& coordinate,
-                             const LineFit& line, bool free) {
-  ResidualParts parts;
-  const bool moves = line.slope.squaredNorm() > 0.0;
-  parts.split = moves;
-  parts.free_axis = free;
-  for (Eigen::Index i = 0; i < coordinate.size(); ++i) {
-    const Matrix6d& W = linear.own[static_cast<std::size_t>(i)];
-    const Vector6d r = W * (linear.tangent.col(i) - line.mean - coordinate(i) * line.slope);
-    const Vector6d axis = W * line.slope;
-    const double along = moves ? axis.dot(r) / axis.norm() : 0.0;
-    parts.along.push_back(free ? 0.0 : along);
-    parts.across.push_back(std::max(0.0, r.squaredNorm() - along * along));
-    parts.penalty.push_back(0.0);
-    parts.lever.push_back(axis.norm());
-  }
-  return parts;
-}
-
-// Solves for the parameters whose index is in `used` (mean, then slope); true standard deviations
-// need unit noise.
-LineFit solve_line(const LinearMotion& linear, const Eigen::VectorXd& coordinate,
-                   const std::vector<double>& weight, const std::vector<int>& used) {
-  Matrix12d H = Matrix12d::Zero();
-  Vector12d g = Vector12d::Zero();
-  for (Eigen::Index i = 0; i < coordinate.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    if (weight[at] <= 0.0) continue;
-    const Matrix6d information = weight[at] * (linear.own[at].transpose() * linear.own[at]);
-    const Vector6d b = information * linear.tangent.col(i);
-    const double c = coordinate(i);
-    H.topLeftCorner<6, 6>() += information;
-    H.bottomLeftCorner<6, 6>() += c * information;
-    H.bottomRightCorner<6, 6>() += (c * c) * information;
-    g.head<6>() += b;
-    g.tail<6>() += c * b;
-  }
-  H.topRightCorner<6, 6>() = H.bottomLeftCorner<6, 6>().transpose();
-  Eigen::MatrixXd part = H(used, used);
-  part.diagonal() *= 1.0 + 1e-9;
-  const Eigen::LDLT<Eigen::MatrixXd> factor(part);
-  Vector12d x = Vector12d::Zero();
-  const Eigen::VectorXd right = g(used);
-  const Eigen::VectorXd solved = factor.solve(right);
-  for (std::size_t k = 0; k < used.size(); ++k) x(used[k]) = solved(static_cast<Eigen::Index>(k));
-  LineFit fit{x.head<6>(), x.tail<6>(), 0.0, 0.0};
-  if (used.size() == 12) {
-    const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(12, 12));
-    const double variance = covariance.block<3, 3>(6, 6).trace() / 3.0;
-    fit.turn_evidence = fit.slope.head<3>().norm() / std::sqrt(std::max(1e-300, variance));
-  }
-  return fit;
-}
-
-std::vector<int> parameters_of(JointType type) {
-  if (type == JointType::kRevolute) return {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
-  return {0, 1, 2, 3, 4, 5, 9, 10, 11};
-}
-
-// Passes of reweighted least squares; the best by cost, since few outliers may lead astray.
-template <typename Improve>
-LineFit reweighted(const LinearMotion& linear, Eigen::VectorXd& coordinate,
-                   const std::vector<int>& used, const LineFit& start, bool free,
-                   Improve&& improve) {
-  constexpr int kPasses = 3;
-  LineFit line = start;
-  LineFit best;
-  Eigen::VectorXd best_coordinate = coordinate;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    const ResidualParts before = line_residuals(linear, coordinate, line, free);
-    line = solve_line(linear, coordinate, robust_weights(before, residual_scale(before)), used);
-    improve(line, coordinate);
-    line.cost = residual_scale(line_residuals(linear, coordinate, line, free)).cost;
-    if (pass > 0 && line.cost >= best.cost) continue;
-    best = line;
-    best_coordinate = coordinate;
-  }
-  coordinate = best_coordinate;
-  return best;
-}
-
 }  // namespace
 
-LineFit fit_line(const LinearMotion& linear, const Eigen::VectorXd& coordinate, JointType type,
-                 const LineFit& start) {
-  Eigen::VectorXd kept = coordinate;
-  return reweighted(linear, kept, parameters_of(type), start, false,
-                    [](const LineFit&, const Eigen::VectorXd&) {});
-}
-
-LineFit fit_free_line(const LinearMotion& linear, Eigen::VectorXd& coordinate, JointType type,
-                      const LineFit& start) {
-  const auto move = [&](const LineFit& line, Eigen::VectorXd& c) {
-    for (Eigen::Index i = 0; i < c.size(); ++i) {
-      const Matrix6d& W = linear.own[static_cast<std::size_t>(i)];
-      const Vector6d axis = W * line.slope;
-      c(i) = axis.dot(W * (linear.tangent.col(i) - line.mean)) / axis.squaredNorm();
-    }
-  };
-  LineFit fit = reweighted(linear, coordinate, parameters_of(type), start, true, move);
-  const ResidualParts parts = line_residuals(linear, coordinate, fit, true);
-  const double variance = (coordinate.array() - coordinate.mean()).square().mean();
-  for (const double lever : parts.lever) fit.cost += 1.0 + std::log1p(variance * lever * lever);
-  return fit;
-}
-
-LineFit fit_point(const LinearMotion& linear, const LineFit& start) {
-  Eigen::VectorXd none = Eigen::VectorXd::Zero(linear.tangent.cols());
-  return reweighted(linear, none, {0, 1, 2, 3, 4, 5}, {start.mean, Vector6d::Zero(), 0.0, 0.0},
-                    false, [](const LineFit&, const Eigen::VectorXd&) {});
+Matrix6d tangent_whitening(const MotionSample& sample, const Vector6d& y) {
+  // A right perturbation d of the pose moves the logarithm by the inverse right Jacobian, which is
+  // Ad(exp(y / 2)) to second order in y.
+  return sample.whitening * adjoint(exp_pose(-0.5 * y));
 }
 
 LinearMotion linear_motion(const Motion& motion) {
@@ -180,10 +69,6 @@ LinearMotion linear_motion(const Motion& motion) {
     out.widest = std::max(out.widest, y.head<3>().norm());
     out.y.col(i) = y;
     out.tangent.col(i) = y;
-    // A right perturbation d of the pose moves the logarithm by the inverse right Jacobian, which
-    // is Ad(exp(y / 2)) to second order in y.
-    out.own.emplace_back(motion[static_cast<std::size_t>(i)].whitening *
-                         adjoint(exp_pose(-0.5 * y)));
   }
   out.y = out.whitening.triangularView<Eigen::Upper>() * out.y;
   out.kept.assign(motion.size(), 1);

@@ -6,11 +6,11 @@
 namespace kinescope::structure_search {
 namespace {
 
-// ln det of the covariance that W whitens.
-double log_det_of(const Matrix6d& W) {
-  double sum = 0.0;
-  for (int c = 0; c < 6; ++c) sum += std::log(std::abs(W(c, c)));
-  return -2.0 * sum;
+// ln of the ratio of the determinants of the covariances that W and V whiten.
+double log_det_ratio(const Matrix6d& W, const Matrix6d& V) {
+  double ratio = 1.0;
+  for (int c = 0; c < 6; ++c) ratio *= V(c, c) / W(c, c);
+  return 2.0 * std::log(std::abs(ratio));
 }
 
 }  // namespace
@@ -24,6 +24,7 @@ LinkPath camera_path(int instants) {
 
 RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Readings& readings) {
   RelativeMotion out;
+  out.motion.reserve(body.at.size());
   for (std::size_t i = 0; i < body.at.size(); ++i) {
     const Sighting& s = body.at[i];
     if (!s.seen || path.valid[i] == 0 || readings.valid[i] == 0) continue;
@@ -37,7 +38,7 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
     if (!path.covariance.empty()) {
       const Matrix6d ad = adjoint(sample.pose.inverse());
       sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
-      out.log_det += log_det_of(sample.whitening) - log_det_of(s.whitening);
+      out.log_det += log_det_ratio(sample.whitening, s.whitening);
     }
     out.motion.push_back(std::move(sample));
   }

@@ -9,7 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "kinematics/structure/linear_motion.h"
+#include "kinematics/structure/line_regression.h"
 #include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/wide_turn.h"
@@ -87,13 +87,13 @@ LineFit start_of(const LinearMotion& linear, const Eigen::VectorXd& coordinate,
 }
 
 // A turn where the rotation shows, and a slide; each with the cost it leaves.
-void add_candidates(const LinearMotion& linear, const Direction& d, const Eigen::VectorXd& q,
-                    std::vector<Candidate>& out) {
+void add_candidates(const LinearMotion& linear, const LineProblem& problem, const Direction& d,
+                    const Eigen::VectorXd& q, std::vector<Candidate>& out) {
+  const LineFit start = start_of(linear, q, d);
   const auto fit = [&](JointType type) {
     Eigen::VectorXd coordinate = q;
-    const LineFit start = start_of(linear, coordinate, d);
-    const LineFit line = d.channel >= 0 ? fit_line(linear, coordinate, type, start)
-                                        : fit_free_line(linear, coordinate, type, start);
+    const LineFit line = d.channel >= 0 ? fit_line(problem, coordinate, type, start)
+                                        : fit_free_line(problem, coordinate, type, start);
     const bool shows = type == JointType::kPrismatic || line.turn_evidence > kTurnEvidence;
     if (shows) add_candidate(linear, line, d.channel, type, coordinate, out);
   };
@@ -120,9 +120,9 @@ std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::M
 }
 
 // Rest about the median, which few outliers do not move.
-Candidate rest_candidate(const LinearMotion& linear) {
+Candidate rest_candidate(const LinearMotion& linear, const LineProblem& problem) {
   const LineFit line =
-      fit_point(linear, start_of(linear, Eigen::VectorXd::Zero(linear.y.cols()), Direction{}));
+      fit_point(problem, start_of(linear, Eigen::VectorXd::Zero(linear.y.cols()), Direction{}));
   Candidate rest;
   rest.start.mount = linear.mean * exp_pose(line.mean);
   rest.cost = line.cost;
@@ -222,7 +222,8 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
   for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass)
     r = regress(linear, q, usable);
 
-  out.push_back(rest_candidate(linear));
+  const LineProblem problem = line_problem(linear, motion);
+  out.push_back(rest_candidate(linear, problem));
   if (linear.widest > kWideTurn) {
     for (Candidate& c : wide_turn_candidates(motion, q, usable, options.coordinate_free)) {
       out.push_back(std::move(c));
@@ -231,12 +232,12 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
   for (std::size_t k = 0; k < channels; ++k) {
     const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
-    add_candidates(linear, r.driven[k], readings_k, out);
+    add_candidates(linear, problem, r.driven[k], readings_k, out);
   }
   if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0) {
     const Eigen::VectorXd along =
         linear.y.transpose() * r.principal.slope / r.principal.slope.squaredNorm();
-    add_candidates(linear, r.principal, along, out);
+    add_candidates(linear, problem, r.principal, along, out);
   }
   std::ranges::stable_sort(out, {}, &Candidate::cost);
   return out;

@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
@@ -269,15 +267,36 @@ double median_of(std::vector<double> values) {
 }
 
 Matrix6d whitening_of(const Matrix6d& covariance) {
-  const Eigen::LLT<Matrix6d> information(covariance.inverse());
-  if (information.info() != Eigen::Success) {
-    return covariance.diagonal()
-        .cwiseMax(kNoiseFloor * kNoiseFloor)
-        .cwiseSqrt()
-        .cwiseInverse()
-        .asDiagonal();
+  // covariance = U U' with U upper triangular, from the last row up; W = U^-1.
+  Matrix6d U = Matrix6d::Zero();
+  Matrix6d W = Matrix6d::Zero();
+  for (int j = 5; j >= 0; --j) {
+    double squared = covariance(j, j);
+    for (int k = j + 1; k < 6; ++k) squared -= U(j, k) * U(j, k);
+    if (!(squared > 0.0)) {
+      return covariance.diagonal()
+          .cwiseMax(kNoiseFloor * kNoiseFloor)
+          .cwiseSqrt()
+          .cwiseInverse()
+          .asDiagonal();
+    }
+    const double inverse = 1.0 / std::sqrt(squared);
+    U(j, j) = squared * inverse;
+    W(j, j) = inverse;
+    for (int i = 0; i < j; ++i) {
+      double sum = covariance(i, j);
+      for (int k = j + 1; k < 6; ++k) sum -= U(i, k) * U(j, k);
+      U(i, j) = sum * inverse;
+    }
   }
-  return information.matrixU();
+  for (int j = 1; j < 6; ++j) {
+    for (int i = j - 1; i >= 0; --i) {
+      double sum = 0.0;
+      for (int k = i + 1; k <= j; ++k) sum += U(i, k) * W(k, j);
+      W(i, j) = -sum * W(i, i);
+    }
+  }
+  return W;
 }
 
 Series clean_series(const PoseTracks& tracks) {
