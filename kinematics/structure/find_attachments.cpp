@@ -16,6 +16,10 @@ namespace {
 
 // Candidates this much worse (-2 ln likelihood, linear) than the best refined one are not refined.
 constexpr double kHopeless = 60.0;
+// The same for candidates that leave more than this across the joint (variance over the declared
+// one), and more than this part of the motion: is_acceptable() asks for far less of either.
+constexpr double kHopelessVariance = 50.0;
+constexpr double kHopelessShare = 0.01;
 constexpr std::size_t kFewestSamples = 5;
 
 // Fits with the weight along the joint that its inexactness asks for.
@@ -105,6 +109,7 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
     const bool enough = static_cast<int>(refiner.count()) >= options.max_refined && !rest;
     const double hopeless = (rest ? 1.5 * refiner.best() : refiner.best()) + kHopeless;
     if (refiner.count() > 0 && (candidate.cost > hopeless || enough)) continue;
+    if (candidate.across > kHopelessVariance && candidate.share > kHopelessShare) continue;
     if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
     refiner.refine(candidate);
   }

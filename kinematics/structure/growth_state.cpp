@@ -5,6 +5,7 @@
 
 #include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/find_attachments.h"
+#include "kinematics/structure/first_look.h"
 #include "kinematics/structure/rest.h"
 
 namespace kinescope::structure_search {
@@ -64,13 +65,18 @@ void list_alternatives(GrowthState& state, std::size_t body, int link) {
   GrownBody& grown = state.tree.bodies[body];
   if (state.tree.link(link).founder == static_cast<int>(body)) return;
   if (grown.link >= 0 && is_below(state.tree, link, body)) return;
+  const FirstLook look = first_look(seen, path, state.readings, state.usable);
   AttachmentOptions options;
   const Attachment* best = best_of(grown.alternatives);
   if (best != nullptr && seen.seen > 0) {
     options.give_up_above = std::max(0.0, best->data_cost / seen.seen) + kGiveUpMargin;
   }
-  auto found = find_attachments(seen, link, path, state.readings, state.usable, options);
-  const auto rest = practical_rest(seen, link, path, state.readings);
+  std::vector<Attachment> found;
+  if (look.may_hang) {
+    found = find_attachments(seen, link, path, state.readings, state.usable, options);
+  }
+  std::optional<Attachment> rest;
+  if (look.may_rest) rest = practical_rest(seen, link, path, state.readings);
   for (Attachment& a : found) {
     if (rest && !a.driven()) continue;
     if (state.moves_freely[body] != 0 && !a.at_rest() && !a.driven()) continue;

@@ -84,7 +84,7 @@ LineFit solve_line(const LineProblem& problem, const Eigen::VectorXd& coordinate
   const Eigen::VectorXd right = g(used);
   const Eigen::VectorXd solved = factor.solve(right);
   for (std::size_t k = 0; k < used.size(); ++k) x(used[k]) = solved(static_cast<Eigen::Index>(k));
-  LineFit fit{x.head<6>(), x.tail<6>(), 0.0, 0.0};
+  LineFit fit{.mean = x.head<6>(), .slope = x.tail<6>()};
   if (used.size() == 12) {
     const Eigen::MatrixXd covariance =
         factor.solve(Eigen::MatrixXd::Identity(12, 12).middleCols<3>(6));
@@ -115,6 +115,7 @@ LineFit reweighted(const LineProblem& problem, Eigen::VectorXd& coordinate,
     parts = line_residuals(problem, coordinate, line, free);
     scale = residual_scale(parts);
     line.cost = scale.cost;
+    line.across = scale.across;
     if (pass > 0 && line.cost >= best.cost) continue;
     best = line;
     best_coordinate = coordinate;
@@ -169,8 +170,8 @@ LineFit fit_free_line(const LineProblem& problem, Eigen::VectorXd& coordinate, J
 
 LineFit fit_point(const LineProblem& problem, const LineFit& start) {
   Eigen::VectorXd none = Eigen::VectorXd::Zero(problem.white.cols());
-  return reweighted(problem, none, {0, 1, 2, 3, 4, 5}, {start.mean, Vector6d::Zero(), 0.0, 0.0},
-                    false, [](const LineFit&, const Eigen::VectorXd&) {});
+  return reweighted(problem, none, {0, 1, 2, 3, 4, 5}, {.mean = start.mean}, false,
+                    [](const LineFit&, const Eigen::VectorXd&) {});
 }
 
 }  // namespace kinescope::structure_search

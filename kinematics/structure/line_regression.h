@@ -24,6 +24,7 @@ struct LineFit {
   Vector6d slope = Vector6d::Zero();
   double turn_evidence = 0.0;  ///< rotation of the slope over its standard deviation
   double cost = 0.0;           ///< -2 ln likelihood, noise scale free but >= 1
+  double across = 1.0;         ///< that noise scale across the slope (variance over declared)
 };
 
 /// Generalised least squares with every sample's own whitening, robust, from `start` (which says

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/structure/link_path.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kinescope::structure_search {
@@ -22,25 +23,32 @@ LinkPath camera_path(int instants) {
   return path;
 }
 
-RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Readings& readings) {
-  RelativeMotion out;
-  out.motion.reserve(body.at.size());
+RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Readings& readings,
+                               int most) {
+  std::vector<std::size_t> instants;
+  instants.reserve(body.at.size());
   for (std::size_t i = 0; i < body.at.size(); ++i) {
+    if (body.at[i].seen && path.valid[i] != 0 && readings.valid[i] != 0) instants.push_back(i);
+  }
+  const std::size_t keep = most > 0 ? static_cast<std::size_t>(most) : instants.size();
+  const std::size_t stride = keep > 0 ? (instants.size() + keep - 1) / keep : 1;
+  RelativeMotion out;
+  out.motion.reserve(std::min(keep, instants.size()));
+  for (std::size_t k = 0; k < instants.size(); k += stride) {
+    const std::size_t i = instants[k];
     const Sighting& s = body.at[i];
-    if (!s.seen || path.valid[i] == 0 || readings.valid[i] == 0) continue;
     const Pose inverse = path.pose[i].inverse();
-    MotionSample sample{.instant = static_cast<int>(i),
-                        .pose = inverse * s.pose,
-                        .whitening = s.whitening,
-                        .alternative = {},
-                        .alternative_cost = s.alternative_cost};
+    MotionSample& sample = out.motion.emplace_back();
+    sample = {.instant = static_cast<int>(i),
+              .pose = inverse * s.pose,
+              .whitening = s.whitening,
+              .alternative = {},
+              .alternative_cost = s.alternative_cost};
     if (s.alternative) sample.alternative = inverse * *s.alternative;
-    if (!path.covariance.empty()) {
-      const Matrix6d ad = adjoint(sample.pose.inverse());
-      sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
-      out.log_det += log_det_ratio(sample.whitening, s.whitening);
-    }
-    out.motion.push_back(std::move(sample));
+    if (path.covariance.empty()) continue;
+    const Matrix6d ad = adjoint(sample.pose.inverse());
+    sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
+    out.log_det += log_det_ratio(sample.whitening, s.whitening);
   }
   return out;
 }

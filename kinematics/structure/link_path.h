@@ -27,8 +27,9 @@ struct RelativeMotion {
   Motion motion;
   double log_det = 0.0;  ///< sum of ln det of the covariances over those of the sightings alone
 };
+/// With `most` above 0, evenly chosen sightings, at most so many.
 [[nodiscard]] RelativeMotion relative_motion(const Body& body, const LinkPath& path,
-                                             const Readings& readings);
+                                             const Readings& readings, int most = 0);
 
 /// Sightings of the body at instants for which the log has values.
 [[nodiscard]] int seen_with_log(const Body& body, const Readings& readings);

@@ -26,8 +26,8 @@ Pose median_pose(const Motion& motion) {
   return reference * Pose{exp_rotation(middle.head<3>()), middle.tail<3>()};
 }
 
-// Less than a robot moves by, at the distance of the body from the camera.
-bool hardly_moves(const Motion& motion, const Pose& from, const Body& body) {
+// Less than a robot moves by, at the distance of the body from the camera, `slack` times.
+bool hardly_moves(const Motion& motion, const Pose& from, const Body& body, double slack) {
   constexpr double kTurn = 0.01;    // rad
   constexpr double kShift = 0.003;  // of the distance from the camera
   std::vector<double> turn;
@@ -41,7 +41,8 @@ bool hardly_moves(const Motion& motion, const Pose& from, const Body& body) {
   for (const Sighting& s : body.at) {
     if (s.seen) distance.push_back(s.pose.translation.norm());
   }
-  return median_of(turn) <= kTurn && median_of(shift) <= kShift * median_of(distance);
+  return median_of(turn) <= slack * kTurn &&
+         median_of(shift) <= slack * kShift * median_of(distance);
 }
 
 // The body as if it were a link: where it was seen, as well as it was seen.
@@ -60,6 +61,11 @@ LinkPath seen_path(const Body& body) {
 
 }  // namespace
 
+bool may_rest(const Motion& motion, const Body& body) {
+  constexpr double kSlack = 2.0;  // for the errors of few samples
+  return hardly_moves(motion, median_pose(motion), body, kSlack);
+}
+
 std::optional<Attachment> practical_rest(const Body& body, int link, const LinkPath& path,
                                          const Readings& readings) {
   constexpr std::size_t kFewest = 5;
@@ -67,7 +73,7 @@ std::optional<Attachment> practical_rest(const Body& body, int link, const LinkP
   if (relative.motion.size() < kFewest) return std::nullopt;
   ChainModel model;
   model.mount = median_pose(relative.motion);
-  if (!hardly_moves(relative.motion, model.mount, body)) return std::nullopt;
+  if (!hardly_moves(relative.motion, model.mount, body, 1.0)) return std::nullopt;
   return attachment_from(fit_chain(relative.motion, readings.value, model), link, relative, body,
                          readings);
 }

@@ -16,6 +16,9 @@ namespace kinescope::structure_search {
                                                        const LinkPath& path,
                                                        const Readings& readings);
 
+/// Whether that may be so, from some of the samples.
+[[nodiscard]] bool may_rest(const Motion& motion, const Body& body);
+
 /// Whether two bodies keep one relative pose wherever both are seen, for all that `a` moves by
 /// `motion_size` (m).
 [[nodiscard]] bool rest_on_each_other(const Body& a, double motion_size, const Body& b,

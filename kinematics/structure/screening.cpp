@@ -19,6 +19,9 @@ namespace {
 
 // Rotation slopes below this many standard deviations are no evidence for a turn.
 constexpr double kTurnEvidence = 3.5;
+// Medians of chi-square with 5 and 6 degrees of freedom.
+constexpr double kMedian5 = 4.3515;
+constexpr double kMedian6 = 5.3481;
 // A sample this many times further than the median from the best line is left out.
 constexpr double kTrim = 25.0;
 
@@ -60,6 +63,7 @@ void add_candidate(const LinearMotion& linear, const LineFit& line, int channel,
   Candidate c;
   c.channel = channel;
   c.cost = line.cost;
+  c.across = line.across;
   const Pose centre = linear.mean * exp_pose(line.mean);
   ChainJoint joint = joint_from_twist(centre, line.slope, type);
   c.start.mount = centre;
@@ -119,6 +123,25 @@ std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::M
   return squared;
 }
 
+// What the direction leaves across itself is far above the noise and a fair part of the motion
+// (median squared lengths).
+bool is_hopeless(const LinearMotion& linear, const Eigen::MatrixXd& q, const Direction& d) {
+  constexpr double kVariance = 100.0;
+  constexpr double kShare = 0.04;
+  const Vector6d u = d.slope.normalized();
+  std::vector<double> across;
+  std::vector<double> all;
+  for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
+    const Vector6d r = d.channel >= 0 ? Vector6d(linear.y.col(i) - d.slope * q(d.channel, i))
+                                      : Vector6d(linear.y.col(i));
+    const double along = u.dot(r);
+    across.push_back(linear.weight(i) * std::max(0.0, r.squaredNorm() - along * along));
+    all.push_back(linear.weight(i) * linear.y.col(i).squaredNorm());
+  }
+  const double left = median_of(std::move(across)) / kMedian5;
+  return left > kVariance && left > kShare * median_of(std::move(all)) / kMedian6;
+}
+
 // Rest about the median, which few outliers do not move.
 Candidate rest_candidate(const LinearMotion& linear, const LineProblem& problem) {
   const LineFit line =
@@ -126,6 +149,7 @@ Candidate rest_candidate(const LinearMotion& linear, const LineProblem& problem)
   Candidate rest;
   rest.start.mount = linear.mean * exp_pose(line.mean);
   rest.cost = line.cost;
+  rest.across = line.across;
   return rest;
 }
 
@@ -149,7 +173,7 @@ bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Regression& r) {
     least = median;
     best = std::move(squared);
   }
-  const double limit = kTrim * std::max(1.0, least / 5.35) * 1.5;
+  const double limit = kTrim * std::max(1.0, least / kMedian6) * 1.5;
   bool any = false;
   for (std::size_t i = 0; i < best.size(); ++i) {
     if (linear.kept[i] == 0 || best[i] <= limit) continue;
@@ -184,6 +208,12 @@ Regression regress(const LinearMotion& linear, const Eigen::MatrixXd& q,
   }
   std::ranges::stable_sort(out.driven, {}, &Direction::cost);
   return out;
+}
+
+// Of the motion about its mean, over the declared one.
+double whole_variance(const LineProblem& problem) {
+  const Eigen::VectorXd squared = problem.white.colwise().squaredNorm();
+  return std::max(1.0, median_of({squared.data(), squared.data() + squared.size()}) / kMedian6);
 }
 
 Eigen::MatrixXd readings_of(const Motion& motion, const Eigen::MatrixXd& readings) {
@@ -231,6 +261,7 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
   }
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
   for (std::size_t k = 0; k < channels; ++k) {
+    if (k > 0 && is_hopeless(linear, q, r.driven[k])) continue;
     const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
     add_candidates(linear, problem, r.driven[k], readings_k, out);
   }
@@ -239,6 +270,8 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
         linear.y.transpose() * r.principal.slope / r.principal.slope.squaredNorm();
     add_candidates(linear, problem, r.principal, along, out);
   }
+  const double spread = whole_variance(problem);
+  for (Candidate& c : out) c.share = c.across / spread;
   std::ranges::stable_sort(out, {}, &Candidate::cost);
   return out;
 }

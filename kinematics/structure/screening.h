@@ -19,8 +19,10 @@ namespace kinescope::structure_search {
 /// One explanation to be refined by fit_chain.
 struct Candidate {
   ChainModel start;
-  int channel = -1;   ///< of a driven joint; -1: rest, or coordinate free
-  double cost = 0.0;  ///< -2 ln likelihood, linear approximation
+  int channel = -1;     ///< of a driven joint; -1: rest, or coordinate free
+  double cost = 0.0;    ///< -2 ln likelihood, linear approximation
+  double across = 1.0;  ///< variance left across the joint, over the declared one
+  double share = 0.0;   ///< the same over the variance of the whole motion
 };
 
 struct ScreeningOptions {

@@ -92,12 +92,13 @@ void turn_mount(ChainModel& model, double angle) {
   model.mount = F * turn * F.inverse() * model.mount;
 }
 
-// Evaluates the start as it stands: no iteration.
-double start_cost(const Motion& motion, const Candidate& c, const Eigen::MatrixXd& q) {
+// What the start leaves, after two iterations.
+void judge_start(const Motion& motion, const Eigen::MatrixXd& q, Candidate& c) {
   Motion numbered = motion;
   for (std::size_t i = 0; i < numbered.size(); ++i) numbered[i].instant = static_cast<int>(i);
   const ChainFit fit = fit_chain(numbered, q.transpose(), c.start, {.max_iterations = 2});
-  return fit.cost;
+  c.cost = fit.cost;
+  c.across = fit.variance;
 }
 
 }  // namespace
@@ -115,7 +116,7 @@ std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::M
     for (const double a : c.start.coordinates) mean += a / static_cast<double>(motion.size());
     for (double& a : c.start.coordinates) a -= mean;
     turn_mount(c.start, mean);
-    c.cost = start_cost(motion, c, q);
+    judge_start(motion, q, c);
     out.push_back(std::move(c));
   }
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
@@ -128,7 +129,7 @@ std::vector<Candidate> wide_turn_candidates(const Motion& motion, const Eigen::M
     c.channel = static_cast<int>(k);
     c.start.joints.front().terms = {{c.channel, line.slope}};
     turn_mount(c.start, line.intercept);
-    c.cost = start_cost(motion, c, q);
+    judge_start(motion, q, c);
     out.push_back(std::move(c));
   }
   return out;

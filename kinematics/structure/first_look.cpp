@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/first_look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "kinematics/structure/linear_motion.h"
+#include "kinematics/structure/rest.h"
+#include "kinematics/structure/tangent.h"
+#include "kinematics/structure/wide_turn.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+constexpr int kSamples = 64;
+// With fewer samples than this there is nothing to be saved.
+constexpr std::size_t kFewest = 32;
+// What is left across the joint is hopeless above this variance over the declared one, and
+constexpr double kHopelessVariance = 100.0;
+// above this part of the motion's variance.
+constexpr double kHopelessShare = 0.04;
+// Channels that get a robust regression, best first.
+constexpr std::size_t kMostChannels = 4;
+// Medians of chi-square with 5 and 6 degrees of freedom.
+constexpr double kMedian5 = 4.3515;
+constexpr double kMedian6 = 5.3481;
+
+// Rows of a motion that are linear in the channel that drives it: logarithms about the mean pose
+// or, where the turn is too wide for one, from each sample to the next.
+struct Rows {
+  Eigen::MatrixXd y;  // 6 x samples, whitened
+  Eigen::MatrixXd q;  // samples x channels
+};
+
+Rows rows_of(const Motion& motion, const Eigen::MatrixXd& readings) {
+  const LinearMotion linear = linear_motion(motion);
+  const auto n = static_cast<Eigen::Index>(motion.size());
+  Rows rows{linear.y, Eigen::MatrixXd(n, readings.cols())};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    rows.q.row(i) = readings.row(motion[static_cast<std::size_t>(i)].instant);
+  }
+  if (linear.widest <= kWideTurn) return rows;
+  // Increments carry the noise of two samples.
+  rows.q = (rows.q.bottomRows(n - 1) - rows.q.topRows(n - 1)).eval() / std::sqrt(2.0);
+  rows.y.resize(6, n - 1);
+  for (Eigen::Index i = 0; i + 1 < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    rows.y.col(i) = linear.whitening * fast_log(motion[at].pose.inverse() * motion[at + 1].pose) /
+                    std::sqrt(2.0);
+  }
+  return rows;
+}
+
+double median(Eigen::ArrayXd values) {
+  double* middle = values.data() + values.size() / 2;
+  std::nth_element(values.data(), middle, values.data() + values.size());
+  return *middle;
+}
+
+// Weights that leave out what lies far from most.
+Eigen::ArrayXd robust(const Eigen::ArrayXd& squared) {
+  const double knee = 9.0 * std::max(1e-300, median(squared));
+  return (knee / (knee + squared)).square();
+}
+
+// Median variance across the slope of the rows regressed on one channel.
+double left_by_channel(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
+  constexpr int kPasses = 3;
+  Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(q.size());
+  double left = 0.0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const double total = weight.sum();
+    const Vector6d y_mean = y * weight.matrix() / total;
+    const Eigen::VectorXd centred = q.array() - q.dot(weight.matrix()) / total;
+    const Eigen::VectorXd weighted = centred.array() * weight;
+    const Vector6d slope = y * weighted / std::max(1e-300, weighted.dot(centred));
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> r =
+        (y.colwise() - y_mean) - slope * centred.transpose();
+    const Eigen::ArrayXd squared = r.colwise().squaredNorm().transpose();
+    const Eigen::ArrayXd along = r.transpose() * slope.normalized();
+    left = median(squared - along.square()) / kMedian5;
+    weight = robust(squared);
+  }
+  return left;
+}
+
+// The same across the direction in which most of the motion is.
+double left_by_principal(const Eigen::MatrixXd& y) {
+  constexpr int kPasses = 3;
+  Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(y.cols());
+  double left = 0.0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const Vector6d mean = y * weight.matrix() / weight.sum();
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> r = y.colwise() - mean;
+    const Matrix6d G = r * weight.matrix().asDiagonal() * r.transpose();
+    const Vector6d u = Eigen::SelfAdjointEigenSolver<Matrix6d>(G).eigenvectors().col(5);
+    const Eigen::ArrayXd along = r.transpose() * u;
+    const Eigen::ArrayXd across = r.colwise().squaredNorm().transpose().array() - along.square();
+    left = median(across) / kMedian5;
+    weight = robust(across);
+  }
+  return left;
+}
+
+// Channels by what least squares on each leave, best first.
+std::vector<Eigen::Index> best_channels(const Rows& rows, const std::vector<char>& usable) {
+  const Eigen::MatrixXd y = rows.y.colwise() - Vector6d(rows.y.rowwise().mean());
+  const Eigen::MatrixXd q = rows.q.rowwise() - Eigen::RowVectorXd(rows.q.colwise().mean());
+  const Eigen::MatrixXd B = y * q;
+  std::vector<std::pair<double, Eigen::Index>> gains;
+  for (Eigen::Index c = 0; c < q.cols(); ++c) {
+    const double qq = q.col(c).squaredNorm();
+    if (usable[static_cast<std::size_t>(c)] == 0 || !(qq > 0.0)) continue;
+    gains.emplace_back(-B.col(c).squaredNorm() / qq, c);
+  }
+  std::ranges::sort(gains);
+  std::vector<Eigen::Index> out;
+  for (std::size_t k = 0; k < std::min(kMostChannels, gains.size()); ++k) {
+    out.push_back(gains[k].second);
+  }
+  return out;
+}
+
+bool may_hang(const Motion& motion, const Readings& readings, const std::vector<char>& usable) {
+  const Rows rows = rows_of(motion, readings.value);
+  const Eigen::MatrixXd centred = rows.y.colwise() - Vector6d(rows.y.rowwise().mean());
+  const double spread = median(centred.colwise().squaredNorm().transpose()) / kMedian6;
+  const double limit = std::max(kHopelessVariance, kHopelessShare * spread);
+  if (spread < limit || left_by_principal(rows.y) < limit) return true;
+  return std::ranges::any_of(best_channels(rows, usable), [&](Eigen::Index c) {
+    return left_by_channel(rows.y, rows.q.col(c)) < limit;
+  });
+}
+
+}  // namespace
+
+FirstLook first_look(const Body& body, const LinkPath& path, const Readings& readings,
+                     const std::vector<char>& usable) {
+  const Motion motion = relative_motion(body, path, readings, kSamples).motion;
+  if (motion.size() < kFewest) return {};
+  return {may_hang(motion, readings, usable), may_rest(motion, body)};
+}
+
+}  // namespace kinescope::structure_search
