@@ -121,4 +121,15 @@ void ChainKinematics::jacobian(const double* coordinates, const Eigen::MatrixXd&
   }
 }
 
+Vector6d ChainKinematics::twist(const double* coordinates, const double* rates) const {
+  Vector6d out = Vector6d::Zero();
+  Pose tail = links_.back();
+  for (std::size_t k = model_.joints.size(); k-- > 0;) {
+    const JointType type = model_.joints[k].type;
+    out += rates[k] * axis_seen_from(tail, type);
+    if (k > 0) tail = compose(links_[k], moved(type, coordinates[k], tail));
+  }
+  return out;
+}
+
 }  // namespace kinescope::structure_search

@@ -37,6 +37,8 @@ class ChainKinematics {
   /// readings.
   void jacobian(const double* coordinates, const Eigen::MatrixXd& readings, int instant,
                 ChainJacobian& J) const;
+  /// Twist of the child, in its frame, while the coordinates change at `rates`.
+  [[nodiscard]] Vector6d twist(const double* coordinates, const double* rates) const;
   /// The last joint's axis as a body twist of the child.
   [[nodiscard]] const Vector6d& last_axis() const { return last_axis_; }
 

@@ -5,154 +5,12 @@
 #include <Eigen/Cholesky>
 
 #include "kinematics/structure/chain_kinematics.h"
-#include "kinematics/structure/residual_scale.h"
+#include "kinematics/structure/chain_residuals.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
 namespace {
-
-// Residual of the better branch, whitened, and that branch's penalty.
-struct SampleResidual {
-  Vector6d white;
-  double penalty = 0.0;
-};
-
-SampleResidual residual_of(const MotionSample& sample, const ChainKinematics& chain,
-                           const double* coordinates) {
-  SampleResidual r{sample.whitening * fast_log(chain.left_over(coordinates, sample.pose)), 0.0};
-  if (!sample.alternative) return r;
-  const Vector6d other =
-      sample.whitening * fast_log(chain.left_over(coordinates, *sample.alternative));
-  if (other.squaredNorm() + sample.alternative_cost < r.white.squaredNorm()) {
-    r.white = other;
-    r.penalty = std::max(0.0, sample.alternative_cost);
-  }
-  return r;
-}
-
-// What a model leaves of a motion.
-struct Evaluation {
-  ResidualParts parts;
-  std::vector<Vector6d> white;      // one a sample
-  std::vector<Vector6d> axis;       // whitened axis, one a sample (single joint)
-  std::vector<double> coordinates;  // samples x joints
-};
-
-void find_coordinates(const Motion& motion, const ChainModel& model,
-                      const Eigen::MatrixXd& readings, std::vector<double>& out) {
-  if (is_free(model)) {
-    out = model.coordinates;
-    return;
-  }
-  out.clear();
-  for (const MotionSample& sample : motion) {
-    for (const ChainJoint& joint : model.joints) {
-      out.push_back(chain_coordinate(joint, readings, sample.instant));
-    }
-  }
-}
-
-void clear(Evaluation& e, std::size_t samples) {
-  e.white.clear();
-  e.axis.clear();
-  e.white.reserve(samples);
-  e.axis.reserve(samples);
-  for (auto* part : {&e.parts.along, &e.parts.across, &e.parts.lever, &e.parts.penalty}) {
-    part->clear();
-    part->reserve(samples);
-  }
-}
-
-Evaluation evaluate(const Motion& motion, const ChainModel& model,
-                    const Eigen::MatrixXd& readings) {
-  Evaluation e;
-  clear(e, motion.size());
-  find_coordinates(motion, model, readings, e.coordinates);
-  const ChainKinematics chain(model);
-  const std::size_t joints = model.joints.size();
-  e.parts.split = joints == 1;
-  e.parts.free_axis = is_free(model);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    const SampleResidual r = residual_of(motion[i], chain, e.coordinates.data() + i * joints);
-    double along = 0.0;
-    if (e.parts.split) {
-      e.axis.emplace_back(motion[i].whitening * chain.last_axis());
-      e.parts.lever.push_back(e.axis.back().norm());
-      along = e.axis.back().dot(r.white) / e.parts.lever.back();
-    }
-    e.white.push_back(r.white);
-    e.parts.along.push_back(along);
-    e.parts.across.push_back(std::max(0.0, r.white.squaredNorm() - along * along));
-    e.parts.penalty.push_back(r.penalty);
-  }
-  return e;
-}
-
-struct Normal {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd g;
-};
-
-// Sums A' A over rows that come six at a time: products of many rows at once are what matrix
-// kernels are fast at.
-class SquareSum {
- public:
-  explicit SquareSum(Eigen::Index columns)
-      : rows_(6 * kBlock, columns), sum_(Eigen::MatrixXd::Zero(columns, columns)) {}
-
-  [[nodiscard]] auto next_rows() {
-    if (used_ == rows_.rows()) flush();
-    used_ += 6;
-    return rows_.middleRows<6>(used_ - 6);
-  }
-  [[nodiscard]] Eigen::MatrixXd sum() && {
-    flush();
-    sum_.triangularView<Eigen::StrictlyUpper>() = sum_.transpose();
-    return std::move(sum_);
-  }
-
- private:
-  static constexpr Eigen::Index kBlock = 40;
-
-  void flush() {
-    sum_.selfadjointView<Eigen::Lower>().rankUpdate(rows_.topRows(used_).transpose());
-    used_ = 0;
-  }
-
-  Eigen::MatrixXd rows_;
-  Eigen::MatrixXd sum_;
-  Eigen::Index used_ = 0;
-};
-
-// Normal equations of the weighted residuals; of the part along the joint, `axis_weight`.
-Normal linearise(const Motion& motion, const ChainModel& model, const Eigen::MatrixXd& readings,
-                 double axis_weight, const Evaluation& e, const std::vector<double>& weights) {
-  const int size = parameter_count(model);
-  const ChainKinematics chain(model);
-  const std::size_t joints = model.joints.size();
-  const bool reduced = joints == 1 && axis_weight < 1.0;
-  const double drop = 1.0 - std::sqrt(axis_weight);
-  ChainJacobian J(6, size);
-  SquareSum square(size + 1);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    if (weights[i] <= 0.0) continue;
-    chain.jacobian(e.coordinates.data() + i * joints, readings, motion[i].instant, J);
-    Matrix6d W = std::sqrt(weights[i]) * motion[i].whitening;
-    Vector6d white = std::sqrt(weights[i]) * e.white[i];
-    if (reduced) {
-      const Vector6d u = e.axis[i] / e.parts.lever[i];
-      white -= drop * u.dot(white) * u;
-      W -= (drop * u) * (u.transpose() * W).eval();
-    }
-    auto rows = square.next_rows();
-    for (Eigen::Index c = 0; c < size - 6; ++c) rows.col(c).noalias() = W * J.col(c);
-    rows.middleCols<6>(size - 6) = W;
-    rows.col(size) = white;
-  }
-  const Eigen::MatrixXd sum = std::move(square).sum();
-  return {sum.topLeftCorner(size, size), sum.col(size).head(size)};
-}
 
 void apply_step(ChainModel& model, const Eigen::VectorXd& step) {
   Eigen::Index column = 0;
@@ -168,7 +26,7 @@ void apply_step(ChainModel& model, const Eigen::VectorXd& step) {
 }
 
 // Moves every free coordinate to where its sighting wants it (one Gauss-Newton step).
-void update_coordinates(ChainModel& model, const Evaluation& e) {
+void update_coordinates(ChainModel& model, const ChainResiduals& e) {
   const double limit = model.joints.front().type == JointType::kRevolute ? 0.7 : 1e3;
   for (std::size_t i = 0; i < model.coordinates.size(); ++i) {
     model.coordinates[i] += std::clamp(e.parts.along[i] / e.parts.lever[i], -limit, limit);
@@ -193,7 +51,7 @@ std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd&
   return sigma;
 }
 
-void describe(const Motion& motion, const Evaluation& e, const ResidualScale& scale,
+void describe(const Motion& motion, const ChainResiduals& e, const ResidualScale& scale,
               ChainFit& fit) {
   std::vector<double> rotation;
   std::vector<double> translation;
@@ -222,14 +80,15 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
   const bool free = is_free(start);
   const double axis_weight = free ? 0.0 : options.axis_weight;
   ChainModel model = std::move(start);
-  Evaluation e = evaluate(motion, model, readings);
+  ChainResiduals e = chain_residuals(motion, model, readings);
   ResidualScale scale = residual_scale(e.parts, options.outlier_cost);
   double damping = model.joints.size() > 1 ? 1e-3 : 1e-7;
-  Normal normal;
+  NormalEquations normal;
   bool moved = true;  // since the last linearisation
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     if (moved) {
-      normal = linearise(motion, model, readings, axis_weight, e, robust_weights(e.parts, scale));
+      normal =
+          normal_equations(motion, model, readings, axis_weight, e, robust_weights(e.parts, scale));
     }
     ChainModel next = model;
     Eigen::MatrixXd damped = normal.H;
@@ -237,8 +96,8 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
     const Eigen::VectorXd step = damped.ldlt().solve(normal.g);
     if (!step.allFinite()) break;
     apply_step(next, step);
-    if (free) update_coordinates(next, evaluate(motion, next, readings));
-    Evaluation e_next = evaluate(motion, next, readings);
+    if (free) update_coordinates(next, chain_residuals(motion, next, readings));
+    ChainResiduals e_next = chain_residuals(motion, next, readings);
     const ResidualScale scale_next = residual_scale(e_next.parts, options.outlier_cost);
     const double gain = scale.cost - scale_next.cost;
     moved = gain > 0.0;
@@ -255,7 +114,8 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
     }
   }
   if (normal.H.size() == 0) {
-    normal = linearise(motion, model, readings, axis_weight, e, robust_weights(e.parts, scale));
+    normal =
+        normal_equations(motion, model, readings, axis_weight, e, robust_weights(e.parts, scale));
   }
   fit.covariance = covariance_of(normal.H, std::max(scale.across, scale.along));
   fit.scale_sigma = scale_sigmas(model, fit.covariance);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 
 #include "kinematics/structure/time_offset.h"
@@ -16,6 +15,8 @@ namespace {
 constexpr double kOffsetMoved = 3e-3;
 constexpr double kSameSigmas = 2.0;
 constexpr int kMostGrowths = 4;
+// Instants of the series on which an offset is looked for first.
+constexpr int kRoughInstants = 80;
 // How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
 constexpr double kClearly = 25.0;
 // Variances over the declared ones up to which a tree explains all there is.
@@ -23,7 +24,7 @@ constexpr double kNoiseOnly = 1.5;
 
 // Channels of one log are mostly of one kind: when the clear joints are in rad and m, the others
 // are too.
-double si_share_of(const GrownTree& tree, const Readings& readings) {
+double si_share_of(const GrownTree& tree, const Readings& readings, double unknown) {
   int si = 0;
   int driven = 0;
   for (const GrownLink& link : tree.links) {
@@ -39,7 +40,7 @@ double si_share_of(const GrownTree& tree, const Readings& readings) {
       t += joint.terms.size();
     }
   }
-  return driven >= 3 && 3 * si > 2 * driven ? 0.98 : readings.si_share;
+  return driven >= 3 && 3 * si > 2 * driven ? 0.98 : unknown;
 }
 
 bool has_driven_joint(const GrownTree& tree) {
@@ -49,14 +50,6 @@ bool has_driven_joint(const GrownTree& tree) {
 
 bool has_free_body(const GrownTree& tree) {
   return std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
-}
-
-double most_correlated(const GrownTree& tree) {
-  double correlation = 1.0;
-  for (const GrownBody& b : tree.bodies) {
-    if (b.link > 0) correlation = std::max(correlation, b.attachment.fit.correlation);
-  }
-  return correlation;
 }
 
 // Penalised cost as if the log covered every instant, so that offsets may be compared.
@@ -84,80 +77,57 @@ bool explains_all(const GrownTree& tree) {
 
 class Search {
  public:
-  Search(const Series& thin, const JointLog& log, const StructureOptions& options)
-      : thin_(thin), log_(log), options_(options) {}
+  Search(const Series& full, const Series& thin, const JointLog& log,
+         const StructureOptions& options)
+      : thin_(thin), rough_(thinned(full, kRoughInstants)), log_(log), options_(options) {}
 
-  [[nodiscard]] FoundTree grow_at(double offset_s, const GrowthOptions& growth = {}) const {
+  // `si_share`: how likely channels are in rad and m; 0: as nothing is known.
+  [[nodiscard]] FoundTree grow_at(double offset_s, const Series& series,
+                                  const GrowthOptions& growth = {}, double si_share = 0.0) const {
     FoundTree found;
     found.offset.value_s = offset_s;
-    found.readings = readings_at(log_, thin_, offset_s, options_.max_gap_s);
-    found.tree = grow_tree(thin_, found.readings, growth);
-    const double si_share = si_share_of(found.tree, found.readings);
-    if (si_share > found.readings.si_share) {
-      found.readings.si_share = si_share;
-      found.tree = grow_tree(thin_, found.readings, growth);
+    found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
+    const double unknown = found.readings.si_share;
+    found.readings.si_share = std::max(si_share, unknown);
+    found.tree = grow_tree(series, found.readings, growth);
+    const double told = si_share_of(found.tree, found.readings, unknown);
+    if (told != found.readings.si_share) {
+      found.readings.si_share = told;
+      found.tree = grow_tree(series, found.readings, growth);
     }
     return found;
   }
 
-  // Tree and offset settled on each other.
+  // Tree and offset settled on each other: first on few instants, for the offset's sake.
   [[nodiscard]] FoundTree settle_at(double start_s, double step_s,
                                     const GrowthOptions& options) const {
-    FoundTree found = grow_at(start_s, options);
+    double offset_s = start_s;
+    double si_share = 0.0;
+    if (2 * rough_.size() <= thin_.size()) {
+      const FoundTree rough = grow_at(start_s, rough_, options);
+      si_share = rough.readings.si_share;
+      if (has_driven_joint(rough.tree)) offset_s = refined(rough, step_s).value_s;
+    }
+    FoundTree found = grow_at(offset_s, thin_, options, si_share);
     for (int growth = 1; growth < kMostGrowths && has_driven_joint(found.tree); ++growth) {
-      const TimeOffset refined = refine_offset(found, step_s);
-      const double moved = std::abs(refined.value_s - found.offset.value_s);
-      found.offset.sigma_s = refined.sigma_s;
-      if (moved < std::min(kOffsetMoved, kSameSigmas * refined.sigma_s)) break;
-      found = grow_at(refined.value_s, options);
-      found.offset.sigma_s = refined.sigma_s;
+      const TimeOffset offset = refined(found, step_s);
+      const double moved = std::abs(offset.value_s - found.offset.value_s);
+      found.offset.sigma_s = offset.sigma_s;
+      if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) break;
+      found = grow_at(offset.value_s, thin_, options, found.readings.si_share);
+      found.offset.sigma_s = offset.sigma_s;
     }
     return found;
   }
 
  private:
-  // Walks downhill to a minimum of the tree's cost, then narrows it by parabolas down to its sigma.
-  [[nodiscard]] TimeOffset refine_offset(const FoundTree& found, double step_s) const {
-    constexpr double kFinest = 1e-5;  // s
-    constexpr int kMostSteps = 24;
-    std::map<double, double> known;
-    const auto cost_at = [&](double value_s) {
-      const auto [place, is_new] = known.try_emplace(value_s, 0.0);
-      if (is_new) place->second = cost_of(found, value_s);
-      return place->second;
-    };
-    const double correlation = most_correlated(found.tree);
-    TimeOffset offset = found.offset;
-    double step = 0.5 * step_s;
-    for (int k = 0; k < kMostSteps; ++k) {
-      const double left = cost_at(offset.value_s - step);
-      const double middle = cost_at(offset.value_s);
-      const double right = cost_at(offset.value_s + step);
-      if (std::min(left, right) < middle) {
-        const double next = offset.value_s + (left < right ? -step : step);
-        if (std::abs(next) > options_.max_time_offset_s) break;
-        offset.value_s = next;
-        continue;
-      }
-      const double curvature = (left - 2.0 * middle + right) / (step * step);
-      if (!(curvature > 0.0)) break;
-      offset.value_s += 0.5 * (left - right) / (curvature * step);
-      offset.sigma_s = std::sqrt(2.0 * correlation / curvature);
-      const double next = std::max({0.25 * step, 0.5 * offset.sigma_s, kFinest});
-      if (next > 0.7 * step) break;
-      step = next;
-    }
-    return offset;
-  }
-
-  [[nodiscard]] double cost_of(const FoundTree& found, double offset_s) const {
-    const Readings r = readings_like(found.readings, log_, thin_, offset_s, options_.max_gap_s);
-    const auto valid = std::max<double>(1.0, static_cast<double>(std::ranges::count(r.valid, 1)));
-    return tree_cost(refit_tree(found.tree, thin_, r)) * static_cast<double>(r.valid.size()) /
-           valid;
+  [[nodiscard]] TimeOffset refined(const FoundTree& found, double step_s) const {
+    return refine_offset(found.tree, thin_, found.readings, log_, found.offset.value_s,
+                         {options_.max_time_offset_s, step_s, options_.max_gap_s});
   }
 
   const Series& thin_;
+  Series rough_;
   const JointLog& log_;
   const StructureOptions& options_;
 };
@@ -166,8 +136,9 @@ class Search {
 
 FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
                       const StructureOptions& options) {
-  const Search search(thin, log, options);
-  if (!options.scan_time_offset || !thin.smooth || log.channels.empty()) return search.grow_at(0.0);
+  const Search search(full, thin, log, options);
+  if (!options.scan_time_offset || !thin.smooth || log.channels.empty())
+    return search.grow_at(0.0, thin);
   const OffsetScan scan =
       scan_time_offsets(full, log, options.max_time_offset_s, options.max_gap_s);
   std::vector<FoundTree> found;

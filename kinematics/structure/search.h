@@ -8,14 +8,10 @@
 #pragma once
 
 #include "kinematics/structure/growth.h"
+#include "kinematics/structure/refine_offset.h"
 #include "kinematics/structure/structure.h"
 
 namespace kinescope::structure_search {
-
-struct TimeOffset {
-  double value_s = 0.0;
-  double sigma_s = 0.0;
-};
 
 struct FoundTree {
   GrownTree tree;
