@@ -42,25 +42,28 @@ void add_parameter_doubt(const ChainFit& fit, const ChainKinematics& chain,
                          const std::vector<std::vector<double>>& coordinates,
                          const Readings& readings, LinkPath& path) {
   if (fit.covariance.size() == 0) return;
-  const Eigen::Index parameters = fit.covariance.rows();
-  const Eigen::MatrixXd covariance = fit.correlation * fit.covariance;
-  std::vector<ChainJacobian> jacobians(coordinates.size());
-  ChainJacobian mean = ChainJacobian::Zero(6, parameters);
+  const Eigen::Index size = fit.covariance.rows();
+  const auto instants = static_cast<Eigen::Index>(coordinates.size());
+  Eigen::MatrixXd jacobians = Eigen::MatrixXd::Zero(6 * instants, size);
+  ChainJacobian J(6, size);
+  ChainJacobian mean = ChainJacobian::Zero(6, size);
   double count = 0.0;
-  for (std::size_t i = 0; i < coordinates.size(); ++i) {
-    if (path.valid[i] == 0) continue;
-    jacobians[i].resize(6, parameters);
-    chain.jacobian(coordinates[i].data(), readings.value, static_cast<int>(i), jacobians[i]);
-    mean += jacobians[i];
+  for (Eigen::Index i = 0; i < instants; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (path.valid[at] == 0) continue;
+    chain.jacobian(coordinates[at].data(), readings.value, static_cast<int>(i), J);
+    jacobians.middleRows<6>(6 * i) = J;
+    mean += J;
     count += 1.0;
   }
   mean /= std::max(1.0, count);
-  ChainJacobian product(6, parameters);
-  for (std::size_t i = 0; i < coordinates.size(); ++i) {
-    if (path.valid[i] == 0) continue;
-    jacobians[i] -= mean;
-    product.noalias() = jacobians[i].lazyProduct(covariance);
-    path.covariance[i] += product.lazyProduct(jacobians[i].transpose());
+  for (Eigen::Index i = 0; i < instants; ++i) jacobians.middleRows<6>(6 * i) -= mean;
+  const Eigen::MatrixXd products = jacobians * (fit.correlation * fit.covariance);
+  for (Eigen::Index i = 0; i < instants; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (path.valid[at] == 0) continue;
+    path.covariance[at] +=
+        products.middleRows<6>(6 * i).lazyProduct(jacobians.middleRows<6>(6 * i).transpose());
   }
 }
 

@@ -118,13 +118,15 @@ ChainFit pruned(ChainFit fit, const Motion& motion, const Readings& readings) {
 
 ChainFit with_couplings(ChainFit fit, const Motion& motion, const Readings& readings,
                         const std::vector<char>& usable) {
-  if (fit.model.joints.size() != 1 || fit.axis_variance < 1.05 || readings.channels() < 2)
+  // Less than this cannot lose kMinShare and stay above the noise.
+  if (fit.model.joints.size() != 1 || readings.channels() < 2 ||
+      fit.axis_variance < 0.99 / (1.0 - kMinShare)) {
     return fit;
+  }
   // Terms are added greedily first and judged together afterwards: with one of two that are
   // missing, what is left still looks like a slow error.
   std::vector<ChainFit> grown;
-  grown.push_back(
-      fit_chain(motion, readings.value, fit.model, {.max_iterations = 2, .with_residuals = true}));
+  grown.push_back(fit);
   while (static_cast<int>(grown.size()) < kMostTerms && grown.back().axis_variance > 1.05) {
     const Addition addition = best_addition(grown.back(), motion, readings, usable);
     if (addition.channel < 0 || addition.share < kLeastShare) break;

@@ -23,11 +23,13 @@ constexpr double kHopelessShare = 0.01;
 constexpr std::size_t kFewestSamples = 5;
 
 // Fits with the weight along the joint that its inexactness asks for.
-ChainFit fit_weighted(const Motion& motion, const Readings& readings, const ChainModel& start) {
-  ChainFit fit = fit_chain(motion, readings.value, start);
+ChainFit fit_weighted(const Motion& motion, const Readings& readings, const ChainModel& start,
+                      bool with_residuals) {
+  ChainFit fit = fit_chain(motion, readings.value, start, {.with_residuals = with_residuals});
   if (fit.axis_variance > 2.0 * kInexact) {
     ChainFit again =
-        fit_chain(motion, readings.value, fit.model, {.axis_weight = 1.0 / fit.axis_variance});
+        fit_chain(motion, readings.value, fit.model,
+                  {.axis_weight = 1.0 / fit.axis_variance, .with_residuals = with_residuals});
     if (again.cost < fit.cost) fit = std::move(again);
   }
   return fit;
@@ -41,13 +43,14 @@ class Refiner {
       : body_(body), relative_(relative), readings_(readings), usable_(usable), parent_(parent) {}
 
   void refine(const Candidate& candidate) {
-    ChainFit fit = fit_weighted(relative_.motion, readings_, candidate.start);
+    ChainFit fit = fit_weighted(relative_.motion, readings_, candidate.start, true);
     if (candidate.channel >= 0) {
       fit = with_couplings(std::move(fit), relative_.motion, readings_, usable_);
     } else if (!candidate.start.joints.empty()) {
       const auto driven = driven_by_best_channel(fit.model, relative_.motion, readings_, usable_);
       if (driven) refine(*driven);
     }
+    fit.residuals = {};
     out_.push_back(attachment_from(std::move(fit), parent_, relative_, body_, readings_));
     best_ = std::min(best_, out_.back().data_cost);
   }
@@ -124,7 +127,7 @@ Attachment refit(const Attachment& attachment, const Body& body, const LinkPath&
     // Free coordinates belong to samples: take them anew from the sightings.
     start.coordinates = coordinates_from(relative.motion, start);
   }
-  ChainFit fit = fit_weighted(relative.motion, readings, start);
+  ChainFit fit = fit_weighted(relative.motion, readings, start, false);
   Attachment a = attachment_from(std::move(fit), attachment.parent, relative, body, readings);
   a.order_doubts = attachment.order_doubts;
   return a;

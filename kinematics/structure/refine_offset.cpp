@@ -140,8 +140,10 @@ TimeOffset refine_offset(const GrownTree& tree, const Series& series, const Read
   double step = 0.0;
   for (int k = 0; k < kMostSteps; ++k) {
     const double at = best.value_s + step;
-    const Readings here = readings_like(readings, log, series, at, bounds.max_gap_s);
-    const GrownTree fitted = refit_tree(tree, series, here);
+    const bool as_grown = k == 0 && tree.links.front().path.pose.size() == series.times_s.size();
+    const Readings here =
+        as_grown ? readings : readings_like(readings, log, series, at, bounds.max_gap_s);
+    const GrownTree fitted = as_grown ? tree : refit_tree(tree, series, here);
     const double cost = cost_of(fitted, here);
     if (cost > least) {
       // Too far: half the way.

@@ -23,7 +23,7 @@ struct OffsetBounds {
   double max_gap_s = 0.5;  ///< of the log
 };
 
-/// `readings` are those at `start_s`. The tree may have been grown on another series.
+/// `readings` are those of the tree, at `start_s`. It may have been grown on another series.
 [[nodiscard]] TimeOffset refine_offset(const GrownTree& tree, const Series& series,
                                        const Readings& readings, const JointLog& log,
                                        double start_s, const OffsetBounds& bounds);

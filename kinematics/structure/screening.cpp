@@ -19,6 +19,8 @@ namespace {
 
 // Rotation slopes below this many standard deviations are no evidence for a turn.
 constexpr double kTurnEvidence = 3.5;
+// Cost beyond which, with one more a sample, a direction is not looked at any further.
+constexpr double kFar = 100.0;
 // Medians of chi-square with 5 and 6 degrees of freedom.
 constexpr double kMedian5 = 4.3515;
 constexpr double kMedian6 = 5.3481;
@@ -259,13 +261,18 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
       out.push_back(std::move(c));
     }
   }
+  // In this first regression, with one whitening for all samples, nothing that comes close to the
+  // best is further from it.
+  const double far = (r.driven.empty() ? r.principal.cost : r.driven.front().cost) + kFar +
+                     static_cast<double>(linear.count);
   const auto channels = std::min(r.driven.size(), static_cast<std::size_t>(options.max_channels));
   for (std::size_t k = 0; k < channels; ++k) {
     if (k > 0 && is_hopeless(linear, q, r.driven[k])) continue;
+    if (r.driven[k].cost > far) continue;
     const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
     add_candidates(linear, problem, r.driven[k], readings_k, out);
   }
-  if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0) {
+  if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0 && r.principal.cost < far) {
     const Eigen::VectorXd along =
         linear.y.transpose() * r.principal.slope / r.principal.slope.squaredNorm();
     add_candidates(linear, problem, r.principal, along, out);

@@ -75,6 +75,20 @@ bool explains_all(const GrownTree& tree) {
   });
 }
 
+// Every channel that moves drives a joint.
+bool uses_all(const FoundTree& found) {
+  std::vector<char> used(found.readings.mean.size(), 0);
+  for (const GrownLink& link : found.tree.links) {
+    if (link.founder >= 0 && link.attachment.driven()) {
+      used[static_cast<std::size_t>(link.attachment.channel())] = 1;
+    }
+  }
+  for (int c = 0; c < found.readings.channels(); ++c) {
+    if (found.readings.moves(c) && used[static_cast<std::size_t>(c)] == 0) return false;
+  }
+  return true;
+}
+
 class Search {
  public:
   Search(const Series& full, const Series& thin, const JointLog& log,
@@ -105,8 +119,10 @@ class Search {
     double si_share = 0.0;
     if (2 * rough_.size() <= thin_.size()) {
       const FoundTree rough = grow_at(start_s, rough_, options);
-      si_share = rough.readings.si_share;
-      if (has_driven_joint(rough.tree)) offset_s = refined(rough, step_s).value_s;
+      if (has_driven_joint(rough.tree) && !has_free_body(rough.tree)) {
+        si_share = rough.readings.si_share;
+        offset_s = refined(rough, step_s).value_s;
+      }
     }
     FoundTree found = grow_at(offset_s, thin_, options, si_share);
     for (int growth = 1; growth < kMostGrowths && has_driven_joint(found.tree); ++growth) {
@@ -139,16 +155,19 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
   const Search search(full, thin, log, options);
   if (!options.scan_time_offset || !thin.smooth || log.channels.empty())
     return search.grow_at(0.0, thin);
-  const OffsetScan scan =
-      scan_time_offsets(full, log, options.max_time_offset_s, options.max_gap_s);
+  // Joints in series without markers between are a long search: not at every offset.
+  const GrowthOptions quick{.paths_of_several_joints = false};
+  const double step_s = offset_step(readings_at(log, thin, 0.0, options.max_gap_s));
   std::vector<FoundTree> found;
-  for (const double start_s : scan.likely) {
+  found.push_back(search.settle_at(0.0, step_s, quick));
+  if (explains_all(found.back().tree) && uses_all(found.back())) return std::move(found.back());
+  for (const double start_s :
+       scan_time_offsets(full, log, step_s, options.max_time_offset_s, options.max_gap_s)) {
     const bool known = std::ranges::any_of(found, [&](const FoundTree& f) {
-      return std::abs(f.offset.value_s - start_s) < 0.5 * scan.step_s;
+      return std::abs(f.offset.value_s - start_s) < 0.5 * step_s;
     });
     if (known) continue;
-    // Joints in series without markers between are a long search: not at every offset.
-    found.push_back(search.settle_at(start_s, scan.step_s, {.paths_of_several_joints = false}));
+    found.push_back(search.settle_at(start_s, step_s, quick));
     if (explains_all(found.back().tree)) return std::move(found.back());
   }
   std::ranges::stable_sort(found, {},
@@ -158,7 +177,7 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
     if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
   }
   if (!has_free_body(found[best].tree)) return std::move(found[best]);
-  return search.settle_at(found[best].offset.value_s, scan.step_s, {});
+  return search.settle_at(found[best].offset.value_s, step_s, {});
 }
 
 }  // namespace kinescope::structure_search

@@ -151,19 +151,23 @@ void swap_branch(Sighting& s) {
   s.alternative_cost = -s.alternative_cost;
 }
 
-// Takes the branch that agrees with the neighbours; drops the sighting when none does.
-void clean_in_time(Body& body, const Deviations& d) {
+// Takes the branch that agrees with the neighbours; drops the sighting when none does. True when
+// anything changed.
+bool clean_in_time(Body& body, const Deviations& d) {
+  bool changed = false;
   for (std::size_t f = 0; f < body.at.size(); ++f) {
     // The neighbours' own spread allows for fast motion, above all where they lie on one side only.
     const double limit =
         std::max({kOutlierRatio * d.median, kOutlierFloor, kOutlierRatio * d.spread[f]});
     if (!body.at[f].seen || std::isnan(d.main[f]) || d.main[f] <= limit) continue;
+    changed = true;
     if (d.alternative[f] < limit) {
       swap_branch(body.at[f]);
     } else {
       body.at[f].seen = false;
     }
   }
+  return changed;
 }
 
 // Robust noise over declared noise from fourth differences of the pose, which see no motion slower
@@ -315,8 +319,7 @@ Series clean_series(const PoseTracks& tracks) {
     if (d.median > 0.0) ++judged;
     if (!is_smooth(body, d, series.times_s)) continue;
     ++smooth;
-    clean_in_time(body, d);
-    clean_in_time(body, deviations_of(body, series.times_s));
+    if (clean_in_time(body, d)) clean_in_time(body, deviations_of(body, series.times_s));
     const auto noise = noise_from_differences(body);
     if (noise) scale_noise(body, std::max(*noise, kLeastNoiseScale));
   }

@@ -12,7 +12,6 @@
 #include <numeric>
 
 #include "kinematics/structure/linear_motion.h"
-#include "kinematics/structure/readings.h"
 #include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/wide_turn.h"
 
@@ -230,17 +229,6 @@ double tree_cost_at(const std::vector<Pair>& pairs, std::size_t bodies, const Re
   return sum;
 }
 
-// A fraction of the time in which the fastest channel changes.
-double scan_step(const Readings& readings) {
-  double fastest = 0.0;
-  for (Eigen::Index c = 0; c < readings.value.cols(); ++c) {
-    if (!readings.moves(static_cast<int>(c))) continue;
-    const double n = static_cast<double>(std::max<Eigen::Index>(1, readings.rate.rows()));
-    fastest = std::max(fastest, std::sqrt(readings.rate.col(c).squaredNorm() / n));
-  }
-  return fastest > 0.0 ? std::clamp(0.25 / fastest, kFinestStep, kCoarsestStep) : kCoarsestStep;
-}
-
 // Local minima by cost, down to half as deep below the usual cost as the best; the middle one (no
 // offset) is always among them.
 std::vector<int> minima_of(const std::vector<double>& cost) {
@@ -270,21 +258,29 @@ double vertex(const std::vector<double>& cost, int s) {
 
 }  // namespace
 
-OffsetScan scan_time_offsets(const Series& series, const JointLog& log, double half_width_s,
-                             double max_gap_s) {
+double offset_step(const Readings& readings) {
+  double fastest = 0.0;
+  for (Eigen::Index c = 0; c < readings.value.cols(); ++c) {
+    if (!readings.moves(static_cast<int>(c))) continue;
+    const double n = static_cast<double>(std::max<Eigen::Index>(1, readings.rate.rows()));
+    fastest = std::max(fastest, std::sqrt(readings.rate.col(c).squaredNorm() / n));
+  }
+  return fastest > 0.0 ? std::clamp(0.25 / fastest, kFinestStep, kCoarsestStep) : kCoarsestStep;
+}
+
+std::vector<double> scan_time_offsets(const Series& series, const JointLog& log, double step_s,
+                                      double half_width_s, double max_gap_s) {
   const Series thin = thinned(series, kMostInstants);
   const std::vector<Pair> pairs = all_pairs(thin);
-  OffsetScan scan{scan_step(readings_at(log, thin, 0.0, max_gap_s)), {}};
-  const int steps = std::max(1, static_cast<int>(std::floor(half_width_s / scan.step_s)));
+  const int steps = std::max(1, static_cast<int>(std::floor(half_width_s / step_s)));
   std::vector<double> cost;
   for (int s = -steps; s <= steps; ++s) {
-    const Readings readings = readings_at(log, thin, s * scan.step_s, max_gap_s);
+    const Readings readings = readings_at(log, thin, s * step_s, max_gap_s);
     cost.push_back(tree_cost_at(pairs, thin.bodies.size(), readings));
   }
-  for (const int s : minima_of(cost)) {
-    scan.likely.push_back((vertex(cost, s) - steps) * scan.step_s);
-  }
-  return scan;
+  std::vector<double> likely;
+  for (const int s : minima_of(cost)) likely.push_back((vertex(cost, s) - steps) * step_s);
+  return likely;
 }
 
 }  // namespace kinescope::structure_search

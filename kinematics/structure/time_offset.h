@@ -5,19 +5,18 @@
 
 #include <vector>
 
-#include "kinematics/log/joint_log.h"
-#include "kinematics/structure/series.h"
+#include "kinematics/structure/readings.h"
 
 namespace kinescope::structure_search {
 
-struct OffsetScan {
-  double step_s = 0.0;         ///< of the scan: a fraction of the time in which channels change
-  std::vector<double> likely;  ///< offsets worth a structure each, best first, 0 among them
-};
+/// A fraction of the time in which the fastest channel changes.
+[[nodiscard]] double offset_step(const Readings& readings);
 
-/// Minima of a likelihood over offsets within `half_width_s`, in which bodies hang on each other
-/// as a tree of single joints. Cost O(bodies^2 * channels * offsets).
-[[nodiscard]] OffsetScan scan_time_offsets(const Series& series, const JointLog& log,
-                                           double half_width_s, double max_gap_s);
+/// Offsets worth a structure each, best first, 0 among them: minima of a likelihood over offsets
+/// within `half_width_s`, in which bodies hang on each other as a tree of single joints. Cost
+/// O(bodies^2 * channels * offsets).
+[[nodiscard]] std::vector<double> scan_time_offsets(const Series& series, const JointLog& log,
+                                                    double step_s, double half_width_s,
+                                                    double max_gap_s);
 
 }  // namespace kinescope::structure_search
