@@ -126,6 +126,8 @@ void add_run(CLI::App& app, CommandLine& line) {
                  "Limit that turns the exit code to 5, such as held_out_px>0.2; may be given again")
       ->type_name("LIMIT")
       ->allow_extra_args(false);
+  run.add_flag("!--no-trace", line.run.trace,
+               "Do not look for effects that the calibration lacks (trace.json)");
   run.add_flag("--force", line.run.force, "Run every stage again, also where nothing changed");
   add_output_options(run, line.output);
   run.footer(fmt::format(

@@ -35,6 +35,7 @@ struct RunOptions {
   DetectOptions detect;
   CalibrateOptions calibrate;
   bool estimate_intrinsics = false;
+  bool trace = true;   ///< close the loop: look for effects that the calibration lacks
   bool force = false;  ///< run every stage again, also where nothing changed
   std::vector<std::string>
       fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5

@@ -12,8 +12,10 @@
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
+#include "app/commands/trace_stage.h"
 #include "app/io/products.h"
 #include "app/report/report.h"
+#include "app/report/trace_json.h"
 #include "calib/quality/error_summary.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/file.h"
@@ -83,15 +85,12 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
 
   CalibrateOptions calibrate_options = options.calibrate;
   calibrate_options.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
-  const auto calibrate_from = [&](const CalibrationStart& start) {
-    return calibrate(observed.measurements, recording.markers, recording.log, start,
-                     calibrate_options, console.progress);
-  };
+  CalibrationStart begin;
   if (recording.nominal) {
     const CalibrationStart start =
         start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
     clock.lap("structure", run.times);
-    run.calibration = calibrate_from(start);
+    begin = start;
   } else {
     run.structure = find_robot(recording, run.tracks, options.calibrate);
     // What was found is shown also where it is no answer, but never over an earlier answer.
@@ -100,10 +99,19 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     }
     require_determined(*run.structure);
     clock.lap("structure", run.times);
-    run.calibration = calibrate_from(start_from_structure(*run.structure, recording, camera));
+    begin = start_from_structure(*run.structure, recording, camera);
+  }
+  run.calibration = calibrate(observed.measurements, recording.markers, recording.log, begin,
+                              calibrate_options, console.progress);
+  clock.lap("calibrate", run.times);
+  if (options.trace) {
+    TracedCalibration traced = trace_stage(recording, observed, begin, run.calibration,
+                                           calibrate_options, console.progress);
+    run.trace = std::move(traced.trace);
+    run.calibration = std::move(traced.calibration);
+    clock.lap("trace", run.times);
   }
   run.errors = summarise_errors(run.calibration);
-  clock.lap("calibrate", run.times);
 
   const std::string urdf = write_urdf(run.calibration.tree);
   if (run.structure) {
@@ -112,6 +120,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   folder.write("robot.urdf", urdf);
   folder.write("calibration.json", calibration_json(run.calibration).dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));
+  if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");
   folder.write("result.json", result_json(run).dump(2) + "\n");
   clock.lap("write", run.times);
   run.torque =

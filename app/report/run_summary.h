@@ -11,6 +11,7 @@
 #include "calib/bundle/calibration.h"
 #include "calib/camera/marker_set.h"
 #include "calib/quality/error_summary.h"
+#include "calib/trace/trace_result.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/structure/pose_tracks.h"
 #include "kinematics/structure/structure.h"
@@ -58,6 +59,7 @@ struct RunSummary {
   std::optional<Structure> structure;  ///< none when a nominal robot was given
   std::optional<KinematicTree> nominal;
   Calibration calibration;
+  std::optional<Trace> trace;  ///< none where it was not asked for
   ErrorSummary errors;
   std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without
 };

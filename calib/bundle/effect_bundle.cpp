@@ -33,6 +33,11 @@ constexpr double kDifferenceVariance = 1.26;
 constexpr int kMostFrames = 2500;
 constexpr int kFolds = 5;
 
+std::size_t path_length(const Spec& spec, const Sighting& sighting) {
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  return spec.path[marker.link.index()].size();
+}
+
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -57,6 +62,19 @@ double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
   return sum / static_cast<double>(own.size()) / kDifferenceVariance;
 }
 
+// Corners are off by this much in ways that repeat with the view.
+constexpr double kCornerBias = 0.02;  // px
+
+// The residual that stays the same, root mean square over the rows.
+double lasting_part(const std::vector<Eigen::VectorXd>& series) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(series.front().size());
+  for (const Eigen::VectorXd& r : series) {
+    if (r.size() == sum.size()) sum += r;
+  }
+  return sum.norm() / static_cast<double>(series.size()) /
+         std::sqrt(static_cast<double>(sum.size()));
+}
+
 // Multiplies a sighting's sigma.
 void widen(Sighting& sighting, double factor) {
   sighting.sigma *= factor;
@@ -65,8 +83,13 @@ void widen(Sighting& sighting, double factor) {
 
 // Thins and weighs sightings by how they differ from their neighbours in time; gives those that do
 // not stand out.
-std::vector<int> choose_by_neighbours(Spec& spec, const State& state,
-                                      const std::vector<int>& usable, double reject_sigma) {
+struct Chosen {
+  std::vector<int> used;
+  double bias_px = kCornerBias;
+};
+
+Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
+                            double reject_sigma) {
   const Readings readings(spec, state.time_offset[0]);
   std::map<int, std::vector<int>> of_marker;
   std::map<int, std::vector<Eigen::VectorXd>> residuals;
@@ -77,26 +100,40 @@ std::vector<int> choose_by_neighbours(Spec& spec, const State& state,
     of_marker[sighting.marker].push_back(index);
     residuals[sighting.marker].push_back(error->residual);
   }
-  std::vector<int> used;
+  Chosen out;
+  double resting_bias_px = 0.0;
+  bool any_rests = false;
   for (const auto& [marker, indices] : of_marker) {
     std::vector<double> distance;
     for (std::size_t i = 0; i < indices.size(); ++i) {
       distance.push_back(stands_out(residuals[marker], i));
     }
     const double typical = std::max(median_of(distance), 1e-12);
+    const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
+    double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
+    // A marker at rest repeats its bias in every frame: all of them together say what one does. Of
+    // the bias the fit has taken most away (six of eight rows by the camera's pose).
+    const bool rests = path_length(spec, first) == 0;
+    if (rests) {
+      const double seen = 2.0 * lasting_part(residuals[marker]);
+      any_rests = true;
+      resting_bias_px = std::max(resting_bias_px, seen * first.sigma);
+      bias = std::max(bias, seen) * std::sqrt(static_cast<double>(indices.size()));
+    }
     for (std::size_t i = 0; i < indices.size(); ++i) {
       Sighting& sighting = spec.sightings[static_cast<std::size_t>(indices[i])];
       const double freedom = sighting.dimension();
       // Median and scatter of a mean of `freedom` squares, to first order.
       const double noise = typical / (1.0 - 2.0 / (9.0 * freedom));
-      widen(sighting, std::sqrt(noise));
+      widen(sighting, std::sqrt(noise + bias * bias));
       if (distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
-        used.push_back(indices[i]);
+        out.used.push_back(indices[i]);
       }
     }
   }
-  std::ranges::sort(used);
-  return used;
+  std::ranges::sort(out.used);
+  if (any_rests) out.bias_px = resting_bias_px;
+  return out;
 }
 
 std::vector<int> thin_frames(const Spec& spec, const std::vector<int>& usable) {
@@ -126,6 +163,7 @@ struct EffectBundle::Impl {
   double offset_start_s = 0.0;
   std::vector<int> used;
   std::vector<int> fold;
+  double bias_px = kCornerBias;
 
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
@@ -147,7 +185,9 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
     spec = std::move(robust);
     impl_->used = solution.used;
   } else {
-    impl_->used = choose_by_neighbours(spec, state, usable, options.reject_sigma);
+    Chosen chosen = choose_by_neighbours(spec, state, usable, options.reject_sigma);
+    impl_->used = std::move(chosen.used);
+    impl_->bias_px = chosen.bias_px;
   }
   impl_->offset_start_s = state.time_offset[0];
   impl_->start = state;
@@ -327,6 +367,7 @@ JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s) const
 const KinematicTree& EffectBundle::tree() const { return impl_->spec.tree; }
 MeasurementKind EffectBundle::kind() const { return impl_->spec.kind; }
 const CameraModel& EffectBundle::camera() const { return impl_->spec.camera; }
+double EffectBundle::corner_bias_px() const { return impl_->bias_px; }
 bool EffectBundle::postures() const { return impl_->spec.postures; }
 const std::vector<int>& EffectBundle::fold_of_frame() const { return impl_->fold; }
 const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->spec.times_s; }

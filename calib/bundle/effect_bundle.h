@@ -68,6 +68,9 @@ class EffectBundle {
   [[nodiscard]] const KinematicTree& tree() const;
   [[nodiscard]] MeasurementKind kind() const;
   [[nodiscard]] const CameraModel& camera() const;
+  /// By how much corners are off in ways that repeat: as markers at rest show it, else a typical
+  /// one.
+  [[nodiscard]] double corner_bias_px() const;
   /// Postures at rest, each on its own: no clock, no motion.
   [[nodiscard]] bool postures() const;
   /// A fold for every frame, by posture; -1 for frames without a sighting.

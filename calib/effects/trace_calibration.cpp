@@ -4,14 +4,6 @@
 #include "calib/effects/traced_bundle.h"
 
 namespace kinescope {
-namespace {
-
-// Detectors err by this much in ways that repeat with the view: smaller effects are not told from
-// that.
-constexpr double kCornerFloor = 0.01;  // px
-
-}  // namespace
-
 CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
                                    const JointLog& log, const CalibrationStart& start,
                                    const CalibrationTraceOptions& options,
@@ -20,7 +12,8 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   const effects::TracedBundle model(bundle, options);
   TraceOptions trace_options = options.trace;
   if (bundle.kind() == MeasurementKind::kCorners && trace_options.floor == 0.0) {
-    trace_options.floor = kCornerFloor;
+    // An effect that moves corners by less is not told from the detector's own errors.
+    trace_options.floor = bundle.corner_bias_px();
   }
   if (options.calibrate.estimate_time_offset && !bundle.postures()) {
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/trace_stage.h"
+
+namespace kinescope {
+namespace {
+
+// From where the plain calibration ended; a nominal robot stays the start, since its prior is
+// around it.
+CalibrationStart continued(const CalibrationStart& start, const Calibration& plain) {
+  CalibrationStart out = start;
+  if (start.nominal) {
+    out.T_camera_base = plain.T_camera_base;
+    out.tree.markers = plain.tree.markers;
+    return out;
+  }
+  out.tree = plain.tree;
+  out.T_camera_base = plain.T_camera_base;
+  out.camera = plain.camera;
+  out.time_offset_s = plain.time_offset_s;
+  if (!start.joint_values.size()) return out;
+  out.joint_values = plain.joint_values;
+  return out;
+}
+
+}  // namespace
+
+TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
+                              const CalibrationStart& start, const Calibration& plain,
+                              const CalibrateOptions& options, const Progress& progress) {
+  CalibrationTraceOptions trace_options;
+  trace_options.calibrate = options;
+  // A declared gravity, and a nominal robot, put the base upright.
+  if (recording.settings.gravity || start.nominal) {
+    trace_options.gravity_base = -Eigen::Vector3d::UnitZ();
+  }
+  CalibrationStart from = continued(start, plain);
+  const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
+                                                   recording.log, from, trace_options, progress);
+  TracedCalibration out{found.trace, plain};
+  if (found.corrections.empty()) return out;
+  from.corrections = found.corrections;
+  out.calibration =
+      calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Closing the loop on a calibration: what it lacks is traced, put into it, and it is solved again.
+#pragma once
+
+#include "app/commands/pipeline.h"
+#include "calib/effects/trace_calibration.h"
+
+namespace kinescope {
+
+struct TracedCalibration {
+  Trace trace;
+  Calibration calibration;  ///< with the effects that were found
+};
+
+/// `start` is where `plain` began. The time offset stays estimated whether it is found to matter or
+/// not.
+[[nodiscard]] TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
+                                            const CalibrationStart& start, const Calibration& plain,
+                                            const CalibrateOptions& options,
+                                            const Progress& progress);
+
+}  // namespace kinescope

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// trace.json: what closing the loop found. Keys: `verdict` (effects, ambiguous, unknown, clean,
+// nothing_to_say), `reason`, `accepted` (effect, place, size, unit, interval, explained, ..),
+// `held_out_before`, `held_out_after` (value, interval, unit), `ambiguous`, `unexplained`,
+// `candidates` (every one tested, by round), `not_found` (with the smallest size that would have
+// been seen), `steps`.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "calib/trace/trace_result.h"
+
+namespace kinescope {
+
+[[nodiscard]] nlohmann::json trace_json(const Trace& trace);
+
+}  // namespace kinescope

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What tracing found, as a value.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "calib/trace/traced_model.h"
+
+namespace kinescope {
+
+enum class TraceVerdict {
+  kNotRun,
+  kEffects,      ///< named, sized, corrected; nothing else is left
+  kAmbiguous,    ///< one of several effects; this recording cannot tell which
+  kUnknown,      ///< structure is left that no known effect explains
+  kClean,        ///< the residual is noise
+  kNothingToSay  ///< the recording is too short, or the model did not converge
+};
+
+/// "not_run", "effects", "ambiguous", "unknown", "clean", "nothing_to_say".
+[[nodiscard]] std::string_view to_string(TraceVerdict verdict);
+
+struct Interval {
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// Root mean square error of a row on instants held out, with its 95 % interval.
+struct HeldOutError {
+  double value = 0.0;
+  Interval interval;
+  std::string unit;
+};
+
+struct EffectValue {
+  EffectParameter parameter;
+  double value = 0.0;
+  double sigma = 0.0;  ///< standard uncertainty, residuals correlated in time allowed for
+};
+
+struct TracedEffect {
+  EffectId id;
+  std::string words;
+  std::string check;
+  double size = 0.0;
+  std::string unit;
+  Interval interval;       ///< 95 %
+  double explained = 0.0;  ///< share of the base model's sum of squares that it alone takes away
+  std::vector<EffectValue> values;
+  double scan = 0.0;
+  std::string scan_name;  ///< empty: none
+  std::string scan_unit;
+  std::string scan_words;        ///< "joint2"; empty: the number says it
+  double p_value = 1.0;          ///< over the whole family of tests
+  HeldOutError held_out_before;  ///< with all the others, without this one
+  HeldOutError held_out_after;   ///< with all
+};
+
+/// Several effects, each of which explains what the others explain.
+struct Ambiguity {
+  std::vector<EffectId> effects;  ///< the one that is in the model first
+  std::vector<std::string> words;
+  std::string record;  ///< what to record to decide
+};
+
+enum class CandidateState {
+  kTested,    ///< not significant, or less so than another
+  kRefitted,  ///< fitted in full and not chosen
+  kAccepted,
+  kRemoved,  ///< accepted at first, did not earn its place in the end
+  kHidden    ///< the model's own parameters take its shape: this recording cannot show it
+};
+
+/// "tested", "refitted", "accepted", "removed", "hidden".
+[[nodiscard]] std::string_view to_string(CandidateState state);
+
+/// A candidate in one round.
+struct TestedCandidate {
+  int round = 0;
+  EffectId id;
+  CandidateState state = CandidateState::kTested;
+  double statistic = 0.0;  ///< F of the score test, best value of the scan
+  int parameters = 0;
+  double freedom = 0.0;  ///< of the denominator
+  double p_value = 1.0;  ///< with the scan and the family counted in
+  double scan = 0.0;
+  double size = 0.0;  ///< as the score test sees it
+  std::string unit;
+  std::optional<double> held_out;  ///< error after a refit, in the residual's unit
+};
+
+struct NotFoundEffect {
+  EffectId id;
+  bool hidden = false;         ///< cannot be seen in this recording, whatever its size
+  double smallest_size = 0.0;  ///< that would have been found in 95 of 100 recordings
+  std::string unit;
+  std::string record;  ///< hidden: what to record so that it shows
+};
+
+/// Structure that no effect explains, as a function of what it depends on most.
+struct Rest {
+  std::string place;
+  std::string unit;
+  std::string covariate;
+  std::string covariate_unit;
+  double p_value = 1.0;
+  double explained = 0.0;  ///< share of the residual's sum of squares
+  Eigen::VectorXd at;      ///< of the covariate
+  Eigen::VectorXd mean;    ///< Gaussian process, posterior
+  Eigen::VectorXd sigma;
+  Eigen::VectorXd instants;  ///< its mean at every instant
+  HeldOutError held_out_before;
+  HeldOutError held_out_after;
+};
+
+/// One round, for a reader who wants to follow.
+struct TraceStep {
+  int round = 0;
+  std::string words;
+  double rms = 0.0;  ///< training, in the residual's unit
+  HeldOutError held_out;
+};
+
+struct Trace {
+  TraceVerdict verdict = TraceVerdict::kNotRun;
+  std::string reason;                  ///< in one sentence
+  std::vector<TracedEffect> accepted;  ///< in the order in which they were found
+  std::vector<AddedEffect> added;      ///< the same, as TracedModel::fit takes them
+  std::vector<Ambiguity> ambiguities;
+  std::vector<Rest> rest;
+  std::vector<TestedCandidate> candidates;
+  std::vector<NotFoundEffect> not_found;
+  std::vector<TraceStep> steps;
+  HeldOutError held_out_before;
+  HeldOutError held_out_after;
+  double noise = 0.0;  ///< rms of what is left, in the residual's unit
+  int stretches = 0;   ///< of time, over which the noise was judged
+  double false_alarm_rate = 0.0;
+};
+
+}  // namespace kinescope
