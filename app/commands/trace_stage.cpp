@@ -4,6 +4,10 @@
 namespace kinescope {
 namespace {
 
+// The detector's corners are off by this much in ways that repeat with the view (H.264, light,
+// small markers). Corners from elsewhere are taken at their word.
+constexpr double kDetectorBias = 0.02;  // px
+
 // From where the plain calibration ended; a nominal robot stays the start, since its prior is
 // around it.
 CalibrationStart continued(const CalibrationStart& start, const Calibration& plain) {
@@ -29,6 +33,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
                               const CalibrateOptions& options, const Progress& progress) {
   CalibrationTraceOptions trace_options;
   trace_options.calibrate = options;
+  if (recording.entry == RecordingEntry::kVideo) trace_options.trace.floor = kDetectorBias;
   // A declared gravity, and a nominal robot, put the base upright.
   if (recording.settings.gravity || start.nominal) {
     trace_options.gravity_base = -Eigen::Vector3d::UnitZ();

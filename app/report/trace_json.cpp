@@ -90,7 +90,8 @@ json candidate_json(const TestedCandidate& tested) {
               {"p_value", number(tested.p_value)},
               {"at", number(tested.scan)},
               {"size", number(tested.size)},
-              {"unit", text(tested.unit)}};
+              {"unit", text(tested.unit)},
+              {"moves", number(tested.moves)}};
   if (tested.held_out) out["held_out"] = number(*tested.held_out);
   return out;
 }

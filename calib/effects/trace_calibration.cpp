@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/effects/trace_calibration.h"
 
+#include <algorithm>
+
 #include "calib/effects/traced_bundle.h"
 
 namespace kinescope {
@@ -11,9 +13,9 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
   const effects::TracedBundle model(bundle, options);
   TraceOptions trace_options = options.trace;
-  if (bundle.kind() == MeasurementKind::kCorners && trace_options.floor == 0.0) {
+  if (bundle.kind() == MeasurementKind::kCorners) {
     // An effect that moves corners by less is not told from the detector's own errors.
-    trace_options.floor = bundle.corner_bias_px();
+    trace_options.floor = std::max(trace_options.floor, bundle.corner_bias_px());
   }
   if (options.calibrate.estimate_time_offset && !bundle.postures()) {
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});

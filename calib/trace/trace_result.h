@@ -90,7 +90,9 @@ struct TestedCandidate {
   double freedom = 0.0;  ///< of the denominator
   double p_value = 1.0;  ///< with the scan and the family counted in
   double scan = 0.0;
-  double size = 0.0;  ///< as the score test sees it
+  double size = 0.0;   ///< as the score test sees it
+  double moves = 0.0;  ///< the prediction by, rms, beyond what other parameters could do, in the
+                       ///< residual's unit
   std::string unit;
   std::optional<double> held_out;  ///< error after a refit, in the residual's unit
 };

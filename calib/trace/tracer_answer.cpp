@@ -92,6 +92,7 @@ void Tracer::record(const std::vector<TestedMember>& family, const Stage& stage,
     tested.scan = member.scan;
     tested.size = member.score.hidden() ? 0.0 : size_of(candidate, member.score.theta);
     tested.unit = candidate.size_unit;
+    tested.moves = member.score.rms;
     trace_.candidates.push_back(std::move(tested));
   }
 }
