@@ -16,6 +16,7 @@
 #include "app/io/products.h"
 #include "app/report/report.h"
 #include "app/report/trace_json.h"
+#include "app/report/trace_lines.h"
 #include "calib/quality/error_summary.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/file.h"
@@ -55,6 +56,9 @@ void print_result(const RunSummary& run, const RunFolder& folder, const Console&
   }
   const Verdict verdict = make_verdict(run);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  if (run.trace) {
+    for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
+  }
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
   fmt::print("urdf    {}\nreport  {}\n", folder.file("robot.urdf").string(),
              folder.file("report.html").string());

@@ -9,18 +9,20 @@
 #include "app/report/facts.h"
 #include "app/report/page.h"
 #include "app/report/sections.h"
+#include "app/report/trace_section.h"
 
 namespace kinescope {
 namespace {
 
 using report::Facts;
 
-constexpr std::array<report::ContentsEntry, 12> kContents = {{
+constexpr std::array<report::ContentsEntry, 13> kContents = {{
     {"verdict", "Verdict"},
     {"identity", "Identity"},
     {"view", "The robot"},
     {"data", "Data quality"},
     {"structure", "Structure"},
+    {"trace", "Closing the loop"},
     {"parameters", "Parameters"},
     {"errors", "Errors"},
     {"residuals", "Residuals"},
@@ -33,11 +35,12 @@ constexpr std::array<report::ContentsEntry, 12> kContents = {{
 std::string sections(const Facts& facts, std::string_view urdf) {
   return report::verdict_section(facts) + report::identity_section(facts) +
          report::view_section(facts) + report::data_section(facts) +
-         report::structure_section(facts) + report::parameters_section(facts) +
-         report::errors_section(facts) + report::residuals_section(facts) +
-         report::observability_section(facts) + report::torque_section(facts) +
-         report::method_section(facts) + report::reproduce_section(facts, urdf) +
-         report::licences_section();
+         report::structure_section(facts) +
+         (facts.run.trace ? report::trace_section(*facts.run.trace) : "") +
+         report::parameters_section(facts) + report::errors_section(facts) +
+         report::residuals_section(facts) + report::observability_section(facts) +
+         report::torque_section(facts) + report::method_section(facts) +
+         report::reproduce_section(facts, urdf) + report::licences_section();
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "app/report/facts.h"
 #include "app/report/result_values.h"
+#include "app/report/trace_json.h"
 
 namespace kinescope::report {
 namespace {
@@ -216,6 +217,7 @@ json make_result(const RunSummary& run, const Analysis& analysis, const Verdict&
           {"structure", structure_json(run)},
           {"calibration", calibration_json(run)},
           {"errors", errors_json(run.errors)},
+          {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},
           {"residuals", residuals_json(analysis, run.calibration.kind)},
           {"observability", observability_json(run.calibration)}};
 }

@@ -34,6 +34,8 @@ struct Correction {
   /// of direction and share.
   Eigen::Matrix<double, Eigen::Dynamic, 6> twists;
   double value = 0.0;  ///< where the search starts
+  /// What the shares were divided by (the largest load's arm, m); 1 where they were not.
+  double reference = 1.0;
 };
 
 }  // namespace kinescope

@@ -85,7 +85,7 @@ void widen(Sighting& sighting, double factor) {
 // not stand out.
 struct Chosen {
   std::vector<int> used;
-  double bias_px = kCornerBias;
+  double bias_px = 0.0;
 };
 
 Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
@@ -101,8 +101,6 @@ Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<in
     residuals[sighting.marker].push_back(error->residual);
   }
   Chosen out;
-  double resting_bias_px = 0.0;
-  bool any_rests = false;
   for (const auto& [marker, indices] : of_marker) {
     std::vector<double> distance;
     for (std::size_t i = 0; i < indices.size(); ++i) {
@@ -116,8 +114,7 @@ Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<in
     const bool rests = path_length(spec, first) == 0;
     if (rests) {
       const double seen = 2.0 * lasting_part(residuals[marker]);
-      any_rests = true;
-      resting_bias_px = std::max(resting_bias_px, seen * first.sigma);
+      out.bias_px = std::max(out.bias_px, seen * first.sigma);
       bias = std::max(bias, seen) * std::sqrt(static_cast<double>(indices.size()));
     }
     for (std::size_t i = 0; i < indices.size(); ++i) {
@@ -132,7 +129,6 @@ Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<in
     }
   }
   std::ranges::sort(out.used);
-  if (any_rests) out.bias_px = resting_bias_px;
   return out;
 }
 
@@ -163,7 +159,7 @@ struct EffectBundle::Impl {
   double offset_start_s = 0.0;
   std::vector<int> used;
   std::vector<int> fold;
-  double bias_px = kCornerBias;
+  double bias_px = 0.0;
 
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };

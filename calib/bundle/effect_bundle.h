@@ -68,8 +68,7 @@ class EffectBundle {
   [[nodiscard]] const KinematicTree& tree() const;
   [[nodiscard]] MeasurementKind kind() const;
   [[nodiscard]] const CameraModel& camera() const;
-  /// By how much corners are off in ways that repeat: as markers at rest show it, else a typical
-  /// one.
+  /// By how much corners are off in ways that repeat, as markers at rest show it; 0 without one.
   [[nodiscard]] double corner_bias_px() const;
   /// Postures at rest, each on its own: no clock, no motion.
   [[nodiscard]] bool postures() const;

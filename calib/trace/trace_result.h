@@ -44,6 +44,18 @@ struct EffectValue {
   double sigma = 0.0;  ///< standard uncertainty, residuals correlated in time allowed for
 };
 
+/// An effect made visible: what each instant says of the part it acts on (a joint's value, a
+/// marker's place), from the residual alone, over what it depends on most.
+struct EffectPicture {
+  std::string covariate;  ///< "value of joint3"; empty: no picture
+  std::string covariate_unit;
+  std::string unit;
+  Eigen::VectorXd at;      ///< of the covariate, instants
+  Eigen::VectorXd before;  ///< without the effect
+  Eigen::VectorXd after;   ///< with all effects
+  Eigen::VectorXd effect;  ///< what the effect is
+};
+
 struct TracedEffect {
   EffectId id;
   std::string words;
@@ -60,6 +72,7 @@ struct TracedEffect {
   double p_value = 1.0;          ///< over the whole family of tests
   HeldOutError held_out_before;  ///< with all the others, without this one
   HeldOutError held_out_after;   ///< with all
+  EffectPicture picture;
 };
 
 /// Several effects, each of which explains what the others explain.

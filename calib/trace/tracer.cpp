@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "calib/trace/encompassing.h"
+#include "calib/trace/picture.h"
 
 namespace kinescope::trace {
 namespace {
@@ -198,6 +199,7 @@ bool Tracer::check(std::size_t index) {
              *now_);
     return true;
   }
+  detail.picture = picture_of(*stage, *now_, *candidate, own);
   return settle_rivals(index, *stage, own);
 }
 

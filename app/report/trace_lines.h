@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What tracing found, in sentences: for the console and the head of the report's section.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/trace/trace_result.h"
+
+namespace kinescope {
+
+/// One line a finding: the verdict, then the effects with size, interval and what they do to the
+/// error. Ends with what to record where the recording cannot tell.
+[[nodiscard]] std::vector<std::string> trace_lines(const Trace& trace);
+
+}  // namespace kinescope

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/report/trace_words.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/report/trace_lines.h"
+
+namespace kinescope {
+namespace report {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+// Significant digits that an interval of this width deserves, between 2 and 6.
+int digits_for(double value, double half_width) {
+  if (!(half_width > 0.0) || !(std::abs(value) > 0.0)) return 3;
+  const double digits = std::log10(std::abs(value) / half_width) + 2.0;
+  return static_cast<int>(std::clamp(std::ceil(digits), 2.0, 6.0));
+}
+
+}  // namespace
+
+AmountUnit amount_unit(const std::string& si_unit) {
+  static const std::map<std::string, AmountUnit> kUnits{{
+                                                            "rad",
+                                                            {kDegrees, "°"},
+                                                        },
+                                                        {"m", {1e3, "mm"}},
+                                                        {"s", {1e3, "ms"}},
+                                                        {"m/turn", {1e3, "mm/turn"}},
+                                                        {"rad/m", {kDegrees, "°/m"}},
+                                                        {"rad/s", {kDegrees, "°/s"}},
+                                                        {"m/s", {1e3, "mm/s"}},
+                                                        {"s/s", {1e6, "ppm"}}};
+  const auto found = kUnits.find(si_unit);
+  return found == kUnits.end() ? AmountUnit{1.0, si_unit} : found->second;
+}
+
+std::string amount_text(double si_value, const std::string& si_unit) {
+  AmountUnit unit = amount_unit(si_unit);
+  double value = si_value * unit.factor;
+  // A line of a rolling shutter takes microseconds.
+  if (si_unit == "s" && std::abs(value) < 0.1) {
+    value *= 1e3;
+    unit.text = "µs";
+  }
+  const bool tight = unit.text.empty() || unit.text == "°";
+  return fmt::format("{:.4g}{}{}", value, tight ? "" : " ", unit.text);
+}
+
+std::string effect_name(const TracedEffect& effect) {
+  std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
+  if (effect.scan_name.empty()) return name;
+  if (!effect.scan_words.empty()) {
+    return fmt::format("{} ({} {})", name, effect.scan_name, effect.scan_words);
+  }
+  if (effect.scan_unit.starts_with("per ")) {
+    return fmt::format("{} ({} {:.4g} {})", name, effect.scan_name, effect.scan, effect.scan_unit);
+  }
+  if (effect.scan_unit == "s" && effect.scan_name == "at") {
+    return fmt::format("{} (at {:.2f} s)", name, effect.scan);
+  }
+  return fmt::format("{} ({} {})", name, effect.scan_name,
+                     amount_text(effect.scan, effect.scan_unit));
+}
+
+std::string size_words(const TracedEffect& effect) {
+  const AmountUnit unit = amount_unit(effect.unit);
+  const double half = 0.5 * (effect.interval.high - effect.interval.low);
+  const bool small_time = effect.unit == "s" && std::abs(effect.size) < 1e-4;
+  const double factor = unit.factor * (small_time ? 1e3 : 1.0);
+  const int digits = digits_for(effect.size, half);
+  const std::string words =
+      fmt::format("{:.{}g} ({:.{}g} to {:.{}g})", effect.size * factor, digits,
+                  effect.interval.low * factor, digits, effect.interval.high * factor, digits);
+  return fmt::format("{} {}", words, small_time ? "µs" : unit.text);
+}
+
+std::string error_change_words(const HeldOutError& before, const HeldOutError& after) {
+  return fmt::format("{} → {}", amount_text(before.value, before.unit),
+                     amount_text(after.value, after.unit));
+}
+
+std::string ambiguity_words(const Ambiguity& ambiguity) {
+  std::string names;
+  for (std::size_t i = 0; i < ambiguity.effects.size(); ++i) {
+    const EffectId& id = ambiguity.effects[i];
+    names += fmt::format("{}{} at {}",
+                         i == 0                              ? ""
+                         : i + 1 == ambiguity.effects.size() ? " or "
+                                                             : ", ",
+                         id.effect, id.place);
+  }
+  return fmt::format("{}: this recording cannot tell them apart. To decide: {}.", names,
+                     ambiguity.record);
+}
+
+std::string rest_words(const Rest& rest) {
+  return fmt::format(
+      "At {} something is left that no known effect explains; it follows the {} and makes {:.1f} % "
+      "of the residual. Modelled as a curve: {} on unseen data.",
+      rest.place, rest.covariate, 100.0 * rest.explained,
+      error_change_words(rest.held_out_before, rest.held_out_after));
+}
+
+}  // namespace report
+
+std::vector<std::string> trace_lines(const Trace& trace) {
+  using report::amount_text;
+  std::vector<std::string> out;
+  switch (trace.verdict) {
+    case TraceVerdict::kNotRun:
+      return out;
+    case TraceVerdict::kNothingToSay:
+      out.push_back(fmt::format("Tracing: nothing can be said: {}.", trace.reason));
+      return out;
+    case TraceVerdict::kClean:
+      out.push_back(fmt::format("Tracing: nothing is left to explain; the residual is noise of {}.",
+                                amount_text(trace.noise, trace.held_out_after.unit)));
+      return out;
+    case TraceVerdict::kEffects:
+    case TraceVerdict::kAmbiguous:
+    case TraceVerdict::kUnknown:
+      break;
+  }
+  out.push_back(
+      fmt::format("Tracing: {}. Error on unseen data {}.", trace.reason,
+                  report::error_change_words(trace.held_out_before, trace.held_out_after)));
+  for (const TracedEffect& effect : trace.accepted) {
+    out.push_back(fmt::format("  {}: {}; {}. Check: {}.", report::effect_name(effect),
+                              report::size_words(effect), effect.words, effect.check));
+  }
+  for (const Ambiguity& ambiguity : trace.ambiguities) {
+    out.push_back("  " + report::ambiguity_words(ambiguity));
+  }
+  for (const Rest& rest : trace.rest) out.push_back("  " + report::rest_words(rest));
+  return out;
+}
+
+}  // namespace kinescope

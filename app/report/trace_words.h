@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What tracing found, in words of the report.
+#pragma once
+
+#include <string>
+
+#include "calib/trace/trace_result.h"
+
+namespace kinescope::report {
+
+/// "0.598°", "-39.99 ms", "0.0021 1/m": in the units people use.
+[[nodiscard]] std::string amount_text(double si_value, const std::string& si_unit);
+/// The unit alone, and the factor to it.
+struct AmountUnit {
+  double factor = 1.0;
+  std::string text;
+};
+[[nodiscard]] AmountUnit amount_unit(const std::string& si_unit);
+/// "eccentricity at ch0"; with the value of its scan: ", 1 per turn".
+[[nodiscard]] std::string effect_name(const TracedEffect& effect);
+/// "0.598° (0.596° to 0.600°)".
+[[nodiscard]] std::string size_words(const TracedEffect& effect);
+[[nodiscard]] std::string error_change_words(const HeldOutError& before, const HeldOutError& after);
+[[nodiscard]] std::string ambiguity_words(const Ambiguity& ambiguity);
+[[nodiscard]] std::string rest_words(const Rest& rest);
+
+}  // namespace kinescope::report

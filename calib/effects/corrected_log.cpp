@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/corrected_log.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "calib/effects/camera_effects.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+// Joint values that the log says, and their rates, at its own samples.
+JointMotion motion_of(const JointLog& log, const KinematicTree& tree) {
+  const auto rows = static_cast<Eigen::Index>(log.size());
+  const auto joints = static_cast<Eigen::Index>(tree.joints.size());
+  JointMotion out{log.times_s, Eigen::MatrixXd::Zero(rows, joints),
+                  Eigen::MatrixXd::Zero(rows, joints)};
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+    const auto channel = log.channel(joint.channel);
+    if (!channel) continue;
+    out.value.col(j) = (joint.scale * log.values.col(*channel).array() + joint.offset).matrix();
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const Eigen::Index before = std::max<Eigen::Index>(0, i - 1);
+      const Eigen::Index after = std::min(rows - 1, i + 1);
+      const double step = log.times_s[static_cast<std::size_t>(after)] -
+                          log.times_s[static_cast<std::size_t>(before)];
+      if (step > 0.0) out.rate(i, j) = (out.value(after, j) - out.value(before, j)) / step;
+    }
+  }
+  return out;
+}
+
+effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
+                              const std::optional<Eigen::Vector3d>& gravity_base) {
+  effects::EffectWorld world;
+  world.tree = tree;
+  world.frames = motion_of(log, tree);
+  world.log = world.frames;
+  world.gravity_base = gravity_base;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (log.channel(tree.joints[j].channel)) world.driven.push_back(static_cast<int>(j));
+  }
+  return world;
+}
+
+// True when the correction only turns (or slides) the joint itself.
+bool is_joint_value(const Correction& correction, const Joint& joint) {
+  if (correction.part != CorrectedPart::kJoint || correction.twists.rows() > 0) return false;
+  const bool turns = joint.type == JointType::kRevolute;
+  return turns ? correction.direction.tail<3>().isZero(0.0)
+               : correction.direction.head<3>().isZero(0.0);
+}
+
+// Moves the stamps to the camera's clock; false for other effects.
+bool undo_clock(const FittedEffect& effect, JointLog& log) {
+  if (effect.id.effect == "time_offset") {
+    for (double& t : log.times_s) t -= effect.values[0];
+    return true;
+  }
+  if (effect.id.effect != "clock_drift") return false;
+  for (double& t : log.times_s) t -= effect.values[0] * (t - effect.references[0]);
+  return true;
+}
+
+}  // namespace
+
+CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
+                           const std::vector<FittedEffect>& effects,
+                           const std::optional<Eigen::Vector3d>& gravity_base) {
+  CorrectedLog out{log, {}, {}};
+  if (log.empty()) return out;
+  const effects::EffectWorld world = world_of(log, tree, gravity_base);
+  const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
+  for (const FittedEffect& effect : effects) {
+    if (undo_clock(effect, out.log)) {
+      out.undone.push_back(effect.id);
+      continue;
+    }
+    const auto found = std::ranges::find_if(library, [&](const effects::CameraEffect& known) {
+      return known.candidate.id == effect.id;
+    });
+    if (found == library.end()) {
+      if (tree.joint(effect.id.place) &&
+          !log.channel(tree.joints[tree.joint(effect.id.place)->index()].channel)) {
+        throw bad_request(
+            log.source.empty() ? "the joint log" : log.source,
+            fmt::format("no column for {}, which has {}", effect.id.place, effect.id.effect),
+            "give a log with the channels of the recording");
+      }
+      out.left.push_back(effect.id);
+      continue;
+    }
+    const std::vector<Correction> corrections = found->corrections(effect.scan);
+    const Joint& joint = tree.joints[static_cast<std::size_t>(corrections.front().index)];
+    if (!is_joint_value(corrections.front(), joint)) {
+      out.left.push_back(effect.id);
+      continue;
+    }
+    const auto channel = log.channel(joint.channel);
+    for (std::size_t k = 0; k < corrections.size(); ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      const double amount =
+          effect.values[at] * corrections[k].reference / effect.references[at] / joint.scale;
+      out.log.values.col(*channel) += amount * corrections[k].share;
+    }
+    out.undone.push_back(effect.id);
+  }
+  return out;
+}
+
+}  // namespace kinescope

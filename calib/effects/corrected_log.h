@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a joint log, the robot, the effects that tracing found on it.
+// Gives   the log as encoders without those effects would have written it: channels in their own
+//         units, stamps on the camera's clock.
+// Method  the shares of the effects (camera_effects.h) at the log's own samples.
+// Not here: effects that no encoder could have logged (axes that wobble, markers, the camera).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/effects/trace_calibration.h"
+
+namespace kinescope {
+
+struct CorrectedLog {
+  JointLog log;
+  std::vector<EffectId> undone;
+  std::vector<EffectId> left;  ///< those that a log cannot show
+};
+
+/// Throws bad_request for an effect at a joint that the tree or the log does not have.
+[[nodiscard]] CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
+                                         const std::vector<FittedEffect>& effects,
+                                         const std::optional<Eigen::Vector3d>& gravity_base);
+
+}  // namespace kinescope

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace kinescope::trace {
+namespace {
+
+constexpr Eigen::Index kBins = 24;
+
+// What the rows of each instant say of a carrier's factor, least squares; NaN where they say
+// nothing.
+Eigen::VectorXd factor_of(const Linearisation& linear, const Eigen::VectorXd& residual,
+                          int carrier) {
+  Eigen::VectorXd up = Eigen::VectorXd::Zero(linear.instants());
+  Eigen::VectorXd down = Eigen::VectorXd::Zero(linear.instants());
+  Eigen::Index instant = 0;
+  for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, carrier); entry; ++entry) {
+    while (linear.first_row[static_cast<std::size_t>(instant) + 1] <= entry.row()) ++instant;
+    up[instant] += entry.value() * residual[entry.row()];
+    down[instant] += entry.value() * entry.value();
+  }
+  for (Eigen::Index i = 0; i < up.size(); ++i) {
+    up[i] = down[i] > 0.0 ? up[i] / down[i] : std::numeric_limits<double>::quiet_NaN();
+  }
+  return up;
+}
+
+// Share of the curve's variance that bins of the covariate explain.
+double explained_by(const Eigen::VectorXd& covariate, const Eigen::VectorXd& curve) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(covariate.size()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return covariate[i]; });
+  const Eigen::Index n = covariate.size();
+  const Eigen::Index bins = std::min(kBins, std::max<Eigen::Index>(1, n / 4));
+  double within = 0.0;
+  for (Eigen::Index b = 0; b < bins; ++b) {
+    const Eigen::Index first = b * n / bins;
+    const Eigen::Index last = (b + 1) * n / bins;
+    double sum = 0.0;
+    double squares = 0.0;
+    for (Eigen::Index k = first; k < last; ++k) {
+      const double value = curve[order[static_cast<std::size_t>(k)]];
+      sum += value;
+      squares += value * value;
+    }
+    within += squares - sum * sum / static_cast<double>(last - first);
+  }
+  const double total = (curve.array() - curve.mean()).square().sum();
+  return total > 0.0 ? 1.0 - within / total : 0.0;
+}
+
+}  // namespace
+
+EffectPicture picture_of(const Stage& without, const Stage& with, const Candidate& candidate,
+                         const TestedMember& effect) {
+  // The carrier through which the effect does most.
+  const Linearisation& linear = without.fit.linear;
+  int carrier = -1;
+  double most = 0.0;
+  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
+    const EffectColumn& column = effect.columns[k];
+    const double weight = std::abs(effect.score.theta[static_cast<Eigen::Index>(k)]) *
+                          linear.carriers.col(column.carrier).norm();
+    if (weight > most) {
+      most = weight;
+      carrier = column.carrier;
+    }
+  }
+  EffectPicture out;
+  if (carrier < 0 || without.fit.covariates.empty()) return out;
+  out.effect = Eigen::VectorXd::Zero(linear.instants());
+  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
+    const EffectColumn& column = effect.columns[k];
+    if (column.carrier != carrier) continue;
+    const double theta = effect.score.theta[static_cast<Eigen::Index>(k)];
+    if (column.share.size() == 0) {
+      out.effect.array() += theta;
+    } else {
+      out.effect += theta * column.share;
+    }
+  }
+  const Covariate* best = nullptr;
+  double share = -1.0;
+  for (const Covariate& covariate : without.fit.covariates) {
+    const double explained = explained_by(covariate.value, out.effect);
+    // The first of equals: a joint's value comes before what follows from it.
+    if (explained > share + 0.02) {
+      share = explained;
+      best = &covariate;
+    }
+  }
+  out.covariate = best->name;
+  out.covariate_unit = best->unit;
+  out.unit = candidate.parameters.front().unit;
+  for (const RestPlace& place : without.fit.rest_places) {
+    if (place.carrier == carrier) out.unit = place.unit;
+  }
+  out.at = best->value;
+  // The residual with the effect in the model, and the effect on top of it: what the plain model's
+  // parameters took of the effect is given back. Component-plus-residual plot, Cook 1993.
+  out.after = factor_of(with.fit.linear, with.fit.linear.residual, carrier);
+  out.before = out.after + out.effect;
+  return out;
+}
+
+}  // namespace kinescope::trace
