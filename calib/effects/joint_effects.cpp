@@ -152,9 +152,15 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   return out;
 }
 
-Eigen::VectorXd largest_one(const Eigen::VectorXd& values) {
-  const double largest = values.cwiseAbs().maxCoeff();
-  return largest > 1e-9 ? Eigen::VectorXd(values / largest) : Eigen::VectorXd::Zero(values.size());
+// A sag whose largest load counts as 1, so that the parameter is the largest sag.
+Correction sag(const Suspect& s, std::string name, const Eigen::VectorXd& load) {
+  constexpr double kNoArm = 1e-9;  // m
+  const double largest = load.cwiseAbs().maxCoeff();
+  Correction out = turn(s, std::move(name), s.unit, Eigen::VectorXd::Zero(load.size()));
+  if (largest < kNoArm) return out;
+  out.share = load / largest;
+  out.reference = largest;
+  return out;
 }
 
 CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
@@ -179,12 +185,11 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
     const auto load = gravity_load(world.tree, world.frames, s.joint, at_tip);
     std::vector<Correction> corrections;
     if (world.gravity_base) {
-      corrections.push_back(turn(s, "sag", s.unit, largest_one(load * *world.gravity_base)));
+      corrections.push_back(sag(s, "sag", load * *world.gravity_base));
       return corrections;
     }
     for (int axis = 0; axis < 3; ++axis) {
-      corrections.push_back(
-          turn(s, fmt::format("sag {}", "xyz"[axis]), s.unit, largest_one(load.col(axis))));
+      corrections.push_back(sag(s, fmt::format("sag {}", "xyz"[axis]), load.col(axis)));
     }
     return corrections;
   };

@@ -62,6 +62,7 @@ CameraEffect clock_drift(const EffectWorld& world) {
   out.corrections = [like = out, time](double) {
     Correction drift = correct(CorrectedPart::kClock, like, 0);
     drift.share = time.array() - time.mean();
+    drift.reference = time.mean();
     return std::vector{drift};
   };
   return out;

@@ -22,9 +22,9 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   }
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
-  for (std::vector<Correction>& corrections : model.corrections(out.trace.added)) {
-    for (Correction& correction : corrections) out.corrections.push_back(std::move(correction));
-  }
+  effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added);
+  out.effects = std::move(corrected.effects);
+  out.corrections = std::move(corrected.corrections);
   return out;
 }
 

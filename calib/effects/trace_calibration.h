@@ -24,8 +24,20 @@ struct CalibrationTraceOptions {
   std::optional<Eigen::Vector3d> gravity_base;
 };
 
+/// An effect with its numbers: what is kept of it, and what undoes it.
+struct FittedEffect {
+  EffectId id;
+  double scan = 0.0;
+  std::vector<EffectParameter> parameters;
+  Eigen::VectorXd values;
+  /// Of each parameter: what its share was divided by (compliance: the largest load's arm, m; clock
+  /// drift: the time at which it is zero, s).
+  Eigen::VectorXd references;
+};
+
 struct CalibrationTrace {
   Trace trace;
+  std::vector<FittedEffect> effects;  ///< all that were accepted
   /// Of all accepted effects but the time offset, in their order: for CalibrationStart.
   std::vector<Correction> corrections;
 };

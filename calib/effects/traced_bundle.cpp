@@ -263,20 +263,33 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   return out;
 }
 
-std::vector<std::vector<Correction>> TracedBundle::corrections(
-    const std::vector<AddedEffect>& effects) const {
-  EffectWorld world = world_at(0.0);
-  std::vector<CameraEffect> library = all_effects(world);
-  const BundleFit fit = bundle_->fit(change_of(library, effects), {});
+TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& effects) const {
+  std::vector<CameraEffect> library = all_effects(world_at(0.0));
+  BundleFit fit = bundle_->fit(change_of(library, effects), {});
   library = all_effects(world_at(fit.time_offset_s));
-  std::vector<std::vector<Correction>> out;
+  fit = bundle_->fit(change_of(library, effects), {});
+  Corrected out;
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);
-    std::vector<Correction>& corrections = out.emplace_back();
-    if (effect.is_time_offset) continue;
-    corrections = effect.corrections(added.scan);
-    for (Correction& correction : corrections) correction.value = fit.values[next++];
+    FittedEffect fitted{added.id, added.scan, effect.candidate.parameters, {}, {}};
+    if (effect.is_time_offset) {
+      fitted.values = Eigen::VectorXd::Constant(1, fit.time_offset_s);
+      fitted.references = Eigen::VectorXd::Ones(1);
+      out.effects.push_back(std::move(fitted));
+      continue;
+    }
+    std::vector<Correction> corrections = effect.corrections(added.scan);
+    fitted.values.resize(static_cast<Eigen::Index>(corrections.size()));
+    fitted.references.resize(fitted.values.size());
+    for (std::size_t k = 0; k < corrections.size(); ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      corrections[k].value = fit.values[next++];
+      fitted.values[at] = corrections[k].value;
+      fitted.references[at] = corrections[k].reference;
+      out.corrections.push_back(std::move(corrections[k]));
+    }
+    out.effects.push_back(std::move(fitted));
   }
   return out;
 }

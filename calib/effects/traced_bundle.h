@@ -13,9 +13,12 @@ class TracedBundle final : public TracedModel {
   TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options);
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
 
-  /// The corrections that stand for some effects, one list an effect.
-  [[nodiscard]] std::vector<std::vector<Correction>> corrections(
-      const std::vector<AddedEffect>& effects) const;
+  /// The same with its numbers: the corrections that stand for the effects, at their values.
+  struct Corrected {
+    std::vector<FittedEffect> effects;
+    std::vector<Correction> corrections;  ///< of all effects but the time offset
+  };
+  [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects) const;
 
  private:
   [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
