@@ -8,6 +8,7 @@
 
 #include "app/commands/command_line.h"
 #include "app/commands/progress_line.h"
+#include "app/commands/run_folder.h"
 #include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
 
@@ -63,7 +64,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     remedy = did_you_mean(argv[1], known_words(app, nullptr));
   } else if (command == nullptr) {
     message = "name a command";
-    remedy = "run, dynamics, contact, inspect or camera; see kinescope --help";
+    remedy = "run, trace, correct, dynamics, contact, inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -112,15 +113,45 @@ std::string log_name(const std::filesystem::path& log) {
   return name.substr(0, name.find('.'));
 }
 
-ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
-  if (app.got_subcommand("run")) {
-    if (line.run.output.empty()) {
-      line.run.output = recording_name(line.run.recording.folder) + "_run";
-    }
-    line.run.calibrate.estimate_time_offset = !line.no_time_offset;
-    line.run.calibrate.estimate_intrinsics = line.run.estimate_intrinsics;
-    return run_command(line.run, console);
+RunOptions finished_options(const CommandLine& line) {
+  RunOptions out = line.run;
+  if (out.output.empty()) out.output = recording_name(out.recording.folder) + "_run";
+  out.calibrate.estimate_time_offset = !line.no_time_offset;
+  out.calibrate.estimate_intrinsics = out.estimate_intrinsics;
+  return out;
+}
+
+// The run of a run folder once more, tracing, from its own command line.
+ExitCode run_again(const CommandLine& line, const Console& console) {
+  const std::filesystem::path& folder = line.trace.run_folder;
+  const RunAgain again = read_run_again(folder);
+  CLI::App app;
+  CommandLine first;
+  add_commands(app, first);
+  std::vector<std::string> reversed(again.arguments.rbegin(), again.arguments.rend());
+  try {
+    app.parse(reversed);
+  } catch (const CLI::ParseError&) {
+    throw bad_input((folder / "run.json").string(), "its command line is not understood",
+                    "run the recording again");
   }
+  if (!app.got_subcommand("run")) {
+    throw bad_input((folder / "run.json").string(), "this is no folder of kinescope run",
+                    "give the folder of a finished run");
+  }
+  RunOptions options = finished_options(first);
+  resolve_paths(options.recording, again.working_folder);
+  options.output = folder;
+  options.trace = true;
+  options.arguments = again.arguments;
+  options.command_line = "kinescope trace " + folder.string();
+  return run_command(options, console);
+}
+
+ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
+  if (app.got_subcommand("run")) return run_command(finished_options(line), console);
+  if (app.got_subcommand("trace")) return run_again(line, console);
+  if (app.got_subcommand("correct")) return correct_command(line.correct, console);
   if (app.got_subcommand("dynamics")) {
     if (line.dynamics.output.empty()) {
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
@@ -174,6 +205,7 @@ int run_program(int argc, const char* const* argv) {
   CLI::App app("Learns a robot's body from a video of markers and a joint log", "kinescope");
   CommandLine line;
   line.run.command_line = join_arguments(argc, argv);
+  line.run.arguments.assign(argv + 1, argv + argc);
   line.dynamics.command_line = line.run.command_line;
   line.contact.command_line = line.run.command_line;
   add_commands(app, line);

@@ -134,6 +134,42 @@ void add_run(CLI::App& app, CommandLine& line) {
       "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}", kExitCodes));
 }
 
+void add_path_argument(CLI::App& command, const char* name, std::filesystem::path& path,
+                       const char* help, const char* type) {
+  command
+      .add_option_function<std::string>(
+          name, [&path](const std::string& text) { path = text; }, help)
+      ->required()
+      ->type_name(type);
+}
+
+void add_trace(CLI::App& app, CommandLine& line) {
+  CLI::App& trace =
+      *app.add_subcommand("trace", "Look again for effects that the calibration of a run lacks");
+  add_path_argument(trace, "RUN_FOLDER", line.trace.run_folder,
+                    "Folder of a finished run; its recording must still be where it was", "FOLDER");
+  add_output_options(trace, line.output);
+  trace.footer(fmt::format("Example:\n  kinescope trace scara4_none_run\n\n{}", kExitCodes));
+}
+
+void add_correct(CLI::App& app, CommandLine& line) {
+  CLI::App& correct = *app.add_subcommand(
+      "correct", "A joint log without the effects that a run found on its encoders and gears");
+  add_path_argument(correct, "RUN_FOLDER", line.correct.run_folder, "Folder of a finished run",
+                    "FOLDER");
+  add_path_argument(correct, "LOG", line.correct.log, "Joint log with the recording's channels",
+                    "FILE");
+  correct
+      .add_option_function<std::string>(
+          "--output", [&line](const std::string& text) { line.correct.output = text; },
+          "File to write (default: joints_corrected.csv)")
+      ->type_name("FILE");
+  add_output_options(correct, line.output);
+  correct.footer(fmt::format(
+      "Example:\n  kinescope correct ur6_run new_joints.csv --output corrected.csv\n\n{}",
+      kExitCodes));
+}
+
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
       "inspect", "What a recording holds and what is wrong with it, in a few seconds");
@@ -229,6 +265,8 @@ void add_commands(CLI::App& app, CommandLine& line) {
                   "sample_videos/scara4_none\n\n{}",
                   kExitCodes));
   add_run(app, line);
+  add_trace(app, line);
+  add_correct(app, line);
   add_dynamics(app, line);
   add_contact(app, line);
   add_inspect(app, line);

@@ -25,6 +25,8 @@ struct CommandLine {
   ContactCommandOptions contact;
   InspectOptions inspect;
   CameraOptions camera;
+  TraceCommandOptions trace;
+  CorrectOptions correct;
   std::optional<std::filesystem::path> settings;  ///< recording.yaml of a torque log
   OutputOptions output;
   bool no_time_offset = false;

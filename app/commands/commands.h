@@ -40,9 +40,23 @@ struct RunOptions {
   std::vector<std::string>
       fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5
   std::string command_line;  ///< for the report
+  std::vector<std::string> arguments;  ///< the same, for run.json; without the program's name
 };
 
 [[nodiscard]] ExitCode run_command(const RunOptions& options, const Console& console);
+
+/// On a finished run folder: the run's own command again, with detection taken from the folder.
+struct TraceCommandOptions {
+  std::filesystem::path run_folder;
+};
+
+struct CorrectOptions {
+  std::filesystem::path run_folder;
+  std::filesystem::path log;
+  std::filesystem::path output = "joints_corrected.csv";
+};
+
+[[nodiscard]] ExitCode correct_command(const CorrectOptions& options, const Console& console);
 
 struct DynamicsOptions {
   std::vector<std::filesystem::path> logs;

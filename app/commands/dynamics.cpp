@@ -154,7 +154,7 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
       score.failure = error.what();
     }
     summary.scores.push_back(std::move(score));
-    report(progress, "models", static_cast<int>(k) + 1, static_cast<int>(kinds.size()));
+    report_progress(progress, "models", static_cast<int>(k) + 1, static_cast<int>(kinds.size()));
   }
   summary.best = best_of(summary.scores);
   const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];

@@ -220,14 +220,14 @@ VideoFacts look_at_video(const Recording& recording, const Progress& progress,
     }
     facts.times_s.push_back(frame->time_s + recording.settings.video_start_s);
     if (facts.frames_decoded++ % every != 0) continue;
-    report(progress, "inspect", facts.frames_decoded, expected);
+    report_progress(progress, "inspect", facts.frames_decoded, expected);
     for (const TagObservation& tag : detector->detect(frame->image.view())) {
       add_sighting(seen[tag.id], frame->image.view(), tag);
     }
     if (seen.empty() && facts.frames_searched % 9 == 0) kept.push_back(std::move(frame->image));
     ++facts.frames_searched;
   }
-  report(progress, "inspect", expected, expected);
+  report_progress(progress, "inspect", expected, expected);
   for (const std::string& warning : video->warnings()) findings.push_back({false, warning});
   facts.markers = summarise(seen, recording.markers);
   if (recording.camera) {

@@ -13,6 +13,7 @@
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/commands/trace_stage.h"
+#include "app/io/effects_file.h"
 #include "app/io/products.h"
 #include "app/report/report.h"
 #include "app/report/trace_json.h"
@@ -32,6 +33,7 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.entry = to_string(recording.entry);
   run.version = program_version();
   run.command = options.command_line;
+  run.arguments = options.arguments;
   run.inputs = hash_inputs(recording);
   run.options = list_options(options);
   run.frames = static_cast<int>(observed.measurements.times_s.size());
@@ -112,6 +114,8 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     TracedCalibration traced = trace_stage(recording, observed, begin, run.calibration,
                                            calibrate_options, console.progress);
     run.trace = std::move(traced.trace);
+    run.effects = std::move(traced.effects);
+    run.gravity_base = traced.gravity_base;
     run.calibration = std::move(traced.calibration);
     clock.lap("trace", run.times);
   }
@@ -122,7 +126,10 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
   }
   folder.write("robot.urdf", urdf);
-  folder.write("calibration.json", calibration_json(run.calibration).dump(1) + "\n");
+  nlohmann::json calibration = calibration_json(run.calibration);
+  calibration["effects"] = effects_json(run.effects);
+  if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
+  folder.write("calibration.json", calibration.dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));
   if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");
   folder.write("result.json", result_json(run).dump(2) + "\n");

@@ -146,10 +146,51 @@ json run_json(const RunSummary& run) {
   for (const StageTime& time : run.times) {
     times.push_back({{"stage", time.stage}, {"seconds", time.seconds}});
   }
-  return {{"schema", "kinescope.run"}, {"schema_version", 1},       {"program", "kinescope"},
-          {"version", run.version},    {"command", run.command},    {"recording", run.recording},
-          {"entry", run.entry},        {"inputs", inputs},          {"options", options},
-          {"seed", nullptr},           {"stages", std::move(times)}};
+  return {{"schema", "kinescope.run"},
+          {"schema_version", 1},
+          {"program", "kinescope"},
+          {"version", run.version},
+          {"command", run.command},
+          {"arguments", run.arguments},
+          {"working_folder", fs::current_path().string()},
+          {"recording", run.recording},
+          {"entry", run.entry},
+          {"inputs", inputs},
+          {"options", options},
+          {"seed", nullptr},
+          {"stages", std::move(times)}};
+}
+
+RunAgain read_run_again(const fs::path& folder) {
+  const fs::path path = folder / "run.json";
+  const json document = json::parse(read_text_file(path), nullptr, false);
+  RunAgain out;
+  const bool complete = document.is_object() && document.value("schema", "") == "kinescope.run" &&
+                        document.contains("arguments") && document.at("arguments").is_array() &&
+                        document.contains("working_folder") &&
+                        document.at("working_folder").is_string();
+  if (complete) {
+    for (const json& word : document.at("arguments")) {
+      if (word.is_string()) out.arguments.push_back(word.get<std::string>());
+    }
+    out.working_folder = document.at("working_folder").get<std::string>();
+  }
+  if (out.arguments.empty()) {
+    throw bad_input(path.string(), "it does not say how the run was started",
+                    "give the folder of a finished run, or run the recording again");
+  }
+  return out;
+}
+
+void resolve_paths(RecordingPaths& paths, const fs::path& from) {
+  const auto resolve = [&](fs::path& path) {
+    if (path.is_relative()) path = from / path;
+  };
+  resolve(paths.folder);
+  for (auto* file : {&paths.video, &paths.joints, &paths.camera, &paths.tags, &paths.corners,
+                     &paths.poses, &paths.points, &paths.nominal}) {
+    if (*file) resolve(**file);
+  }
 }
 
 }  // namespace kinescope

@@ -35,6 +35,17 @@ class RunFolder : public OutputFolder {
 [[nodiscard]] std::vector<InputFile> hash_inputs(const Recording& recording);
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> list_options(
     const RunOptions& options);
+/// What is needed to run again.
+struct RunAgain {
+  std::vector<std::string> arguments;
+  std::filesystem::path working_folder;
+};
+
+/// From run.json. Throws bad_input where there is none or it does not say.
+[[nodiscard]] RunAgain read_run_again(const std::filesystem::path& folder);
+/// Relative paths as seen from another folder.
+void resolve_paths(RecordingPaths& paths, const std::filesystem::path& from);
+
 /// run.json: inputs' hashes, options, version, times.
 [[nodiscard]] nlohmann::json run_json(const RunSummary& run);
 

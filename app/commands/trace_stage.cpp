@@ -41,7 +41,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   CalibrationStart from = continued(start, plain);
   const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
                                                    recording.log, from, trace_options, progress);
-  TracedCalibration out{found.trace, plain};
+  TracedCalibration out{found.trace, plain, found.effects, trace_options.gravity_base};
   if (found.corrections.empty()) return out;
   from.corrections = found.corrections;
   out.calibration =

@@ -11,6 +11,8 @@ namespace kinescope {
 struct TracedCalibration {
   Trace trace;
   Calibration calibration;  ///< with the effects that were found
+  std::vector<FittedEffect> effects;
+  std::optional<Eigen::Vector3d> gravity_base;
 };
 
 /// `start` is where `plain` began. The time offset stays estimated whether it is found to matter or

@@ -10,6 +10,7 @@
 
 #include "calib/bundle/calibration.h"
 #include "calib/camera/marker_set.h"
+#include "calib/effects/trace_calibration.h"
 #include "calib/quality/error_summary.h"
 #include "calib/trace/trace_result.h"
 #include "kinematics/log/joint_log.h"
@@ -38,11 +39,12 @@ struct MarkerSummary {
 };
 
 struct RunSummary {
-  std::string robot;      ///< name
-  std::string recording;  ///< folder name
-  std::string entry;      ///< "video", "corners", "poses", "points"
-  std::string version;    ///< of the program
-  std::string command;    ///< how to reproduce
+  std::string robot;                   ///< name
+  std::string recording;               ///< folder name
+  std::string entry;                   ///< "video", "corners", "poses", "points"
+  std::string version;                 ///< of the program
+  std::string command;                 ///< how to reproduce
+  std::vector<std::string> arguments;  ///< the same, for a program
   std::vector<InputFile> inputs;
   std::vector<std::pair<std::string, std::string>> options;  ///< name, value
   std::vector<StageTime> times;
@@ -59,7 +61,9 @@ struct RunSummary {
   std::optional<Structure> structure;  ///< none when a nominal robot was given
   std::optional<KinematicTree> nominal;
   Calibration calibration;
-  std::optional<Trace> trace;  ///< none where it was not asked for
+  std::optional<Trace> trace;                   ///< none where it was not asked for
+  std::vector<FittedEffect> effects;            ///< that the calibration has in it
+  std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   ErrorSummary errors;
   std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without
 };

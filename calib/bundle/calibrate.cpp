@@ -159,7 +159,7 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
     }
   };
   for (int fold = 0; fold < folds; ++fold) {
-    report(progress, "validate", fold, folds);
+    report_progress(progress, "validate", fold, folds);
     const Split split = split_at(fold, robust, slot, out);
     if (split.seen.empty() || split.unseen.empty()) continue;
     const State state = solve_without(spec, solution, split, max_iterations);
@@ -169,7 +169,7 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
     keep(state, split.unseen, &held_out);
     keep(state, split.rejected, nullptr);
   }
-  report(progress, "validate", folds, folds);
+  report_progress(progress, "validate", folds, folds);
   out.folds = folds;
   out.training_rms = training.value();
   out.held_out_rms = held_out.value();
@@ -282,10 +282,10 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   const State before = state;
   const std::vector<int> usable = bundle::usable_sightings(spec, state);
   require_every_joint_seen(spec, usable);
-  report(progress, "calibrate", 0, 1);
+  report_progress(progress, "calibrate", 0, 1);
   const RobustSolution robust =
       bundle::solve_robustly(spec, state, usable, options.reject_sigma, options.max_iterations);
-  report(progress, "calibrate", 1, 1);
+  report_progress(progress, "calibrate", 1, 1);
 
   Calibration out;
   out.kind = spec.kind;

@@ -45,7 +45,7 @@ Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Prog
 }
 
 Trace Tracer::run() {
-  report(progress_, "trace", 0, 0);
+  report_progress(progress_, "trace", 0, 0);
   base_ = make_stage(*model_, {});
   now_ = options_.start.empty() ? base_ : make_stage(*model_, options_.start);
   if (!can_say(*now_)) return trace_;
@@ -81,7 +81,7 @@ bool Tracer::can_say(const Stage& stage) {
 void Tracer::forward() {
   while (static_cast<int>(now_->added.size()) < options_.max_effects) {
     ++round_;
-    report(progress_, "trace", round_, 0);
+    report_progress(progress_, "trace", round_, 0);
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
     StagePtr next = refit_best(contenders(*now_, family), round_);

@@ -85,7 +85,7 @@ Estimate estimate_robustly(BoardAlbum& album, std::vector<std::size_t>& used,
   const auto most = static_cast<std::size_t>(kMaxOutlierShare * static_cast<double>(used.size()));
   std::size_t removed = 0;
   while (true) {
-    report(progress, "estimating the lens", static_cast<int>(removed), 0);
+    report_progress(progress, "estimating the lens", static_cast<int>(removed), 0);
     Estimate now = estimate(album, used, options, source);
     const std::optional<std::size_t> worst = worst_view(now.fits);
     if (!worst || removed >= most || used.size() <= kMinBoardViews) return now;
@@ -104,7 +104,7 @@ double held_out_rms(const BoardAlbum& album, const std::vector<std::size_t>& use
   const int folds = std::min(kFolds, static_cast<int>(used.size()));
   std::vector<ViewFit> out;
   for (int fold = 0; fold < folds; ++fold) {
-    report(progress, "judging on views left out", fold, folds);
+    report_progress(progress, "judging on views left out", fold, folds);
     std::vector<std::size_t> train;
     std::vector<std::size_t> test;
     for (std::size_t i = 0; i < used.size(); ++i) {

@@ -53,7 +53,8 @@ BoardAlbum read_folder(const std::filesystem::path& folder, BoardFinder& finder,
     } else {
       album.warnings.push_back(fmt::format("{}: cannot be decoded", files[i].string()));
     }
-    report(progress, "finding the board", static_cast<int>(i) + 1, static_cast<int>(files.size()));
+    report_progress(progress, "finding the board", static_cast<int>(i) + 1,
+                    static_cast<int>(files.size()));
   }
   return album;
 }
@@ -67,7 +68,7 @@ BoardAlbum read_video(const std::filesystem::path& path, BoardFinder& finder,
     if (frame->index % every == 0) {
       add_view(album, finder, frame->image.view(), fmt::format("frame {}", frame->index));
     }
-    report(progress, "finding the board", frame->index + 1, reader->info().frame_count);
+    report_progress(progress, "finding the board", frame->index + 1, reader->info().frame_count);
   }
   album.warnings = reader->warnings();
   return album;

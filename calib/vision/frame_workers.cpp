@@ -89,7 +89,7 @@ std::vector<double> for_each_frame(VideoReader& reader, std::size_t workers, con
       while (std::optional<VideoFrame> frame = reader.next()) {
         times.push_back(frame->time_s);
         if (!queue.push(std::move(*frame))) break;
-        report(progress, stage, static_cast<int>(times.size()), reader.info().frame_count);
+        report_progress(progress, stage, static_cast<int>(times.size()), reader.info().frame_count);
       }
     } catch (...) {
       const std::lock_guard lock(mutex);

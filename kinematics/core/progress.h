@@ -10,7 +10,7 @@ namespace kinescope {
 /// `app` print nothing; they call this. May be empty.
 using Progress = std::function<void(std::string_view stage, int done, int total)>;
 
-inline void report(const Progress& progress, std::string_view stage, int done, int total) {
+inline void report_progress(const Progress& progress, std::string_view stage, int done, int total) {
   if (progress) progress(stage, done, total);
 }
 

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope correct`: a joint log without the effects that a run found.
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "app/commands/commands.h"
+#include "app/io/effects_file.h"
+#include "calib/effects/corrected_log.h"
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/urdf.h"
+
+namespace kinescope {
+namespace {
+
+std::string log_csv(const JointLog& log) {
+  std::string out = "t";
+  for (const std::string& channel : log.channels) out += "," + channel;
+  out += "\n";
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    out += fmt::format("{}", log.times_s[i]);
+    for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
+      out += fmt::format(",{}", log.values(static_cast<Eigen::Index>(i), c));
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+std::string names_of(const std::vector<EffectId>& effects) {
+  std::string out;
+  for (const EffectId& id : effects) {
+    out += fmt::format("{}{} at {}", out.empty() ? "" : ", ", id.effect, id.place);
+  }
+  return out;
+}
+
+// The tree with the channels and their units, which the URDF does not hold.
+KinematicTree tree_of_run(const std::filesystem::path& run_folder,
+                          const std::vector<JointChannel>& channels) {
+  KinematicTree tree = read_urdf(run_folder / "robot.urdf");
+  for (const JointChannel& channel : channels) {
+    const auto joint = tree.joint(channel.joint);
+    if (!joint) continue;
+    tree.joints[joint->index()].channel = channel.channel;
+    tree.joints[joint->index()].scale = channel.scale;
+    tree.joints[joint->index()].offset = channel.offset;
+  }
+  return tree;
+}
+
+}  // namespace
+
+ExitCode correct_command(const CorrectOptions& options, const Console& console) {
+  const CalibratedEffects found = read_effects(options.run_folder / "calibration.json");
+  const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
+  const JointLog log = read_joint_log(options.log);
+  const CorrectedLog corrected = corrected_log(log, tree, found.effects, found.gravity_base);
+  write_file_atomically(options.output, log_csv(corrected.log));
+  if (console.quiet) return ExitCode::kDone;
+  fmt::print("{}\n", corrected.undone.empty()
+                         ? std::string("The run found no effect that a joint log shows: unchanged.")
+                         : "Undone: " + names_of(corrected.undone) + ".");
+  if (!corrected.left.empty()) {
+    fmt::print("A joint log cannot show: {}.\n", names_of(corrected.left));
+  }
+  fmt::print("log     {}\n", options.output.string());
+  return ExitCode::kDone;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/io/effects_file.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+#include "kinematics/core/file.h"
+
+namespace kinescope {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kRemedy = "give the calibration.json of a finished run";
+
+Error wrong(const std::filesystem::path& path, const std::string& what) {
+  return bad_input(path.string(), what, kRemedy);
+}
+
+double finite(const json& value, const std::filesystem::path& path, const std::string& key) {
+  if (!value.is_number() || !std::isfinite(value.get<double>())) {
+    throw wrong(path, fmt::format("{} is no number", key));
+  }
+  return value.get<double>();
+}
+
+std::string word(const json& entry, const char* key, const std::filesystem::path& path) {
+  if (!entry.is_object() || !entry.contains(key) || !entry.at(key).is_string()) {
+    throw wrong(path, fmt::format("an effect without '{}'", key));
+  }
+  return entry.at(key).get<std::string>();
+}
+
+FittedEffect effect_of(const json& entry, const std::filesystem::path& path) {
+  FittedEffect out;
+  out.id = {word(entry, "effect", path), word(entry, "place", path)};
+  const std::string name = fmt::format("{} at {}", out.id.effect, out.id.place);
+  if (!entry.contains("at") || !entry.contains("parameters") ||
+      !entry.at("parameters").is_array() || entry.at("parameters").empty()) {
+    throw wrong(path, fmt::format("{} has no parameters", name));
+  }
+  out.scan = finite(entry.at("at"), path, name + ": at");
+  const json& parameters = entry.at("parameters");
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  out.values.resize(count);
+  out.references.resize(count);
+  Eigen::Index next = 0;
+  for (const json& parameter : parameters) {
+    out.parameters.push_back({word(parameter, "name", path), word(parameter, "unit", path)});
+    out.values[next] = finite(parameter.value("value", json()), path, name + ": value");
+    out.references[next] = finite(parameter.value("reference", json()), path, name + ": reference");
+    if (out.references[next] == 0.0) throw wrong(path, name + ": reference is 0");
+    ++next;
+  }
+  return out;
+}
+
+}  // namespace
+
+json effects_json(const std::vector<FittedEffect>& effects) {
+  json list = json::array();
+  for (const FittedEffect& effect : effects) {
+    json parameters = json::array();
+    for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      parameters.push_back({{"name", effect.parameters[k].name},
+                            {"unit", effect.parameters[k].unit},
+                            {"value", effect.values[at]},
+                            {"reference", effect.references[at]}});
+    }
+    list.push_back({{"effect", effect.id.effect},
+                    {"place", effect.id.place},
+                    {"at", effect.scan},
+                    {"parameters", std::move(parameters)}});
+  }
+  return list;
+}
+
+CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
+  const json document = json::parse(read_text_file(calibration_json), nullptr, false);
+  if (!document.is_object() || document.value("schema", "") != "kinescope.calibration") {
+    throw wrong(calibration_json, "this is no calibration");
+  }
+  CalibratedEffects out;
+  if (const auto gravity = document.find("gravity_base");
+      gravity != document.end() && gravity->is_array() && gravity->size() == 3) {
+    out.gravity_base = Eigen::Vector3d(finite((*gravity)[0], calibration_json, "gravity_base"),
+                                       finite((*gravity)[1], calibration_json, "gravity_base"),
+                                       finite((*gravity)[2], calibration_json, "gravity_base"));
+  }
+  if (!document.contains("robot") || !document.at("robot").is_object() ||
+      !document.at("robot").contains("joints") || !document.at("robot").at("joints").is_array()) {
+    throw wrong(calibration_json, "no robot with joints");
+  }
+  for (const json& joint : document.at("robot").at("joints")) {
+    out.channels.push_back({word(joint, "name", calibration_json),
+                            word(joint, "channel", calibration_json),
+                            finite(joint.value("scale", json()), calibration_json, "scale"),
+                            finite(joint.value("offset", json()), calibration_json, "offset")});
+  }
+  const auto effects = document.find("effects");
+  if (effects == document.end()) return out;
+  if (!effects->is_array()) throw wrong(calibration_json, "'effects' is no list");
+  for (const json& entry : *effects) out.effects.push_back(effect_of(entry, calibration_json));
+  return out;
+}
+
+}  // namespace kinescope

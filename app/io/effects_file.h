@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The effects of a calibration in calibration.json (key `effects`): written, and read back to undo
+// them on other logs.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "calib/effects/trace_calibration.h"
+
+namespace kinescope {
+
+/// A list: effect, place, at (the value of its scan), parameters (name, unit, value, reference).
+[[nodiscard]] nlohmann::json effects_json(const std::vector<FittedEffect>& effects);
+
+/// How a channel becomes a joint's value: value = scale * reading + offset.
+struct JointChannel {
+  std::string joint;
+  std::string channel;
+  double scale = 1.0;
+  double offset = 0.0;
+};
+
+/// What undoing needs of calibration.json.
+struct CalibratedEffects {
+  std::vector<JointChannel> channels;
+  std::vector<FittedEffect> effects;
+  std::optional<Eigen::Vector3d> gravity_base;  ///< key `gravity_base`
+};
+
+/// Throws bad_input: missing file, no JSON, another schema, numbers that are none.
+[[nodiscard]] CalibratedEffects read_effects(const std::filesystem::path& calibration_json);
+
+}  // namespace kinescope
