@@ -65,14 +65,19 @@ double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
 // Corners are off by this much in ways that repeat with the view.
 constexpr double kCornerBias = 0.02;  // px
 
-// The residual that stays the same, root mean square over the rows.
-double lasting_part(const std::vector<Eigen::VectorXd>& series) {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(series.front().size());
-  for (const Eigen::VectorXd& r : series) {
-    if (r.size() == sum.size()) sum += r;
+// What no pose of the marker explains of its residual and what stays the same over the sightings,
+// root mean square over such rows: the marker may have slipped, the camera may have been bumped,
+// but neither bends a square.
+double lasting_bend(const std::vector<bundle::SightingError>& errors) {
+  const Eigen::Index rows = errors.front().residual.size();
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
+  for (const bundle::SightingError& error : errors) {
+    if (error.residual.size() != rows) continue;
+    const Eigen::Matrix<double, Eigen::Dynamic, 6>& J = error.d_marker;
+    sum += error.residual - J * (J.transpose() * J).ldlt().solve(J.transpose() * error.residual);
   }
-  return sum.norm() / static_cast<double>(series.size()) /
-         std::sqrt(static_cast<double>(sum.size()));
+  const double freedom = std::max(1.0, static_cast<double>(rows) - 6.0);
+  return sum.norm() / static_cast<double>(errors.size()) / std::sqrt(freedom);
 }
 
 // Multiplies a sighting's sigma.
@@ -93,12 +98,14 @@ Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<in
   const Readings readings(spec, state.time_offset[0]);
   std::map<int, std::vector<int>> of_marker;
   std::map<int, std::vector<Eigen::VectorXd>> residuals;
+  std::map<int, std::vector<bundle::SightingError>> errors;
   for (const int index : usable) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
     const auto error = bundle::error_of(spec, state, readings, sighting);
     if (!error || !error->residual.allFinite()) continue;
     of_marker[sighting.marker].push_back(index);
     residuals[sighting.marker].push_back(error->residual);
+    if (path_length(spec, sighting) == 0) errors[sighting.marker].push_back(*error);
   }
   Chosen out;
   for (const auto& [marker, indices] : of_marker) {
@@ -109,11 +116,10 @@ Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<in
     const double typical = std::max(median_of(distance), 1e-12);
     const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
     double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
-    // A marker at rest repeats its bias in every frame: all of them together say what one does. Of
-    // the bias the fit has taken most away (six of eight rows by the camera's pose).
+    // A marker at rest repeats its bias in every frame: all of them together say what one does.
     const bool rests = path_length(spec, first) == 0;
     if (rests) {
-      const double seen = 2.0 * lasting_part(residuals[marker]);
+      const double seen = lasting_bend(errors[marker]);
       out.bias_px = std::max(out.bias_px, seen * first.sigma);
       bias = std::max(bias, seen) * std::sqrt(static_cast<double>(indices.size()));
     }

@@ -163,36 +163,30 @@ Correction sag(const Suspect& s, std::string name, const Eigen::VectorXd& load) 
   return out;
 }
 
+// Gravity known: the joint's own link pulls from wherever its mass is (two unknowns across the
+// axis), those behind it from their middles, evenly or at the tip.
 CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
-  const bool known = world.gravity_base.has_value();
-  std::vector<EffectParameter> parameters{{"largest sag", s.unit}};
-  if (!known) {
-    parameters = {{"sag, gravity along x", s.unit},
-                  {"sag, gravity along y", s.unit},
-                  {"sag, gravity along z", s.unit}};
-  }
+  const std::vector<Load> loads =
+      gravity_loads(world.tree, world.frames, s.joint, world.gravity_base);
+  std::vector<EffectParameter> parameters;
+  for (const Load& load : loads) parameters.push_back({"sag by " + load.what, s.unit});
   CameraEffect out = effect(s, "compliance", fmt::format("{} gives way under its load", s.name),
                             std::move(parameters), s.unit);
-  out.candidate.scan = {0.0, 0.25, 0.5, 0.75, 1.0};
-  out.candidate.scan_listed = true;
-  out.candidate.scan_name = "share of the load at the tip";
   out.candidate.check = "stiffness of the gear and the link; weight of tool and payload";
   out.candidate.record = fmt::format(
       "the same readings of {} with the arm stretched out and folded; declare the direction of "
       "gravity in recording.yaml",
       s.name);
-  out.corrections = [s, world](double at_tip) {
-    const auto load = gravity_load(world.tree, world.frames, s.joint, at_tip);
-    std::vector<Correction> corrections;
-    if (world.gravity_base) {
-      corrections.push_back(sag(s, "sag", load * *world.gravity_base));
-      return corrections;
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-      corrections.push_back(sag(s, fmt::format("sag {}", "xyz"[axis]), load.col(axis)));
-    }
-    return corrections;
+  std::vector<Correction> corrections;
+  Eigen::MatrixXd shares(s.value.size(), static_cast<Eigen::Index>(loads.size()));
+  for (std::size_t k = 0; k < loads.size(); ++k) {
+    corrections.push_back(sag(s, "sag by " + loads[k].what, loads[k].arm_m));
+    shares.col(static_cast<Eigen::Index>(k)) = corrections.back().share;
+  }
+  out.candidate.size = [shares](const Eigen::VectorXd& theta) {
+    return (shares * theta).cwiseAbs().maxCoeff();
   };
+  out.corrections = [corrections](double) { return corrections; };
   return out;
 }
 

@@ -77,29 +77,54 @@ Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd
   return out;
 }
 
-Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load(const KinematicTree& tree,
-                                                      const JointMotion& motion, int joint,
-                                                      double at_tip) {
+namespace {
+
+// Torque about (force along) the axis by a unit of gravity along each axis of the base frame that
+// acts at a point: axis . (arm x g) = g . (axis x arm).
+Eigen::RowVector3d load_at(const Joint& joint, const Pose& T_base_child,
+                           const Eigen::Vector3d& point_base) {
+  const Eigen::Vector3d axis = T_base_child.rotation * joint.axis;
+  if (joint.type == JointType::kPrismatic) return axis.transpose();
+  return axis.cross(point_base - T_base_child.translation).transpose();
+}
+
+}  // namespace
+
+std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion, int joint,
+                                const std::optional<Eigen::Vector3d>& gravity_base) {
   const Joint& axis = tree.joints[static_cast<std::size_t>(joint)];
   const std::vector<std::size_t> behind = links_behind(tree, joint);
   const std::vector<Eigen::Vector3d> middle = middles(tree);
-  Eigen::Matrix<double, Eigen::Dynamic, 3> out(motion.value.rows(), 3);
-  for (Eigen::Index i = 0; i < motion.value.rows(); ++i) {
+  const Eigen::Quaterniond across = rotation_to_axis(axis.axis);
+  const Eigen::Index instants = motion.value.rows();
+  Eigen::MatrixXd all(instants, 3);  // the middles of all links behind
+  Eigen::MatrixXd own_x(instants, 3);
+  Eigen::MatrixXd own_y(instants, 3);
+  Eigen::MatrixXd tip(instants, 3);
+  for (Eigen::Index i = 0; i < instants; ++i) {
     const std::vector<Pose> T_base_link = forward_kinematics(tree, motion.value.row(i).transpose());
     const Pose& T_base_child = T_base_link[axis.child.index()];
-    const Eigen::Vector3d direction = T_base_child.rotation * axis.axis;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const std::size_t link : behind) {
-      centre +=
-          (1.0 - at_tip) / static_cast<double>(behind.size()) * (T_base_link[link] * middle[link]);
+      mean += T_base_link[link] * middle[link] / static_cast<double>(behind.size());
     }
-    centre += at_tip * (T_base_link[behind.back()] * middle[behind.back()]);
-    // axis . (arm x g) = g . (axis x arm); a slider feels g along its axis.
-    out.row(i) = direction;
-    if (axis.type == JointType::kRevolute) {
-      out.row(i) = direction.cross(centre - T_base_child.translation);
-    }
+    all.row(i) = load_at(axis, T_base_child, mean);
+    own_x.row(i) = load_at(axis, T_base_child, T_base_child * (across * Eigen::Vector3d::UnitX()));
+    own_y.row(i) = load_at(axis, T_base_child, T_base_child * (across * Eigen::Vector3d::UnitY()));
+    tip.row(i) = load_at(axis, T_base_child, T_base_link[behind.back()] * middle[behind.back()]);
   }
+  std::vector<Load> out;
+  if (!gravity_base) {
+    for (int k = 0; k < 3; ++k) {
+      out.push_back({std::string("gravity along ") + "xyz"[k], all.col(k)});
+    }
+    return out;
+  }
+  if (axis.type == JointType::kPrismatic) return {{"what it carries", all * *gravity_base}};
+  out.push_back({"its own link, across x", own_x * *gravity_base});
+  out.push_back({"its own link, across y", own_y * *gravity_base});
+  if (behind.size() > 1) out.push_back({"the links behind it", all * *gravity_base});
+  if (behind.size() > 2) out.push_back({"the last link", tip * *gravity_base});
   return out;
 }
 

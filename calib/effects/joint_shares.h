@@ -3,6 +3,8 @@
 // How much of an effect each frame shows, from how the joints move.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -21,12 +23,18 @@ namespace kinescope::effects {
                                       const Eigen::VectorXd& values,
                                       const std::vector<double>& to_s);
 
-/// Torque about (force along) a joint's axis that 1 kg of load causes under a unit of gravity along
-/// each axis of the base frame: instants x 3. Of the load, the share `at_tip` hangs on the last
-/// link of the joint's branch, the rest is spread evenly over the frames of the links behind the
-/// joint.
-[[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load(const KinematicTree& tree,
-                                                                    const JointMotion& motion,
-                                                                    int joint, double at_tip);
+/// A load that a joint may give way under.
+struct Load {
+  std::string what;       ///< "its own link, across x"
+  Eigen::VectorXd arm_m;  ///< instants: torque of 1 kg under a unit of gravity (sliders: its force)
+};
+
+/// What gravity does to a joint from the places where masses may be. Gravity known: the joint's own
+/// link (two unknown arms across the axis), the middles of the links behind it evenly, that of the
+/// last one. Not known: the middles of all links behind it, for gravity along each axis of the
+/// base.
+[[nodiscard]] std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion,
+                                              int joint,
+                                              const std::optional<Eigen::Vector3d>& gravity_base);
 
 }  // namespace kinescope::effects

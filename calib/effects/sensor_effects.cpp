@@ -143,6 +143,9 @@ void happens_at_a_time(const EffectWorld& world, CorrectedPart part, int index, 
     c.scan.push_back(begin + (end - begin) * static_cast<double>(k) /
                                  static_cast<double>(std::max<std::size_t>(1, count - 1)));
   }
+  // A step between two frames: any time between them says the same.
+  c.scan_step =
+      length / static_cast<double>(std::max<std::size_t>(1, world.frames.times_s.size() - 1));
   c.scan_name = "at";
   c.scan_unit = "s";
   const Eigen::VectorXd time = frame_times(world);

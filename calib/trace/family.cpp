@@ -19,6 +19,20 @@ double refine(const NormalSystem& system, const Candidate& candidate, std::size_
   double low = scan[best == 0 ? 0 : best - 1];
   double high = scan[std::min(best + 1, scan.size() - 1)];
   const auto gain = [&](double value) { return gain_of(system, candidate.columns(value)); };
+  if (candidate.scan_step > 0.0) {
+    double value = scan[best];
+    double most = gain(value);
+    const auto steps = static_cast<int>((high - low) / candidate.scan_step);
+    for (int k = 0; k <= steps; ++k) {
+      const double tried = low + candidate.scan_step * k;
+      const double gained = gain(tried);
+      if (gained > most) {
+        most = gained;
+        value = tried;
+      }
+    }
+    return value;
+  }
   double left = high - kGolden * (high - low);
   double right = low + kGolden * (high - low);
   double at_left = gain(left);
@@ -78,6 +92,7 @@ std::vector<TestedMember> test_family(const NormalSystem& system,
 }
 
 double size_of(const Candidate& candidate, const Eigen::VectorXd& theta) {
+  if (candidate.size) return candidate.size(theta);
   if (theta.size() == 1) return theta[0];
   return std::sqrt(candidate.size_weights.dot(theta.cwiseAbs2()));
 }
@@ -87,7 +102,15 @@ double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
   if (theta.size() == 1) return std::sqrt(std::max(0.0, covariance(0, 0)));
   const double size = size_of(candidate, theta);
   if (!(size > 0.0)) return 0.0;
-  const Eigen::VectorXd slope = candidate.size_weights.cwiseProduct(theta) / size;
+  Eigen::VectorXd slope = candidate.size_weights.cwiseProduct(theta) / size;
+  if (candidate.size) {
+    for (Eigen::Index k = 0; k < theta.size(); ++k) {
+      Eigen::VectorXd moved = theta;
+      const double step = 1e-4 * std::max(size, std::abs(theta[k]));
+      moved[k] += step;
+      slope[k] = (candidate.size(moved) - size) / step;
+    }
+  }
   return std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
 }
 

@@ -49,8 +49,9 @@ double explained_by(const Eigen::VectorXd& covariate, const Eigen::VectorXd& cur
     }
     within += squares - sum * sum / static_cast<double>(last - first);
   }
+  constexpr double kConstant = 1e-20;  // of the curve's square
   const double total = (curve.array() - curve.mean()).square().sum();
-  return total > 0.0 ? 1.0 - within / total : 0.0;
+  return total > kConstant * curve.squaredNorm() ? 1.0 - within / total : 0.0;
 }
 
 }  // namespace
@@ -83,8 +84,9 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
       out.effect += theta * column.share;
     }
   }
-  const Covariate* best = nullptr;
-  double share = -1.0;
+  // A constant depends on nothing: it is shown over the last one, time.
+  const Covariate* best = &without.fit.covariates.back();
+  double share = 0.0;
   for (const Covariate& covariate : without.fit.covariates) {
     const double explained = explained_by(covariate.value, out.effect);
     // The first of equals: a joint's value comes before what follows from it.

@@ -69,10 +69,13 @@ struct Candidate {
   /// The size that is reported is the parameter itself where there is one, else
   /// sqrt(sum of weight x parameter^2), in `size_unit`.
   Eigen::VectorXd size_weights;
+  /// Where that is no size: another function of the parameters. Empty: the above.
+  std::function<double(const Eigen::VectorXd& theta)> size;
   std::string size_unit;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;
   bool scan_listed = false;  ///< only the listed values make sense; else those between them too
+  double scan_step = 0.0;  ///< values between them are tried in such steps; 0: they are continuous
   std::string scan_name;
   std::string scan_unit;
   std::function<std::string(double scan)> scan_words;  ///< "joint2"; empty: the number says it
