@@ -14,8 +14,9 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr double kFinest = 1e-5;    // s
-constexpr double kSmallStep = 0.1;  // standard deviations
+// Steps below this (s), or this many standard deviations, are the last.
+constexpr double kFinest = 1e-5;
+constexpr double kSmallStep = 0.3;
 
 // Twist of every link (in its frame, 6 x instants) for one second of offset.
 using Twists = std::vector<Eigen::MatrixXd>;
@@ -158,7 +159,9 @@ TimeOffset refine_offset(const GrownTree& tree, const Series& series, const Read
     best.sigma_s = std::sqrt(most_correlated(fitted) / n.curvature);
     step = std::clamp(n.gradient / n.curvature, -bounds.step_s, bounds.step_s);
     step = std::clamp(at + step, -bounds.most_s, bounds.most_s) - at;
-    if (std::abs(step) < std::max(kFinest, kSmallStep * best.sigma_s)) break;
+    if (std::abs(step) >= std::max(kFinest, kSmallStep * best.sigma_s)) continue;
+    best.value_s += step;
+    break;
   }
   return best;
 }

@@ -24,7 +24,9 @@ constexpr double kNoiseOnly = 1.5;
 
 // Channels of one log are mostly of one kind: when the clear joints are in rad and m, the others
 // are too.
-double si_share_of(const GrownTree& tree, const Readings& readings, double unknown) {
+double si_share_of(const FoundTree& found) {
+  const GrownTree& tree = found.tree;
+  const Readings& readings = found.readings;
   int si = 0;
   int driven = 0;
   for (const GrownLink& link : tree.links) {
@@ -40,7 +42,7 @@ double si_share_of(const GrownTree& tree, const Readings& readings, double unkno
       t += joint.terms.size();
     }
   }
-  return driven >= 3 && 3 * si > 2 * driven ? 0.98 : unknown;
+  return driven >= 3 && 3 * si > 2 * driven ? 0.98 : Readings{}.si_share;
 }
 
 bool has_driven_joint(const GrownTree& tree) {
@@ -95,19 +97,25 @@ class Search {
          const StructureOptions& options)
       : thin_(thin), rough_(thinned(full, kRoughInstants)), log_(log), options_(options) {}
 
-  // `si_share`: how likely channels are in rad and m; 0: as nothing is known.
-  [[nodiscard]] FoundTree grow_at(double offset_s, const Series& series,
-                                  const GrowthOptions& growth = {}, double si_share = 0.0) const {
+  // `si_share`: how likely channels are in rad and m.
+  [[nodiscard]] FoundTree grow_once(double offset_s, const Series& series,
+                                    const GrowthOptions& growth, double si_share) const {
     FoundTree found;
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
-    const double unknown = found.readings.si_share;
-    found.readings.si_share = std::max(si_share, unknown);
+    found.readings.si_share = std::max(si_share, found.readings.si_share);
     found.tree = grow_tree(series, found.readings, growth);
-    const double told = si_share_of(found.tree, found.readings, unknown);
+    return found;
+  }
+
+  // Grown again where the joints tell something else of the channels' units.
+  [[nodiscard]] FoundTree grow_at(double offset_s, const GrowthOptions& growth = {},
+                                  double si_share = 0.0) const {
+    FoundTree found = grow_once(offset_s, thin_, growth, si_share);
+    const double told = si_share_of(found);
     if (told != found.readings.si_share) {
       found.readings.si_share = told;
-      found.tree = grow_tree(series, found.readings, growth);
+      found.tree = grow_tree(thin_, found.readings, growth);
     }
     return found;
   }
@@ -118,19 +126,19 @@ class Search {
     double offset_s = start_s;
     double si_share = 0.0;
     if (2 * rough_.size() <= thin_.size()) {
-      const FoundTree rough = grow_at(start_s, rough_, options);
+      const FoundTree rough = grow_once(start_s, rough_, options, si_share);
       if (has_driven_joint(rough.tree) && !has_free_body(rough.tree)) {
-        si_share = rough.readings.si_share;
+        si_share = si_share_of(rough);
         offset_s = refined(rough, step_s).value_s;
       }
     }
-    FoundTree found = grow_at(offset_s, thin_, options, si_share);
+    FoundTree found = grow_at(offset_s, options, si_share);
     for (int growth = 1; growth < kMostGrowths && has_driven_joint(found.tree); ++growth) {
       const TimeOffset offset = refined(found, step_s);
       const double moved = std::abs(offset.value_s - found.offset.value_s);
       found.offset.sigma_s = offset.sigma_s;
       if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) break;
-      found = grow_at(offset.value_s, thin_, options, found.readings.si_share);
+      found = grow_at(offset.value_s, options, found.readings.si_share);
       found.offset.sigma_s = offset.sigma_s;
     }
     return found;
@@ -153,8 +161,7 @@ class Search {
 FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
                       const StructureOptions& options) {
   const Search search(full, thin, log, options);
-  if (!options.scan_time_offset || !thin.smooth || log.channels.empty())
-    return search.grow_at(0.0, thin);
+  if (!options.scan_time_offset || !thin.smooth || log.channels.empty()) return search.grow_at(0.0);
   // Joints in series without markers between are a long search: not at every offset.
   const GrowthOptions quick{.paths_of_several_joints = false};
   const double step_s = offset_step(readings_at(log, thin, 0.0, options.max_gap_s));
