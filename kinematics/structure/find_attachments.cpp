@@ -113,7 +113,7 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
     const double hopeless = (rest ? 1.5 * refiner.best() : refiner.best()) + kHopeless;
     if (refiner.count() > 0 && (candidate.cost > hopeless || enough)) continue;
     if (candidate.across > kHopelessVariance && candidate.share > kHopelessShare) continue;
-    if (options.give_up_above > 0.0 && candidate.cost > limit + kHopeless) continue;
+    if (candidate.cost > limit + kHopeless) continue;
     refiner.refine(candidate);
   }
   return std::move(refiner).sorted();

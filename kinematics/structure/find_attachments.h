@@ -5,6 +5,7 @@
 // Method  linear screening, then a fit of the whole chain to the promising candidates.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "kinematics/structure/attachment.h"
@@ -13,7 +14,8 @@ namespace kinescope::structure_search {
 
 struct AttachmentOptions {
   bool coordinate_free = true;  ///< joints that no channel drives
-  double give_up_above = 0.0;   ///< cost per sighting beyond which nothing is refined; 0: no limit
+  /// Cost per sighting beyond which nothing is refined.
+  double give_up_above = std::numeric_limits<double>::infinity();
   int max_refined = 4;
 };
 

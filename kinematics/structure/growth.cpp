@@ -23,6 +23,7 @@ GrownTree grow_tree(const Series& series, const Readings& readings, const Growth
   GrowthState state = start_growth(series, readings, options);
   do {
     attach_all(state);
+    if (look_again_at_free_bodies(state)) attach_all(state);
   } while (options.paths_of_several_joints && attach_through_unseen_links(state));
   for (int round = 0; round < kMostRounds && rearrange(state); ++round) {
   }

@@ -2,15 +2,19 @@
 #include "kinematics/structure/growth_state.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/first_look.h"
+#include "kinematics/structure/pair_tree.h"
 #include "kinematics/structure/rest.h"
 
 namespace kinescope::structure_search {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Added to the cost of a free body that is seen to rest.
 constexpr double kNeverFree = 1e6;
 // Cost per sighting above that of the best known attachment from which none is refined.
@@ -20,6 +24,26 @@ std::vector<char> moving_channels(const Readings& readings) {
   std::vector<char> usable;
   for (int c = 0; c < readings.channels(); ++c) usable.push_back(readings.moves(c) ? 1 : 0);
   return usable;
+}
+
+// What each body costs with its neighbours in the tree of likely pairs: its parent is among them.
+std::vector<double> likely_costs(const Series& series, const Readings& readings) {
+  constexpr int kInstants = 80;
+  // More, since a link's path is exact, while the noise of a partner hides errors of the model.
+  constexpr double kMargin = 12.0;
+  std::vector<double> costs(series.bodies.size(), -kInfinity);
+  const PairTree tree = pair_tree(body_pairs(series, kInstants), series.bodies.size(), readings);
+  for (const PairEdge& edge : tree.edges) {
+    for (const int body : {edge.first, edge.second}) {
+      if (body < 0) continue;
+      double& cost = costs[static_cast<std::size_t>(body)];
+      cost = std::max(cost, edge.cost + kMargin);
+    }
+  }
+  for (double& cost : costs) {
+    if (!std::isfinite(cost)) cost = kInfinity;
+  }
+  return costs;
 }
 
 // By cost, tempered by the correlation that the closest one leaves.
@@ -39,6 +63,7 @@ GrowthState start_growth(const Series& series, const Readings& readings,
                     .readings = readings,
                     .options = options,
                     .usable = moving_channels(readings),
+                    .likely_cost = likely_costs(series, readings),
                     .moves_freely = std::vector<char>(series.bodies.size(), 0),
                     .tree = {}};
   for (const Body& body : series.bodies) {
@@ -67,9 +92,11 @@ void list_alternatives(GrowthState& state, std::size_t body, int link) {
   if (grown.link >= 0 && is_below(state.tree, link, body)) return;
   const FirstLook look = first_look(seen, path, state.readings, state.usable);
   AttachmentOptions options;
+  options.give_up_above = state.likely_cost[body];
   const Attachment* best = best_of(grown.alternatives);
   if (best != nullptr && seen.seen > 0) {
-    options.give_up_above = std::max(0.0, best->data_cost / seen.seen) + kGiveUpMargin;
+    const double known = std::max(0.0, best->data_cost / seen.seen) + kGiveUpMargin;
+    options.give_up_above = std::min(options.give_up_above, known);
   }
   std::vector<Attachment> found;
   if (look.may_hang) {
@@ -96,6 +123,20 @@ void list_all_alternatives(GrowthState& state) {
       list_alternatives(state, b, static_cast<int>(l));
     }
   }
+}
+
+bool look_again_at_free_bodies(GrowthState& state) {
+  bool any = false;
+  for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
+    if (state.tree.bodies[b].link >= 0 || state.likely_cost[b] == kInfinity) continue;
+    any = true;
+    state.likely_cost[b] = kInfinity;
+    state.tree.bodies[b].alternatives.clear();
+    for (std::size_t l = 0; l < state.tree.links.size(); ++l) {
+      list_alternatives(state, b, static_cast<int>(l));
+    }
+  }
+  return any;
 }
 
 bool is_acceptable(const GrowthState& state, std::size_t body, const Attachment& a) {

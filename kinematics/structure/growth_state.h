@@ -14,8 +14,9 @@ struct GrowthState {
   const Series& series;
   const Readings& readings;
   GrowthOptions options;
-  std::vector<char> usable;        ///< channels that move
-  std::vector<char> moves_freely;  ///< bodies whose joint without a channel was given up
+  std::vector<char> usable;         ///< channels that move
+  std::vector<double> likely_cost;  ///< of a body on its neighbours, a sighting; infinite: unknown
+  std::vector<char> moves_freely;   ///< bodies whose joint without a channel was given up
   GrownTree tree;
 };
 
@@ -31,6 +32,9 @@ void list_alternatives(GrowthState& state, std::size_t body, int link);
 
 /// The same for every body and every link.
 void list_all_alternatives(GrowthState& state);
+
+/// Lists those of the free bodies anew, whatever their likely cost; false when there are none.
+bool look_again_at_free_bodies(GrowthState& state);
 
 /// Good enough to be believed: clean, and better than moving freely.
 [[nodiscard]] bool is_acceptable(const GrowthState& state, std::size_t body, const Attachment& a);
