@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/tangent.h"
 
@@ -44,7 +46,8 @@ void add_parameter_doubt(const ChainFit& fit, const ChainKinematics& chain,
   if (fit.covariance.size() == 0) return;
   const Eigen::Index size = fit.covariance.rows();
   const auto instants = static_cast<Eigen::Index>(coordinates.size());
-  Eigen::MatrixXd jacobians = Eigen::MatrixXd::Zero(6 * instants, size);
+  // A sample's six rows of the Jacobian stand as columns, one sample after the other.
+  Eigen::MatrixXd jacobians = Eigen::MatrixXd::Zero(size, 6 * instants);
   ChainJacobian J(6, size);
   ChainJacobian mean = ChainJacobian::Zero(6, size);
   double count = 0.0;
@@ -52,18 +55,27 @@ void add_parameter_doubt(const ChainFit& fit, const ChainKinematics& chain,
     const auto at = static_cast<std::size_t>(i);
     if (path.valid[at] == 0) continue;
     chain.jacobian(coordinates[at].data(), readings.value, static_cast<int>(i), J);
-    jacobians.middleRows<6>(6 * i) = J;
+    jacobians.middleCols<6>(6 * i) = J.transpose();
     mean += J;
     count += 1.0;
   }
   mean /= std::max(1.0, count);
-  for (Eigen::Index i = 0; i < instants; ++i) jacobians.middleRows<6>(6 * i) -= mean;
-  const Eigen::MatrixXd products = jacobians * (fit.correlation * fit.covariance);
+  const Eigen::MatrixXd mean_columns = mean.transpose();
+  for (Eigen::Index i = 0; i < instants; ++i) jacobians.middleCols<6>(6 * i) -= mean_columns;
+  const Eigen::LLT<Eigen::MatrixXd> factor(fit.correlation * fit.covariance);
+  if (factor.info() != Eigen::Success) return;
+  const Eigen::MatrixXd roots = factor.matrixU() * jacobians;
   for (Eigen::Index i = 0; i < instants; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (path.valid[at] == 0) continue;
-    path.covariance[at] +=
-        products.middleRows<6>(6 * i).lazyProduct(jacobians.middleRows<6>(6 * i).transpose());
+    Matrix6d& covariance = path.covariance[at];
+    for (Eigen::Index c = 0; c < 6; ++c) {
+      for (Eigen::Index r = c; r < 6; ++r) {
+        const double sum = roots.col(6 * i + r).dot(roots.col(6 * i + c));
+        covariance(r, c) += sum;
+        if (r > c) covariance(c, r) += sum;
+      }
+    }
   }
 }
 

@@ -9,6 +9,8 @@
 //         given out once each.
 #pragma once
 
+#include <vector>
+
 #include "kinematics/structure/grown_tree.h"
 
 namespace kinescope::structure_search {
@@ -18,6 +20,9 @@ struct GrowthOptions {
   double accept_ratio = 40.0;     ///< the motion over what is left of it, beyond the noise
   double free_ratio = 25.0;       ///< the same that a joint without a channel needs at least
   bool paths_of_several_joints = true;
+  /// Of every body on its neighbours, a sighting (likely_costs()): far worse places are not fitted
+  /// at first. Empty: nothing is known.
+  std::vector<double> likely_cost = {};
 };
 
 [[nodiscard]] GrownTree grow_tree(const Series& series, const Readings& readings,

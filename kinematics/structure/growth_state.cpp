@@ -2,13 +2,11 @@
 #include "kinematics/structure/growth_state.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/first_look.h"
-#include "kinematics/structure/pair_tree.h"
 #include "kinematics/structure/rest.h"
 
 namespace kinescope::structure_search {
@@ -24,26 +22,6 @@ std::vector<char> moving_channels(const Readings& readings) {
   std::vector<char> usable;
   for (int c = 0; c < readings.channels(); ++c) usable.push_back(readings.moves(c) ? 1 : 0);
   return usable;
-}
-
-// What each body costs with its neighbours in the tree of likely pairs: its parent is among them.
-std::vector<double> likely_costs(const Series& series, const Readings& readings) {
-  constexpr int kInstants = 80;
-  // More, since a link's path is exact, while the noise of a partner hides errors of the model.
-  constexpr double kMargin = 12.0;
-  std::vector<double> costs(series.bodies.size(), -kInfinity);
-  const PairTree tree = pair_tree(body_pairs(series, kInstants), series.bodies.size(), readings);
-  for (const PairEdge& edge : tree.edges) {
-    for (const int body : {edge.first, edge.second}) {
-      if (body < 0) continue;
-      double& cost = costs[static_cast<std::size_t>(body)];
-      cost = std::max(cost, edge.cost + kMargin);
-    }
-  }
-  for (double& cost : costs) {
-    if (!std::isfinite(cost)) cost = kInfinity;
-  }
-  return costs;
 }
 
 // By cost, tempered by the correlation that the closest one leaves.
@@ -63,9 +41,10 @@ GrowthState start_growth(const Series& series, const Readings& readings,
                     .readings = readings,
                     .options = options,
                     .usable = moving_channels(readings),
-                    .likely_cost = likely_costs(series, readings),
+                    .likely_cost = options.likely_cost,
                     .moves_freely = std::vector<char>(series.bodies.size(), 0),
                     .tree = {}};
+  state.likely_cost.resize(series.bodies.size(), kInfinity);
   for (const Body& body : series.bodies) {
     const FreeCost free = free_cost(body, readings);
     GrownBody& grown = state.tree.bodies.emplace_back();

@@ -105,6 +105,7 @@ LineFit reweighted(const LineProblem& problem, Eigen::VectorXd& coordinate,
                    const std::vector<int>& used, const LineFit& start, bool free,
                    Improve&& improve) {
   constexpr int kPasses = 3;
+  constexpr double kEnough = 1.0;  // -2 ln likelihood
   ResidualParts parts = line_residuals(problem, coordinate, start, free);
   ResidualScale scale = residual_scale(parts);
   LineFit best;
@@ -116,9 +117,11 @@ LineFit reweighted(const LineProblem& problem, Eigen::VectorXd& coordinate,
     scale = residual_scale(parts);
     line.cost = scale.cost;
     line.across = scale.across;
-    if (pass > 0 && line.cost >= best.cost) continue;
+    const double gain = best.cost - line.cost;
+    if (pass > 0 && gain <= 0.0) continue;
     best = line;
     best_coordinate = coordinate;
+    if (pass > 0 && gain < kEnough) break;
   }
   coordinate = best_coordinate;
   return best;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "kinematics/structure/linear_motion.h"
@@ -216,6 +217,22 @@ PairTree pair_tree(const std::vector<BodyPair>& pairs, std::size_t bodies,
     tree.gain -= gain.cost;
   }
   return tree;
+}
+
+std::vector<double> likely_costs(const PairTree& tree, std::size_t bodies) {
+  // A link's path is exact, while the noise of a partner hides errors of the model.
+  constexpr double kMargin = 12.0;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::vector<double> costs(bodies, -kInfinity);
+  for (const PairEdge& edge : tree.edges) {
+    for (const int body : {edge.first, edge.second}) {
+      if (body < 0) continue;
+      double& cost = costs[static_cast<std::size_t>(body)];
+      cost = std::max(cost, edge.cost + kMargin);
+    }
+  }
+  std::ranges::replace(costs, -kInfinity, kInfinity);
+  return costs;
 }
 
 }  // namespace kinescope::structure_search

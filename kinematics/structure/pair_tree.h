@@ -44,4 +44,8 @@ struct PairTree {
 [[nodiscard]] PairTree pair_tree(const std::vector<BodyPair>& pairs, std::size_t bodies,
                                  const Readings& readings);
 
+/// What each body costs with its neighbours in the tree, a sighting, with a margin: its parent is
+/// among them. Infinite for bodies without any.
+[[nodiscard]] std::vector<double> likely_costs(const PairTree& tree, std::size_t bodies);
+
 }  // namespace kinescope::structure_search

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "kinematics/structure/pair_tree.h"
 #include "kinematics/structure/time_offset.h"
 
 namespace kinescope::structure_search {
@@ -95,7 +96,11 @@ class Search {
  public:
   Search(const Series& full, const Series& thin, const JointLog& log,
          const StructureOptions& options)
-      : thin_(thin), rough_(thinned(full, kRoughInstants)), log_(log), options_(options) {}
+      : thin_(thin),
+        rough_(thinned(full, kRoughInstants)),
+        pairs_(body_pairs(rough_, kRoughInstants)),
+        log_(log),
+        options_(options) {}
 
   // `si_share`: how likely channels are in rad and m.
   [[nodiscard]] FoundTree grow_once(double offset_s, const Series& series,
@@ -104,7 +109,7 @@ class Search {
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
     found.readings.si_share = std::max(si_share, found.readings.si_share);
-    found.tree = grow_tree(series, found.readings, growth);
+    found.tree = grow_tree(series, found.readings, with_likely_costs(growth, offset_s));
     return found;
   }
 
@@ -115,7 +120,7 @@ class Search {
     const double told = si_share_of(found);
     if (told != found.readings.si_share) {
       found.readings.si_share = told;
-      found.tree = grow_tree(thin_, found.readings, growth);
+      found.tree = grow_tree(thin_, found.readings, with_likely_costs(growth, offset_s));
     }
     return found;
   }
@@ -145,6 +150,13 @@ class Search {
   }
 
  private:
+  [[nodiscard]] GrowthOptions with_likely_costs(GrowthOptions growth, double offset_s) const {
+    const std::size_t bodies = rough_.bodies.size();
+    const Readings readings = readings_at(log_, rough_, offset_s, options_.max_gap_s);
+    growth.likely_cost = likely_costs(pair_tree(pairs_, bodies, readings), bodies);
+    return growth;
+  }
+
   [[nodiscard]] TimeOffset refined(const FoundTree& found, double step_s) const {
     return refine_offset(found.tree, thin_, found.readings, log_, found.offset.value_s,
                          {options_.max_time_offset_s, step_s, options_.max_gap_s});
@@ -152,6 +164,7 @@ class Search {
 
   const Series& thin_;
   Series rough_;
+  std::vector<BodyPair> pairs_;
   const JointLog& log_;
   const StructureOptions& options_;
 };

@@ -11,7 +11,7 @@ namespace kinescope::structure_search {
 namespace {
 
 // Frames looked at on either side of one when it is judged by its neighbours.
-constexpr int kNeighbours = 4;
+constexpr std::size_t kNeighbours = 4;
 // Neighbours further away than this (s) say nothing about a frame.
 constexpr double kNeighbourTime = 0.4;
 // A sighting this many times further from its neighbours than the median one is an outlier (about 9
@@ -51,39 +51,78 @@ struct Neighbourhood {
 
 using Displacements = std::array<Vector6d, 2 * kNeighbours>;
 
+// Displacements of a body from each frame to the next ones, which most of the cleaning looks at.
+class Steps {
+ public:
+  explicit Steps(const Body& body) : forward_(body.at.size() * kNeighbours, Vector6d::Zero()) {
+    for (std::size_t f = 0; f < body.at.size(); ++f) {
+      if (!body.at[f].seen) continue;
+      const Pose inverse = body.at[f].pose.inverse();
+      const std::size_t last = std::min(body.at.size() - 1, f + kNeighbours);
+      for (std::size_t g = f + 1; g <= last; ++g) {
+        if (body.at[g].seen) place(f, g) = fast_log(compose(inverse, body.at[g].pose));
+      }
+    }
+  }
+
+  // Of frame g as seen from frame f, both with a sighting and at most kNeighbours apart.
+  [[nodiscard]] Vector6d operator()(std::size_t f, std::size_t g) const {
+    return g > f ? forward_[index(f, g)] : Vector6d(-forward_[index(g, f)]);
+  }
+
+ private:
+  [[nodiscard]] static std::size_t index(std::size_t f, std::size_t g) {
+    return kNeighbours * f + (g - f - 1);
+  }
+  Vector6d& place(std::size_t f, std::size_t g) { return forward_[index(f, g)]; }
+
+  std::vector<Vector6d> forward_;
+};
+
+using Numbers = std::array<double, 2 * kNeighbours>;
+
+// By insertion: for so few there is nothing faster.
+void sort_first(Numbers& values, std::size_t count) {
+  for (std::size_t k = 1; k < count; ++k) {
+    const double value = values[k];
+    std::size_t at = k;
+    for (; at > 0 && values[at - 1] > value; --at) values[at] = values[at - 1];
+    values[at] = value;
+  }
+}
+
 Vector6d median_displacement(const Displacements& d, std::size_t count) {
   Vector6d median;
-  std::array<double, 2 * kNeighbours> values{};
+  Numbers values{};
   for (Eigen::Index c = 0; c < 6; ++c) {
     for (std::size_t k = 0; k < count; ++k) values[k] = d[k](c);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
-    median(c) = *middle;
-    if (count % 2 == 0) median(c) = 0.5 * (*middle + *std::max_element(values.begin(), middle));
+    sort_first(values, count);
+    const double upper = values[count / 2];
+    median(c) = count % 2 == 0 ? 0.5 * (upper + values[count / 2 - 1]) : upper;
   }
   return median;
 }
 
-// Nothing with too few neighbours.
+// Nothing with too few neighbours. `displacement_of(g)`: of frame g as seen from frame f.
+template <typename DisplacementOf>
 std::optional<Neighbourhood> neighbourhood_of(const Body& body, const std::vector<double>& times_s,
-                                              int f, const Pose& pose, const Matrix6d& whitening) {
+                                              std::size_t f, DisplacementOf displacement_of) {
   Displacements displacement;
   std::size_t count = 0;
-  const Pose inverse = pose.inverse();
-  for (int g = std::max(0, f - kNeighbours);
-       g <= std::min(static_cast<int>(body.at.size()) - 1, f + kNeighbours); ++g) {
-    const auto at = static_cast<std::size_t>(g);
-    const double apart = std::abs(times_s[at] - times_s[static_cast<std::size_t>(f)]);
-    if (g == f || !body.at[at].seen || apart > kNeighbourTime) continue;
-    displacement[count++] = fast_log(inverse * body.at[at].pose);
+  const std::size_t last = std::min(body.at.size() - 1, f + kNeighbours);
+  for (std::size_t g = f - std::min<std::size_t>(f, kNeighbours); g <= last; ++g) {
+    if (g == f || !body.at[g].seen || std::abs(times_s[g] - times_s[f]) > kNeighbourTime) continue;
+    displacement[count++] = displacement_of(g);
   }
   if (count < 3) return std::nullopt;
   Neighbourhood out;
   out.median = median_displacement(displacement, count);
-  std::vector<double> lengths;
-  for (std::size_t k = 0; k < count; ++k)
-    lengths.push_back((whitening * (displacement[k] - out.median)).norm());
-  out.spread = median_of(std::move(lengths));
+  Numbers squared{};
+  for (std::size_t k = 0; k < count; ++k) {
+    squared[k] = (body.at[f].whitening * (displacement[k] - out.median)).squaredNorm();
+  }
+  sort_first(squared, count);
+  out.spread = std::sqrt(squared[count / 2]);
   return out;
 }
 
@@ -95,7 +134,7 @@ struct Deviations {
   double step = 0.0;  // median displacement, rad and m together
 };
 
-Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
+Deviations deviations_of(const Body& body, const Steps& step, const std::vector<double>& times_s) {
   Deviations out;
   const double unknown = std::nan("");
   out.main.assign(body.at.size(), unknown);
@@ -106,15 +145,17 @@ Deviations deviations_of(const Body& body, const std::vector<double>& times_s) {
   for (std::size_t f = 0; f < body.at.size(); ++f) {
     const Sighting& s = body.at[f];
     if (!s.seen) continue;
-    const auto d = neighbourhood_of(body, times_s, static_cast<int>(f), s.pose, s.whitening);
+    const auto d = neighbourhood_of(body, times_s, f, [&](std::size_t g) { return step(f, g); });
     if (!d) continue;
     out.main[f] = (s.whitening * d->median).norm();
     out.spread[f] = d->spread;
     known.push_back(out.main[f]);
     steps.push_back(d->median.norm());
     if (!s.alternative) continue;
-    const auto other =
-        neighbourhood_of(body, times_s, static_cast<int>(f), *s.alternative, s.whitening);
+    const Pose inverse = s.alternative->inverse();
+    const auto other = neighbourhood_of(body, times_s, f, [&](std::size_t g) {
+      return fast_log(compose(inverse, body.at[g].pose));
+    });
     if (other) out.alternative[f] = (s.whitening * other->median).norm();
   }
   out.median = median_of(std::move(known));
@@ -173,14 +214,13 @@ bool clean_in_time(Body& body, const Deviations& d) {
 // Robust noise over declared noise from fourth differences of the pose, which see no motion slower
 // than a few hertz: (1, -4, 6, -4, 1) has variance 70 sigma^2. Nothing with too few runs of five
 // frames.
-std::optional<double> noise_from_differences(const Body& body) {
+std::optional<double> noise_from_differences(const Body& body, const Steps& step) {
   std::vector<double> absolute;
   for (std::size_t f = 2; f + 2 < body.at.size(); ++f) {
     const auto seen = [&](std::size_t g) { return body.at[g].seen; };
     if (!seen(f - 2) || !seen(f - 1) || !seen(f) || !seen(f + 1) || !seen(f + 2)) continue;
-    const Pose inverse = body.at[f].pose.inverse();
-    const auto at = [&](std::size_t g) { return fast_log(inverse * body.at[g].pose); };
-    const Vector6d difference = at(f - 2) - 4.0 * at(f - 1) - 4.0 * at(f + 1) + at(f + 2);
+    const Vector6d difference =
+        step(f, f - 2) - 4.0 * step(f, f - 1) - 4.0 * step(f, f + 1) + step(f, f + 2);
     const Vector6d white = body.at[f].whitening * difference / std::sqrt(70.0);
     for (int c = 0; c < 6; ++c) absolute.push_back(std::abs(white(c)));
   }
@@ -315,12 +355,16 @@ Series clean_series(const PoseTracks& tracks) {
   int smooth = 0;
   int judged = 0;
   for (Body& body : series.bodies) {
-    const Deviations d = deviations_of(body, series.times_s);
+    Steps step(body);
+    const Deviations d = deviations_of(body, step, series.times_s);
     if (d.median > 0.0) ++judged;
     if (!is_smooth(body, d, series.times_s)) continue;
     ++smooth;
-    if (clean_in_time(body, d)) clean_in_time(body, deviations_of(body, series.times_s));
-    const auto noise = noise_from_differences(body);
+    if (clean_in_time(body, d)) {
+      step = Steps(body);
+      if (clean_in_time(body, deviations_of(body, step, series.times_s))) step = Steps(body);
+    }
+    const auto noise = noise_from_differences(body, step);
     if (noise) scale_noise(body, std::max(*noise, kLeastNoiseScale));
   }
   series.smooth = judged > 0 && 2 * smooth > judged;
