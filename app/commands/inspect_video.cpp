@@ -54,8 +54,9 @@ std::optional<Step> step_across(const ImageView& image, const Eigen::Vector2d& a
   const Eigen::Vector2d normal = Eigen::Vector2d(along.y(), -along.x()).normalized();
   const double reach = std::clamp(along.norm() / 10.0, 2.0, 8.0);
   std::vector<double> profile;
-  for (double s = -reach; s <= reach; s += kSpacingPx) {
-    const auto value = sample(image, 0.5 * (a + b) + s * normal);
+  const auto steps = static_cast<int>(std::floor(2.0 * reach / kSpacingPx));
+  for (int k = 0; k <= steps; ++k) {
+    const auto value = sample(image, 0.5 * (a + b) + (k * kSpacingPx - reach) * normal);
     if (!value) return std::nullopt;
     profile.push_back(*value);
   }
@@ -90,6 +91,7 @@ void add_sighting(Sightings& out, const ImageView& image, const TagObservation& 
 std::vector<MarkerFacts> summarise(const std::map<TagId, Sightings>& seen,
                                    const MarkerSet& markers) {
   std::vector<MarkerFacts> out;
+  out.reserve(seen.size());
   for (const auto& [id, sightings] : seen) {
     out.push_back({.id = id,
                    .size_m = markers.size_m(id),

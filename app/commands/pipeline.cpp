@@ -13,6 +13,7 @@
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
@@ -131,6 +132,7 @@ void match_channels(const Recording& recording, KinematicTree& tree,
     return;
   }
   std::vector<std::string> names;
+  names.reserve(movable.size());
   for (const std::size_t j : movable) names.push_back(tree.joints[j].name);
   if (movable.size() != recording.log.channels.size()) {
     throw bad_input(recording.log.source, "no column is named like a joint of the nominal robot",
@@ -193,16 +195,16 @@ Observed observe(const Recording& recording, const RunOptions& options,
       break;
     }
     case RecordingEntry::kCorners:
-      out.tags = *recording.corners;
+      out.tags = value_of(recording.corners);
       break;
     case RecordingEntry::kPoses:
-      out.measurements.poses = *recording.poses;
-      out.measurements.times_s = recording.poses->times_s;
+      out.measurements.poses = value_of(recording.poses);
+      out.measurements.times_s = out.measurements.poses.times_s;
       break;
     case RecordingEntry::kPoints:
-      out.measurements.points = *recording.points;
+      out.measurements.points = value_of(recording.points);
       out.measurements.points.distances = recording.settings.target_distances;
-      out.measurements.times_s = recording.points->times_s;
+      out.measurements.times_s = out.measurements.points.times_s;
       break;
   }
   if (recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners) {
@@ -257,7 +259,7 @@ CalibrationStart start_from_nominal(const Recording& recording, const Measuremen
                                     const PoseTracks& tracks, const CameraModel& camera,
                                     std::vector<std::string>& warnings) {
   CalibrationStart start;
-  start.tree = *recording.nominal;
+  start.tree = value_of(recording.nominal);
   start.nominal = true;
   start.camera = camera;
   match_channels(recording, start.tree, warnings);

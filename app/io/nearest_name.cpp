@@ -20,10 +20,10 @@ bool same_letter(char a, char b) {
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
+  for (const char letter : a) {
     std::size_t diagonal = row[0]++;
     for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t exchanged = diagonal + (same_letter(a[i], b[j]) ? 0U : 1U);
+      const std::size_t exchanged = diagonal + (same_letter(letter, b[j]) ? 0U : 1U);
       diagonal = row[j + 1];
       row[j + 1] = std::min({exchanged, row[j] + 1, row[j + 1] + 1});
     }
@@ -34,7 +34,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string did_you_mean(std::string_view name, std::span<const std::string> known) {
-  const std::string list = fmt::format("known: {}", fmt::join(known, ", "));
+  std::string list = fmt::format("known: {}", fmt::join(known, ", "));
   const auto nearest = std::ranges::min_element(
       known, {}, [&](const std::string& other) { return edit_distance(name, other); });
   if (nearest == known.end() || edit_distance(name, *nearest) > 1 + nearest->size() / 3)

@@ -43,7 +43,8 @@ void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& s
 void read_log(Recording& recording, const RecordingFiles& files) {
   if (!files.joints) {
     if (!recording.settings.units.empty()) {
-      throw bad_input(files.settings->string(), "units are declared, but there is no joints.csv",
+      throw bad_input(value_of(files.settings).string(),
+                      "units are declared, but there is no joints.csv",
                       "add it, or remove the units");
     }
     return;
@@ -54,18 +55,18 @@ void read_log(Recording& recording, const RecordingFiles& files) {
     const JointLog all = read_joint_log(*files.joints);
     for (const std::string& name : settings.torque_channels) {
       if (name.starts_with("tau") || all.channel(name)) continue;
-      throw bad_input(files.settings->string(),
+      throw bad_input(value_of(files.settings).string(),
                       fmt::format("torques names '{}', which is not logged", name),
                       did_you_mean(name, all.channels));
     }
   }
-  if (!settings.units.empty()) convert_units(recording.log, settings, *files.settings);
+  if (!settings.units.empty()) convert_units(recording.log, settings, value_of(files.settings));
 }
 
 /// Distances join targets that hold a point.
 void add_distances(Recording& recording, const RecordingFiles& files) {
   std::vector<std::string> targets;
-  for (const PointObservation& point : recording.points->observations) {
+  for (const PointObservation& point : value_of(recording.points).observations) {
     if (!point.target.empty()) targets.push_back(point.target);
   }
   std::ranges::sort(targets);
@@ -74,35 +75,38 @@ void add_distances(Recording& recording, const RecordingFiles& files) {
   for (const TargetDistance& distance : recording.settings.target_distances) {
     for (const std::string& name : {distance.from, distance.to}) {
       if (std::ranges::binary_search(targets, name)) continue;
-      throw bad_input(files.settings->string(),
+      throw bad_input(value_of(files.settings).string(),
                       fmt::format("target_distances names '{}', which holds no point", name),
                       did_you_mean(name, targets));
     }
   }
-  recording.points->distances = recording.settings.target_distances;
+  value_of(recording.points).distances = recording.settings.target_distances;
 }
 
 void read_sightings(Recording& recording, const RecordingFiles& files) {
   switch (recording.entry) {
     case RecordingEntry::kVideo:
-      recording.video = *files.video;
+      recording.video = value_of(files.video);
       break;
     case RecordingEntry::kCorners:
-      recording.corners = read_corners(*files.corners, recording.markers);
+      recording.corners = read_corners(value_of(files.corners), recording.markers);
       if (recording.camera) {
-        recording.corners->width = recording.camera->width;
-        recording.corners->height = recording.camera->height;
+        value_of(recording.corners).width = recording.camera->width;
+        value_of(recording.corners).height = recording.camera->height;
       }
-      require_time_overlap(recording.log, recording.corners->times_s, files.corners->string());
+      require_time_overlap(recording.log, value_of(recording.corners).times_s,
+                           value_of(files.corners).string());
       break;
     case RecordingEntry::kPoses:
-      recording.poses = read_poses(*files.poses);
-      require_time_overlap(recording.log, recording.poses->times_s, files.poses->string());
+      recording.poses = read_poses(value_of(files.poses));
+      require_time_overlap(recording.log, value_of(recording.poses).times_s,
+                           value_of(files.poses).string());
       break;
     case RecordingEntry::kPoints:
-      recording.points = read_points(*files.points);
+      recording.points = read_points(value_of(files.points));
       add_distances(recording, files);
-      require_time_overlap(recording.log, recording.points->times_s, files.points->string());
+      require_time_overlap(recording.log, value_of(recording.points).times_s,
+                           value_of(files.points).string());
       break;
   }
 }
@@ -125,9 +129,9 @@ void check_fixed_tags(const Recording& recording, const RecordingFiles& files) {
     const bool listed = !recording.markers.only_listed || recording.markers.sizes_m.contains(id) ||
                         recording.markers.boards.contains(id);
     if (listed) continue;
-    throw bad_input(files.settings->string(),
+    throw bad_input(value_of(files.settings).string(),
                     fmt::format("fixed_tags names {}, which {} does not list", id.value,
-                                files.tags->filename().string()),
+                                value_of(files.tags).filename().string()),
                     "correct one of the two");
   }
 }

@@ -54,6 +54,7 @@ MaybePath find_video(const fs::path& folder) {
   const std::vector<fs::path>& candidates = named.empty() ? videos : named;
   if (candidates.size() > 1) {
     std::vector<std::string> names;
+    names.reserve(candidates.size());
     for (const fs::path& path : candidates) names.push_back(path.filename().string());
     throw bad_input(folder.string(),
                     fmt::format("holds several videos: {}", fmt::join(names, ", ")),

@@ -31,6 +31,7 @@ struct Frames {
 Frames group_by_time(const CsvTable& table) {
   const std::size_t t = table.require_column("t");
   std::vector<double> row_times;
+  row_times.reserve(table.rows.size());
   for (std::size_t r = 0; r < table.rows.size(); ++r) row_times.push_back(table.number(r, t));
   Frames frames;
   frames.times_s = row_times;

@@ -69,6 +69,7 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
 std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) throw error("is no list", "write it as [a, b] or as lines of - a");
   std::vector<YamlValue> out;
+  out.reserve(node_.size());
   for (std::size_t i = 0; i < node_.size(); ++i) {
     out.push_back(below(node_[i], node_[i].Mark(), fmt::format("{}", i)));
   }

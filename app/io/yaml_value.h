@@ -47,8 +47,8 @@ class YamlValue {
   [[nodiscard]] Error error(const std::string& what, const std::string& remedy) const;
 
  private:
-  YamlValue(YAML::Node node, YAML::Mark mark, std::string source, std::string key)
-      : node_(std::move(node)), mark_(mark), source_(std::move(source)), key_(std::move(key)) {}
+  YamlValue(const YAML::Node& node, YAML::Mark mark, std::string source, std::string key)
+      : node_(node), mark_(mark), source_(std::move(source)), key_(std::move(key)) {}
   [[nodiscard]] YamlValue below(const YAML::Node& node, const YAML::Mark& mark,
                                 const std::string& key) const;
 

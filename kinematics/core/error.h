@@ -5,6 +5,7 @@
 // mistakes.
 #pragma once
 
+#include <optional>
 #include <source_location>
 #include <stdexcept>
 #include <string>
@@ -55,3 +56,19 @@ namespace internal {
     if (!(condition))                                                                            \
       ::kinescope::internal::check_failed(#condition, message, std::source_location::current()); \
   } while (false)
+
+namespace kinescope {
+
+/// The value of an optional that the code before has seen to.
+template <typename T>
+[[nodiscard]] T& value_of(std::optional<T>& value) {
+  KINESCOPE_CHECK(value.has_value(), "a value that is there");
+  return *value;
+}
+template <typename T>
+[[nodiscard]] const T& value_of(const std::optional<T>& value) {
+  KINESCOPE_CHECK(value.has_value(), "a value that is there");
+  return *value;
+}
+
+}  // namespace kinescope
