@@ -98,8 +98,9 @@ Replacement without_channel(const GrowthState& state, int link, int channel) {
 bool resolve(GrowthState& state, int l, int m, int channel) {
   const Replacement of_l = without_channel(state, l, channel);
   const Replacement of_m = without_channel(state, m, channel);
-  if (of_l.loss == kInfinity && of_m.loss == kInfinity) return false;
-  const bool take_l = of_l.loss < of_m.loss;
+  if (of_l.attachment == nullptr && of_m.attachment == nullptr) return false;
+  const bool take_l =
+      of_m.attachment == nullptr || (of_l.attachment != nullptr && of_l.loss < of_m.loss);
   move_body(state, state.tree.founder_of(take_l ? l : m),
             take_l ? *of_l.attachment : *of_m.attachment);
   return true;

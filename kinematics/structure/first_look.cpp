@@ -124,11 +124,21 @@ std::vector<Eigen::Index> best_channels(const Rows& rows, const std::vector<char
   return out;
 }
 
-bool may_hang(const Motion& motion, const Readings& readings, const std::vector<char>& usable) {
+// Variance across the joint with which a sample costs so much at least, and as much again for the
+// errors of few samples.
+double variance_of_cost(double cost) {
+  constexpr double kNoiseOnly = 6.0;
+  constexpr double kSlack = 2.0;
+  return kSlack * std::exp(std::max(0.0, cost - kNoiseOnly) / 5.0);
+}
+
+bool may_hang(const Motion& motion, const Readings& readings, const std::vector<char>& usable,
+              double give_up_above) {
   const Rows rows = rows_of(motion, readings.value);
   const Eigen::MatrixXd centred = rows.y.colwise() - Vector6d(rows.y.rowwise().mean());
   const double spread = median(centred.colwise().squaredNorm().transpose()) / kMedian6;
-  const double limit = std::max(kHopelessVariance, kHopelessShare * spread);
+  const double limit = std::min(variance_of_cost(give_up_above),
+                                std::max(kHopelessVariance, kHopelessShare * spread));
   if (spread < limit || left_by_principal(rows.y) < limit) return true;
   return std::ranges::any_of(best_channels(rows, usable), [&](Eigen::Index c) {
     return left_by_channel(rows.y, rows.q.col(c)) < limit;
@@ -138,10 +148,10 @@ bool may_hang(const Motion& motion, const Readings& readings, const std::vector<
 }  // namespace
 
 FirstLook first_look(const Body& body, const LinkPath& path, const Readings& readings,
-                     const std::vector<char>& usable) {
+                     const std::vector<char>& usable, double give_up_above) {
   const Motion motion = relative_motion(body, path, readings, kSamples).motion;
   if (motion.size() < kFewest) return {};
-  return {may_hang(motion, readings, usable), may_rest(motion, body)};
+  return {may_hang(motion, readings, usable, give_up_above), may_rest(motion, body)};
 }
 
 }  // namespace kinescope::structure_search

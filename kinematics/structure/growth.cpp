@@ -18,9 +18,10 @@ bool rearrange(GrowthState& state) {
 
 }  // namespace
 
-GrownTree grow_tree(const Series& series, const Readings& readings, const GrowthOptions& options) {
+GrownTree grow_tree(const Series& series, const Readings& readings, const GrowthOptions& options,
+                    const std::vector<double>& likely_cost) {
   constexpr int kMostRounds = 4;  // in which bodies may change places
-  GrowthState state = start_growth(series, readings, options);
+  GrowthState state = start_growth(series, readings, options, likely_cost);
   do {
     attach_all(state);
     if (look_again_at_free_bodies(state)) attach_all(state);

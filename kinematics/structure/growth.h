@@ -20,12 +20,12 @@ struct GrowthOptions {
   double accept_ratio = 40.0;     ///< the motion over what is left of it, beyond the noise
   double free_ratio = 25.0;       ///< the same that a joint without a channel needs at least
   bool paths_of_several_joints = true;
-  /// Of every body on its neighbours, a sighting (likely_costs()): far worse places are not fitted
-  /// at first. Empty: nothing is known.
-  std::vector<double> likely_cost = {};
 };
 
+/// `likely_cost`: of every body on its neighbours, a sighting (likely_costs()); far worse places
+/// are not fitted at first. Empty: nothing is known.
 [[nodiscard]] GrownTree grow_tree(const Series& series, const Readings& readings,
-                                  const GrowthOptions& options = {});
+                                  const GrowthOptions& options = {},
+                                  const std::vector<double>& likely_cost = {});
 
 }  // namespace kinescope::structure_search

@@ -36,12 +36,12 @@ const Attachment* best_of(const std::vector<Attachment>& alternatives) {
 }  // namespace
 
 GrowthState start_growth(const Series& series, const Readings& readings,
-                         const GrowthOptions& options) {
+                         const GrowthOptions& options, const std::vector<double>& likely_cost) {
   GrowthState state{.series = series,
                     .readings = readings,
                     .options = options,
                     .usable = moving_channels(readings),
-                    .likely_cost = options.likely_cost,
+                    .likely_cost = likely_cost,
                     .moves_freely = std::vector<char>(series.bodies.size(), 0),
                     .tree = {}};
   state.likely_cost.resize(series.bodies.size(), kInfinity);
@@ -69,7 +69,6 @@ void list_alternatives(GrowthState& state, std::size_t body, int link) {
   GrownBody& grown = state.tree.bodies[body];
   if (state.tree.link(link).founder == static_cast<int>(body)) return;
   if (grown.link >= 0 && is_below(state.tree, link, body)) return;
-  const FirstLook look = first_look(seen, path, state.readings, state.usable);
   AttachmentOptions options;
   options.give_up_above = state.likely_cost[body];
   const Attachment* best = best_of(grown.alternatives);
@@ -77,6 +76,8 @@ void list_alternatives(GrowthState& state, std::size_t body, int link) {
     const double known = std::max(0.0, best->data_cost / seen.seen) + kGiveUpMargin;
     options.give_up_above = std::min(options.give_up_above, known);
   }
+  const FirstLook look =
+      first_look(seen, path, state.readings, state.usable, options.give_up_above);
   std::vector<Attachment> found;
   if (look.may_hang) {
     found = find_attachments(seen, link, path, state.readings, state.usable, options);

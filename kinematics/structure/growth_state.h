@@ -22,7 +22,8 @@ struct GrowthState {
 
 /// The camera alone, with every body's ways to hang on it.
 [[nodiscard]] GrowthState start_growth(const Series& series, const Readings& readings,
-                                       const GrowthOptions& options);
+                                       const GrowthOptions& options,
+                                       const std::vector<double>& likely_cost);
 
 /// Appends a link and lists the ways in which the bodies may hang on it.
 void add_link(GrowthState& state, GrownLink link);

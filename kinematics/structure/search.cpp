@@ -109,7 +109,7 @@ class Search {
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
     found.readings.si_share = std::max(si_share, found.readings.si_share);
-    found.tree = grow_tree(series, found.readings, with_likely_costs(growth, offset_s));
+    found.tree = grow_tree(series, found.readings, growth, likely_costs_at(offset_s));
     return found;
   }
 
@@ -120,7 +120,7 @@ class Search {
     const double told = si_share_of(found);
     if (told != found.readings.si_share) {
       found.readings.si_share = told;
-      found.tree = grow_tree(thin_, found.readings, with_likely_costs(growth, offset_s));
+      found.tree = grow_tree(thin_, found.readings, growth, likely_costs_at(offset_s));
     }
     return found;
   }
@@ -150,11 +150,10 @@ class Search {
   }
 
  private:
-  [[nodiscard]] GrowthOptions with_likely_costs(GrowthOptions growth, double offset_s) const {
+  [[nodiscard]] std::vector<double> likely_costs_at(double offset_s) const {
     const std::size_t bodies = rough_.bodies.size();
     const Readings readings = readings_at(log_, rough_, offset_s, options_.max_gap_s);
-    growth.likely_cost = likely_costs(pair_tree(pairs_, bodies, readings), bodies);
-    return growth;
+    return likely_costs(pair_tree(pairs_, bodies, readings), bodies);
   }
 
   [[nodiscard]] TimeOffset refined(const FoundTree& found, double step_s) const {
