@@ -42,15 +42,6 @@ struct Carriers {
 /// Friction in its simplest form, which all that refines it waits for.
 [[nodiscard]] std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t joint);
 
-/// Range and root mean square speed of a joint in the log; speeds at 95 % are its high ones.
-struct JointTravel {
-  double lowest = 0.0;
-  double range = 0.0;
-  double rms_speed = 0.0;
-  double high_speed = 0.0;
-};
-[[nodiscard]] JointTravel travel_of(const EffectContext& context, std::size_t joint);
-
 /// `count` values from `first` to `last` in equal ratios.
 [[nodiscard]] std::vector<double> ratios(double first, double last, int count);
 

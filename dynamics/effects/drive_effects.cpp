@@ -73,61 +73,78 @@ Candidate ripple(const SharedContext& c, std::size_t j) {
   return out;
 }
 
-/// From 0 at the start to 1 at the end, settling with a time constant; long ones are straight.
-Eigen::VectorXd drift_shape(const Eigen::VectorXd& time_s, double constant_s) {
-  const double begin = time_s[0];
-  const double duration = std::max(time_s[time_s.size() - 1] - begin, 1e-12);
-  const Eigen::ArrayXd t = time_s.array() - begin;
-  return ((1.0 - (-t / constant_s).exp()) / (1.0 - std::exp(-duration / constant_s))).matrix();
+/// From 0 at the start of the log to 1 at its end, settling with a time constant; long ones are
+/// straight.
+struct Settling {
+  double begin_s = 0.0;
+  double duration_s = 1.0;
+  double constant_s = 1.0;
+
+  [[nodiscard]] double end() const { return 1.0 - std::exp(-duration_s / constant_s); }
+  [[nodiscard]] Eigen::VectorXd at(const Eigen::VectorXd& time_s) const {
+    return ((1.0 - (-(time_s.array() - begin_s) / constant_s).exp()) / end()).matrix();
+  }
+  [[nodiscard]] double mean() const {
+    return 1.0 / end() - constant_s / duration_s;
+  }
+};
+
+/// The torque's zero goes with the shape itself, friction with its difference from the mean:
+/// friction that does not drift is no matter of this effect.
+std::vector<EffectColumn> drift_columns(const EffectContext& c, std::size_t j,
+                                        const Eigen::VectorXd& shape, double mean) {
+  const auto joint = static_cast<int>(j);
+  const Eigen::VectorXd about = shape.array() - mean;
+  const Eigen::VectorXd speed =
+      c.motion->at_instants(c.motion->samples().dq.col(joint)) / c.travels[j].high_speed;
+  return {{joint, shape},
+          {joint, about.cwiseProduct(direction_column(c, j))},
+          {joint, about.cwiseProduct(speed)}};
 }
 
-Candidate drift_by(const SharedContext& c, std::size_t j,
-                   const std::function<Eigen::VectorXd(double)>& shape) {
+Candidate any_drift(const SharedContext& c, std::size_t j) {
   Candidate out;
   out.id = {"drift", c->joints[j]};
+  out.refines = plain_friction(*c, j);
+  out.refines.push_back({"torque_offset", c->joints[j]});
   out.size_unit = c->unit(j);
   out.parameters = {{"offset", out.size_unit},
                     {"coulomb", out.size_unit},
                     {"viscous_at_high_speed", out.size_unit}};
   out.size_weights = Eigen::Vector3d::Ones();
-  out.refines = plain_friction(*c, j);
-  out.refines.push_back({"torque_offset", c->joints[j]});
-  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
-  out.columns = [c, j, shape, high](double scan) {
-    const auto column = static_cast<Eigen::Index>(j);
-    // About its mean: friction that does not drift is no matter of this effect.
-    const Eigen::VectorXd s = shape(scan).array() - shape(scan).mean();
-    const Eigen::VectorXd speed = c->motion->at_instants(c->motion->samples().dq.col(column)) / high;
-    return std::vector<EffectColumn>{{static_cast<int>(j), s},
-                                     {static_cast<int>(j), s.cwiseProduct(direction_column(*c, j))},
-                                     {static_cast<int>(j), s.cwiseProduct(speed)}};
-  };
   return out;
 }
 
 Candidate drift(const SharedContext& c, std::size_t j) {
-  const Eigen::VectorXd time_s = c->motion->at_instants(c->motion->time_s());
-  Candidate out = drift_by(c, j, [time_s](double constant_s) { return drift_shape(time_s, constant_s); });
+  Candidate out = any_drift(c, j);
   out.words = fmt::format("torque and friction of {} drift while it runs", c->joints[j]);
   out.check = "temperature of the joint; warm up before recording";
   out.record = "repeat one motion cold and warm";
-  const double duration = time_s[time_s.size() - 1] - time_s[0];
-  out.scan = {0.1 * duration, 0.3 * duration, 1.0 * duration, 8.0 * duration};
+  const LogSpan& log = c->log;
+  out.scan = {0.1 * log.duration_s, 0.3 * log.duration_s, log.duration_s, 8.0 * log.duration_s};
   out.scan_name = "time constant";
   out.scan_unit = "s";
+  out.columns = [c, j](double constant_s) {
+    const Settling settling{c->log.begin_s, c->log.duration_s, constant_s};
+    return drift_columns(*c, j, settling.at(c->motion->at_instants(c->motion->time_s())),
+                         settling.mean());
+  };
   return out;
 }
 
-/// The temperature's own scale: what it does over the whole range of the log.
+/// Over the range of temperatures of the log.
 Candidate temperature_drift(const SharedContext& c, std::size_t j) {
-  const double low = c->temperature_c.minCoeff();
-  const double range = std::max(c->temperature_c.maxCoeff() - low, 1e-12);
-  const Eigen::VectorXd shape = (c->temperature_c.array() - low).matrix() / range;
-  Candidate out = drift_by(c, j, [shape](double) { return shape; });
+  Candidate out = any_drift(c, j);
   out.id.place += " with temperature";
   out.words = fmt::format("torque and friction of {} change with its temperature", c->joints[j]);
   out.check = "lubrication of the joint; warm up before recording";
   out.record = "repeat one motion cold and warm, and then cold again";
+  out.columns = [c, j](double) {
+    const Eigen::VectorXd shape =
+        (c->temperature_c.array() - c->log.lowest_c).matrix() / c->log.range_c;
+    constexpr double kMiddle = 0.5;
+    return drift_columns(*c, j, shape, kMiddle);
+  };
   return out;
 }
 
@@ -152,7 +169,7 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
   weights[static_cast<Eigen::Index>(j) + 1] = sum ? 1.0 : -1.0;
   const int carrier =
       Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
-  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
+  const double high = c->travels[j].high_speed;
   out.columns = [c, j, sum, weights, carrier, high](double) {
     const std::string name = fmt::format("pair {} {} {:.17g}", j, sum ? "sum" : "difference",
                                          c->widths[static_cast<Eigen::Index>(j)]);

@@ -111,17 +111,6 @@ Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint
                       [&](const FinePath& path) { return direction(path.dq, width); });
 }
 
-JointTravel travel_of(const EffectContext& context, std::size_t joint) {
-  const auto j = static_cast<Eigen::Index>(joint);
-  const Eigen::VectorXd q = context.motion->at_instants(context.motion->samples().q.col(j));
-  const Eigen::VectorXd dq = context.motion->at_instants(context.motion->samples().dq.col(j));
-  if (q.size() == 0) return {};
-  return {.lowest = q.minCoeff(),
-          .range = q.maxCoeff() - q.minCoeff(),
-          .rms_speed = std::sqrt(dq.squaredNorm() / static_cast<double>(dq.size())),
-          .high_speed = quantile(to_vector(dq.cwiseAbs()), 0.95)};
-}
-
 std::vector<double> ratios(double first, double last, int count) {
   std::vector<double> out;
   for (int k = 0; k < count; ++k) {
@@ -133,13 +122,13 @@ std::vector<double> ratios(double first, double last, int count) {
 std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint) {
   constexpr double kLowest = 3.0;   // slower waves are what gravity and springs look like
   constexpr int kMost = 400;
-  const JointTravel travel = travel_of(context, joint);
+  const JointTravel& travel = context.travels[joint];
   const bool turns = context.turns[joint] != 0;
-  const double turn = turns ? 2.0 * std::numbers::pi : std::max(travel.range, 1e-9);
+  const double turn = turns ? 2.0 * std::numbers::pi : travel.range;
   // Faster than the low-pass at most speeds: nothing of it is left.
   const double cutoff_hz = context.motion->filter().cutoff_hz;
   const double highest =
-      cutoff_hz > 0.0 ? 2.0 * cutoff_hz * turn / std::max(travel.rms_speed, 1e-12) : kMost;
+      cutoff_hz > 0.0 ? 2.0 * cutoff_hz * turn / travel.rms_speed : kMost;
   std::vector<double> out;
   for (int n = 1; n <= kMost; n += n < 60 ? 1 : n < 120 ? 2 : 10) {
     if (n < kLowest || n > highest) continue;
@@ -165,6 +154,26 @@ std::string EffectContext::unit(std::size_t joint) const {
 const Candidate* EffectLibrary::find(const EffectId& id) const {
   const auto found = std::ranges::find(candidates, id, &Candidate::id);
   return found == candidates.end() ? nullptr : &*found;
+}
+
+void describe_log(EffectContext& context) {
+  const EffectMotion& motion = *context.motion;
+  context.travels.clear();
+  for (Eigen::Index j = 0; j < motion.joints(); ++j) {
+    const Eigen::VectorXd q = motion.at_instants(motion.samples().q.col(j));
+    const Eigen::VectorXd dq = motion.at_instants(motion.samples().dq.col(j));
+    // A joint that stands still has no scale of its own; its columns are zero whatever it is.
+    context.travels.push_back(
+        {.range = std::max(q.maxCoeff() - q.minCoeff(), 1e-9),
+         .rms_speed = std::max(std::sqrt(dq.squaredNorm() / static_cast<double>(dq.size())), 1e-9),
+         .high_speed = std::max(quantile(to_vector(dq.cwiseAbs()), 0.95), 1e-9)});
+  }
+  const Eigen::VectorXd time_s = motion.at_instants(motion.time_s());
+  context.log.begin_s = time_s[0];
+  context.log.duration_s = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-9);
+  if (context.temperature_c.size() == 0) return;
+  context.log.lowest_c = context.temperature_c.minCoeff();
+  context.log.range_c = std::max(context.temperature_c.maxCoeff() - context.log.lowest_c, 1e-9);
 }
 
 EffectLibrary make_effect_library(const EffectContext& context) {

@@ -27,6 +27,21 @@ struct FrictionWidths {
   double m_s = 0.002;
 };
 
+/// How a joint moved in the log from which effects are found; scales of some effects.
+struct JointTravel {
+  double range = 0.0;
+  double rms_speed = 0.0;
+  double high_speed = 0.0;  ///< at 95 %
+};
+
+/// The log from which effects are found: what drifts is measured from its beginning to its end.
+struct LogSpan {
+  double begin_s = 0.0;
+  double duration_s = 1.0;
+  double lowest_c = 0.0;  ///< temperature
+  double range_c = 1.0;
+};
+
 /// Columns that were asked for once. Shared by the candidates of all fits of one model.
 class ColumnCache {
  public:
@@ -48,6 +63,8 @@ struct EffectContext {
   Eigen::MatrixXd torque;   ///< torque of the model
   Eigen::MatrixXd measured_rate;  ///< d/dt of the measured torque
   Eigen::VectorXd temperature_c;  ///< instants; empty: not logged
+  std::vector<JointTravel> travels;
+  LogSpan log;
   Eigen::VectorXd widths;   ///< of each joint's sign of the speed, rad/s or m/s
   std::string torque_unit = "Nm";  ///< "Nm" or "A"
 
@@ -55,6 +72,9 @@ struct EffectContext {
   [[nodiscard]] std::string angle(std::size_t joint) const { return turns[joint] ? "rad" : "m"; }
   [[nodiscard]] Eigen::Index instants() const { return motion->instants(); }
 };
+
+/// Travels and span of the context's own motion.
+void describe_log(EffectContext& context);
 
 /// Candidates and what they act through. Row i * joints + j of the carriers is joint j at instant
 /// i; the first carriers are the joints themselves.

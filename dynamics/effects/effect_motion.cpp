@@ -72,6 +72,10 @@ void EffectMotion::lay_out() {
 }
 
 void EffectMotion::choose_instants() {
+  if (options_.every_sample) {
+    for (Eigen::Index row = 0; row < samples_.size(); ++row) kept_.push_back(row);
+    return;
+  }
   const bool filtered = options_.filter.cutoff_hz > 0.0;
   const double wanted_hz = options_.samples_per_cutoff * options_.filter.cutoff_hz;
   Eigen::Index stride = 1;

@@ -29,6 +29,7 @@ struct EffectMotionOptions {
   /// Rate of the samples that are kept, in cut-offs: what the low-pass has left is then independent
   /// enough to count.
   double samples_per_cutoff = 4.0;
+  bool every_sample = false;  ///< all are kept, those at the ends too
 };
 
 /// One joint on one trajectory, finely.

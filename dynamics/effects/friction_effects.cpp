@@ -76,7 +76,7 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   out.record = "move the joint slowly for a while, with many reversals";
   out.size_unit = c->unit(j);
   out.parameters = {{"excess_at_rest", out.size_unit}};
-  out.scan = ratios(0.03 * travel_of(*c, j).rms_speed, 0.7 * travel_of(*c, j).rms_speed, 10);
+  out.scan = ratios(0.03 * c->travels[j].rms_speed, 0.7 * c->travels[j].rms_speed, 10);
   out.scan_name = "Stribeck speed";
   out.scan_unit = c->angle(j) + "/s";
   out.columns = [c, j](double speed) {
@@ -100,7 +100,7 @@ Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
   out.parameters = {{"at_high_speed", out.size_unit}};
   out.scan = {2.0, 3.0};
   out.scan_name = "power of the speed";
-  const double high = std::max(travel_of(*c, j).high_speed, 1e-12);
+  const double high = c->travels[j].high_speed;
   out.columns = [c, j, high](double power) {
     return one_column(j, joint_column(*c, j, fmt::format("power {:.17g}", power),
                                       [&](const FinePath& p) {
@@ -132,8 +132,7 @@ Candidate position_friction(const SharedContext& c, std::size_t j) {
   out.size_unit = c->unit(j);
   out.parameters = {{"cosine", out.size_unit}, {"sine", out.size_unit}};
   out.size_weights = Eigen::Vector2d::Ones();
-  const JointTravel travel = travel_of(*c, j);
-  const double turn = c->turns[j] != 0 ? kFullTurn : std::max(travel.range, 1e-9);
+  const double turn = c->turns[j] != 0 ? kFullTurn : c->travels[j].range;
   out.scan = {0.5, 1.0, 2.0, 3.0, 4.0};
   if (c->turns[j] == 0) {
     for (double& periods : out.scan) periods /= turn;
@@ -176,7 +175,7 @@ Candidate hysteresis(const SharedContext& c, std::size_t j) {
   out.record = "reverse the joint often, with small motions among large ones";
   out.size_unit = c->unit(j);
   out.parameters = {{"friction", out.size_unit}};
-  const double range = std::max(travel_of(*c, j).range, 1e-9);
+  const double range = c->travels[j].range;
   out.scan = ratios(2e-4 * range, 0.2 * range, 13);
   out.scan_name = "pre-sliding length";
   out.scan_unit = c->angle(j);

@@ -72,9 +72,9 @@ Eigen::MatrixXd declared_drives(const DynamicModel& model, const EffectContext& 
 /// not for naming anything.
 Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data, Eigen::Index j) {
   const auto joint = static_cast<std::size_t>(j);
-  const effects::JointTravel travel = effects::travel_of(context, joint);
-  const double high = std::max(travel.high_speed, 1e-12);
-  const double slow = std::max(0.1 * travel.rms_speed, 1e-12);
+  const JointTravel& travel = context.travels[joint];
+  const double high = travel.high_speed;
+  const double slow = 0.1 * travel.rms_speed;
   const Eigen::ArrayXd v = data.dq.col(j).array() / high;
   const Eigen::VectorXd way = effects::direction_column(context, joint);
   const Eigen::VectorXd dip =
@@ -185,6 +185,7 @@ void TorqueTracedModel::Parts::refresh() {
   if (options.temperature_c.size() > 0) {
     context.temperature_c = motion->at_instants(options.temperature_c);
   }
+  describe_log(context);
   const RigidModel declared = make_rigid_model(model);
   context.load = inverse_dynamics_of_samples(declared, q, dq, ddq);
   drives = declared_drives(model, context, dq);
@@ -233,6 +234,7 @@ TracedFit TorqueTracedModel::fit(const std::vector<AddedEffect>& effects) const 
 }
 
 const TorqueBase& TorqueTracedModel::base() const { return parts_->base; }
+const EffectContext& TorqueTracedModel::context() const { return parts_->context; }
 const EffectMotion& TorqueTracedModel::motion() const { return *parts_->motion; }
 
 void TorqueTracedModel::leave_out(const std::vector<char>& wanted) {

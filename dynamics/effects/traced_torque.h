@@ -64,6 +64,7 @@ class TorqueTracedModel : public TracedModel {
 
   [[nodiscard]] const TorqueBase& base() const;
   [[nodiscard]] const EffectMotion& motion() const;
+  [[nodiscard]] const EffectContext& context() const;
 
   /// Samples for which `wanted` is 0 count no more.
   void leave_out(const std::vector<char>& wanted);

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <chrono>
 #include "dynamics/data/torque_data.h"
-#include "dynamics/effects/traced_torque.h"
+#include "dynamics/effects/trace_torque.h"
 #include "calib/trace/trace.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/truth/shared_data.h"
@@ -21,19 +21,21 @@ int main(int argc, char** argv) {
     const TorqueData data = read_torque_data({*folder / "log.csv.gz"}, wanted_joints(model.tree));
     fmt::print("{}: {} samples {:.1f} Hz, cutoff {:.2f}\n", argv[a], data.samples.size(), data.rate_hz, data.cutoff.cutoff_hz);
     lap("read");
-    TorqueModelOptions options;
-    options.filter = {data.filter, data.cutoff.cutoff_hz};
-    const TorqueTracedModel traced(model, data.samples, options);
-    lap("model");
-    fmt::print("base {}: {}  instants {}\n", to_string(traced.base().kind), traced.base().reason, traced.motion().instants());
-    for (double s : traced.base().sigma) fmt::print(" {:.4g}", s);
-    fmt::print("\n");
-    const TracedFit fit = traced.fit({});
-    lap("fit");
-    TraceOptions o;
-    o.max_effects = 60;
-    const Trace trace = trace_effects(traced, o, [&](std::string_view, int r, int) { fmt::print("round {} ", r); lap(""); });
+    TorqueTraceOptions options;
+    options.model.filter = {data.filter, data.cutoff.cutoff_hz};
+    const TorqueTrace traced = trace_torque(model, data.samples, options);
     lap("trace");
+    fmt::print("base {}: {}\n", to_string(traced.base.kind), traced.base.reason);
+    for (double s : traced.base.sigma) fmt::print(" {:.4g}", s);
+    fmt::print("\n");
+    const Trace& trace = traced.trace;
+    {
+      const TorqueData test = read_torque_data({*folder / "log_test.csv.gz"}, wanted_joints(model.tree));
+      const TorqueFilter f{test.filter, test.cutoff.cutoff_hz};
+      const Eigen::MatrixXd p = predict_torque(traced.corrected, test.samples, f);
+      for (Eigen::Index j = 0; j < p.cols(); ++j) fmt::print(" test nMSE {:.4g}", 100 * (test.samples.torque.col(j) - p.col(j)).squaredNorm() / (test.samples.torque.col(j).array() - test.samples.torque.col(j).mean()).square().sum());
+      fmt::print("\n");
+    }
     fmt::print("{}: {}\nheld out {:.4g} -> {:.4g}  stretches {}\n", to_string(trace.verdict), trace.reason, trace.held_out_before.value, trace.held_out_after.value, trace.stretches);
     for (const auto& e : trace.accepted) {
       fmt::print("  {:<18} {:<12} {:9.4g} [{:.4g}, {:.4g}] {} {} {:.4g}  explained {:.3g} p {:.2g}\n", e.id.effect, e.id.place, e.size, e.interval.low, e.interval.high, e.unit, e.scan_name, e.scan, e.explained, e.p_value);

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// measured(t + delay) = sensor * (rigid bodies + effects)(t), forwards and backwards.
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "dynamics/effects/trace_torque.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+/// An effect's part in the equation above.
+enum class Part { kPhysical, kDelay, kGain, kCross, kGravity };
+
+Part part_of(const TorqueEffect& effect) {
+  if (effect.id.effect == "torque_delay") return Part::kDelay;
+  if (effect.id.effect == "torque_gain") return Part::kGain;
+  if (effect.id.effect == "gravity_direction") return Part::kGravity;
+  if (effect.id.effect == "cross_talk" && effect.values.size() == 1) return Part::kCross;
+  return Part::kPhysical;
+}
+
+/// A log at all of its samples, and its library.
+struct Applied {
+  const CorrectedTorqueModel& corrected;
+  EffectMotion motion;
+  EffectContext context;
+  EffectLibrary library;
+
+  Applied(const CorrectedTorqueModel& model, const TorqueSamples& samples,
+          const TorqueFilter& filter)
+      : corrected(model), motion(samples, {.filter = filter, .every_sample = true}) {
+    context.motion = std::make_shared<const EffectMotion>(motion);
+    context.cache = std::make_shared<ColumnCache>();
+    context.torque_unit = samples.torque_unit;
+    context.rigid = model.rigid;
+    context.widths.resize(model.rigid.size());
+    for (const RigidBody& body : model.rigid.bodies) {
+      const bool turns = body.type == JointType::kRevolute;
+      context.widths[std::ssize(context.joints)] = turns ? model.widths.rad_s : model.widths.m_s;
+      context.joints.push_back(body.joint);
+      context.turns.push_back(turns ? 1 : 0);
+    }
+    for (const TorqueEffect& effect : model.effects) {
+      if (effect.id.effect == "coulomb") context.widths[joint_of(effect)] = effect.scan;
+    }
+    context.load = inverse_dynamics_of_samples(model.rigid, samples.q, samples.dq, samples.ddq);
+    context.torque = context.load;
+    context.measured_rate = Eigen::MatrixXd::Zero(samples.size(), samples.joints());
+    context.travels = model.travels;
+    context.log = model.log;
+    library = make_effect_library(context);
+  }
+
+  [[nodiscard]] Eigen::Index joint_of(const TorqueEffect& effect) const {
+    const auto& names = context.joints;
+    const auto found = std::ranges::find_if(names, [&](const std::string& name) {
+      return effect.id.place == name || effect.id.place.starts_with(name + " ");
+    });
+    KINESCOPE_CHECK(found != names.end(), "an effect at a joint of the model");
+    return found - names.begin();
+  }
+
+  /// Torque of the effects that are no matter of the sensors.
+  [[nodiscard]] Eigen::MatrixXd effects() const {
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(context.load.rows(), context.load.cols());
+    for (const TorqueEffect& effect : corrected.effects) {
+      if (part_of(effect) != Part::kPhysical) continue;
+      const Candidate* candidate = library.find(effect.id);
+      if (candidate == nullptr) continue;  // a temperature that this log does not have
+      out += effect_torque(library, *candidate, effect.scan, effect.values, out.cols());
+    }
+    return out;
+  }
+
+  [[nodiscard]] Eigen::MatrixXd sensor() const {
+    Eigen::MatrixXd out = Eigen::MatrixXd::Identity(context.load.cols(), context.load.cols());
+    for (const TorqueEffect& effect : corrected.effects) {
+      const Eigen::Index j = part_of(effect) == Part::kGain || part_of(effect) == Part::kCross
+                                 ? joint_of(effect)
+                                 : 0;
+      if (part_of(effect) == Part::kGain) out(j, j) += effect.values[0];
+      if (part_of(effect) != Part::kCross) continue;
+      for (std::size_t from = 0; from < context.joints.size(); ++from) {
+        if (effect.id.place.ends_with(" from " + context.joints[from])) {
+          out(j, static_cast<Eigen::Index>(from)) += effect.values[0];
+        }
+      }
+    }
+    return out;
+  }
+
+  /// `later`: 1 takes the delay out of a measured torque, -1 puts it into a predicted one.
+  [[nodiscard]] Eigen::MatrixXd shifted(Eigen::MatrixXd torque, double later) const {
+    for (const TorqueEffect& effect : corrected.effects) {
+      if (part_of(effect) != Part::kDelay) continue;
+      const Eigen::Index j = joint_of(effect);
+      torque.col(j) = motion.shifted(torque.col(j), later * effect.values[0]);
+    }
+    return torque;
+  }
+};
+
+}  // namespace
+
+Eigen::MatrixXd predict_torque(const CorrectedTorqueModel& corrected, const TorqueSamples& samples,
+                               const TorqueFilter& filter) {
+  const Applied applied(corrected, samples, filter);
+  const Eigen::MatrixXd physical = applied.context.load + applied.effects();
+  return applied.shifted(physical * applied.sensor().transpose(), -1.0);
+}
+
+TorqueSamples compensate(const CorrectedTorqueModel& corrected, const TorqueSamples& samples,
+                         const TorqueFilter& filter) {
+  const Applied applied(corrected, samples, filter);
+  TorqueSamples out = samples;
+  const Eigen::MatrixXd in_time = applied.shifted(samples.torque, 1.0);
+  out.torque = applied.sensor().fullPivLu().solve(in_time.transpose()).transpose() -
+               applied.effects();
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/effects/trace_torque.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+constexpr int kMostPasses = 4;  // of a trace, with the contact spans that the last one shows
+
+double rms(const Eigen::VectorXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, values.size())));
+}
+
+/// Spans that touch are one.
+std::vector<ContactSpan> merged(std::vector<ContactSpan> spans, double gap_s) {
+  std::ranges::sort(spans, {}, &ContactSpan::from_s);
+  std::vector<ContactSpan> out;
+  for (ContactSpan& span : spans) {
+    if (out.empty() || span.from_s > out.back().to_s + gap_s) {
+      out.push_back(std::move(span));
+      continue;
+    }
+    ContactSpan& last = out.back();
+    last.to_s = std::max(last.to_s, span.to_s);
+    for (Eigen::Index j = 0; j < span.peak.size(); ++j) {
+      if (std::abs(span.peak[j]) > std::abs(last.peak[j])) last.peak[j] = span.peak[j];
+      last.noise_ratio[j] = std::max(last.noise_ratio[j], span.noise_ratio[j]);
+    }
+  }
+  return out;
+}
+
+Trace trace_with(const TorqueTracedModel& model, const TorqueTraceOptions& options,
+                 const Progress& progress) {
+  TraceOptions trace = options.trace;
+  trace.floor = std::max(trace.floor, options.noise_share * rms(model.base().sigma));
+  return trace_effects(model, trace, progress);
+}
+
+/// A contact as an effect among the others: the joint that felt it most, and how much.
+TracedEffect contact_effect(const ContactSpan& span, const TorqueTracedModel& model,
+                            const HeldOutError& before, const HeldOutError& after) {
+  Eigen::Index joint = 0;
+  span.noise_ratio.maxCoeff(&joint);
+  const auto j = static_cast<std::size_t>(joint);
+  const EffectContext& context = model.context();
+  TracedEffect out;
+  out.id = {"contact", fmt::format("{:.2f} to {:.2f} s", span.from_s, span.to_s)};
+  out.words = fmt::format("something pushed the robot, felt most at {}", context.joints[j]);
+  out.check = "what stood in the way, or who touched the robot";
+  out.size = std::abs(span.peak[joint]);
+  out.unit = context.unit(j);
+  const double half = 1.96 * model.base().sigma[joint];
+  out.interval = {std::max(0.0, out.size - half), out.size + half};
+  out.p_value = std::exp(-0.5 * std::pow(span.noise_ratio[joint], 2));
+  out.held_out_before = before;
+  out.held_out_after = after;
+  return out;
+}
+
+void add_contacts(const TorqueTracedModel& model, const HeldOutError& before, TorqueTrace& out) {
+  std::vector<TracedEffect> contacts;
+  for (const ContactSpan& span : out.contacts) {
+    contacts.push_back(contact_effect(span, model, before, out.trace.held_out_before));
+  }
+  out.trace.accepted.insert(out.trace.accepted.begin(), contacts.begin(), contacts.end());
+  out.trace.held_out_before = before;
+  if (out.trace.verdict == TraceVerdict::kClean) out.trace.verdict = TraceVerdict::kEffects;
+  out.trace.reason = fmt::format("{} contact spans are left out; beyond them, {}", contacts.size(),
+                                 out.trace.reason);
+}
+
+std::vector<TorqueEffect> effects_of(const Trace& trace) {
+  std::vector<TorqueEffect> out;
+  for (const TracedEffect& effect : trace.accepted) {
+    if (effect.id.effect == "contact") continue;
+    TorqueEffect own{effect.id, effect.scan, effect.scan_name, effect.scan_unit, {},
+                     Eigen::VectorXd(static_cast<Eigen::Index>(effect.values.size()))};
+    for (std::size_t k = 0; k < effect.values.size(); ++k) {
+      own.parameters.push_back(effect.values[k].parameter);
+      own.values[static_cast<Eigen::Index>(k)] = effect.values[k].value;
+    }
+    out.push_back(std::move(own));
+  }
+  return out;
+}
+
+/// Puts an effect into the model where a DynamicModel has a place for it.
+bool put_into(DynamicModel& model, const TorqueEffect& effect) {
+  for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
+    if (model.tree.joints[j].name != effect.id.place) continue;
+    JointDynamics& joint = model.joints[j];
+    double* value = effect.id.effect == "viscous"         ? &joint.viscous
+                    : effect.id.effect == "coulomb"       ? &joint.coulomb
+                    : effect.id.effect == "motor_inertia" ? &joint.motor_inertia
+                                                          : nullptr;
+    // No URDF reader takes friction that drives.
+    if (value == nullptr || *value + effect.values[0] < 0.0) return false;
+    *value += effect.values[0];
+    return true;
+  }
+  const auto link = model.tree.link(effect.id.place);
+  if (effect.id.effect == "payload" && link) {
+    InertialParameters& own = model.links[link->index()];
+    InertialParameters sum = own;
+    sum += InertialParameters::from_vector(effect.values);
+    if (!(sum.mass_kg > 0.0)) return false;
+    own = sum;
+    return true;
+  }
+  return false;
+}
+
+CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel& traced,
+                             const Trace& trace, const TorqueTraceOptions& options) {
+  CorrectedTorqueModel out;
+  out.model = model;
+  out.effects = effects_of(trace);
+  out.rigid = traced.fitted_rigid(trace.added);
+  out.widths = options.model.widths;
+  out.travels = traced.context().travels;
+  out.log = traced.context().log;
+  if (traced.base().kind == TorqueBaseKind::kIdentified) {
+    for (JointDynamics& joint : out.model.joints) joint = {};
+  }
+  for (const TorqueEffect& effect : out.effects) {
+    if (effect.id.effect == "gravity_direction") {
+      out.model.gravity_m_s2 = out.rigid.gravity_m_s2;
+      out.in_model.push_back(1);
+      continue;
+    }
+    out.in_model.push_back(put_into(out.model, effect) ? 1 : 0);
+  }
+  return out;
+}
+
+/// What the corrected model leaves at every instant of the whole log, spans and all.
+std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
+                                    const TorqueTracedModel& whole, const Eigen::VectorXd& sigma,
+                                    const TorqueTraceOptions& options) {
+  const TorqueSamples& samples = whole.motion().samples();
+  const Eigen::MatrixXd left =
+      samples.torque - predict_torque(corrected, samples, options.model.filter);
+  const Eigen::MatrixXd whitened =
+      whole.motion().rows_at_instants(left) * sigma.cwiseInverse().asDiagonal();
+  return merged(find_contact_spans(whole.motion(), whitened, sigma, options.contact_spans),
+                2.0 * options.contact_spans.window_s);
+}
+
+bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan>& b,
+                double tolerance_s) {
+  return std::ranges::equal(a, b, [tolerance_s](const ContactSpan& x, const ContactSpan& y) {
+    return std::abs(x.from_s - y.from_s) <= tolerance_s && std::abs(x.to_s - y.to_s) <= tolerance_s;
+  });
+}
+
+}  // namespace
+
+TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
+                         const TorqueTraceOptions& options, const Progress& progress) {
+  const TorqueTracedModel whole(model, samples, options.model);
+  const double cutoff_hz = whole.motion().filter().cutoff_hz;
+  // The low-pass smears a contact over its own memory.
+  const double margin_s =
+      options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
+  TorqueTrace out;
+  HeldOutError before;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    TorqueTracedModel traced(model, samples, options.model);
+    if (!out.contacts.empty()) {
+      traced.leave_out(outside_spans(traced.motion(), out.contacts, margin_s));
+    }
+    out.trace = trace_with(traced, options, progress);
+    out.base = traced.base();
+    out.corrected = correct(model, traced, out.trace, options);
+    if (pass == 0) before = out.trace.held_out_before;
+    if (!options.contacts || out.trace.verdict == TraceVerdict::kNothingToSay) break;
+    std::vector<ContactSpan> spans = spans_left(out.corrected, whole, out.base.sigma, options);
+    if (same_spans(spans, out.contacts, options.contact_spans.window_s)) break;
+    out.contacts = std::move(spans);
+  }
+  if (!out.contacts.empty()) add_contacts(whole, before, out);
+  return out;
+}
+
+}  // namespace kinescope
