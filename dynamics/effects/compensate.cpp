@@ -38,22 +38,17 @@ struct Applied {
     context.cache = std::make_shared<ColumnCache>();
     context.torque_unit = samples.torque_unit;
     context.rigid = model.rigid;
-    context.widths.resize(model.rigid.size());
     for (const RigidBody& body : model.rigid.bodies) {
-      const bool turns = body.type == JointType::kRevolute;
-      context.widths[std::ssize(context.joints)] = turns ? model.widths.rad_s : model.widths.m_s;
       context.joints.push_back(body.joint);
-      context.turns.push_back(turns ? 1 : 0);
+      context.turns.push_back(body.type == JointType::kRevolute ? 1 : 0);
     }
-    for (const TorqueEffect& effect : model.effects) {
-      if (effect.id.effect == "coulomb") context.widths[joint_of(effect)] = effect.scan;
-    }
+    context.widths = model.widths;
     context.load = inverse_dynamics_of_samples(model.rigid, samples.q, samples.dq, samples.ddq);
     context.torque = context.load;
     context.measured_rate = Eigen::MatrixXd::Zero(samples.size(), samples.joints());
     context.travels = model.travels;
     context.log = model.log;
-    library = make_effect_library(context);
+    library = {make_candidates(context), make_carriers(context)};
   }
 
   [[nodiscard]] Eigen::Index joint_of(const TorqueEffect& effect) const {
@@ -72,7 +67,7 @@ struct Applied {
       if (part_of(effect) != Part::kPhysical) continue;
       const Candidate* candidate = library.find(effect.id);
       if (candidate == nullptr) continue;  // a temperature that this log does not have
-      out += effect_torque(library, *candidate, effect.scan, effect.values, out.cols());
+      out += effect_torque(library.carriers, *candidate, effect.scan, effect.values, out.cols());
     }
     return out;
   }

@@ -176,14 +176,18 @@ void describe_log(EffectContext& context) {
   context.log.range_c = std::max(context.temperature_c.maxCoeff() - context.log.lowest_c, 1e-9);
 }
 
-EffectLibrary make_effect_library(const EffectContext& context) {
+std::vector<Candidate> make_candidates(const EffectContext& context) {
   KINESCOPE_CHECK(context.motion != nullptr && context.cache != nullptr, "a motion and a cache");
   const auto shared = std::make_shared<const EffectContext>(context);
-  EffectLibrary out;
-  effects::add_friction(shared, out.candidates);
-  effects::add_drives(shared, out.candidates);
-  effects::add_sensors(shared, out.candidates);
-  effects::add_bodies(shared, out.candidates);
+  std::vector<Candidate> out;
+  effects::add_friction(shared, out);
+  effects::add_drives(shared, out);
+  effects::add_sensors(shared, out);
+  effects::add_bodies(shared, out);
+  return out;
+}
+
+Eigen::SparseMatrix<double> make_carriers(const EffectContext& context) {
   const Carriers carriers{static_cast<Eigen::Index>(context.joints.size())};
   TorqueSamples rows;
   rows.q = context.motion->rows_at_instants(context.motion->samples().q);
@@ -193,19 +197,21 @@ EffectLibrary make_effect_library(const EffectContext& context) {
   put_joints(context, carriers, triplets);
   put_gravity(context, rows.q, carriers, triplets);
   put_bodies(context, rows, carriers, triplets);
-  out.carriers.resize(context.instants() * carriers.joints,
-                      carriers.count(static_cast<int>(effects::tips(context.rigid).size())));
-  out.carriers.setFromTriplets(triplets.begin(), triplets.end());
+  Eigen::SparseMatrix<double> out(
+      context.instants() * carriers.joints,
+      carriers.count(static_cast<int>(effects::tips(context.rigid).size())));
+  out.setFromTriplets(triplets.begin(), triplets.end());
   return out;
 }
 
-Eigen::MatrixXd effect_torque(const EffectLibrary& library, const Candidate& candidate, double scan,
+Eigen::MatrixXd effect_torque(const Eigen::SparseMatrix<double>& carriers,
+                              const Candidate& candidate, double scan,
                               const Eigen::VectorXd& values, Eigen::Index joints) {
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(library.carriers.rows() / joints, joints);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(carriers.rows() / joints, joints);
   const std::vector<EffectColumn> columns = candidate.columns(scan);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const EffectColumn& column = columns[k];
-    for (Eigen::SparseMatrix<double>::InnerIterator entry(library.carriers, column.carrier); entry;
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(carriers, column.carrier); entry;
          ++entry) {
       const Eigen::Index instant = entry.row() / joints;
       const double share = column.share.size() > 0 ? column.share[instant] : 1.0;

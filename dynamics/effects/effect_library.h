@@ -86,11 +86,13 @@ struct EffectLibrary {
 };
 
 /// All effects of the library for one log. The context is copied into the candidates.
-[[nodiscard]] EffectLibrary make_effect_library(const EffectContext& context);
+[[nodiscard]] std::vector<Candidate> make_candidates(const EffectContext& context);
+/// Of the motion, the bodies and gravity only.
+[[nodiscard]] Eigen::SparseMatrix<double> make_carriers(const EffectContext& context);
 
 /// Torque of an effect at the instants, instants x joints.
-[[nodiscard]] Eigen::MatrixXd effect_torque(const EffectLibrary& library, const Candidate& candidate,
-                                            double scan, const Eigen::VectorXd& values,
+[[nodiscard]] Eigen::MatrixXd effect_torque(const Eigen::SparseMatrix<double>& carriers,
+                                            const Candidate& candidate, double scan, const Eigen::VectorXd& values,
                                             Eigen::Index joints);
 
 /// Two axes across gravity (columns), about which it may be tilted; deterministic.

@@ -45,11 +45,7 @@ Candidate coulomb(const SharedContext& c, std::size_t j) {
   out.record = "move the joint both ways at low speed";
   out.size_unit = c->unit(j);
   out.parameters = {{"coulomb", out.size_unit}};
-  const double width = c->widths[static_cast<Eigen::Index>(j)];
-  out.scan = {0.1 * width, 0.3 * width, width, 3.0 * width};
-  out.scan_name = "width of the turn";
-  out.scan_unit = c->angle(j) + "/s";
-  out.columns = [c, j](double turn) { return one_column(j, direction_column(*c, j, turn)); };
+  out.columns = [c, j](double) { return one_column(j, direction_column(*c, j)); };
   return out;
 }
 

@@ -4,36 +4,51 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
 #include "dynamics/effects/torque_parts.h"
-#include "dynamics/identify/block_jackknife.h"
-#include "dynamics/rigid/inverse_dynamics.h"
-#include "dynamics/rigid/regressor.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::effects {
 namespace {
 
-constexpr int kMostSteps = 30;
-constexpr double kSettled = 1e-9;   // of the residual's length
-constexpr double kUnseen = 1e-10;   // base parameters: share of the largest direction's square
-constexpr double kBasePrior = 1e-6; // of what the whole log says about a base parameter
+constexpr int kMostSteps = 40;
+constexpr double kSettled = 1e-8;    // of the residual's length
+constexpr double kBasePrior = 1e-6;  // of what the whole log says about a base parameter
+// Widths of the turn of friction: within these factors of the nominal one, by which they are drawn
+// (a log that does not show them leaves them there).
+constexpr double kNarrowest = 0.05;
+constexpr double kWidest = 4.0;
+constexpr double kWidthPrior = 1.0;  // of the logarithm
 
 /// Rows of instants x joints.
-Eigen::VectorXd as_rows(const Eigen::MatrixXd& torque) {
-  return torque.transpose().reshaped();
-}
+Eigen::VectorXd as_rows(const Eigen::MatrixXd& torque) { return torque.transpose().reshaped(); }
 
 Eigen::MatrixXd as_matrix(const Eigen::VectorXd& rows, Eigen::Index joints) {
   return rows.reshaped(joints, rows.size() / joints).transpose();
 }
 
 bool is_coupling(const Candidate& candidate) { return candidate.parameters.size() > 1; }
+
+/// H x = g with columns scaled to length 1; directions that nothing determines stay.
+Eigen::VectorXd scaled_solve(const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
+  const Eigen::VectorXd diagonal = H.diagonal();
+  const Eigen::VectorXd scale =
+      (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+  Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
+  scaled.diagonal().array() += 1e-12;
+  return scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * g);
+}
+
+const Candidate& candidate_of(const std::vector<Candidate>& candidates, const EffectId& id) {
+  const auto found = std::ranges::find(candidates, id, &Candidate::id);
+  KINESCOPE_CHECK(found != candidates.end(), "effects that `candidates` named");
+  return *found;
+}
 
 }  // namespace
 
@@ -42,95 +57,55 @@ TorqueFitter::TorqueFitter(const TorqueTracedModel::Parts& parts,
     : parts_(parts),
       joints_(parts.motion->joints()),
       rows_(parts.motion->instants() * parts.motion->joints()) {
-  read_widths(effects);
   set_gravity(Eigen::Vector2d::Zero());
   read(effects);
 }
 
-/// Friction that refines a joint's Coulomb friction turns round as that does.
-void TorqueFitter::read_widths(const std::vector<AddedEffect>& effects) {
-  widths_ = parts_.context.widths;
-  for (const AddedEffect& effect : effects) {
-    if (effect.id.effect != "coulomb") continue;
-    const auto& names = parts_.context.joints;
-    widths_[std::ranges::find(names, effect.id.place) - names.begin()] = effect.scan;
-  }
-}
-
 void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
   for (const AddedEffect& effect : effects) {
-    const Candidate* candidate = library_.find(effect.id);
-    KINESCOPE_CHECK(candidate != nullptr, "effects that `candidates` named");
+    const Candidate& candidate = candidate_of(candidates_, effect.id);
     Added added;
     added.effect = effect;
     added.first = effect_parameters_;
-    const auto count = static_cast<Eigen::Index>(candidate->parameters.size());
-    added.values = Eigen::VectorXd::Zero(count);
-    effect_parameters_ += count;
+    added.values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(candidate.parameters.size()));
+    effect_parameters_ += added.values.size();
     const std::string& name = effect.id.effect;
     if (name == "torque_delay") added.kind = Kind::kDelay;
     if (name == "torque_gain") added.kind = Kind::kGain;
     if (name == "gravity_direction") added.kind = Kind::kGravity;
-    if (name == "cross_talk" && !is_coupling(*candidate)) added.kind = Kind::kCross;
+    if (name == "cross_talk" && !is_coupling(candidate)) added.kind = Kind::kCross;
     const auto& names = parts_.context.joints;
     for (std::size_t j = 0; j < names.size(); ++j) {
-      if (effect.id.place == names[j] || effect.id.place.starts_with(names[j] + " from ")) {
+      if (effect.id.place == names[j] || effect.id.place.starts_with(names[j] + " ")) {
         added.joint = static_cast<Eigen::Index>(j);
       }
       if (effect.id.place.ends_with(" from " + names[j])) added.from = static_cast<Eigen::Index>(j);
     }
+    if (name == "coulomb") turning_.push_back(added.joint);
     added_.push_back(std::move(added));
   }
 }
 
 void TorqueFitter::set_gravity(const Eigen::Vector2d& tilt_deg) {
-  tilt_deg_ = tilt_deg;
-  const Eigen::Vector3d gravity = tilted(parts_.base.rigid.gravity_m_s2, tilt_deg);
-  rigid_ = parts_.base.rigid;
-  rigid_.gravity_m_s2 = gravity;
-  context_ = parts_.context;
-  context_.rigid.gravity_m_s2 = gravity;
-  context_.widths = widths_;
-  if (!tilt_deg.isZero(0.0)) {
-    context_.load = inverse_dynamics_of_samples(context_.rigid, parts_.q, parts_.dq, parts_.ddq);
-  }
-  library_ = make_effect_library(context_);
-  if (parts_.base.kind == TorqueBaseKind::kDeclared) {
-    fixed_ = as_rows(inverse_dynamics_of_samples(rigid_, parts_.q, parts_.dq, parts_.ddq) +
-                     parts_.drives);
-    base_.resize(rows_, 0);
-    bodies_.resize(0, 0);
-    base_values_.resize(0);
-    return;
-  }
-  fixed_ = Eigen::VectorXd::Zero(rows_);
-  const std::vector<Eigen::MatrixXd> Y =
-      regressors_of_samples(rigid_, parts_.q, parts_.dq, parts_.ddq);
-  const Eigen::Index n = Y.front().cols();
-  Eigen::MatrixXd all(rows_, n);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index j = 0; j < joints_; ++j) {
-    const Eigen::MatrixXd& own = Y[static_cast<std::size_t>(j)];
-    all(Eigen::seqN(j, own.rows(), joints_), Eigen::all) = own;
-    H.noalias() += own.transpose() * own / std::pow(parts_.base.sigma[j], 2);
-  }
-  const Eigen::VectorXd diagonal = H.diagonal();
-  const Eigen::VectorXd scale =
-      (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
-                                                             scale.asDiagonal());
-  const Eigen::VectorXd& values = eigen.eigenvalues();
-  Eigen::Index first = 0;
-  while (first < n && !(values[first] > kUnseen * values[n - 1])) ++first;
-  bodies_ = scale.asDiagonal() * eigen.eigenvectors().rightCols(n - first) *
-            values.tail(n - first).cwiseSqrt().cwiseInverse().asDiagonal();
-  base_ = all * bodies_;
-  base_values_ = Eigen::VectorXd::Zero(base_.cols());
+  case_ = tilt_deg.isZero(0.0) ? parts_.upright : make_gravity_case(parts_, tilt_deg);
+  const Eigen::VectorXd widths = context_.widths;
+  context_ = case_->context;
+  if (widths.size() > 0) context_.widths = widths;
+  candidates_ = make_candidates(context_);
+  base_values_ = Eigen::VectorXd::Zero(case_->base.cols());
 }
 
-RigidModel TorqueFitter::rigid() const {
-  if (parts_.base.kind == TorqueBaseKind::kDeclared) return rigid_;
-  return with_body_parameters(rigid_, bodies_ * base_values_);
+void TorqueFitter::set_widths(const Eigen::VectorXd& widths) {
+  context_.widths = widths;
+  candidates_ = make_candidates(context_);
+}
+
+FittedTorque TorqueFitter::fitted() const {
+  FittedTorque out{case_->rigid, context_.widths};
+  if (parts_.base.kind == TorqueBaseKind::kIdentified) {
+    out.rigid = with_body_parameters(case_->rigid, case_->bodies * base_values_);
+  }
+  return out;
 }
 
 Eigen::VectorXd TorqueFitter::observed() const {
@@ -163,11 +138,11 @@ Eigen::VectorXd TorqueFitter::whitened(const Eigen::VectorXd& rows) const {
 
 /// Torque of the rigid bodies and of all effects that are no matter of the sensors.
 Eigen::VectorXd TorqueFitter::physical() const {
-  Eigen::VectorXd out = fixed_ + base_ * base_values_;
+  Eigen::VectorXd out = case_->fixed + case_->base * base_values_;
   for (const Added& added : added_) {
     if (added.kind != Kind::kLinear) continue;
-    const Candidate* candidate = library_.find(added.effect.id);
-    out += as_rows(effect_torque(library_, *candidate, added.effect.scan, added.values, joints_));
+    out += as_rows(effect_torque(case_->carriers, candidate_of(candidates_, added.effect.id),
+                                 added.effect.scan, added.values, joints_));
   }
   return out;
 }
@@ -177,108 +152,151 @@ Eigen::MatrixXd TorqueFitter::effect_columns() const {
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(rows_, effect_parameters_);
   const Eigen::MatrixXd torque = as_matrix(physical(), joints_);
   for (const Added& added : added_) {
+    const auto own_rows = Eigen::seqN(added.joint, torque.rows(), joints_);
     if (added.kind == Kind::kDelay) {
       const Eigen::VectorXd& all = parts_.motion->samples().torque.col(added.joint);
       const Eigen::VectorXd late =
           parts_.motion->shifted(parts_.motion->rate(all), added.values[0]);
-      out(Eigen::seqN(added.joint, torque.rows(), joints_), added.first) =
-          -parts_.motion->at_instants(late);
+      out(own_rows, added.first) = -parts_.motion->at_instants(late);
     } else if (added.kind == Kind::kGain || added.kind == Kind::kCross) {
-      const Eigen::Index from = added.kind == Kind::kGain ? added.joint : added.from;
-      out(Eigen::seqN(added.joint, torque.rows(), joints_), added.first) = torque.col(from);
+      out(own_rows, added.first) =
+          torque.col(added.kind == Kind::kGain ? added.joint : added.from);
     } else {
-      const Candidate* candidate = library_.find(added.effect.id);
+      const Candidate& candidate = candidate_of(candidates_, added.effect.id);
       for (Eigen::Index k = 0; k < added.values.size(); ++k) {
         const Eigen::VectorXd unit = Eigen::VectorXd::Unit(added.values.size(), k);
-        out.col(added.first + k) = through_sensor(
-            as_rows(effect_torque(library_, *candidate, added.effect.scan, unit, joints_)));
+        out.col(added.first + k) = through_sensor(as_rows(
+            effect_torque(case_->carriers, candidate, added.effect.scan, unit, joints_)));
       }
     }
   }
   return out;
 }
 
-void TorqueFitter::make_design() {
-  const Eigen::Index p = base_.cols();
-  design_.resize(rows_, p + effect_parameters_);
-  for (Eigen::Index k = 0; k < p; ++k) {
-    design_.col(k) = whitened(through_sensor(base_.col(k)));
+/// All of a joint's friction that turns round with its speed, for a width of that.
+Eigen::VectorXd TorqueFitter::friction_of(Eigen::Index joint, double width) const {
+  EffectContext context = context_;
+  context.widths[joint] = width;
+  const std::vector<Candidate> candidates = make_candidates(context);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(rows_);
+  for (const Added& added : added_) {
+    if (added.kind != Kind::kLinear || added.joint != joint) continue;
+    out += as_rows(effect_torque(case_->carriers, candidate_of(candidates, added.effect.id),
+                                 added.effect.scan, added.values, joints_));
   }
+  return out;
+}
+
+/// d measured / d logarithm of the width of each joint that turns.
+Eigen::MatrixXd TorqueFitter::width_columns() const {
+  constexpr double kStep = 0.05;
+  Eigen::MatrixXd out(rows_, free_widths());
+  for (Eigen::Index k = 0; k < free_widths(); ++k) {
+    const Eigen::Index joint = turning_[static_cast<std::size_t>(k)];
+    const double width = context_.widths[joint];
+    out.col(k) = through_sensor(friction_of(joint, width * std::exp(kStep)) -
+                                friction_of(joint, width * std::exp(-kStep))) /
+                 (2.0 * kStep);
+  }
+  return out;
+}
+
+void TorqueFitter::make_design() {
+  const Eigen::Index p = base_values_.size();
+  design_.resize(rows_, own_parameters() + effect_parameters_);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    design_.col(k) = whitened(through_sensor(case_->base.col(k)));
+  }
+  const Eigen::MatrixXd widths = width_columns();
+  for (Eigen::Index k = 0; k < widths.cols(); ++k) design_.col(p + k) = whitened(widths.col(k));
   const Eigen::MatrixXd effects = effect_columns();
   for (Eigen::Index k = 0; k < effect_parameters_; ++k) {
-    design_.col(p + k) = whitened(effects.col(k));
+    design_.col(own_parameters() + k) = whitened(effects.col(k));
   }
   residual_ = whitened(observed() - through_sensor(physical()));
+}
+
+Eigen::MatrixXd TorqueFitter::own_prior() const {
+  const Eigen::Index n = own_parameters() + effect_parameters_;
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
+  out.diagonal().head(base_values_.size()).setConstant(kBasePrior);
+  out.diagonal().segment(base_values_.size(), free_widths()).setConstant(kWidthPrior);
+  return out;
 }
 
 /// One step of all parameters; gives its length beside the residual's.
 double TorqueFitter::step() {
   make_design();
-  const Eigen::Index p = base_.cols();
-  const Eigen::Index n = design_.cols();
-  if (n == 0) return 0.0;
+  if (design_.cols() == 0) return 0.0;
+  const Eigen::Index p = base_values_.size();
   Eigen::MatrixXd H = design_.transpose() * design_;
   Eigen::VectorXd g = design_.transpose() * residual_;
-  H.diagonal().head(p).array() += kBasePrior;
+  H += own_prior();
   g.head(p) -= kBasePrior * base_values_;
-  const Eigen::VectorXd diagonal = H.diagonal();
-  const Eigen::VectorXd scale =
-      (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
-  Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
-  scaled.diagonal().array() += 1e-12;
-  const Eigen::VectorXd change = scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * g);
+  for (Eigen::Index k = 0; k < free_widths(); ++k) {
+    const Eigen::Index joint = turning_[static_cast<std::size_t>(k)];
+    g[p + k] -= kWidthPrior * std::log(context_.widths[joint] / parts_.context.widths[joint]);
+  }
+  const Eigen::VectorXd change = scaled_solve(H, g);
+  const double length = (design_ * change).norm() / std::max(residual_.norm(), 1e-300);
+  apply(change);
+  return length;
+}
+
+void TorqueFitter::apply(const Eigen::VectorXd& change) {
+  constexpr double kLongest = 0.5;  // step of a width's logarithm
+  const Eigen::Index p = base_values_.size();
   base_values_ += change.head(p);
-  Eigen::Vector2d tilt = tilt_deg_;
+  Eigen::Vector2d tilt = case_->tilt_deg;
   for (Added& added : added_) {
-    const Eigen::VectorXd own = change.segment(p + added.first, added.values.size());
-    added.values += own;
+    added.values += change.segment(own_parameters() + added.first, added.values.size());
     if (added.kind == Kind::kGravity) tilt = added.values;
   }
-  const double length = (design_ * change).norm() / std::max(residual_.norm(), 1e-300);
-  if (tilt != tilt_deg_) {
-    const RigidModel now = rigid();
+  Eigen::VectorXd widths = context_.widths;
+  for (Eigen::Index k = 0; k < free_widths(); ++k) {
+    const Eigen::Index joint = turning_[static_cast<std::size_t>(k)];
+    const double nominal = parts_.context.widths[joint];
+    widths[joint] = std::clamp(widths[joint] * std::exp(std::clamp(change[p + k], -kLongest, kLongest)),
+                               kNarrowest * nominal, kWidest * nominal);
+  }
+  if (tilt != case_->tilt_deg) {
+    const RigidModel now = fitted().rigid;
     set_gravity(tilt);
     // The tilt's columns at the masses found; what the log does not show of them stays unknown.
     if (parts_.base.kind == TorqueBaseKind::kIdentified) {
-      context_.rigid = now;
-      context_.rigid.gravity_m_s2 = rigid_.gravity_m_s2;
-      library_ = make_effect_library(context_);
+      auto found = std::make_shared<GravityCase>(*case_);
+      found->context.rigid = now;
+      found->context.rigid.gravity_m_s2 = case_->rigid.gravity_m_s2;
+      found->carriers = make_carriers(found->context);
+      case_ = found;
     }
   }
-  return length;
+  if (free_widths() > 0) set_widths(widths);
 }
 
 /// A base on a wall is far from one on the floor: the axes' directions are tried first.
 void TorqueFitter::choose_gravity_start(Added& gravity) {
   constexpr double kRight = 90.0;
   const std::array<Eigen::Vector2d, 6> starts = {
-      Eigen::Vector2d{0, 0},      Eigen::Vector2d{kRight, 0}, Eigen::Vector2d{-kRight, 0},
+      Eigen::Vector2d{0, 0},      Eigen::Vector2d{kRight, 0},  Eigen::Vector2d{-kRight, 0},
       Eigen::Vector2d{0, kRight}, Eigen::Vector2d{0, -kRight}, Eigen::Vector2d{2.0 * kRight, 0}};
   double best = std::numeric_limits<double>::infinity();
   Eigen::Vector2d chosen = starts[0];
   for (const Eigen::Vector2d& start : starts) {
-    for (Added& added : added_) added.values.setZero();
     gravity.values = start;
     set_gravity(start);
-    // What is left when all that is linear is fitted and the tilt stays.
     make_design();
-    const Eigen::Index p = base_.cols();
-    Eigen::MatrixXd columns(rows_, design_.cols() - 2);
-    columns << design_.leftCols(p + gravity.first), design_.rightCols(effect_parameters_ - gravity.first - 2);
-    double cost = residual_.squaredNorm();
-    if (columns.cols() > 0) {
-      Eigen::MatrixXd H = columns.transpose() * columns;
-      H.diagonal().array() *= 1.0 + 1e-10;
-      H.diagonal().array() += 1e-12;
-      const Eigen::VectorXd g = columns.transpose() * residual_;
-      cost -= g.dot(H.ldlt().solve(g));
-    }
+    // What is left when all that is linear is fitted and the tilt stays.
+    const Eigen::Index at = own_parameters() + gravity.first;
+    design_.middleCols(at, gravity.values.size()).setZero();
+    const Eigen::VectorXd g = design_.transpose() * residual_;
+    const double cost = residual_.squaredNorm() -
+                        g.dot(scaled_solve(design_.transpose() * design_, g));
     if (cost < best) {
       best = cost;
       chosen = start;
     }
   }
-  for (Added& added : added_) added.values.setZero();
   gravity.values = chosen;
   set_gravity(chosen);
 }
@@ -289,64 +307,7 @@ TracedFit TorqueFitter::run() {
   bool converged = false;
   for (int k = 0; k < kMostSteps && !converged; ++k) converged = step() < kSettled;
   make_design();
-  return read_back(converged && residual_.allFinite());
-}
-
-/// Only waves may come several times: of all else a second one would mend the first one's shape.
-bool TorqueFitter::is_open(const EffectId& id) const {
-  if (id.effect == "ripple") return true;
-  return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
-}
-
-TracedFit TorqueFitter::read_back(bool converged) const {
-  TracedFit out;
-  out.converged = converged;
-  if (!converged) out.reason = "delay, gain or gravity did not settle";
-  Linearisation& linear = out.linear;
-  linear.residual = residual_;
-  linear.jacobian = design_;
-  linear.prior = Eigen::MatrixXd::Zero(design_.cols(), design_.cols());
-  linear.prior.diagonal().head(base_.cols()).setConstant(kBasePrior);
-  linear.carriers = library_.carriers;
-  for (int c = 0; c < linear.carriers.outerSize(); ++c) {
-    for (Eigen::SparseMatrix<double>::InnerIterator e(linear.carriers, c); e; ++e) {
-      e.valueRef() /= parts_.base.sigma[e.row() % joints_];
-    }
-  }
-  const Eigen::Index instants = parts_.motion->instants();
-  for (Eigen::Index i = 0; i <= instants; ++i) linear.first_row.push_back(i * joints_);
-  linear.time_s = parts_.motion->at_instants(parts_.motion->time_s());
-  for (const Eigen::Index row : parts_.motion->kept()) {
-    linear.fold.push_back(parts_.fold[static_cast<std::size_t>(row)]);
-  }
-  linear.unit = parts_.base.sigma.replicate(instants, 1);
-  linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
-  const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());
-  linear.correlation_time_s =
-      identify::correlation_samples(as_matrix(residual_, joints_), trajectory) *
-      (linear.time_s[instants - 1] - linear.time_s[0]) / static_cast<double>(instants);
-  for (const Added& added : added_) out.values.push_back(added.values);
-  EffectContext now = context_;
-  now.torque = as_matrix(physical(), joints_);
-  for (Candidate& candidate : make_effect_library(now).candidates) {
-    if (is_open(candidate.id)) out.candidates.push_back(std::move(candidate));
-  }
-  const auto& names = parts_.context.joints;
-  for (std::size_t j = 0; j < names.size(); ++j) {
-    const auto c = static_cast<Eigen::Index>(j);
-    const std::string rate = parts_.context.angle(j) + "/s";
-    out.covariates.push_back({"value of " + names[j], parts_.context.angle(j), parts_.q.col(c)});
-    out.covariates.push_back({"speed of " + names[j], rate, parts_.dq.col(c)});
-    out.covariates.push_back(
-        {"acceleration of " + names[j], rate + "^2", parts_.ddq.col(c)});
-    out.covariates.push_back({"load of " + names[j], parts_.context.unit(j), context_.load.col(c)});
-    out.rest_places.push_back({names[j], parts_.context.unit(j), static_cast<int>(j)});
-  }
-  out.covariates.push_back({"time", "s", linear.time_s});
-  if (parts_.context.temperature_c.size() > 0) {
-    out.covariates.push_back({"temperature", "deg C", parts_.context.temperature_c});
-  }
-  return out;
+  return read_back(residual_.allFinite());
 }
 
 }  // namespace kinescope::effects

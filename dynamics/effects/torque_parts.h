@@ -12,6 +12,24 @@
 
 namespace kinescope {
 
+namespace effects {
+
+/// The base under one direction of gravity.
+struct GravityCase {
+  Eigen::Vector2d tilt_deg;
+  RigidModel rigid;       ///< bodies of the base; of the reference where they are free
+  EffectContext context;
+  Eigen::SparseMatrix<double> carriers;
+  Eigen::VectorXd fixed;  ///< torque that is not free, rows
+  Eigen::MatrixXd base;   ///< torque a base parameter, rows x parameters
+  Eigen::MatrixXd bodies; ///< the bodies' parameters from the base parameters
+};
+
+[[nodiscard]] std::shared_ptr<const GravityCase> make_gravity_case(
+    const TorqueTracedModel::Parts& parts, const Eigen::Vector2d& tilt_deg);
+
+}  // namespace effects
+
 struct TorqueTracedModel::Parts {
   DynamicModel model;
   TorqueModelOptions options;
@@ -22,6 +40,8 @@ struct TorqueTracedModel::Parts {
   Eigen::MatrixXd q, dq, ddq;     ///< at the instants
   Eigen::MatrixXd drives;         ///< friction that the model declares, instants x joints
   Eigen::MatrixXd widest;           ///< whitened, see widest_residual()
+
+  std::shared_ptr<const effects::GravityCase> upright;  ///< gravity as declared
 
   /// All that follows from the instants that are kept.
   void refresh();
@@ -36,50 +56,52 @@ class TorqueFitter {
   TorqueFitter(const TorqueTracedModel::Parts& parts, const std::vector<AddedEffect>& effects);
 
   [[nodiscard]] TracedFit run();
-  [[nodiscard]] RigidModel rigid() const;
+  [[nodiscard]] FittedTorque fitted() const;
 
  private:
   enum class Kind { kLinear, kDelay, kGain, kCross, kGravity };
   struct Added {
     AddedEffect effect;
     Kind kind = Kind::kLinear;
-    Eigen::Index joint = 0;  ///< of delay, gain, cross-talk
+    Eigen::Index joint = 0;  ///< of delay, gain, cross-talk, friction
     Eigen::Index from = 0;   ///< of cross-talk
     Eigen::Index first = 0;  ///< of its parameters, among those of all effects
     Eigen::VectorXd values;
   };
 
-  void read_widths(const std::vector<AddedEffect>& effects);
   void read(const std::vector<AddedEffect>& effects);
   [[nodiscard]] bool is_open(const EffectId& id) const;
   void set_gravity(const Eigen::Vector2d& tilt_deg);
+  void set_widths(const Eigen::VectorXd& widths);
   void choose_gravity_start(Added& gravity);
   [[nodiscard]] double step();
+  void apply(const Eigen::VectorXd& change);
   [[nodiscard]] Eigen::VectorXd observed() const;
   [[nodiscard]] Eigen::MatrixXd sensor() const;
   [[nodiscard]] Eigen::MatrixXd effect_columns() const;
+  [[nodiscard]] Eigen::MatrixXd width_columns() const;
+  [[nodiscard]] Eigen::VectorXd friction_of(Eigen::Index joint, double width) const;
   [[nodiscard]] Eigen::VectorXd physical() const;
   [[nodiscard]] Eigen::VectorXd through_sensor(const Eigen::VectorXd& rows) const;
   [[nodiscard]] Eigen::VectorXd whitened(const Eigen::VectorXd& rows) const;
+  [[nodiscard]] Eigen::Index own_parameters() const { return base_values_.size() + free_widths(); }
+  [[nodiscard]] Eigen::Index free_widths() const { return std::ssize(turning_); }
   void make_design();
   [[nodiscard]] TracedFit read_back(bool converged) const;
+  [[nodiscard]] Eigen::MatrixXd own_prior() const;
+  void name_covariates(TracedFit& out) const;
 
   const TorqueTracedModel::Parts& parts_;
   Eigen::Index joints_ = 0;
   Eigen::Index rows_ = 0;
   std::vector<Added> added_;
+  std::vector<Eigen::Index> turning_;  ///< joints with Coulomb friction: their widths are free
   Eigen::Index effect_parameters_ = 0;
-  Eigen::VectorXd widths_;
-  Eigen::Vector2d tilt_deg_ = Eigen::Vector2d::Zero();
-  // Under the present gravity.
-  RigidModel rigid_;             ///< declared bodies, or those of the reference
+  std::shared_ptr<const GravityCase> case_;
   EffectContext context_;
-  EffectLibrary library_;
-  Eigen::VectorXd fixed_;        ///< torque that is not free, rows
-  Eigen::MatrixXd base_;         ///< torque a base parameter, rows x parameters
-  Eigen::MatrixXd bodies_;       ///< the bodies' parameters from the base parameters
+  std::vector<Candidate> candidates_;  ///< of the added effects' kinds, at the present state
   Eigen::VectorXd base_values_;
-  // Of the last step.
+  // Of the last step. Columns: base, widths, effects.
   RowMatrix design_;
   Eigen::VectorXd residual_;
 };

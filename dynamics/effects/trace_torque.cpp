@@ -118,12 +118,13 @@ bool put_into(DynamicModel& model, const TorqueEffect& effect) {
 }
 
 CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel& traced,
-                             const Trace& trace, const TorqueTraceOptions& options) {
+                             const Trace& trace) {
   CorrectedTorqueModel out;
   out.model = model;
   out.effects = effects_of(trace);
-  out.rigid = traced.fitted_rigid(trace.added);
-  out.widths = options.model.widths;
+  FittedTorque fitted = traced.fitted(trace.added);
+  out.rigid = std::move(fitted.rigid);
+  out.widths = std::move(fitted.widths);
   out.travels = traced.context().travels;
   out.log = traced.context().log;
   if (traced.base().kind == TorqueBaseKind::kIdentified) {
@@ -178,7 +179,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
     }
     out.trace = trace_with(traced, options, progress);
     out.base = traced.base();
-    out.corrected = correct(model, traced, out.trace, options);
+    out.corrected = correct(model, traced, out.trace);
     if (pass == 0) before = out.trace.held_out_before;
     if (!options.contacts || out.trace.verdict == TraceVerdict::kNothingToSay) break;
     std::vector<ContactSpan> spans = spans_left(out.corrected, whole, out.base.sigma, options);

@@ -43,7 +43,7 @@ struct CorrectedTorqueModel {
   std::vector<TorqueEffect> effects;
   std::vector<char> in_model;
   RigidModel rigid;    ///< bodies of the torque without the effects; masses as the base had them
-  FrictionWidths widths;
+  Eigen::VectorXd widths;  ///< speed within which each joint's friction turns round, rad/s or m/s
   std::vector<JointTravel> travels;  ///< of the log in which they were found
   LogSpan log;
 };

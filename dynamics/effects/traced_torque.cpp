@@ -206,6 +206,7 @@ void TorqueTracedModel::Parts::refresh() {
     if (!has_masses(declared)) context.rigid = identified;
   }
   context.torque = context.load;
+  upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
 }
 
 void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool masses) {
@@ -254,10 +255,10 @@ Eigen::MatrixXd TorqueTracedModel::residual_torque(const TracedFit& fit) const {
   return rows.reshaped(joints, rows.size() / joints).transpose();
 }
 
-RigidModel TorqueTracedModel::fitted_rigid(const std::vector<AddedEffect>& effects) const {
+FittedTorque TorqueTracedModel::fitted(const std::vector<AddedEffect>& effects) const {
   effects::TorqueFitter fitter(*parts_, effects);
   static_cast<void>(fitter.run());
-  return fitter.rigid();
+  return fitter.fitted();
 }
 
 Eigen::MatrixXd TorqueTracedModel::widest_residual() const { return parts_->widest; }

@@ -53,6 +53,12 @@ struct TorqueBase {
   RigidModel rigid;              ///< bodies that give the base's torque
 };
 
+/// What a fit found beside the effects.
+struct FittedTorque {
+  RigidModel rigid;        ///< bodies identified, or as declared; gravity as found
+  Eigen::VectorXd widths;  ///< of each joint: speed within which its friction turns round
+};
+
 class TorqueTracedModel : public TracedModel {
  public:
   /// Throws bad_request for arrays or options that do not fit; undetermined for logs too short.
@@ -71,8 +77,7 @@ class TorqueTracedModel : public TracedModel {
 
   /// What every instant's torque lacks after a fit, in the unit of the torque: instants x joints.
   [[nodiscard]] Eigen::MatrixXd residual_torque(const TracedFit& fit) const;
-  /// The bodies after a fit: identified, or as declared; gravity as found.
-  [[nodiscard]] RigidModel fitted_rigid(const std::vector<AddedEffect>& effects) const;
+  [[nodiscard]] FittedTorque fitted(const std::vector<AddedEffect>& effects) const;
   /// Whitened residuals of the widest linear description (every joint alone, all that a joint may
   /// have), instants x joints: what is neither rigid bodies nor any common effect.
   [[nodiscard]] Eigen::MatrixXd widest_residual() const;

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A fit as calib/trace takes it.
+#include <algorithm>
+
+#include "dynamics/effects/torque_parts.h"
+#include "dynamics/identify/block_jackknife.h"
+
+namespace kinescope::effects {
+
+/// Only waves may come several times: of all else a second one would mend the first one's shape.
+bool TorqueFitter::is_open(const EffectId& id) const {
+  if (id.effect == "ripple") return true;
+  return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
+}
+
+TracedFit TorqueFitter::read_back(bool converged) const {
+  TracedFit out;
+  out.converged = converged;
+  if (!converged) out.reason = "delay, gain or gravity did not settle";
+  Linearisation& linear = out.linear;
+  linear.residual = residual_;
+  linear.jacobian = design_;
+  linear.prior = own_prior();
+  linear.carriers = case_->carriers;
+  for (int c = 0; c < linear.carriers.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, c); entry; ++entry) {
+      entry.valueRef() /= parts_.base.sigma[entry.row() % joints_];
+    }
+  }
+  const Eigen::Index instants = parts_.motion->instants();
+  for (Eigen::Index i = 0; i <= instants; ++i) linear.first_row.push_back(i * joints_);
+  linear.time_s = parts_.motion->at_instants(parts_.motion->time_s());
+  for (const Eigen::Index row : parts_.motion->kept()) {
+    linear.fold.push_back(parts_.fold[static_cast<std::size_t>(row)]);
+  }
+  linear.unit = parts_.base.sigma.replicate(instants, 1);
+  linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
+  const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());
+  const Eigen::MatrixXd left = residual_.reshaped(joints_, instants).transpose();
+  linear.correlation_time_s = identify::correlation_samples(left, trajectory) *
+                              (linear.time_s[instants - 1] - linear.time_s[0]) /
+                              static_cast<double>(instants);
+  for (const Added& added : added_) out.values.push_back(added.values);
+  EffectContext now = context_;
+  now.torque = physical().reshaped(joints_, instants).transpose();
+  for (Candidate& candidate : make_candidates(now)) {
+    if (is_open(candidate.id)) out.candidates.push_back(std::move(candidate));
+  }
+  name_covariates(out);
+  return out;
+}
+
+void TorqueFitter::name_covariates(TracedFit& out) const {
+  const EffectContext& context = parts_.context;
+  for (std::size_t j = 0; j < context.joints.size(); ++j) {
+    const auto c = static_cast<Eigen::Index>(j);
+    const std::string& name = context.joints[j];
+    const std::string rate = context.angle(j) + "/s";
+    out.covariates.push_back({"value of " + name, context.angle(j), parts_.q.col(c)});
+    out.covariates.push_back({"speed of " + name, rate, parts_.dq.col(c)});
+    out.covariates.push_back({"acceleration of " + name, rate + "^2", parts_.ddq.col(c)});
+    out.covariates.push_back({"load of " + name, context.unit(j), context_.load.col(c)});
+    out.rest_places.push_back({name, context.unit(j), static_cast<int>(j)});
+  }
+  out.covariates.push_back({"time", "s", out.linear.time_s});
+  if (context.temperature_c.size() > 0) {
+    out.covariates.push_back({"temperature", "deg C", context.temperature_c});
+  }
+}
+
+}  // namespace kinescope::effects
