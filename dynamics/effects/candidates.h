@@ -32,13 +32,14 @@ struct Carriers {
     const EffectContext& context, std::size_t joint, const std::string& name,
     const std::function<Eigen::ArrayXd(const FinePath&)>& torque);
 
+/// Friction that turns round with the speed's sign, within the joint's width: `torque` of a path and
+/// a width. Made at widths in equal ratios and interpolated between them.
+[[nodiscard]] Eigen::VectorXd turning_column(
+    const EffectContext& context, std::size_t joint, const std::string& name,
+    const std::function<Eigen::ArrayXd(const FinePath&, double width)>& torque);
 /// Smoothed sign of the speed, as Coulomb friction has it.
-[[nodiscard]] Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
-                                       const Eigen::ArrayXd& dq);
 [[nodiscard]] Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width);
 [[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint);
-[[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint,
-                                               double width);
 /// Friction in its simplest form, which all that refines it waits for.
 [[nodiscard]] std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t joint);
 
@@ -49,6 +50,7 @@ struct Carriers {
 [[nodiscard]] std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint);
 
 void add_friction(const SharedContext& context, std::vector<Candidate>& out);
+void add_friction_of(const SharedContext& context, std::size_t joint, std::vector<Candidate>& out);
 void add_drives(const SharedContext& context, std::vector<Candidate>& out);
 void add_sensors(const SharedContext& context, std::vector<Candidate>& out);
 void add_bodies(const SharedContext& context, std::vector<Candidate>& out);

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kFullTurn = 6.283185307179586;
 
+constexpr double kTurn_rad_s = 0.01;  // of a coupled drive's friction
+
 Candidate motor_inertia(const SharedContext& c, std::size_t j) {
   Candidate out;
   out.id = {"motor_inertia", c->joints[j]};
@@ -171,10 +173,9 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
       Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
   const double high = c->travels[j].high_speed;
   out.columns = [c, j, sum, weights, carrier, high](double) {
-    const std::string name = fmt::format("pair {} {} {:.17g}", j, sum ? "sum" : "difference",
-                                         c->widths[static_cast<Eigen::Index>(j)]);
+    const std::string name = fmt::format("pair {} {}", j, sum ? "sum" : "difference");
     const Eigen::VectorXd& way = c->cache->get(name, [&] {
-      return c->motion->column(weights, [&](const FinePath& p) { return direction(*c, j, p.dq); });
+      return c->motion->column(weights, [&](const FinePath& p) { return direction(p.dq, kTurn_rad_s); });
     });
     const TorqueSamples& samples = c->motion->samples();
     return std::vector<EffectColumn>{

@@ -85,16 +85,36 @@ namespace effects {
 Eigen::VectorXd joint_column(const EffectContext& context, std::size_t joint,
                              const std::string& name,
                              const std::function<Eigen::ArrayXd(const FinePath&)>& torque) {
-  // All that knows a direction depends on the width of its turning round.
-  const double width = context.widths[static_cast<Eigen::Index>(joint)];
-  return context.cache->get(fmt::format("{} {:.17g} {}", joint, width, name), [&] {
+  return context.cache->get(fmt::format("{} {}", joint, name), [&] {
     return context.motion->column(static_cast<Eigen::Index>(joint), torque);
   });
 }
 
-Eigen::ArrayXd direction(const EffectContext& context, std::size_t joint,
-                         const Eigen::ArrayXd& dq) {
-  return direction(dq, context.widths[static_cast<Eigen::Index>(joint)]);
+Eigen::VectorXd turning_column(
+    const EffectContext& context, std::size_t joint, const std::string& name,
+    const std::function<Eigen::ArrayXd(const FinePath&, double width)>& torque) {
+  constexpr double kRatio = 1.4;
+  const double width = context.widths[static_cast<Eigen::Index>(joint)];
+  if (width == 0.0) {
+    return joint_column(context, joint, name + " sharp",
+                        [&](const FinePath& path) { return torque(path, 0.0); });
+  }
+  // Lagrange's cubic through four neighbours.
+  const double at = std::log(width) / std::log(kRatio);
+  const auto below = static_cast<int>(std::floor(at));
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(context.instants());
+  for (int k = below - 1; k <= below + 2; ++k) {
+    double weight = 1.0;
+    for (int other = below - 1; other <= below + 2; ++other) {
+      if (other != k) weight *= (at - other) / (k - other);
+    }
+    if (weight == 0.0) continue;
+    out += weight * joint_column(context, joint, fmt::format("{} {}", name, k),
+                                 [&](const FinePath& path) {
+                                   return torque(path, std::pow(kRatio, k));
+                                 });
+  }
+  return out;
 }
 
 Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width) {
@@ -103,12 +123,9 @@ Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width) {
 }
 
 Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint) {
-  return direction_column(context, joint, context.widths[static_cast<Eigen::Index>(joint)]);
-}
-
-Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint, double width) {
-  return joint_column(context, joint, fmt::format("direction {:.17g}", width),
-                      [&](const FinePath& path) { return direction(path.dq, width); });
+  return turning_column(
+      context, joint, "direction",
+      [](const FinePath& path, double width) { return direction(path.dq, width); });
 }
 
 std::vector<double> ratios(double first, double last, int count) {

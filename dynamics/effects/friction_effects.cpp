@@ -76,12 +76,12 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   out.scan_name = "Stribeck speed";
   out.scan_unit = c->angle(j) + "/s";
   out.columns = [c, j](double speed) {
-    return one_column(j, joint_column(*c, j, fmt::format("stribeck {:.17g}", speed),
-                                      [&](const FinePath& p) {
-                                        return (direction(*c, j, p.dq) *
-                                                (-(p.dq / speed).square()).exp())
-                                            .eval();
-                                      }));
+    return one_column(j, turning_column(*c, j, fmt::format("stribeck {:.17g}", speed),
+                                        [&](const FinePath& p, double width) {
+                                          return (direction(p.dq, width) *
+                                                  (-(p.dq / speed).square()).exp())
+                                              .eval();
+                                        }));
   };
   return out;
 }
@@ -137,15 +137,16 @@ Candidate position_friction(const SharedContext& c, std::size_t j) {
   const double wave = c->turns[j] != 0 ? 1.0 : kFullTurn;
   out.columns = [c, j, wave](double periods) {
     const double w = wave * periods;
+    const auto joint = static_cast<int>(j);
     return std::vector<EffectColumn>{
-        {static_cast<int>(j), joint_column(*c, j, fmt::format("position cos {:.17g}", w),
-                                           [&](const FinePath& p) {
-                                             return (direction(*c, j, p.dq) * (w * p.q).cos()).eval();
-                                           })},
-        {static_cast<int>(j), joint_column(*c, j, fmt::format("position sin {:.17g}", w),
-                                           [&](const FinePath& p) {
-                                             return (direction(*c, j, p.dq) * (w * p.q).sin()).eval();
-                                           })}};
+        {joint, turning_column(*c, j, fmt::format("position cos {:.17g}", w),
+                               [&](const FinePath& p, double width) {
+                                 return (direction(p.dq, width) * (w * p.q).cos()).eval();
+                               })},
+        {joint, turning_column(*c, j, fmt::format("position sin {:.17g}", w),
+                               [&](const FinePath& p, double width) {
+                                 return (direction(p.dq, width) * (w * p.q).sin()).eval();
+                               })}};
   };
   return out;
 }
@@ -188,13 +189,15 @@ std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t j
   return {{"coulomb", context.joints[joint]}, {"viscous", context.joints[joint]}};
 }
 
-void add_friction(const SharedContext& context, std::vector<Candidate>& out) {
-  for (std::size_t j = 0; j < context->joints.size(); ++j) {
-    for (const auto& make : {viscous, coulomb, asymmetric, stribeck, cubic_viscous, load_friction,
-                             position_friction, hysteresis}) {
-      out.push_back(make(context, j));
-    }
+void add_friction_of(const SharedContext& context, std::size_t joint, std::vector<Candidate>& out) {
+  for (const auto& make : {viscous, coulomb, asymmetric, stribeck, cubic_viscous, load_friction,
+                           position_friction, hysteresis}) {
+    out.push_back(make(context, joint));
   }
+}
+
+void add_friction(const SharedContext& context, std::vector<Candidate>& out) {
+  for (std::size_t j = 0; j < context->joints.size(); ++j) add_friction_of(context, j, out);
 }
 
 }  // namespace kinescope::effects

@@ -17,7 +17,7 @@ namespace kinescope::effects {
 namespace {
 
 constexpr int kMostSteps = 40;
-constexpr double kSettled = 1e-8;    // of the residual's length
+constexpr double kSettled = 1e-5;    // of the residual's length
 constexpr double kBasePrior = 1e-6;  // of what the whole log says about a base parameter
 // Widths of the turn of friction: within these factors of the nominal one, by which they are drawn
 // (a log that does not show them leaves them there).
@@ -177,12 +177,15 @@ Eigen::MatrixXd TorqueFitter::effect_columns() const {
 Eigen::VectorXd TorqueFitter::friction_of(Eigen::Index joint, double width) const {
   EffectContext context = context_;
   context.widths[joint] = width;
-  const std::vector<Candidate> candidates = make_candidates(context);
+  std::vector<Candidate> candidates;
+  add_friction_of(std::make_shared<const EffectContext>(context), static_cast<std::size_t>(joint),
+                  candidates);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(rows_);
   for (const Added& added : added_) {
-    if (added.kind != Kind::kLinear || added.joint != joint) continue;
-    out += as_rows(effect_torque(case_->carriers, candidate_of(candidates, added.effect.id),
-                                 added.effect.scan, added.values, joints_));
+    const auto found = std::ranges::find(candidates, added.effect.id, &Candidate::id);
+    if (found == candidates.end()) continue;
+    out += as_rows(
+        effect_torque(case_->carriers, *found, added.effect.scan, added.values, joints_));
   }
   return out;
 }

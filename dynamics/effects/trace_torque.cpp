@@ -148,8 +148,19 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
   const TorqueSamples& samples = whole.motion().samples();
   const Eigen::MatrixXd left =
       samples.torque - predict_torque(corrected, samples, options.model.filter);
-  const Eigen::MatrixXd whitened =
+  Eigen::MatrixXd whitened =
       whole.motion().rows_at_instants(left) * sigma.cwiseInverse().asDiagonal();
+  // About a turn, friction depends on what noise makes of the speed: no sign of a contact.
+  const Eigen::MatrixXd dq = whole.motion().rows_at_instants(samples.dq);
+  for (const TorqueEffect& effect : corrected.effects) {
+    for (Eigen::Index j = 0; j < dq.cols(); ++j) {
+      const bool rubs = effect.id.effect == "coulomb" || effect.id.effect == "hysteresis";
+      if (!rubs || effect.id.place != whole.context().joints[static_cast<std::size_t>(j)]) continue;
+      constexpr double kTurns = 5.0;
+      const Eigen::ArrayXd near = (dq.col(j).array().abs() < kTurns * corrected.widths[j]).cast<double>();
+      whitened.col(j).array() *= 1.0 - near;
+    }
+  }
   return merged(find_contact_spans(whole.motion(), whitened, sigma, options.contact_spans),
                 2.0 * options.contact_spans.window_s);
 }
@@ -162,6 +173,12 @@ bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan
 }
 
 }  // namespace
+
+double tracing_cutoff_hz(const CutoffChoice& chosen) {
+  constexpr double kOverEnd = 2.0;  // of the fastest motion
+  const double end_hz = chosen.motion_end_hz.size() > 0 ? chosen.motion_end_hz.maxCoeff() : 0.0;
+  return end_hz > 0.0 ? std::min(chosen.cutoff_hz, kOverEnd * end_hz) : chosen.cutoff_hz;
+}
 
 TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
                          const TorqueTraceOptions& options, const Progress& progress) {

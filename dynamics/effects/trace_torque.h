@@ -55,6 +55,11 @@ struct TorqueTrace {
   CorrectedTorqueModel corrected;
 };
 
+/// Cut-off for a log that is traced: what friction does at every turn is not needed to its last
+/// harmonic, but noise of the speed at the turns is felt. Not above what was chosen for
+/// identification.
+[[nodiscard]] double tracing_cutoff_hz(const CutoffChoice& chosen);
+
 /// Throws as TorqueTracedModel does.
 [[nodiscard]] TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
                                        const TorqueTraceOptions& options = {},

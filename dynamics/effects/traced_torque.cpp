@@ -78,8 +78,8 @@ Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data
   const Eigen::ArrayXd v = data.dq.col(j).array() / high;
   const Eigen::VectorXd way = effects::direction_column(context, joint);
   const Eigen::VectorXd dip =
-      effects::joint_column(context, joint, "base stribeck", [&](const FinePath& p) {
-        return (effects::direction(context, joint, p.dq) * (-(p.dq / slow).square()).exp()).eval();
+      effects::turning_column(context, joint, "base stribeck", [&](const FinePath& p, double width) {
+        return (effects::direction(p.dq, width) * (-(p.dq / slow).square()).exp()).eval();
       });
   const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
   const double duration = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-12);

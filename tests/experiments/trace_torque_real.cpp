@@ -18,7 +18,11 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
       t0 = t1;
     };
-    const TorqueData data = read_torque_data({*folder / "log.csv.gz"}, wanted_joints(model.tree));
+    TorqueData data = read_torque_data({*folder / "log.csv.gz"}, wanted_joints(model.tree));
+    TorqueDataOptions read;
+    read.motion.cutoff_hz = tracing_cutoff_hz(data.cutoff);
+    fmt::print("cut-off {:.2f}, motion ends {:.2f}\n", data.cutoff.cutoff_hz, data.cutoff.motion_end_hz.maxCoeff());
+    data = read_torque_data({*folder / "log.csv.gz"}, wanted_joints(model.tree), read);
     fmt::print("{}: {} samples {:.1f} Hz, cutoff {:.2f}\n", argv[a], data.samples.size(), data.rate_hz, data.cutoff.cutoff_hz);
     lap("read");
     TorqueTraceOptions options;
