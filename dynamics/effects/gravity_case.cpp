@@ -51,7 +51,8 @@ std::shared_ptr<const GravityCase> make_gravity_case(const TorqueTracedModel::Pa
   const Eigen::Index rows = parts.q.rows() * joints;
   if (parts.base.kind == TorqueBaseKind::kDeclared) {
     const Eigen::MatrixXd torque =
-        inverse_dynamics_of_samples(out->rigid, parts.q, parts.dq, parts.ddq) + parts.drives;
+        inverse_dynamics_of_samples(out->rigid, parts.q, parts.dq, parts.ddq) +
+        parts.dq * parts.viscous.asDiagonal();
     out->fixed = torque.transpose().reshaped();
     out->base.resize(rows, 0);
     return out;

@@ -58,6 +58,9 @@ TorqueFitter::TorqueFitter(const TorqueTracedModel::Parts& parts,
       joints_(parts.motion->joints()),
       rows_(parts.motion->instants() * parts.motion->joints()) {
   set_gravity(Eigen::Vector2d::Zero());
+  for (Eigen::Index j = 0; j < joints_; ++j) {
+    if (parts_.coulomb[j] > 0.0) turning_.push_back(j);
+  }
   read(effects);
 }
 
@@ -81,7 +84,8 @@ void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
       }
       if (effect.id.place.ends_with(" from " + names[j])) added.from = static_cast<Eigen::Index>(j);
     }
-    if (name == "coulomb") turning_.push_back(added.joint);
+    const bool turns = std::ranges::find(turning_, added.joint) != turning_.end();
+    if (name == "coulomb" && !turns) turning_.push_back(added.joint);
     added_.push_back(std::move(added));
   }
 }
@@ -139,6 +143,7 @@ Eigen::VectorXd TorqueFitter::whitened(const Eigen::VectorXd& rows) const {
 /// Torque of the rigid bodies and of all effects that are no matter of the sensors.
 Eigen::VectorXd TorqueFitter::physical() const {
   Eigen::VectorXd out = case_->fixed + case_->base * base_values_;
+  for (const Eigen::Index joint : turning_) out += declared_coulomb(joint, context_);
   for (const Added& added : added_) {
     if (added.kind != Kind::kLinear) continue;
     out += as_rows(effect_torque(case_->carriers, candidate_of(candidates_, added.effect.id),
@@ -173,6 +178,15 @@ Eigen::MatrixXd TorqueFitter::effect_columns() const {
   return out;
 }
 
+Eigen::VectorXd TorqueFitter::declared_coulomb(Eigen::Index joint,
+                                               const EffectContext& context) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(rows_);
+  if (parts_.coulomb[joint] == 0.0) return out;
+  out(Eigen::seqN(joint, rows_ / joints_, joints_)) =
+      parts_.coulomb[joint] * direction_column(context, static_cast<std::size_t>(joint));
+  return out;
+}
+
 /// All of a joint's friction that turns round with its speed, for a width of that.
 Eigen::VectorXd TorqueFitter::friction_of(Eigen::Index joint, double width) const {
   EffectContext context = context_;
@@ -180,7 +194,7 @@ Eigen::VectorXd TorqueFitter::friction_of(Eigen::Index joint, double width) cons
   std::vector<Candidate> candidates;
   add_friction_of(std::make_shared<const EffectContext>(context), static_cast<std::size_t>(joint),
                   candidates);
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(rows_);
+  Eigen::VectorXd out = declared_coulomb(joint, context);
   for (const Added& added : added_) {
     const auto found = std::ranges::find(candidates, added.effect.id, &Candidate::id);
     if (found == candidates.end()) continue;

@@ -38,7 +38,7 @@ struct TorqueTracedModel::Parts {
   TorqueBase base;
   std::vector<int> fold;          ///< of every sample
   Eigen::MatrixXd q, dq, ddq;     ///< at the instants
-  Eigen::MatrixXd drives;         ///< friction that the model declares, instants x joints
+  Eigen::VectorXd viscous, coulomb; ///< that the model declares, of each joint; 0 where masses are free
   Eigen::MatrixXd widest;           ///< whitened, see widest_residual()
 
   std::shared_ptr<const effects::GravityCase> upright;  ///< gravity as declared
@@ -81,6 +81,8 @@ class TorqueFitter {
   [[nodiscard]] Eigen::MatrixXd effect_columns() const;
   [[nodiscard]] Eigen::MatrixXd width_columns() const;
   [[nodiscard]] Eigen::VectorXd friction_of(Eigen::Index joint, double width) const;
+  [[nodiscard]] Eigen::VectorXd declared_coulomb(Eigen::Index joint,
+                                                 const EffectContext& context) const;
   [[nodiscard]] Eigen::VectorXd physical() const;
   [[nodiscard]] Eigen::VectorXd through_sensor(const Eigen::VectorXd& rows) const;
   [[nodiscard]] Eigen::VectorXd whitened(const Eigen::VectorXd& rows) const;

@@ -54,16 +54,11 @@ bool has_masses(const RigidModel& rigid) {
   });
 }
 
-Eigen::MatrixXd declared_drives(const DynamicModel& model, const EffectContext& context,
-                                const Eigen::MatrixXd& dq) {
+Eigen::VectorXd declared(const DynamicModel& model, double JointDynamics::* what) {
   const std::vector<JointId> joints = moving_joints(model.tree);
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(dq.rows(), dq.cols());
-  for (Eigen::Index j = 0; j < dq.cols(); ++j) {
-    const JointDynamics& joint = model.joints[joints[static_cast<std::size_t>(j)].index()];
-    if (joint.viscous != 0.0) out.col(j) += joint.viscous * dq.col(j);
-    if (joint.coulomb != 0.0) {
-      out.col(j) += joint.coulomb * effects::direction_column(context, static_cast<std::size_t>(j));
-    }
+  Eigen::VectorXd out(std::ssize(joints));
+  for (Eigen::Index j = 0; j < out.size(); ++j) {
+    out[j] = model.joints[joints[static_cast<std::size_t>(j)].index()].*what;
   }
   return out;
 }
@@ -186,24 +181,31 @@ void TorqueTracedModel::Parts::refresh() {
     context.temperature_c = motion->at_instants(options.temperature_c);
   }
   describe_log(context);
-  const RigidModel declared = make_rigid_model(model);
-  context.load = inverse_dynamics_of_samples(declared, q, dq, ddq);
-  drives = declared_drives(model, context, dq);
-  BaseData data = base_data(context, declared);
-  data.declared = context.load + drives;
+  const RigidModel nominal = make_rigid_model(model);
+  context.load = inverse_dynamics_of_samples(nominal, q, dq, ddq);
+  viscous = declared(model, &JointDynamics::viscous);
+  coulomb = declared(model, &JointDynamics::coulomb);
+  BaseData data = base_data(context, nominal);
+  data.declared = context.load + dq * viscous.asDiagonal();
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    data.declared.col(j) +=
+        coulomb[j] * effects::direction_column(context, static_cast<std::size_t>(j));
+  }
   for (const Eigen::Index row : motion->kept()) {
     data.fold.push_back(fold[static_cast<std::size_t>(row)]);
   }
   effects::WidestFit described = effects::widest_fit(data);
   base.sigma = described.sigma;
   widest = std::move(described.residual);
-  choose_base(data, has_masses(declared));
+  choose_base(data, has_masses(nominal));
   if (base.kind == TorqueBaseKind::kIdentified) {
+    viscous.setZero();
+    coulomb.setZero();
     const RigidModel identified =
-        with_body_parameters(declared, effects::identified_bodies(data, base.sigma));
+        with_body_parameters(nominal, effects::identified_bodies(data, base.sigma));
     context.load = inverse_dynamics_of_samples(identified, q, dq, ddq);
     // Where gravity may pull is known only for masses that are: declared ones serve better.
-    if (!has_masses(declared)) context.rigid = identified;
+    if (!has_masses(nominal)) context.rigid = identified;
   }
   context.torque = context.load;
   upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
