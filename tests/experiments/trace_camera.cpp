@@ -2,18 +2,16 @@
 //
 // Undeclared effects in recordings at corner level, and what tracing makes of them:
 //   trace_camera PART [--seeds N] [--frames N] [--sigma PX] [--robot KIND] [--effect NAME]
-//                     [--strength X] [--gravity] [--realistic] [--verbose]
+//                     [--strength X] [--floor PX] [--gravity] [--realistic] [--verbose]
 // PART:
 //   visible  how many standard deviations of the noise each effect is worth at the weakest
-//   strength:
-//            what no method can see below about 5, and size to 10 % below 10
+//            strength: what no method can see below about 5, and size to 10 % below 10
 //   clean    recordings without effects: false alarms
 //   single   every effect alone, at 1, 3 and 10 times the weakest strength
 //   pairs    two effects at 3 times the weakest strength
 //   unknown  effects of the test's own making at 10 times: the answer must be that none explains it
-// Every figure is over five kinds of robots; `visible`, `seen` are by calibration of twins.
+// Every figure is over five kinds of robots.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -66,6 +64,7 @@ Trace trace_of(const TraceCase& of, const std::vector<InjectedEffect>& effects) 
   start.T_camera_base = plain.T_camera_base;
   start.time_offset_s = plain.time_offset_s;
   CalibrationTraceOptions options;
+  options.trace.floor = of.floor_px;
   if (of.gravity_known) options.gravity_base = world_options(of).down;
   return trace_calibration(world.measurements, world.markers, world.log, start, options).trace;
 }
@@ -265,6 +264,8 @@ bool parse(int argc, char** argv, Request& request) {
       request.base.frames = std::atoi(value.c_str());
     } else if (key == "--sigma") {
       request.base.sigma_px = std::atof(value.c_str());
+    } else if (key == "--floor") {
+      request.base.floor_px = std::atof(value.c_str());
     } else if (key == "--effect") {
       request.effects.push_back(value);
     } else if (key == "--strength") {
@@ -291,10 +292,11 @@ int main(int argc, char** argv) {
                                                               {"unknown", print_unknown}};
   Request request;
   if (!parse(argc, argv, request) || !parts.contains(request.part)) {
-    fmt::print(stderr,
-               "trace_camera visible|clean|single|pairs|unknown [--seeds N] [--frames N] [--sigma "
-               "PX] [--robot KIND] [--effect NAME] [--strength X] [--gravity] [--realistic] "
-               "[--verbose]\n");
+    fmt::print(
+        stderr,
+        "trace_camera visible|clean|single|pairs|unknown [--seeds N] [--frames N] [--sigma "
+        "PX] [--robot KIND] [--effect NAME] [--strength X] [--floor PX] [--gravity] [--realistic] "
+        "[--verbose]\n");
     return 2;
   }
   parts.at(request.part)(request);

@@ -17,6 +17,7 @@ struct TraceCase {
   int seed = 0;
   int frames = 1000;           ///< of 33 s
   double sigma_px = 0.03;      ///< what refined corners of tags of 34 px have
+  double floor_px = 0.0;       ///< smaller effects are not looked for; 0: tracing's own figure
   bool gravity_known = false;  ///< its direction is declared
   bool realistic = false;      ///< noise partly correlated in time, detector bias, encoder steps
 };
