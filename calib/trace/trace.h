@@ -25,7 +25,7 @@ struct TraceOptions {
   /// residual's unit) are below what the sensor itself gets wrong and are not looked for.
   double floor = 0.0;
   /// Effects that the model has already: they stay if they earn their place.
-  std::vector<AddedEffect> start;
+  std::vector<AddedEffect> start = {};
   int fewest_stretches = 12;  ///< of time; with fewer nothing is said
 };
 
