@@ -79,52 +79,93 @@ Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd
 
 namespace {
 
-// Torque about (force along) the axis by a unit of gravity along each axis of the base frame that
-// acts at a point: axis . (arm x g) = g . (axis x arm).
-Eigen::RowVector3d load_at(const Joint& joint, const Pose& T_base_child,
-                           const Eigen::Vector3d& point_base) {
-  const Eigen::Vector3d axis = T_base_child.rotation * joint.axis;
-  if (joint.type == JointType::kPrismatic) return axis.transpose();
-  return axis.cross(point_base - T_base_child.translation).transpose();
+// Gravity's torque about (force along) a joint's axis for 1 kg at a point, per unit of gravity
+// along each axis of the base frame: axis . (arm x g) = g . (axis x arm).
+Eigen::RowVector3d load_of(const Joint& joint, const Eigen::Vector3d& axis_base,
+                           const Eigen::Vector3d& arm_base) {
+  if (joint.type == JointType::kPrismatic) return axis_base.transpose();
+  return axis_base.cross(arm_base).transpose();
+}
+
+// A mass in one place of a link: at its origin, or (a first moment) along a direction.
+struct Place {
+  std::size_t link = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // in the link; zero: its origin
+  std::string what;
+};
+
+// Of the joint's own link two directions across its axis; of every link behind it its origin and
+// two directions across its own joint's axis. More would be combinations of these (Khalil and
+// Dombre 2002, section 9.4.2).
+std::vector<Place> places_of(const KinematicTree& tree, int joint,
+                             const std::vector<std::size_t>& behind) {
+  std::vector<Place> out;
+  for (const std::size_t link : behind) {
+    const JointId own = *tree.parent_joint(LinkId{static_cast<int>(link)});
+    const Joint& carrier = tree.joints[own.index()];
+    const std::string name = tree.links[link].name;
+    const bool turns = carrier.type == JointType::kRevolute;
+    if (own.value != joint) out.push_back({link, Eigen::Vector3d::Zero(), "the origin of " + name});
+    if (!turns) continue;
+    const Eigen::Quaterniond R = rotation_to_axis(carrier.axis);
+    out.push_back({link, R * Eigen::Vector3d::UnitX(), name + " along x"});
+    out.push_back({link, R * Eigen::Vector3d::UnitY(), name + " along y"});
+  }
+  return out;
+}
+
+Eigen::MatrixXd loads_over(const KinematicTree& tree, const JointMotion& motion, int joint,
+                           const std::vector<Place>& places, const Eigen::Vector3d& gravity_base) {
+  const Joint& suspect = tree.joints[static_cast<std::size_t>(joint)];
+  Eigen::MatrixXd out(motion.value.rows(), static_cast<Eigen::Index>(places.size()));
+  for (Eigen::Index i = 0; i < out.rows(); ++i) {
+    const std::vector<Pose> T_base_link = forward_kinematics(tree, motion.value.row(i).transpose());
+    const Pose& T_base_child = T_base_link[suspect.child.index()];
+    const Eigen::Vector3d axis = T_base_child.rotation * suspect.axis;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      const Place& place = places[k];
+      const Eigen::Vector3d arm =
+          place.direction.isZero(0.0)
+              ? Eigen::Vector3d(T_base_link[place.link].translation - T_base_child.translation)
+              : Eigen::Vector3d(T_base_link[place.link].rotation * place.direction);
+      out(i, static_cast<Eigen::Index>(k)) = load_of(suspect, axis, arm).dot(gravity_base);
+    }
+  }
+  return out;
 }
 
 }  // namespace
 
 std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion, int joint,
                                 const std::optional<Eigen::Vector3d>& gravity_base) {
-  const Joint& axis = tree.joints[static_cast<std::size_t>(joint)];
   const std::vector<std::size_t> behind = links_behind(tree, joint);
+  std::vector<Load> out;
+  if (gravity_base) {
+    const std::vector<Place> places = places_of(tree, joint, behind);
+    const Eigen::MatrixXd loads = loads_over(tree, motion, joint, places, *gravity_base);
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      out.push_back({places[k].what, loads.col(static_cast<Eigen::Index>(k))});
+    }
+    if (!out.empty()) return out;
+  }
+  // All masses in one: the mean of the links' middles.
   const std::vector<Eigen::Vector3d> middle = middles(tree);
-  const Eigen::Quaterniond across = rotation_to_axis(axis.axis);
-  const Eigen::Index instants = motion.value.rows();
-  Eigen::MatrixXd all(instants, 3);  // the middles of all links behind
-  Eigen::MatrixXd own_x(instants, 3);
-  Eigen::MatrixXd own_y(instants, 3);
-  Eigen::MatrixXd tip(instants, 3);
-  for (Eigen::Index i = 0; i < instants; ++i) {
+  const Joint& suspect = tree.joints[static_cast<std::size_t>(joint)];
+  Eigen::MatrixXd all(motion.value.rows(), 3);
+  for (Eigen::Index i = 0; i < all.rows(); ++i) {
     const std::vector<Pose> T_base_link = forward_kinematics(tree, motion.value.row(i).transpose());
-    const Pose& T_base_child = T_base_link[axis.child.index()];
+    const Pose& T_base_child = T_base_link[suspect.child.index()];
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const std::size_t link : behind) {
       mean += T_base_link[link] * middle[link] / static_cast<double>(behind.size());
     }
-    all.row(i) = load_at(axis, T_base_child, mean);
-    own_x.row(i) = load_at(axis, T_base_child, T_base_child * (across * Eigen::Vector3d::UnitX()));
-    own_y.row(i) = load_at(axis, T_base_child, T_base_child * (across * Eigen::Vector3d::UnitY()));
-    tip.row(i) = load_at(axis, T_base_child, T_base_link[behind.back()] * middle[behind.back()]);
+    all.row(i) =
+        load_of(suspect, T_base_child.rotation * suspect.axis, mean - T_base_child.translation);
   }
-  std::vector<Load> out;
-  if (!gravity_base) {
-    for (int k = 0; k < 3; ++k) {
-      out.push_back({std::string("gravity along ") + "xyz"[k], all.col(k)});
-    }
-    return out;
+  if (gravity_base) return {{"what it carries", all * *gravity_base}};
+  for (int k = 0; k < 3; ++k) {
+    out.push_back({std::string("gravity along ") + "xyz"[k], all.col(k)});
   }
-  if (axis.type == JointType::kPrismatic) return {{"what it carries", all * *gravity_base}};
-  out.push_back({"its own link, across x", own_x * *gravity_base});
-  out.push_back({"its own link, across y", own_y * *gravity_base});
-  if (behind.size() > 1) out.push_back({"the links behind it", all * *gravity_base});
-  if (behind.size() > 2) out.push_back({"the last link", tip * *gravity_base});
   return out;
 }
 

@@ -29,10 +29,9 @@ struct Load {
   Eigen::VectorXd arm_m;  ///< instants: torque of 1 kg under a unit of gravity (sliders: its force)
 };
 
-/// What gravity does to a joint from the places where masses may be. Gravity known: the joint's own
-/// link (two unknown arms across the axis), the middles of the links behind it evenly, that of the
-/// last one. Not known: the middles of all links behind it, for gravity along each axis of the
-/// base.
+/// What gravity does to a joint from the places where masses may be: with a known gravity from
+/// every place that matters (up to three a link), else from one in the middle of all links behind
+/// it, for gravity along each axis of the base.
 [[nodiscard]] std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion,
                                               int joint,
                                               const std::optional<Eigen::Vector3d>& gravity_base);

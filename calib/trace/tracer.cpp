@@ -203,6 +203,27 @@ bool Tracer::check(std::size_t index) {
   return settle_rivals(index, *stage, own);
 }
 
+// Puts another effect in the place of one; for good where the other makes it superfluous.
+bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous) {
+  const EffectId id = now_->added[index].id;
+  std::vector<AddedEffect> effects = now_->added;
+  effects[index] = other;
+  StagePtr swapped = make_stage(*model_, std::move(effects));
+  if (!swapped->fit.converged) return false;
+  // What says the same predicts as well, within its own doubt.
+  const double bar = superfluous ? now_->error.value : now_->error.interval.high;
+  if (swapped->error.value >= bar) return false;
+  if (superfluous) removed_.insert(id);
+  mark(round_, id, CandidateState::kRemoved, now_->error.value);
+  mark(round_, other.id, CandidateState::kAccepted, swapped->error.value);
+  now_ = std::move(swapped);
+  add_step(round_,
+           fmt::format("{} takes the place of {}{}", name_of(other.id), name_of(id),
+                       superfluous ? ", which it makes superfluous" : ": plainer, and as good"),
+           *now_);
+  return true;
+}
+
 bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
   const AddedEffect effect = now_->added[index];
   std::vector<TestedMember> rivals;
@@ -222,30 +243,17 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
   Ambiguity ambiguity;
   for (const TestedMember& rival : rivals) {
     const Candidate& candidate = without.fit.candidates[rival.index];
-    switch (compare_effects(without.system, own.columns, rival.columns)) {
-      case Comparison::kFirst:
-        break;
-      case Comparison::kInterchangeable:
-        ambiguity.effects.push_back(candidate.id);
-        ambiguity.words.push_back(candidate.words);
-        if (ambiguity.record.empty()) ambiguity.record = candidate.record;
-        break;
-      case Comparison::kSecond: {
-        std::vector<AddedEffect> effects = now_->added;
-        effects[index] = {candidate.id, rival.scan};
-        StagePtr swapped = make_stage(*model_, std::move(effects));
-        if (!swapped->fit.converged || swapped->held_out_sum() >= now_->held_out_sum()) break;
-        removed_.insert(effect.id);
-        mark(round_, effect.id, CandidateState::kRemoved, now_->error.value);
-        mark(round_, candidate.id, CandidateState::kAccepted, swapped->error.value);
-        now_ = std::move(swapped);
-        add_step(round_,
-                 fmt::format("{} takes the place of {}, which it makes superfluous",
-                             name_of(candidate.id), name_of(effect.id)),
-                 *now_);
-        return true;
-      }
+    const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
+    if (comparison == Comparison::kFirst) continue;
+    // Of two that say the same the plainer one comes first.
+    const bool plainer = rival.columns.size() < own.columns.size();
+    if (comparison == Comparison::kSecond || plainer) {
+      if (swap(index, {candidate.id, rival.scan}, comparison == Comparison::kSecond)) return true;
     }
+    if (comparison == Comparison::kSecond) continue;
+    ambiguity.effects.push_back(candidate.id);
+    ambiguity.words.push_back(candidate.words);
+    if (ambiguity.record.empty()) ambiguity.record = candidate.record;
   }
   if (ambiguity.effects.empty()) return false;
   const Candidate* chosen = find_candidate(without.fit, effect.id);

@@ -36,6 +36,7 @@ class Tracer {
   void search_again(const std::optional<std::string>& place);
   [[nodiscard]] bool backward();
   [[nodiscard]] bool check(std::size_t index);
+  [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   void look_for_rest();
