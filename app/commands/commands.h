@@ -66,9 +66,11 @@ struct DynamicsOptions {
   TorqueDataOptions data;
   TorqueModelOptions models_options;
   std::vector<std::string> models;              ///< names; empty: all
-  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.80665 down z
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   bool learning_curve = false;
-  std::string command_line;  ///< for the report
+  bool trace = true;                      ///< close the loop: look for effects beyond rigid bodies
+  std::string trace_file = "trace.json";  ///< in the output folder
+  std::string command_line;               ///< for the report
 };
 
 [[nodiscard]] ExitCode dynamics_command(const DynamicsOptions& options, const Console& console);
@@ -81,7 +83,7 @@ struct ContactCommandOptions {
   TorqueDataOptions data;
   ContactOptions contact;
   bool identify = false;  ///< masses and friction from the log although the URDF has some
-  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.80665 down z
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   std::string command_line;                     ///< for the report
 };
 

@@ -12,7 +12,9 @@
 #include "app/commands/output_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
+#include "app/commands/torque_trace_stage.h"
 #include "app/io/nearest_name.h"
+#include "app/report/trace_lines.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/data/torque_scale.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -214,6 +216,10 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     clock.lap("learning curve", summary.times);
   }
 
+  if (options.trace) {
+    summary.trace = trace_torque_stage(options, model, summary.data, folder, progress).trace;
+    clock.lap("trace", summary.times);
+  }
   folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
   folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));
   folder.write("dynamics.html", torque_report_html(summary));
@@ -230,6 +236,9 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   const TorqueVerdict verdict = torque_verdict(summary);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
   print_scores(summary);
+  if (summary.trace) {
+    for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);
+  }
   fmt::print("urdf    {}\nreport  {}\n", folder.file("robot_dynamics.urdf").string(),
              folder.file("dynamics.html").string());
   return ExitCode::kDone;

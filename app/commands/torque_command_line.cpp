@@ -79,7 +79,7 @@ void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2
           [&gravity_m_s2](const std::vector<double>& g) {
             gravity_m_s2 = Eigen::Vector3d(g[0], g[1], g[2]);
           },
-          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.80665)")
+          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.81)")
       ->delimiter(',')
       ->expected(3)
       ->check(number_in(-100, 100))
@@ -104,6 +104,8 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   add_gravity(command, dynamics.gravity_m_s2);
   command.add_flag("--gains", dynamics.models_options.identify.gains,
                    "Estimate a gain a joint: currents, or doubtful drive constants");
+  command.add_flag("!--no-trace", dynamics.trace,
+                   "Do not look for effects beyond rigid bodies (trace.json)");
   command.add_flag("--learning-curve", dynamics.learning_curve,
                    "The score of every model against the number of samples (slow)");
   command

@@ -104,7 +104,9 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
     dynamics.robot = folder / "robot.urdf";
     dynamics.output = folder;
     dynamics.data = data;
-    dynamics.models = {"parametric", "gip"};  // the others on request, by kinescope dynamics
+    dynamics.trace = options.trace;
+    dynamics.trace_file = "dynamics_trace.json";  // trace.json is the calibration's
+    dynamics.models = {"parametric", "gip"};      // the others on request, by kinescope dynamics
     dynamics.models_options.samples = kGpSamples;
     dynamics.command_line = options.command_line;
     const TorqueVerdict verdict = torque_verdict(model_torque(dynamics, progress));

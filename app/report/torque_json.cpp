@@ -3,6 +3,7 @@
 
 #include "app/report/result_values.h"
 #include "app/report/torque_summary.h"
+#include "app/report/trace_json.h"
 
 namespace kinescope {
 namespace {
@@ -141,6 +142,7 @@ json torque_json(const TorqueSummary& summary) {
       {"correlation_samples", number(summary.identification.correlation_samples)},
       {"drives", drives_json(summary.drives)},
       {"consistent", consistent_json(summary.consistent)},
+      {"trace", summary.trace ? trace_json(*summary.trace) : json(nullptr)},
       {"warnings", report::texts(summary.warnings)}};
 }
 

@@ -53,6 +53,7 @@ struct TorqueSummary {
   std::vector<DriveEstimate> drives;
   int best = 0;                 ///< index into scores: what `prediction` is from
   TorquePrediction prediction;  ///< of `test`
+  std::optional<Trace> trace;   ///< none where it was not asked for
   std::vector<std::string> warnings;
 };
 

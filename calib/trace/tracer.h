@@ -40,6 +40,7 @@ class Tracer {
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   void look_for_rest();
+  void drop_what_rests_explain();
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);

@@ -36,13 +36,41 @@ void Tracer::look_for_rest() {
     const NormalSystem system(linear, now_->system.partition());
     std::optional<FoundRest> found = find_rest(system, now_->fit.rest_places, now_->fit.covariates,
                                                rests_, level_, options_.floor);
-    if (!found) return;
+    if (!found) break;
     if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
     add_step(
         round_,
         fmt::format("structure is left at {}, over {}", found->rest.place, found->rest.covariate),
         *now_);
     rests_.push_back(std::move(*found));
+  }
+  if (!rests_.empty()) drop_what_rests_explain();
+}
+
+// Effects that explain nothing where what is left is in the model as curves: they stood in for it,
+// at whatever place.
+void Tracer::drop_what_rests_explain() {
+  for (std::size_t i = now_->added.size(); i-- > 0;) {
+    const AddedEffect effect = now_->added[i];
+    std::vector<AddedEffect> effects = now_->added;
+    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
+    StagePtr stage = make_stage(*model_, std::move(effects));
+    const auto candidate = std::ranges::find(stage->fit.candidates, effect.id, &Candidate::id);
+    if (candidate == stage->fit.candidates.end()) continue;
+    const Linearisation linear = with_rests(stage->fit.linear, rests_);
+    const NormalSystem system(linear, stage->system.partition());
+    const Score score = jackknife_test(system, candidate->columns(effect.scan));
+    const double tests = static_cast<double>(stage->fit.candidates.size() *
+                                             std::max<std::size_t>(1, candidate->scan.size()));
+    if (!score.hidden() && score.p_value * tests < level_) continue;
+    removed_.insert(effect.id);
+    mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
+    now_ = std::move(stage);
+    details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+    add_step(round_,
+             fmt::format("{} at {} removed: what is left explains it too", effect.id.effect,
+                         effect.id.place),
+             *now_);
   }
 }
 

@@ -14,11 +14,11 @@ namespace kinescope::effects {
 
 /// The log at the instants, ready for regressions.
 struct BaseData {
-  Eigen::MatrixXd q, dq, ddq, torque;  ///< instants x joints
-  Eigen::MatrixXd declared;            ///< torque of the model as declared, friction and all
-  std::vector<Eigen::MatrixXd> rigid;  ///< regressor of each joint, instants x 10 bodies
-  std::vector<Eigen::MatrixXd> drives; ///< columns that a joint's drive may add
-  std::vector<Eigen::MatrixXd> common; ///< of each joint: a payload and gravity, shared parameters
+  Eigen::MatrixXd q, dq, ddq, torque;   ///< instants x joints
+  Eigen::MatrixXd declared;             ///< torque of the model as declared, friction and all
+  std::vector<Eigen::MatrixXd> rigid;   ///< regressor of each joint, instants x 10 bodies
+  std::vector<Eigen::MatrixXd> drives;  ///< columns that a joint's drive may add
+  std::vector<Eigen::MatrixXd> common;  ///< of each joint: a payload and gravity, shared parameters
   std::vector<int> fold;
 };
 
@@ -37,8 +37,8 @@ struct BaseErrors {
 };
 [[nodiscard]] BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma);
 
-/// Parameters of the bodies that explain the torque best beside the drives (least squares, whitened,
-/// directions that the log does not show left at zero), 10 bodies.
+/// Parameters of the bodies that explain the torque best beside the drives (least squares,
+/// whitened, directions that the log does not show left at zero), 10 bodies.
 [[nodiscard]] Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma);
 
 }  // namespace kinescope::effects

@@ -58,8 +58,8 @@ Candidate gravity_direction(const SharedContext& c) {
 std::vector<int> tips(const RigidModel& rigid) {
   std::vector<int> out;
   for (int b = 0; b < static_cast<int>(rigid.bodies.size()); ++b) {
-    const bool carries =
-        std::ranges::any_of(rigid.bodies, [b](const RigidBody& other) { return other.parent == b; });
+    const bool carries = std::ranges::any_of(
+        rigid.bodies, [b](const RigidBody& other) { return other.parent == b; });
     if (!carries) out.push_back(b);
   }
   return out;

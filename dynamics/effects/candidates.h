@@ -32,8 +32,8 @@ struct Carriers {
     const EffectContext& context, std::size_t joint, const std::string& name,
     const std::function<Eigen::ArrayXd(const FinePath&)>& torque);
 
-/// Friction that turns round with the speed's sign, within the joint's width: `torque` of a path and
-/// a width. Made at widths in equal ratios and interpolated between them.
+/// Friction that turns round with the speed's sign, within the joint's width: `torque` of a path
+/// and a width. Made at widths in equal ratios and interpolated between them.
 [[nodiscard]] Eigen::VectorXd turning_column(
     const EffectContext& context, std::size_t joint, const std::string& name,
     const std::function<Eigen::ArrayXd(const FinePath&, double width)>& torque);

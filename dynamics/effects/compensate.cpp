@@ -75,9 +75,8 @@ struct Applied {
   [[nodiscard]] Eigen::MatrixXd sensor() const {
     Eigen::MatrixXd out = Eigen::MatrixXd::Identity(context.load.cols(), context.load.cols());
     for (const TorqueEffect& effect : corrected.effects) {
-      const Eigen::Index j = part_of(effect) == Part::kGain || part_of(effect) == Part::kCross
-                                 ? joint_of(effect)
-                                 : 0;
+      const Eigen::Index j =
+          part_of(effect) == Part::kGain || part_of(effect) == Part::kCross ? joint_of(effect) : 0;
       if (part_of(effect) == Part::kGain) out(j, j) += effect.values[0];
       if (part_of(effect) != Part::kCross) continue;
       for (std::size_t from = 0; from < context.joints.size(); ++from) {
@@ -114,8 +113,8 @@ TorqueSamples compensate(const CorrectedTorqueModel& corrected, const TorqueSamp
   const Applied applied(corrected, samples, filter);
   TorqueSamples out = samples;
   const Eigen::MatrixXd in_time = applied.shifted(samples.torque, 1.0);
-  out.torque = applied.sensor().fullPivLu().solve(in_time.transpose()).transpose() -
-               applied.effects();
+  out.torque =
+      applied.sensor().fullPivLu().solve(in_time.transpose()).transpose() - applied.effects();
   return out;
 }
 

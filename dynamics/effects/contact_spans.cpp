@@ -36,8 +36,7 @@ std::vector<ContactSpan> find_contact_spans(const EffectMotion& motion,
           .max(1e-12)
           .log();
   const double median = median_of(to_vector(level.matrix()));
-  const double spread =
-      kNormal * median_of(to_vector((level - median).abs().matrix()));
+  const double spread = kNormal * median_of(to_vector((level - median).abs().matrix()));
   std::vector<ContactSpan> out;
   if (!(spread > 0.0)) return out;
   const Eigen::ArrayXd height = (level - median) / spread;

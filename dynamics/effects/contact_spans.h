@@ -20,7 +20,7 @@ struct ContactSpanOptions {
   /// above its median. Noise stays below 4; what a model lacks is felt all over the log and widens
   /// the deviation.
   double level = 6.0;
-  double end_level = 2.5;  ///< below which a burst has ended
+  double end_level = 2.5;    ///< below which a burst has ended
   double most_share = 0.25;  ///< of the time: more than that is no burst but how the robot moves
 };
 
@@ -28,7 +28,7 @@ struct ContactSpanOptions {
 struct ContactSpan {
   double from_s = 0.0;
   double to_s = 0.0;
-  Eigen::VectorXd peak;  ///< largest residual torque of each joint, with its sign
+  Eigen::VectorXd peak;         ///< largest residual torque of each joint, with its sign
   Eigen::VectorXd noise_ratio;  ///< its size over the noise of the joint
 };
 

@@ -67,10 +67,12 @@ Candidate ripple(const SharedContext& c, std::size_t j) {
   out.columns = [c, j, wave](double periods) {
     const double w = wave * periods;
     return std::vector<EffectColumn>{
-        {static_cast<int>(j), joint_column(*c, j, fmt::format("ripple sin {:.17g}", w),
-                                           [&](const FinePath& p) { return (w * p.q).sin().eval(); })},
-        {static_cast<int>(j), joint_column(*c, j, fmt::format("ripple cos {:.17g}", w),
-                                           [&](const FinePath& p) { return (w * p.q).cos().eval(); })}};
+        {static_cast<int>(j),
+         joint_column(*c, j, fmt::format("ripple sin {:.17g}", w),
+                      [&](const FinePath& p) { return (w * p.q).sin().eval(); })},
+        {static_cast<int>(j),
+         joint_column(*c, j, fmt::format("ripple cos {:.17g}", w),
+                      [&](const FinePath& p) { return (w * p.q).cos().eval(); })}};
   };
   return out;
 }
@@ -86,9 +88,7 @@ struct Settling {
   [[nodiscard]] Eigen::VectorXd at(const Eigen::VectorXd& time_s) const {
     return ((1.0 - (-(time_s.array() - begin_s) / constant_s).exp()) / end()).matrix();
   }
-  [[nodiscard]] double mean() const {
-    return 1.0 / end() - constant_s / duration_s;
-  }
+  [[nodiscard]] double mean() const { return 1.0 / end() - constant_s / duration_s; }
 };
 
 /// The torque's zero goes with the shape itself, friction with its difference from the mean:
@@ -163,25 +163,25 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
   out.refines = plain_friction(*c, j);
   for (EffectId& id : plain_friction(*c, j + 1)) out.refines.push_back(std::move(id));
   out.size_unit = c->unit(j);
-  out.parameters = {{"coulomb", c->unit(j)}, {"viscous_at_high_speed", c->unit(j)},
+  out.parameters = {{"coulomb", c->unit(j)},
+                    {"viscous_at_high_speed", c->unit(j)},
                     {"inertia", c->unit(j) + " s^2/" + c->angle(j)}};
   out.size_weights = Eigen::Vector3d(1.0, 1.0, 0.0);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c->joints.size()));
   weights[static_cast<Eigen::Index>(j)] = 1.0;
   weights[static_cast<Eigen::Index>(j) + 1] = sum ? 1.0 : -1.0;
-  const int carrier =
-      Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
+  const int carrier = Carriers{static_cast<Eigen::Index>(c->joints.size())}.pair(j, sum);
   const double high = c->travels[j].high_speed;
   out.columns = [c, j, sum, weights, carrier, high](double) {
     const std::string name = fmt::format("pair {} {}", j, sum ? "sum" : "difference");
     const Eigen::VectorXd& way = c->cache->get(name, [&] {
-      return c->motion->column(weights, [&](const FinePath& p) { return direction(p.dq, kTurn_rad_s); });
+      return c->motion->column(weights,
+                               [&](const FinePath& p) { return direction(p.dq, kTurn_rad_s); });
     });
     const TorqueSamples& samples = c->motion->samples();
-    return std::vector<EffectColumn>{
-        {carrier, way},
-        {carrier, c->motion->at_instants(samples.dq * weights) / high},
-        {carrier, c->motion->at_instants(samples.ddq * weights)}};
+    return std::vector<EffectColumn>{{carrier, way},
+                                     {carrier, c->motion->at_instants(samples.dq * weights) / high},
+                                     {carrier, c->motion->at_instants(samples.ddq * weights)}};
   };
   return out;
 }

@@ -109,10 +109,9 @@ Eigen::VectorXd turning_column(
       if (other != k) weight *= (at - other) / (k - other);
     }
     if (weight == 0.0) continue;
-    out += weight * joint_column(context, joint, fmt::format("{} {}", name, k),
-                                 [&](const FinePath& path) {
-                                   return torque(path, std::pow(kRatio, k));
-                                 });
+    out += weight *
+           joint_column(context, joint, fmt::format("{} {}", name, k),
+                        [&](const FinePath& path) { return torque(path, std::pow(kRatio, k)); });
   }
   return out;
 }
@@ -123,9 +122,9 @@ Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width) {
 }
 
 Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint) {
-  return turning_column(
-      context, joint, "direction",
-      [](const FinePath& path, double width) { return direction(path.dq, width); });
+  return turning_column(context, joint, "direction", [](const FinePath& path, double width) {
+    return direction(path.dq, width);
+  });
 }
 
 std::vector<double> ratios(double first, double last, int count) {
@@ -137,15 +136,14 @@ std::vector<double> ratios(double first, double last, int count) {
 }
 
 std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint) {
-  constexpr double kLowest = 3.0;   // slower waves are what gravity and springs look like
+  constexpr double kLowest = 3.0;  // slower waves are what gravity and springs look like
   constexpr int kMost = 400;
   const JointTravel& travel = context.travels[joint];
   const bool turns = context.turns[joint] != 0;
   const double turn = turns ? 2.0 * std::numbers::pi : travel.range;
   // Faster than the low-pass at most speeds: nothing of it is left.
   const double cutoff_hz = context.motion->filter().cutoff_hz;
-  const double highest =
-      cutoff_hz > 0.0 ? 2.0 * cutoff_hz * turn / travel.rms_speed : kMost;
+  const double highest = cutoff_hz > 0.0 ? 2.0 * cutoff_hz * turn / travel.rms_speed : kMost;
   std::vector<double> out;
   for (int n = 1; n <= kMost; n += n < 60 ? 1 : n < 120 ? 2 : 10) {
     if (n < kLowest || n > highest) continue;
@@ -243,8 +241,7 @@ Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity) {
   const Eigen::Vector3d down = gravity.normalized();
   Eigen::Index least = 0;
   down.cwiseAbs().minCoeff(&least);
-  const Eigen::Vector3d first =
-      (Eigen::Vector3d::Unit(least) - down[least] * down).normalized();
+  const Eigen::Vector3d first = (Eigen::Vector3d::Unit(least) - down[least] * down).normalized();
   Eigen::Matrix<double, 3, 2> out;
   out << first, down.cross(first);
   return out;

@@ -57,15 +57,15 @@ struct EffectContext {
   std::shared_ptr<const EffectMotion> motion;
   std::shared_ptr<ColumnCache> cache;  ///< of columns that depend on the motion only
   std::vector<std::string> joints;
-  std::vector<char> turns;  ///< revolute
-  RigidModel rigid;         ///< bodies, and gravity as it is believed to be
-  Eigen::MatrixXd load;     ///< torque of the rigid bodies
-  Eigen::MatrixXd torque;   ///< torque of the model
+  std::vector<char> turns;        ///< revolute
+  RigidModel rigid;               ///< bodies, and gravity as it is believed to be
+  Eigen::MatrixXd load;           ///< torque of the rigid bodies
+  Eigen::MatrixXd torque;         ///< torque of the model
   Eigen::MatrixXd measured_rate;  ///< d/dt of the measured torque
   Eigen::VectorXd temperature_c;  ///< instants; empty: not logged
   std::vector<JointTravel> travels;
   LogSpan log;
-  Eigen::VectorXd widths;   ///< of each joint's sign of the speed, rad/s or m/s
+  Eigen::VectorXd widths;          ///< of each joint's sign of the speed, rad/s or m/s
   std::string torque_unit = "Nm";  ///< "Nm" or "A"
 
   [[nodiscard]] std::string unit(std::size_t joint) const;  ///< of the joint's torque
@@ -92,12 +92,13 @@ struct EffectLibrary {
 
 /// Torque of an effect at the instants, instants x joints.
 [[nodiscard]] Eigen::MatrixXd effect_torque(const Eigen::SparseMatrix<double>& carriers,
-                                            const Candidate& candidate, double scan, const Eigen::VectorXd& values,
-                                            Eigen::Index joints);
+                                            const Candidate& candidate, double scan,
+                                            const Eigen::VectorXd& values, Eigen::Index joints);
 
 /// Two axes across gravity (columns), about which it may be tilted; deterministic.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity);
 /// Gravity turned by a rotation vector about these axes, degrees.
-[[nodiscard]] Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt_deg);
+[[nodiscard]] Eigen::Vector3d tilted(const Eigen::Vector3d& gravity,
+                                     const Eigen::Vector2d& tilt_deg);
 
 }  // namespace kinescope

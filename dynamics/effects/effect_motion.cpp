@@ -24,9 +24,10 @@ void check_sizes(const TorqueSamples& s) {
                     s.dq.cols() == s.joints() && s.ddq.cols() == s.joints() &&
                     s.torque.cols() == s.joints();
   if (fits && s.size() > 0 && s.joints() > 0) return;
-  throw bad_request("torque samples",
-                    fmt::format("the arrays are not all {} samples x {} joints", s.size(), s.joints()),
-                    "give positions, rates, accelerations and torques of the same joints");
+  throw bad_request(
+      "torque samples",
+      fmt::format("the arrays are not all {} samples x {} joints", s.size(), s.joints()),
+      "give positions, rates, accelerations and torques of the same joints");
 }
 
 int order_of(LowPass kind) { return kind == LowPass::kButterworth ? 4 : 3; }
@@ -64,7 +65,8 @@ void EffectMotion::lay_out() {
   for (std::size_t p = 0; p < pieces_.size(); ++p) {
     Piece& piece = pieces_[p];
     const auto t = samples_.t_s.segment(piece.begin, piece.rows);
-    if (piece.rows > 1) piece.step_s = (t(piece.rows - 1) - t(0)) / static_cast<double>(piece.rows - 1);
+    if (piece.rows > 1)
+      piece.step_s = (t(piece.rows - 1) - t(0)) / static_cast<double>(piece.rows - 1);
     const double late_s = p > 0 && t(0) <= end_s ? end_s + kGapSteps * piece.step_s - t(0) : 0.0;
     time_s_.segment(piece.begin, piece.rows).array() += late_s;
     end_s = time_s_(piece.begin + piece.rows - 1);
@@ -169,18 +171,18 @@ Eigen::VectorXd EffectMotion::shifted(const Eigen::VectorXd& samples, double lat
     const double last = static_cast<double>(piece.rows - 1);
     for (Eigen::Index k = 0; k < piece.rows; ++k) {
       const double at = std::clamp(static_cast<double>(k) + later_s / piece.step_s, 0.0, last);
-      const Eigen::Index a =
-          piece.begin + std::min(static_cast<Eigen::Index>(at), piece.rows - 2);
+      const Eigen::Index a = piece.begin + std::min(static_cast<Eigen::Index>(at), piece.rows - 2);
       const double u = at - static_cast<double>(a - piece.begin);
-      out(piece.begin + k) = hermite(samples(a), samples(a + 1), rates(a), rates(a + 1),
-                                     piece.step_s, u);
+      out(piece.begin + k) =
+          hermite(samples(a), samples(a + 1), rates(a), rates(a + 1), piece.step_s, u);
     }
   }
   return out;
 }
 
 void EffectMotion::leave_out(const std::vector<char>& wanted) {
-  std::erase_if(kept_, [&](Eigen::Index row) { return wanted[static_cast<std::size_t>(row)] == 0; });
+  std::erase_if(kept_,
+                [&](Eigen::Index row) { return wanted[static_cast<std::size_t>(row)] == 0; });
 }
 
 }  // namespace kinescope

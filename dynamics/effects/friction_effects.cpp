@@ -32,8 +32,8 @@ Candidate viscous(const SharedContext& c, std::size_t j) {
   out.size_unit = fmt::format("{} s/{}", c->unit(j), c->angle(j));
   out.parameters = {{"viscous", out.size_unit}};
   out.columns = [c, j](double) {
-    return one_column(j, c->motion->at_instants(c->motion->samples().dq.col(
-                             static_cast<Eigen::Index>(j))));
+    return one_column(
+        j, c->motion->at_instants(c->motion->samples().dq.col(static_cast<Eigen::Index>(j))));
   };
   return out;
 }
@@ -76,12 +76,11 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   out.scan_name = "Stribeck speed";
   out.scan_unit = c->angle(j) + "/s";
   out.columns = [c, j](double speed) {
-    return one_column(j, turning_column(*c, j, fmt::format("stribeck {:.17g}", speed),
-                                        [&](const FinePath& p, double width) {
-                                          return (direction(p.dq, width) *
-                                                  (-(p.dq / speed).square()).exp())
-                                              .eval();
-                                        }));
+    return one_column(
+        j, turning_column(
+               *c, j, fmt::format("stribeck {:.17g}", speed), [&](const FinePath& p, double width) {
+                 return (direction(p.dq, width) * (-(p.dq / speed).square()).exp()).eval();
+               }));
   };
   return out;
 }
@@ -98,10 +97,10 @@ Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
   out.scan_name = "power of the speed";
   const double high = c->travels[j].high_speed;
   out.columns = [c, j, high](double power) {
-    return one_column(j, joint_column(*c, j, fmt::format("power {:.17g}", power),
-                                      [&](const FinePath& p) {
-                                        return (p.dq.sign() * (p.dq.abs() / high).pow(power)).eval();
-                                      }));
+    return one_column(
+        j, joint_column(*c, j, fmt::format("power {:.17g}", power), [&](const FinePath& p) {
+          return (p.dq.sign() * (p.dq.abs() / high).pow(power)).eval();
+        }));
   };
   return out;
 }

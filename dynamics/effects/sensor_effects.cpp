@@ -40,8 +40,8 @@ Candidate torque_gain(const SharedContext& c, std::size_t j) {
 Candidate cross_talk(const SharedContext& c, std::size_t j, std::size_t from) {
   Candidate out;
   out.id = {"cross_talk", fmt::format("{} from {}", c->joints[j], c->joints[from])};
-  out.words = fmt::format("the torque of {} shows a share of that of {}", c->joints[j],
-                          c->joints[from]);
+  out.words =
+      fmt::format("the torque of {} shows a share of that of {}", c->joints[j], c->joints[from]);
   out.check = "mounting and wiring of the torque sensors; a coupled transmission";
   out.record = "load the other joint while this one is not loaded";
   out.size_unit = fmt::format("{}/{}", c->unit(j), c->unit(from));

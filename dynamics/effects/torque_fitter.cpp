@@ -116,8 +116,8 @@ Eigen::VectorXd TorqueFitter::observed() const {
   Eigen::MatrixXd torque = parts_.motion->rows_at_instants(parts_.motion->samples().torque);
   for (const Added& added : added_) {
     if (added.kind != Kind::kDelay) continue;
-    torque.col(added.joint) = parts_.motion->at_instants(parts_.motion->shifted(
-        parts_.motion->samples().torque.col(added.joint), added.values[0]));
+    torque.col(added.joint) = parts_.motion->at_instants(
+        parts_.motion->shifted(parts_.motion->samples().torque.col(added.joint), added.values[0]));
   }
   return as_rows(torque);
 }
@@ -164,14 +164,13 @@ Eigen::MatrixXd TorqueFitter::effect_columns() const {
           parts_.motion->shifted(parts_.motion->rate(all), added.values[0]);
       out(own_rows, added.first) = -parts_.motion->at_instants(late);
     } else if (added.kind == Kind::kGain || added.kind == Kind::kCross) {
-      out(own_rows, added.first) =
-          torque.col(added.kind == Kind::kGain ? added.joint : added.from);
+      out(own_rows, added.first) = torque.col(added.kind == Kind::kGain ? added.joint : added.from);
     } else {
       const Candidate& candidate = candidate_of(candidates_, added.effect.id);
       for (Eigen::Index k = 0; k < added.values.size(); ++k) {
         const Eigen::VectorXd unit = Eigen::VectorXd::Unit(added.values.size(), k);
-        out.col(added.first + k) = through_sensor(as_rows(
-            effect_torque(case_->carriers, candidate, added.effect.scan, unit, joints_)));
+        out.col(added.first + k) = through_sensor(
+            as_rows(effect_torque(case_->carriers, candidate, added.effect.scan, unit, joints_)));
       }
     }
   }
@@ -198,8 +197,8 @@ Eigen::VectorXd TorqueFitter::friction_of(Eigen::Index joint, double width) cons
   for (const Added& added : added_) {
     const auto found = std::ranges::find(candidates, added.effect.id, &Candidate::id);
     if (found == candidates.end()) continue;
-    out += as_rows(
-        effect_torque(case_->carriers, *found, added.effect.scan, added.values, joints_));
+    out +=
+        as_rows(effect_torque(case_->carriers, *found, added.effect.scan, added.values, joints_));
   }
   return out;
 }
@@ -273,8 +272,9 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
   for (Eigen::Index k = 0; k < free_widths(); ++k) {
     const Eigen::Index joint = turning_[static_cast<std::size_t>(k)];
     const double nominal = parts_.context.widths[joint];
-    widths[joint] = std::clamp(widths[joint] * std::exp(std::clamp(change[p + k], -kLongest, kLongest)),
-                               kNarrowest * nominal, kWidest * nominal);
+    widths[joint] =
+        std::clamp(widths[joint] * std::exp(std::clamp(change[p + k], -kLongest, kLongest)),
+                   kNarrowest * nominal, kWidest * nominal);
   }
   if (tilt != case_->tilt_deg) {
     const RigidModel now = fitted().rigid;
@@ -307,8 +307,8 @@ void TorqueFitter::choose_gravity_start(Added& gravity) {
     const Eigen::Index at = own_parameters() + gravity.first;
     design_.middleCols(at, gravity.values.size()).setZero();
     const Eigen::VectorXd g = design_.transpose() * residual_;
-    const double cost = residual_.squaredNorm() -
-                        g.dot(scaled_solve(design_.transpose() * design_, g));
+    const double cost =
+        residual_.squaredNorm() - g.dot(scaled_solve(design_.transpose() * design_, g));
     if (cost < best) {
       best = cost;
       chosen = start;

@@ -17,12 +17,12 @@ namespace effects {
 /// The base under one direction of gravity.
 struct GravityCase {
   Eigen::Vector2d tilt_deg;
-  RigidModel rigid;       ///< bodies of the base; of the reference where they are free
+  RigidModel rigid;  ///< bodies of the base; of the reference where they are free
   EffectContext context;
   Eigen::SparseMatrix<double> carriers;
-  Eigen::VectorXd fixed;  ///< torque that is not free, rows
-  Eigen::MatrixXd base;   ///< torque a base parameter, rows x parameters
-  Eigen::MatrixXd bodies; ///< the bodies' parameters from the base parameters
+  Eigen::VectorXd fixed;   ///< torque that is not free, rows
+  Eigen::MatrixXd base;    ///< torque a base parameter, rows x parameters
+  Eigen::MatrixXd bodies;  ///< the bodies' parameters from the base parameters
 };
 
 [[nodiscard]] std::shared_ptr<const GravityCase> make_gravity_case(
@@ -32,14 +32,15 @@ struct GravityCase {
 
 struct TorqueTracedModel::Parts {
   DynamicModel model;
-  TorqueModelOptions options;
+  TracedTorqueOptions options;
   std::shared_ptr<EffectMotion> motion;
-  EffectContext context;          ///< under the declared gravity
+  EffectContext context;  ///< under the declared gravity
   TorqueBase base;
-  std::vector<int> fold;          ///< of every sample
-  Eigen::MatrixXd q, dq, ddq;     ///< at the instants
-  Eigen::VectorXd viscous, coulomb; ///< that the model declares, of each joint; 0 where masses are free
-  Eigen::MatrixXd widest;           ///< whitened, see widest_residual()
+  std::vector<int> fold;       ///< of every sample
+  Eigen::MatrixXd q, dq, ddq;  ///< at the instants
+  Eigen::VectorXd viscous,
+      coulomb;             ///< that the model declares, of each joint; 0 where masses are free
+  Eigen::MatrixXd widest;  ///< whitened, see widest_residual()
 
   std::shared_ptr<const effects::GravityCase> upright;  ///< gravity as declared
 

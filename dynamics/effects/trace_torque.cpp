@@ -14,7 +14,8 @@ namespace {
 constexpr int kMostPasses = 4;  // of a trace, with the contact spans that the last one shows
 
 double rms(const Eigen::VectorXd& values) {
-  return std::sqrt(values.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, values.size())));
+  return std::sqrt(values.squaredNorm() /
+                   static_cast<double>(std::max<Eigen::Index>(1, values.size())));
 }
 
 /// Spans that touch are one.
@@ -80,7 +81,11 @@ std::vector<TorqueEffect> effects_of(const Trace& trace) {
   std::vector<TorqueEffect> out;
   for (const TracedEffect& effect : trace.accepted) {
     if (effect.id.effect == "contact") continue;
-    TorqueEffect own{effect.id, effect.scan, effect.scan_name, effect.scan_unit, {},
+    TorqueEffect own{effect.id,
+                     effect.scan,
+                     effect.scan_name,
+                     effect.scan_unit,
+                     {},
                      Eigen::VectorXd(static_cast<Eigen::Index>(effect.values.size()))};
     for (std::size_t k = 0; k < effect.values.size(); ++k) {
       own.parameters.push_back(effect.values[k].parameter);
@@ -157,7 +162,8 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
       const bool rubs = effect.id.effect == "coulomb" || effect.id.effect == "hysteresis";
       if (!rubs || effect.id.place != whole.context().joints[static_cast<std::size_t>(j)]) continue;
       constexpr double kTurns = 5.0;
-      const Eigen::ArrayXd near = (dq.col(j).array().abs() < kTurns * corrected.widths[j]).cast<double>();
+      const Eigen::ArrayXd near =
+          (dq.col(j).array().abs() < kTurns * corrected.widths[j]).cast<double>();
       whitened.col(j).array() *= 1.0 - near;
     }
   }

@@ -18,7 +18,7 @@
 namespace kinescope {
 
 struct TorqueTraceOptions {
-  TorqueModelOptions model = {};
+  TracedTorqueOptions model = {};
   TraceOptions trace = {.max_effects = 80};  ///< every joint has friction of its own
   /// Effects that move no torque by more than this share of its noise are not looked for.
   double noise_share = 0.1;
@@ -42,7 +42,7 @@ struct CorrectedTorqueModel {
   /// All of them. Those that `in_model` says are in the DynamicModel must not be added twice.
   std::vector<TorqueEffect> effects;
   std::vector<char> in_model;
-  RigidModel rigid;    ///< bodies of the torque without the effects; masses as the base had them
+  RigidModel rigid;  ///< bodies of the torque without the effects; masses as the base had them
   Eigen::VectorXd widths;  ///< speed within which each joint's friction turns round, rad/s or m/s
   std::vector<JointTravel> travels;  ///< of the log in which they were found
   LogSpan log;

@@ -20,7 +20,7 @@ namespace {
 
 using effects::BaseData;
 
-constexpr int kFewestPaths = 5;       // to hold out whole trajectories
+constexpr int kFewestPaths = 5;  // to hold out whole trajectories
 constexpr Eigen::Index kFewestInstants = 60;
 
 /// Of every sample: trajectories of one path together where there are enough paths, else stretches
@@ -72,8 +72,8 @@ Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data
   const double slow = 0.1 * travel.rms_speed;
   const Eigen::ArrayXd v = data.dq.col(j).array() / high;
   const Eigen::VectorXd way = effects::direction_column(context, joint);
-  const Eigen::VectorXd dip =
-      effects::turning_column(context, joint, "base stribeck", [&](const FinePath& p, double width) {
+  const Eigen::VectorXd dip = effects::turning_column(
+      context, joint, "base stribeck", [&](const FinePath& p, double width) {
         return (effects::direction(p.dq, width) * (-(p.dq / slow).square()).exp()).eval();
       });
   const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
@@ -129,7 +129,7 @@ std::string_view to_string(TorqueBaseKind kind) {
 TorqueTracedModel::~TorqueTracedModel() = default;
 
 TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamples& samples,
-                                     const TorqueModelOptions& options)
+                                     const TracedTorqueOptions& options)
     : parts_(std::make_unique<Parts>()) {
   if (options.folds < 2 || options.most_instants < kFewestInstants ||
       !(options.trust_factor >= 1.0)) {
@@ -141,13 +141,14 @@ TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamp
   p.options = options;
   p.base.rigid = make_rigid_model(model);
   if (samples.joints() != p.base.rigid.size()) {
-    throw bad_request("torque samples",
-                      fmt::format("{} joints, the model moves {}", samples.joints(),
-                                  p.base.rigid.size()),
-                      "give one column a movable joint of the model");
+    throw bad_request(
+        "torque samples",
+        fmt::format("{} joints, the model moves {}", samples.joints(), p.base.rigid.size()),
+        "give one column a movable joint of the model");
   }
   p.motion = std::make_shared<EffectMotion>(
-      samples, EffectMotionOptions{.filter = options.filter, .most_instants = options.most_instants});
+      samples,
+      EffectMotionOptions{.filter = options.filter, .most_instants = options.most_instants});
   if (p.motion->instants() < kFewestInstants) {
     throw undetermined("trace", fmt::format("only {} independent samples", p.motion->instants()),
                        "record a longer motion");
@@ -227,9 +228,9 @@ void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool m
   base.identified_error = errors.identified;
   const bool trusted = errors.declared <= options.trust_factor * errors.identified;
   if (trusted) base.kind = TorqueBaseKind::kDeclared;
-  base.reason = fmt::format(
-      "declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g}",
-      errors.declared, errors.identified);
+  base.reason =
+      fmt::format("declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g}",
+                  errors.declared, errors.identified);
 }
 
 TracedFit TorqueTracedModel::fit(const std::vector<AddedEffect>& effects) const {

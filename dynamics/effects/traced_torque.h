@@ -6,7 +6,8 @@
 // Units   N m (N for joints that slide) or A; rows are joints within instants.
 // Method  base parameters or declared masses (identify); columns low-passed as the torque is
 //         (Gautier 1997); Gauss-Newton for delay, gain and gravity, all else is linear.
-// Not here: which effect it is (calib/trace), contact spans (contact_spans.h), driver (trace_torque.h).
+// Not here: which effect it is (calib/trace), contact spans (contact_spans.h), driver
+// (trace_torque.h).
 #pragma once
 
 #include <memory>
@@ -31,7 +32,7 @@ enum class TorqueBaseKind {
 /// "auto", "declared", "identified".
 [[nodiscard]] std::string_view to_string(TorqueBaseKind kind);
 
-struct TorqueModelOptions {
+struct TracedTorqueOptions {
   TorqueBaseKind base = TorqueBaseKind::kAuto;
   /// Declared masses are trusted while their held-out error is not above that of identified ones by
   /// more than this factor, all other terms being free for both.
@@ -46,11 +47,11 @@ struct TorqueModelOptions {
 /// What the effects come on top of, and how that was chosen.
 struct TorqueBase {
   TorqueBaseKind kind = TorqueBaseKind::kIdentified;
-  std::string reason;            ///< in one sentence
-  double declared_error = 0.0;   ///< held-out, whitened; NaN where it was not looked at
+  std::string reason;           ///< in one sentence
+  double declared_error = 0.0;  ///< held-out, whitened; NaN where it was not looked at
   double identified_error = 0.0;
-  Eigen::VectorXd sigma;         ///< noise of each joint's torque, on what no linear term explains
-  RigidModel rigid;              ///< bodies that give the base's torque
+  Eigen::VectorXd sigma;  ///< noise of each joint's torque, on what no linear term explains
+  RigidModel rigid;       ///< bodies that give the base's torque
 };
 
 /// What a fit found beside the effects.
@@ -63,7 +64,7 @@ class TorqueTracedModel : public TracedModel {
  public:
   /// Throws bad_request for arrays or options that do not fit; undetermined for logs too short.
   TorqueTracedModel(const DynamicModel& model, const TorqueSamples& samples,
-                    const TorqueModelOptions& options = {});
+                    const TracedTorqueOptions& options = {});
   ~TorqueTracedModel() override;
 
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;

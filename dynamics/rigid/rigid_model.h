@@ -37,8 +37,8 @@ struct LinkPlacement {
 /// The robot as its moving bodies; parents stand before children. Body k moves with entry k of q.
 struct RigidModel {
   std::vector<RigidBody> bodies;
-  std::vector<LinkPlacement> links;                                ///< one a link of the tree
-  Eigen::Vector3d gravity_m_s2{0.0, 0.0, -kStandardGravity_m_s2};  ///< in the base frame
+  std::vector<LinkPlacement> links;                             ///< one a link of the tree
+  Eigen::Vector3d gravity_m_s2{0.0, 0.0, -kUsualGravity_m_s2};  ///< in the base frame
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(bodies.size()); }
 };

@@ -11,7 +11,8 @@
 namespace kinescope {
 
 /// Standard gravity, CGPM 1901.
-inline constexpr double kStandardGravity_m_s2 = 9.80665;
+/// What simulators and most drivers assume; on Earth it lies between 9.78 and 9.83.
+inline constexpr double kUsualGravity_m_s2 = 9.81;
 
 /// What a joint adds to the rigid bodies, on the joint's side of the gear: motor_inertia * ddq +
 /// viscous * dq + coulomb * sign(dq). N m for a revolute joint, N for a prismatic one.
@@ -27,7 +28,7 @@ struct DynamicModel {
   std::vector<InertialParameters> links;  ///< one a link of the tree, in the link's frame
   std::vector<JointDynamics> joints;      ///< one a joint of the tree, zero for fixed ones
   /// Acceleration of free fall in the root link's frame, m/s^2.
-  Eigen::Vector3d gravity_m_s2{0.0, 0.0, -kStandardGravity_m_s2};
+  Eigen::Vector3d gravity_m_s2{0.0, 0.0, -kUsualGravity_m_s2};
 };
 
 /// A model of the tree with massless links and ideal joints.

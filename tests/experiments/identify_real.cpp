@@ -174,7 +174,7 @@ RealSet rokae(const fs::path& folder) {
               .first_fit = "0.09 0.32 0.48 0.17 11 3.7 3.2"};
   set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = read_dynamic_urdf(folder / "AR5-5_07R-W4C4A2.urdf");
-  set.model.gravity_m_s2 = {kStandardGravity_m_s2, 0.0, 0.0};
+  set.model.gravity_m_s2 = {kUsualGravity_m_s2, 0.0, 0.0};
   const TorqueSamples all = filtered(read_log(folder / "ident.csv", 7, "tau"), 4.0);
   const double cut = 0.65 * all.t_s[all.size() - 1];
   set.train = rows_between(all, 0.0, cut);

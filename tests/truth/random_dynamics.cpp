@@ -27,7 +27,7 @@ DynamicModel random_masses(const KinematicTree& tree, const RandomMassOptions& o
                        .coulomb = rng.uniform(0.1, 2.0),
                        .motor_inertia = rng.uniform(0.01, 0.3)};
   }
-  if (options.every_direction) model.gravity_m_s2 = kStandardGravity_m_s2 * rng.unit3();
+  if (options.every_direction) model.gravity_m_s2 = kUsualGravity_m_s2 * rng.unit3();
   return model;
 }
 

@@ -58,18 +58,18 @@ TEST(BaseParameters, KnownCounts) {
   EXPECT_EQ(base_parameters(make_rigid_model(dh_robot(puma()))).size(), 36);
   // With gravity across the first axis its two first moments act too.
   DynamicModel tilted = dh_robot(puma());
-  tilted.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};
+  tilted.gravity_m_s2 = {0.0, -kUsualGravity_m_s2, 0.0};
   EXPECT_EQ(base_parameters(make_rigid_model(tilted)).size(), 38);
   // A pendulum has three, about a vertical axis one.
   DynamicModel one = dh_robot({{0, 0, 0}});
   EXPECT_EQ(base_parameters(make_rigid_model(one)).size(), 1);
-  one.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};
+  one.gravity_m_s2 = {0.0, -kUsualGravity_m_s2, 0.0};
   EXPECT_EQ(base_parameters(make_rigid_model(one)).size(), 3);
   // Two parallel joints: I1 + m2 l^2, m2 c2 (x, y), I2 when gravity is along them; across them also
   // m1 c1 + m2 l and m1 c1y.
   DynamicModel two = dh_robot({{0, 0, 0}, {0.4, 0, 0}});
   EXPECT_EQ(base_parameters(make_rigid_model(two)).size(), 4);
-  two.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};
+  two.gravity_m_s2 = {0.0, -kUsualGravity_m_s2, 0.0};
   EXPECT_EQ(base_parameters(make_rigid_model(two)).size(), 6);
   // A sliding joint alone has its mass only; nothing else, whatever gravity.
   EXPECT_EQ(
@@ -88,7 +88,7 @@ TEST(BaseParameters, SevenJointArm) {
 
 TEST(BaseParameters, NamesAreFormulas) {
   DynamicModel two = dh_robot({{0, 0, 0}, {0.4, 0, 0}});
-  two.gravity_m_s2 = {0.0, -kStandardGravity_m_s2, 0.0};
+  two.gravity_m_s2 = {0.0, -kUsualGravity_m_s2, 0.0};
   const BaseParameters base = base_parameters(make_rigid_model(two));
   const std::vector<std::string> expected = {"mcx(link1) + 0.4 m(link2)",
                                              "mcy(link1)",

@@ -13,7 +13,7 @@ namespace kinescope {
 namespace {
 
 constexpr double kExact = 1e-12;
-constexpr double kG = kStandardGravity_m_s2;
+constexpr double kG = kUsualGravity_m_s2;
 
 struct JointAt {
   JointType type;

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/torque_trace_stage.h"
+
+#include <fmt/format.h>
+
+#include "app/report/trace_json.h"
+#include "dynamics/data/torque_data.h"
+#include "kinematics/urdf/dynamic_urdf.h"
+
+namespace kinescope {
+namespace {
+
+// t, trajectory, then q, dq, ddq and the compensated torque of every joint.
+std::string compensated_csv(const TorqueSamples& samples, const std::vector<std::string>& joints) {
+  std::string out = "t,trajectory";
+  for (const char* what : {"q", "dq", "ddq", "tau"}) {
+    for (const std::string& joint : joints) out += fmt::format(",{}_{}", what, joint);
+  }
+  out += "\n";
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    out += fmt::format("{},{}", samples.t_s[i], samples.trajectory[i]);
+    for (const Eigen::MatrixXd* values : {&samples.q, &samples.dq, &samples.ddq, &samples.torque}) {
+      for (Eigen::Index j = 0; j < values->cols(); ++j) {
+        out += fmt::format(",{:.9g}", (*values)(i, j));
+      }
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+nlohmann::json corrected_json(const CorrectedTorqueModel& corrected) {
+  nlohmann::json list = nlohmann::json::array();
+  for (std::size_t k = 0; k < corrected.effects.size(); ++k) {
+    const TorqueEffect& effect = corrected.effects[k];
+    nlohmann::json parameters = nlohmann::json::array();
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
+      parameters.push_back({{"name", effect.parameters[p].name},
+                            {"unit", effect.parameters[p].unit},
+                            {"value", effect.values[static_cast<Eigen::Index>(p)]}});
+    }
+    list.push_back({{"effect", effect.id.effect},
+                    {"place", effect.id.place},
+                    {"at", effect.scan},
+                    {"in_urdf", corrected.in_model[k] != 0},
+                    {"parameters", std::move(parameters)}});
+  }
+  return list;
+}
+
+nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const ContactSpan& span : contacts) {
+    list.push_back({{"from_s", span.from_s}, {"to_s", span.to_s}});
+  }
+  return list;
+}
+
+}  // namespace
+
+TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,
+                               const TorqueData& data, const OutputFolder& folder,
+                               const Progress& progress) {
+  TorqueDataOptions read = options.data;
+  if (read.motion.cutoff_hz <= 0.0) read.motion.cutoff_hz = tracing_cutoff_hz(data.cutoff);
+  const TorqueData traced = read_torque_data(options.logs, wanted_joints(model.tree), read);
+  TorqueTraceOptions trace_options;
+  trace_options.model.filter = {traced.filter, traced.cutoff.cutoff_hz};
+  TorqueTrace out = trace_torque(model, traced.samples, trace_options, progress);
+
+  nlohmann::json document = trace_json(out.trace);
+  document["base"] = {{"masses", to_string(out.base.kind)}, {"reason", out.base.reason}};
+  document["effects"] = corrected_json(out.corrected);
+  document["left_out"] = contacts_json(out.contacts);
+  folder.write(options.trace_file, document.dump(1) + "\n");
+  if (out.trace.verdict == TraceVerdict::kNothingToSay) return out;
+  folder.write("robot_traced.urdf", write_urdf(out.corrected.model));
+  std::vector<std::string> joints;
+  for (const WantedJoint& joint : wanted_joints(model.tree)) joints.push_back(joint.name);
+  folder.write("torque_compensated.csv",
+               compensated_csv(
+                   compensate(out.corrected, traced.samples, trace_options.model.filter), joints));
+  return out;
+}
+
+}  // namespace kinescope

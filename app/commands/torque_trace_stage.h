@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Closing the loop on a torque log: what rigid bodies lack is traced; the corrected model and the
+// log without the effects are written.
+#pragma once
+
+#include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
+#include "dynamics/effects/trace_torque.h"
+
+namespace kinescope {
+
+/// Reads the logs again at the cut-off that tracing asks for. Writes trace.json (or the name
+/// given), robot_traced.urdf and torque_compensated.csv. Throws as read_torque_data() and
+/// trace_torque().
+[[nodiscard]] TorqueTrace trace_torque_stage(const DynamicsOptions& options,
+                                             const DynamicModel& model, const TorqueData& data,
+                                             const OutputFolder& folder, const Progress& progress);
+
+}  // namespace kinescope
