@@ -2,9 +2,11 @@
 //
 // Takes   a clean series, thinned, and the log.
 // Gives   the tree that explains it best, over all offsets between the two clocks.
-// Method  the scan's likely offsets are starts: at each a tree is grown, the offset refined on that
-//         tree's likelihood, and the tree grown again where the offset moved. The likelihoods of
-//         the trees decide, since a scan of pairs may well have its minimum elsewhere.
+// Method  clocks that agree are tried first; where that leaves more than noise, the scan's likely
+//         offsets are starts too. At each a tree is grown, on few instants first, the offset
+//         refined on that tree's likelihood, and the tree grown again where the offset moved. The
+//         likelihoods of the trees decide, since a scan of pairs may well have its minimum
+//         elsewhere.
 #pragma once
 
 #include "kinematics/structure/growth.h"

@@ -15,6 +15,9 @@
 
 namespace kinescope::structure_search {
 
+/// Noise below this is not believed: interpolation of the log alone is worse (rad, m).
+inline constexpr double kNoiseFloor = 2e-6;
+
 /// One marker at one instant.
 struct Sighting {
   bool seen = false;
@@ -42,6 +45,9 @@ struct Series {
 
   [[nodiscard]] int size() const { return static_cast<int>(times_s.size()); }
 };
+
+/// Sets `seen` of every body.
+void count_seen(Series& series);
 
 /// Every frame as an instant, cleaned in time, covariances scaled to the noise found.
 [[nodiscard]] Series clean_series(const PoseTracks& tracks);
