@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "kinematics/core/error.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/tangent.h"
 
@@ -181,7 +182,7 @@ bool is_smooth(const Body& body, const Deviations& d, const std::vector<double>&
 }
 
 void swap_branch(Sighting& s) {
-  std::swap(s.pose, *s.alternative);
+  std::swap(s.pose, value_of(s.alternative));
   s.alternative_cost = -s.alternative_cost;
 }
 
