@@ -20,6 +20,7 @@ constexpr double kGiveUpMargin = 3.0;
 
 std::vector<char> moving_channels(const Readings& readings) {
   std::vector<char> usable;
+  usable.reserve(static_cast<std::size_t>(readings.channels()));
   for (int c = 0; c < readings.channels(); ++c) usable.push_back(readings.moves(c) ? 1 : 0);
   return usable;
 }
