@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include "dynamics/effects/candidates.h"
 #include "dynamics/effects/trace_torque.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/core/error.h"
@@ -37,13 +38,15 @@ struct Applied {
     context.motion = std::make_shared<const EffectMotion>(motion);
     context.cache = std::make_shared<ColumnCache>();
     context.torque_unit = samples.torque_unit;
-    context.rigid = model.rigid;
-    for (const RigidBody& body : model.rigid.bodies) {
+    context.rigid = model.base.rigid;
+    for (const RigidBody& body : model.base.rigid.bodies) {
       context.joints.push_back(body.joint);
       context.turns.push_back(body.type == JointType::kRevolute ? 1 : 0);
     }
-    context.widths = model.widths;
-    context.load = inverse_dynamics_of_samples(model.rigid, samples.q, samples.dq, samples.ddq);
+    context.widths = model.base.widths;
+    context.gravity_moves = tilt_moves(context.rigid.gravity_m_s2, Eigen::Vector2d::Zero());
+    context.load =
+        inverse_dynamics_of_samples(model.base.rigid, samples.q, samples.dq, samples.ddq);
     context.torque = context.load;
     context.measured_rate = Eigen::MatrixXd::Zero(samples.size(), samples.joints());
     context.travels = model.travels;
@@ -58,6 +61,18 @@ struct Applied {
     });
     KINESCOPE_CHECK(found != names.end(), "an effect at a joint of the model");
     return found - names.begin();
+  }
+
+  /// Torque of the bodies with the friction that was declared.
+  [[nodiscard]] Eigen::MatrixXd base() const {
+    Eigen::MatrixXd out = context.load;
+    for (Eigen::Index j = 0; j < out.cols(); ++j) {
+      out.col(j) += corrected.base.viscous[j] * motion.samples().dq.col(j);
+      if (corrected.base.coulomb[j] == 0.0) continue;
+      out.col(j) += corrected.base.coulomb[j] *
+                    effects::direction_column(context, static_cast<std::size_t>(j));
+    }
+    return out;
   }
 
   /// Torque of the effects that are no matter of the sensors.
@@ -104,7 +119,7 @@ struct Applied {
 Eigen::MatrixXd predict_torque(const CorrectedTorqueModel& corrected, const TorqueSamples& samples,
                                const TorqueFilter& filter) {
   const Applied applied(corrected, samples, filter);
-  const Eigen::MatrixXd physical = applied.context.load + applied.effects();
+  const Eigen::MatrixXd physical = applied.base() + applied.effects();
   return applied.shifted(physical * applied.sensor().transpose(), -1.0);
 }
 

@@ -47,13 +47,10 @@ void put_joints(const EffectContext& context, const Carriers& carriers, Triplets
 /// Torque a degree of tilt: d torque / d gravity times the way gravity moves.
 void put_gravity(const EffectContext& context, const Eigen::MatrixXd& q, const Carriers& carriers,
                  Triplets& triplets) {
-  const Eigen::Vector3d& gravity = context.rigid.gravity_m_s2;
-  if (!(gravity.norm() > 0.0)) return;
-  const Eigen::Matrix<double, 3, 2> axes = tilt_axes(gravity);
-  Eigen::Matrix<double, 3, 2> moved;
-  for (int a = 0; a < 2; ++a) moved.col(a) = kDegree * axes.col(a).cross(gravity);
+  if (!(context.rigid.gravity_m_s2.norm() > 0.0)) return;
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Eigen::MatrixXd torque = gravity_jacobian(context.rigid, q.row(i).transpose()) * moved;
+    const Eigen::MatrixXd torque =
+        gravity_jacobian(context.rigid, q.row(i).transpose()) * context.gravity_moves;
     for (int a = 0; a < 2; ++a) {
       for (Eigen::Index j = 0; j < carriers.joints; ++j) {
         triplets.emplace_back(static_cast<int>(i * carriers.joints + j), carriers.gravity(a),
@@ -237,6 +234,9 @@ Eigen::MatrixXd effect_torque(const Eigen::SparseMatrix<double>& carriers,
   return out;
 }
 
+namespace {
+
+/// Two axes across gravity (columns).
 Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity) {
   const Eigen::Vector3d down = gravity.normalized();
   Eigen::Index least = 0;
@@ -244,6 +244,20 @@ Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity) {
   const Eigen::Vector3d first = (Eigen::Vector3d::Unit(least) - down[least] * down).normalized();
   Eigen::Matrix<double, 3, 2> out;
   out << first, down.cross(first);
+  return out;
+}
+
+}  // namespace
+
+Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity,
+                                       const Eigen::Vector2d& tilt_deg) {
+  constexpr double kStep_deg = 1e-3;
+  Eigen::Matrix<double, 3, 2> out;
+  for (int a = 0; a < 2; ++a) {
+    const Eigen::Vector2d step = kStep_deg * Eigen::Vector2d::Unit(a);
+    out.col(a) =
+        (tilted(gravity, tilt_deg + step) - tilted(gravity, tilt_deg - step)) / (2.0 * kStep_deg);
+  }
   return out;
 }
 

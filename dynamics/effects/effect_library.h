@@ -57,12 +57,13 @@ struct EffectContext {
   std::shared_ptr<const EffectMotion> motion;
   std::shared_ptr<ColumnCache> cache;  ///< of columns that depend on the motion only
   std::vector<std::string> joints;
-  std::vector<char> turns;        ///< revolute
-  RigidModel rigid;               ///< bodies, and gravity as it is believed to be
-  Eigen::MatrixXd load;           ///< torque of the rigid bodies
-  Eigen::MatrixXd torque;         ///< torque of the model
-  Eigen::MatrixXd measured_rate;  ///< d/dt of the measured torque
-  Eigen::VectorXd temperature_c;  ///< instants; empty: not logged
+  std::vector<char> turns;                    ///< revolute
+  RigidModel rigid;                           ///< bodies, and gravity as it is believed to be
+  Eigen::Matrix<double, 3, 2> gravity_moves;  ///< with the tilt of the base, m/s^2 a degree
+  Eigen::MatrixXd load;                       ///< torque of the rigid bodies
+  Eigen::MatrixXd torque;                     ///< torque of the model
+  Eigen::MatrixXd measured_rate;              ///< d/dt of the measured torque
+  Eigen::VectorXd temperature_c;              ///< instants; empty: not logged
   std::vector<JointTravel> travels;
   LogSpan log;
   Eigen::VectorXd widths;          ///< of each joint's sign of the speed, rad/s or m/s
@@ -95,10 +96,11 @@ struct EffectLibrary {
                                             const Candidate& candidate, double scan,
                                             const Eigen::VectorXd& values, Eigen::Index joints);
 
-/// Two axes across gravity (columns), about which it may be tilted; deterministic.
-[[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity);
-/// Gravity turned by a rotation vector about these axes, degrees.
+/// Gravity turned by a rotation vector about two axes across it, degrees; always the same two.
 [[nodiscard]] Eigen::Vector3d tilted(const Eigen::Vector3d& gravity,
                                      const Eigen::Vector2d& tilt_deg);
+/// Its derivative, m/s^2 a degree.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity,
+                                                     const Eigen::Vector2d& tilt_deg);
 
 }  // namespace kinescope

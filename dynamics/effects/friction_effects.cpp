@@ -151,10 +151,10 @@ Candidate position_friction(const SharedContext& c, std::size_t j) {
 }
 
 /// Dahl's state z, between -1 and 1: dz/dq = (1 - z sign(dq)) / length. Solved exactly over each
-/// step, in which the joint turns one way.
+/// step, in which the joint turns one way. Before the log, the joint slid on as it moves at first.
 Eigen::ArrayXd dahl_state(const Eigen::ArrayXd& q, double length) {
   Eigen::ArrayXd z(q.size());
-  double state = 0.0;
+  double state = q.size() > 1 && q(1) != q(0) ? (q(1) < q(0) ? -1.0 : 1.0) : 0.0;
   for (Eigen::Index k = 0; k < q.size(); ++k) {
     const double moved = k > 0 ? q(k) - q(k - 1) : 0.0;
     const double way = moved < 0.0 ? -1.0 : 1.0;

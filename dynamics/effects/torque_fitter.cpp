@@ -105,7 +105,7 @@ void TorqueFitter::set_widths(const Eigen::VectorXd& widths) {
 }
 
 FittedTorque TorqueFitter::fitted() const {
-  FittedTorque out{case_->rigid, context_.widths};
+  FittedTorque out{case_->rigid, context_.widths, parts_.viscous, parts_.coulomb};
   if (parts_.base.kind == TorqueBaseKind::kIdentified) {
     out.rigid = with_body_parameters(case_->rigid, case_->bodies * base_values_);
   }

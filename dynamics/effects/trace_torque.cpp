@@ -127,9 +127,7 @@ CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel&
   CorrectedTorqueModel out;
   out.model = model;
   out.effects = effects_of(trace);
-  FittedTorque fitted = traced.fitted(trace.added);
-  out.rigid = std::move(fitted.rigid);
-  out.widths = std::move(fitted.widths);
+  out.base = traced.fitted(trace.added);
   out.travels = traced.context().travels;
   out.log = traced.context().log;
   if (traced.base().kind == TorqueBaseKind::kIdentified) {
@@ -137,7 +135,7 @@ CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel&
   }
   for (const TorqueEffect& effect : out.effects) {
     if (effect.id.effect == "gravity_direction") {
-      out.model.gravity_m_s2 = out.rigid.gravity_m_s2;
+      out.model.gravity_m_s2 = out.base.rigid.gravity_m_s2;
       out.in_model.push_back(1);
       continue;
     }
@@ -163,7 +161,7 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
       if (!rubs || effect.id.place != whole.context().joints[static_cast<std::size_t>(j)]) continue;
       constexpr double kTurns = 5.0;
       const Eigen::ArrayXd near =
-          (dq.col(j).array().abs() < kTurns * corrected.widths[j]).cast<double>();
+          (dq.col(j).array().abs() < kTurns * corrected.base.widths[j]).cast<double>();
       whitened.col(j).array() *= 1.0 - near;
     }
   }

@@ -42,8 +42,7 @@ struct CorrectedTorqueModel {
   /// All of them. Those that `in_model` says are in the DynamicModel must not be added twice.
   std::vector<TorqueEffect> effects;
   std::vector<char> in_model;
-  RigidModel rigid;  ///< bodies of the torque without the effects; masses as the base had them
-  Eigen::VectorXd widths;  ///< speed within which each joint's friction turns round, rad/s or m/s
+  FittedTorque base;                 ///< what the effects come on top of
   std::vector<JointTravel> travels;  ///< of the log in which they were found
   LogSpan log;
 };

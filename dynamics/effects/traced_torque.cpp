@@ -78,11 +78,11 @@ Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data
       });
   const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
   const double duration = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-12);
-  Eigen::MatrixXd out(v.size(), 12);
+  Eigen::MatrixXd out(v.size(), 13);
   out << Eigen::VectorXd::Ones(v.size()), v.matrix(), way, data.ddq.col(j), data.q.col(j),
       v.abs().matrix(), (v * v.abs()).matrix(), v.cube().matrix(), dip,
       (time_s.array() - time_s[0]).matrix() / duration, context.measured_rate.col(j),
-      way.cwiseProduct(context.load.col(j).cwiseAbs());
+      way.cwiseProduct(context.load.col(j).cwiseAbs()), context.load.col(j);
   return out;
 }
 

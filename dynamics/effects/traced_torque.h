@@ -56,8 +56,9 @@ struct TorqueBase {
 
 /// What a fit found beside the effects.
 struct FittedTorque {
-  RigidModel rigid;        ///< bodies identified, or as declared; gravity as found
-  Eigen::VectorXd widths;  ///< of each joint: speed within which its friction turns round
+  RigidModel rigid;                  ///< bodies identified, or as declared; gravity as found
+  Eigen::VectorXd widths;            ///< of each joint: speed within which its friction turns round
+  Eigen::VectorXd viscous, coulomb;  ///< friction of the base, as declared
 };
 
 class TorqueTracedModel : public TracedModel {

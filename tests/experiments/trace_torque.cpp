@@ -3,6 +3,8 @@
 // Torque effects of known size in logs of random robots: which name and joint the trace gives, and
 // how large. `trace_torque [alone|pairs|clean|unknown|all] [ROBOTS [FIRST_SEED]]`; default: all 3.
 // Every case has a clean twin: the same robot, motion and noise without the effect.
+#include "dynamics/effects/trace_torque.h"
+
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -12,7 +14,6 @@
 
 #include <fmt/format.h>
 
-#include "dynamics/effects/trace_torque.h"
 #include "tests/truth/torque_effects.h"
 
 namespace kinescope {
@@ -51,6 +52,10 @@ TorqueTrace trace_world(const EffectWorld& world) {
   const Motion derived = derive_motion(world.log, motion);
   TorqueTraceOptions options;
   options.model.filter = {derived.filter, derived.cutoff.cutoff_hz};
+  if (std::getenv("TRACE_VERBOSE") != nullptr) {
+    fmt::print("    cut-off {:.2f} motion end {:.2f}\n", motion.cutoff_hz,
+               derived.cutoff.motion_end_hz.maxCoeff());
+  }
   return trace_torque(world.model, derived.samples, options);
 }
 
@@ -78,7 +83,10 @@ void judge_size(const TracedEffect& found, const KnownEffect& truth, Verdict& ou
 
 Verdict judge(const Case& c) {
   Rng rng = Rng::from_name("trace_torque", c.seed);
-  const EffectWorld world = effect_world(c.effects, {}, rng);
+  EffectWorldOptions options;
+  if (const char* noise = std::getenv("POSITION_NOISE"))
+    options.position_noise_rad = std::atof(noise);
+  const EffectWorld world = effect_world(c.effects, options, rng);
   const TorqueTrace traced = trace_world(world);
   const Trace& trace = traced.trace;
   Verdict out;
@@ -99,6 +107,7 @@ Verdict judge(const Case& c) {
                            (world.effects.empty() && trace.verdict == TraceVerdict::kClean));
   out.ambiguous = out.ambiguous && trace.verdict == TraceVerdict::kAmbiguous;
   out.answer = std::string(to_string(trace.verdict));
+  if (traced.base.kind == TorqueBaseKind::kIdentified) out.answer += " (on identified masses)";
   for (const TracedEffect& e : trace.accepted) {
     out.answer += fmt::format(" {}@{}", e.id.effect, e.id.place);
   }
@@ -107,7 +116,10 @@ Verdict judge(const Case& c) {
     for (const EffectId& id : a.effects) out.answer += fmt::format(" {}@{}", id.effect, id.place);
     out.answer += " )";
   }
-  for (const Rest& rest : trace.rest) out.answer += fmt::format(" [{} over {}]", rest.place, rest.covariate);
+  for (const Rest& rest : trace.rest) {
+    out.answer += fmt::format(" [{} over {}: {:.2g} of the squares]", rest.place, rest.covariate,
+                              rest.explained);
+  }
   return out;
 }
 
@@ -123,10 +135,11 @@ struct Count {
 };
 
 void report(const std::string& name, const Count& count) {
-  fmt::print("{:<20} {:4d} right {:5.1f} %  ambiguous {:5.1f} %  sized {:5.1f} % of right  error over twin at most {:.3f}\n",
-             name, count.cases, 100.0 * count.right / count.cases,
-             100.0 * count.ambiguous / count.cases,
-             count.right > 0 ? 100.0 * count.sized / count.right : 0.0, count.worst_twin);
+  fmt::print(
+      "{:<20} {:4d} right {:5.1f} %  ambiguous {:5.1f} %  sized {:5.1f} % of right  error over "
+      "twin at most {:.3f}\n",
+      name, count.cases, 100.0 * count.right / count.cases, 100.0 * count.ambiguous / count.cases,
+      count.right > 0 ? 100.0 * count.sized / count.right : 0.0, count.worst_twin);
   std::fflush(stdout);
 }
 
@@ -143,7 +156,8 @@ Count run(const std::vector<Case>& cases) {
     }
     if (!verdict.right || !verdict.sized) {
       std::string truth;
-      for (const TrueEffect& e : c.effects) truth += fmt::format(" {}@{} x{:.3g}", e.effect, e.joint + 1, e.strength);
+      for (const TrueEffect& e : c.effects)
+        truth += fmt::format(" {}@{} x{:.3g}", e.effect, e.joint + 1, e.strength);
       fmt::print("    seed {}{}: {}{}\n", c.seed, truth, verdict.answer, verdict.sizes);
     }
   }
@@ -158,9 +172,10 @@ void add(Count& total, const Count& part) {
   total.worst_twin = std::max(total.worst_twin, part.worst_twin);
 }
 
-void alone(int robots, std::uint64_t first) {
+void alone(int robots, std::uint64_t first, const std::string& only) {
   Count total;
   for (const std::string& name : known_torque_effects()) {
+    if (!only.empty() && name != only) continue;
     std::vector<Case> cases;
     for (int k = 0; k < robots; ++k) {
       const std::uint64_t seed = first + static_cast<std::uint64_t>(k);
@@ -180,7 +195,8 @@ void pairs(int robots, std::uint64_t first) {
     for (int k = 0; k < robots; ++k) {
       const std::uint64_t seed = first + 1000 + 20 * a + static_cast<std::uint64_t>(k);
       const std::size_t b = (a + 1 + seed % (names.size() - 1)) % names.size();
-      cases.push_back({{effect_at(names[a], seed, kStrong), effect_at(names[b], seed / 3 + 1, kStrong)}, seed});
+      cases.push_back(
+          {{effect_at(names[a], seed, kStrong), effect_at(names[b], seed / 3 + 1, kStrong)}, seed});
     }
   }
   report("pairs", run(cases));
@@ -188,7 +204,8 @@ void pairs(int robots, std::uint64_t first) {
 
 void clean(int robots, std::uint64_t first) {
   std::vector<Case> cases;
-  for (int k = 0; k < 20 * robots; ++k) cases.push_back({{}, first + 5000 + static_cast<std::uint64_t>(k)});
+  for (int k = 0; k < 20 * robots; ++k)
+    cases.push_back({{}, first + 5000 + static_cast<std::uint64_t>(k)});
   report("clean", run(cases));
 }
 
@@ -211,10 +228,11 @@ void unknown(int robots, std::uint64_t first) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "all";
+  const std::string only = argc > 4 ? argv[4] : "";
   const int robots = argc > 2 ? std::atoi(argv[2]) : 3;
   const auto first = static_cast<std::uint64_t>(argc > 3 ? std::atoi(argv[3]) : 1);
   const auto begin = std::chrono::steady_clock::now();
-  if (what == "alone" || what == "all") kinescope::alone(robots, first);
+  if (what == "alone" || what == "all") kinescope::alone(robots, first, only);
   if (what == "pairs" || what == "all") kinescope::pairs(robots, first);
   if (what == "clean" || what == "all") kinescope::clean(robots, first);
   if (what == "unknown" || what == "all") kinescope::unknown(robots, first);

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kPrismaticMetrePerRad = 0.2;
+constexpr double kSettling = 0.5;  // time constant of a drift, of the log
 
 struct State {
   Eigen::VectorXd q, dq, ddq;
@@ -162,8 +163,10 @@ class World {
         const LinkId link{static_cast<int>(truth_.links.size()) - 1};
         const double mass = effect.strength * truth_.links[link.index()].mass_kg;
         const Eigen::Vector3d centre(0.03, -0.02, 0.06);
-        truth_.links[link.index()] += from_central(
-            {.mass_kg = mass, .centre_m = centre, .inertia_kgm2 = 4e-4 * mass * Eigen::Matrix3d::Identity()});
+        truth_.links[link.index()] +=
+            from_central({.mass_kg = mass,
+                          .centre_m = centre,
+                          .inertia_kgm2 = 4e-4 * mass * Eigen::Matrix3d::Identity()});
         known_.push_back({"payload", truth_.tree.links[link.index()].name, mass});
       }
       if (effect.effect == "gravity_direction") {
@@ -184,9 +187,10 @@ class World {
       if (e.effect == "viscous") know(e, torque / scales_.speed[e.joint]);
       if (e.effect == "coulomb" || e.effect == "stribeck" || e.effect == "hysteresis" ||
           e.effect == "position_friction" || e.effect == "ripple" || e.effect == "torque_offset" ||
-          e.effect == "drift" || e.effect == "contact" || e.effect == "snag") {
+          e.effect == "contact" || e.effect == "snag") {
         know(e, torque);
       }
+      if (e.effect == "drift") know(e, torque * (1.0 - std::exp(-1.0 / kSettling)));
       if (e.effect == "asymmetric") know(e, torque / scales_.speed[e.joint]);
       if (e.effect == "cubic_viscous") know(e, 0.0);
       if (e.effect == "load_friction" || e.effect == "torque_gain" || e.effect == "torque_delay") {
@@ -195,8 +199,8 @@ class World {
       if (e.effect == "motor_inertia") know(e, torque / scales_.acceleration[e.joint]);
       if (e.effect == "spring") know(e, torque / (0.3 * scales_.range[e.joint]));
       if (e.effect == "cross_talk") {
-        known_.push_back({e.effect, name(e.joint) + " from " + name(e.other),
-                          torque / scales_.torque[e.other]});
+        known_.push_back(
+            {e.effect, name(e.joint) + " from " + name(e.other), torque / scales_.torque[e.other]});
       }
     }
   }
@@ -271,8 +275,9 @@ class World {
     if (kind == "spring") return size * (q - 0.1 * scales_.range[j]) / (0.3 * scales_.range[j]);
     if (kind == "ripple") return size * std::sin(11.0 * angle + phase_);
     if (kind == "torque_offset") return size;
-    if (kind == "drift") return size * (1.0 - std::exp(-t_s / (0.5 * options_.duration_s)));
-    if (kind == "snag") return size * std::tanh(20.0 * (q - 0.1 * scales_.range[j]) / scales_.range[j]);
+    if (kind == "drift") return size * (1.0 - std::exp(-t_s / (kSettling * options_.duration_s)));
+    if (kind == "snag")
+      return size * std::tanh(20.0 * (q - 0.1 * scales_.range[j]) / scales_.range[j]);
     if (kind == "contact") {
       const double since = t_s - 0.6 * options_.duration_s;
       constexpr double kSpan_s = 0.4;
@@ -290,7 +295,8 @@ class World {
       const Eigen::Index j = effect.joint;
       if (effect.effect == "torque_gain") out[j] *= 1.0 + effect.strength;
       if (effect.effect == "cross_talk") {
-        out[j] += effect.strength * scales_.torque[j] / scales_.torque[effect.other] * now[effect.other];
+        out[j] +=
+            effect.strength * scales_.torque[j] / scales_.torque[effect.other] * now[effect.other];
       }
       if (effect.effect == "torque_delay") out[j] = physical(t_s - effect.strength)[j];
     }
@@ -325,10 +331,25 @@ class World {
 }  // namespace
 
 std::vector<std::string> known_torque_effects() {
-  return {"viscous",       "coulomb",  "asymmetric",    "stribeck",      "cubic_viscous",
-          "load_friction", "position_friction", "hysteresis", "motor_inertia", "payload",
-          "spring",        "ripple",   "torque_offset", "torque_gain",   "cross_talk",
-          "torque_delay",  "drift",    "gravity_direction", "contact"};
+  return {"viscous",
+          "coulomb",
+          "asymmetric",
+          "stribeck",
+          "cubic_viscous",
+          "load_friction",
+          "position_friction",
+          "hysteresis",
+          "motor_inertia",
+          "payload",
+          "spring",
+          "ripple",
+          "torque_offset",
+          "torque_gain",
+          "cross_talk",
+          "torque_delay",
+          "drift",
+          "gravity_direction",
+          "contact"};
 }
 
 EffectWorld effect_world(const std::vector<TrueEffect>& effects, const EffectWorldOptions& options,

@@ -38,8 +38,8 @@ struct EffectWorldOptions {
   double rate_hz = 250.0;
   double amplitude_rad = 1.3;
   double highest_hz = 0.5;
-  double noise = 0.01;         ///< standard deviation, share of each joint's rms torque
-  double noise_memory = 0.0;   ///< AR(1), from sample to sample
+  double noise = 0.01;        ///< standard deviation, share of each joint's rms torque
+  double noise_memory = 0.0;  ///< AR(1), from sample to sample
   double position_noise_rad = 1e-5;
   double declared_coulomb = 0.1;  ///< friction that the model does declare, over the rms torque
   double declared_viscous = 0.1;
