@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The library against a generator that makes every effect by other means: the model with the effect
+// in it has the generator's torque, the size comes out, and nothing comes out where nothing is.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "dynamics/effects/trace_torque.h"
+#include "dynamics/effects/traced_torque.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "kinematics/core/error.h"
+#include "tests/truth/torque_effects.h"
+
+namespace kinescope {
+namespace {
+
+// Of the effect's own rms torque that the fitted effect may leave: sampled at 250 Hz without a
+// low-pass, friction turns within a sample; Dahl's first stretch is not known.
+constexpr double kLeft = 0.05;
+// Of the size: the noise is a tenth of a percent of the torque.
+constexpr double kSizeTolerance = 0.05;
+
+/// Rows as logged, with the exact motion; no low-pass.
+TorqueSamples exact_samples(const EffectWorld& world, double cutoff_hz = 25.0) {
+  MotionOptions options;
+  options.cutoff_hz = cutoff_hz;
+  return derive_motion(world.log, options).samples;
+}
+
+TorqueModelOptions declared_options(double cutoff_hz = 25.0) {
+  TorqueModelOptions options;
+  options.base = TorqueBaseKind::kDeclared;
+  options.filter = {LowPass::kSmoothingSpline, cutoff_hz};
+  return options;
+}
+
+EffectWorldOptions quiet_world() {
+  EffectWorldOptions options;
+  options.joints = 3;
+  options.prismatic_share = 0.0;
+  options.duration_s = 16.0;
+  options.noise = 1e-3;
+  options.position_noise_rad = 1e-7;
+  return options;
+}
+
+double rms(const Eigen::VectorXd& x) {
+  return std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
+}
+
+const Candidate& candidate(const TracedFit& fit, const EffectId& id) {
+  const auto found = std::ranges::find(fit.candidates, id, &Candidate::id);
+  EXPECT_NE(found, fit.candidates.end()) << id.effect << " at " << id.place;
+  return *found;
+}
+
+/// The value of the scan that leaves least, by trying all of them.
+AddedEffect best(const TorqueTracedModel& model, const Candidate& candidate) {
+  AddedEffect out{candidate.id, candidate.scan.empty() ? 0.0 : candidate.scan.front()};
+  double least = 1e300;
+  for (const double scan : candidate.scan) {
+    const double left = model.fit({{candidate.id, scan}}).linear.residual.squaredNorm();
+    if (left < least) {
+      least = left;
+      out.scan = scan;
+    }
+  }
+  return out;
+}
+
+class EveryEffect : public testing::TestWithParam<std::string> {};
+
+TEST_P(EveryEffect, explains_the_torque_that_the_generator_made_and_has_its_size) {
+  Rng rng = Rng::from_name("effects", 7);
+  const double strength = GetParam() == "gravity_direction" ? 5.0
+                          : GetParam() == "torque_delay"    ? 0.01
+                                                            : 0.2;
+  const EffectWorld world = effect_world({{GetParam(), 1, 2, strength}}, quiet_world(), rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const TracedFit without = model.fit({});
+  const EffectId id{world.effects.front().effect, world.effects.front().place};
+  const Candidate& known = candidate(without, id);
+  const AddedEffect added = best(model, known);
+  const TracedFit with = model.fit({added});
+  ASSERT_TRUE(with.converged) << with.reason;
+  const double before = rms(without.linear.residual);
+  const double noise = 3.0;  // whitened: the noise is estimated on what a wide fit leaves
+  EXPECT_LT(rms(with.linear.residual), kLeft * before + noise) << "before " << before;
+  EXPECT_GT(before, 2.0 * rms(with.linear.residual)) << "the effect is there to be seen";
+  const Eigen::VectorXd& values = with.values.front();
+  const double size =
+      values.size() == 1 ? values[0] : std::sqrt(known.size_weights.dot(values.cwiseAbs2()));
+  const double truth = world.effects.front().size;
+  if (truth != 0.0) {
+    EXPECT_NEAR(size, truth, kSizeTolerance * truth);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(library, EveryEffect,
+                         testing::Values("viscous", "coulomb", "asymmetric", "stribeck",
+                                         "cubic_viscous", "load_friction", "position_friction",
+                                         "hysteresis", "motor_inertia", "payload", "spring",
+                                         "ripple", "torque_offset", "torque_gain", "cross_talk",
+                                         "torque_delay", "drift", "gravity_direction"),
+                         [](const auto& tested) { return tested.param; });
+
+TEST(TorqueEffects, every_fixed_name_is_offered_once_at_each_place) {
+  Rng rng = Rng::from_name("effects", 1);
+  const EffectWorld world = effect_world({}, quiet_world(), rng);
+  const TracedFit fit =
+      TorqueTracedModel(world.model, exact_samples(world), declared_options()).fit({});
+  std::vector<EffectId> ids;
+  for (const Candidate& c : fit.candidates) ids.push_back(c.id);
+  std::ranges::sort(ids);
+  EXPECT_EQ(std::ranges::adjacent_find(ids), ids.end()) << "one candidate a name and place";
+  for (const std::string& name : known_torque_effects()) {
+    if (name == "contact") continue;  // found as spans
+    EXPECT_TRUE(std::ranges::any_of(ids, [&](const EffectId& id) { return id.effect == name; }))
+        << name;
+  }
+}
+
+TEST(TorqueEffects, columns_are_the_derivatives_of_the_fits_prediction) {
+  Rng rng = Rng::from_name("effects", 2);
+  const EffectWorld world = effect_world({{"payload", 0, 0, 0.2}}, quiet_world(), rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const TracedFit fit = model.fit({});
+  for (const Candidate& c : fit.candidates) {
+    if (c.id.place != "joint1" && c.id.effect != "payload") continue;
+    const std::vector<EffectColumn> columns = c.columns(c.scan.empty() ? 0.0 : c.scan.front());
+    ASSERT_EQ(columns.size(), c.parameters.size()) << c.id.effect;
+    for (const EffectColumn& column : columns) {
+      ASSERT_LT(column.carrier, fit.linear.carriers.cols()) << c.id.effect;
+      EXPECT_TRUE(column.share.size() == 0 || column.share.size() == fit.linear.instants());
+      EXPECT_TRUE(column.share.allFinite()) << c.id.effect;
+    }
+  }
+}
+
+TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
+  Rng rng = Rng::from_name("effects", 3);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  const EffectWorld world = effect_world({}, options, rng);
+  TorqueTraceOptions trace;
+  trace.model.filter = {LowPass::kSmoothingSpline, 12.0};
+  const TorqueTrace out = trace_torque(world.model, exact_samples(world, 12.0), trace);
+  EXPECT_EQ(out.base.kind, TorqueBaseKind::kDeclared) << out.base.reason;
+  EXPECT_TRUE(out.trace.accepted.empty()) << out.trace.reason;
+  EXPECT_TRUE(out.contacts.empty());
+}
+
+TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
+  Rng rng = Rng::from_name("effects", 4);
+  EffectWorld world = effect_world({}, quiet_world(), rng);
+  for (InertialParameters& link : world.model.links) {
+    link = InertialParameters::from_vector(1.5 * link.vector());
+  }
+  TorqueModelOptions options = declared_options();
+  options.base = TorqueBaseKind::kAuto;
+  const TorqueTracedModel model(world.model, exact_samples(world), options);
+  EXPECT_EQ(model.base().kind, TorqueBaseKind::kIdentified) << model.base().reason;
+}
+
+TEST(TorqueEffects, found_friction_goes_into_the_model_and_out_of_the_log) {
+  Rng rng = Rng::from_name("effects", 5);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.005;
+  const EffectWorld world =
+      effect_world({{"coulomb", 1, 0, 0.2}, {"viscous", 1, 0, 0.2}}, options, rng);
+  TorqueTraceOptions trace;
+  trace.model.filter = {LowPass::kSmoothingSpline, 12.0};
+  const TorqueSamples samples = exact_samples(world, 12.0);
+  const TorqueTrace out = trace_torque(world.model, samples, trace);
+  ASSERT_EQ(out.trace.accepted.size(), 2U) << out.trace.reason;
+  const auto joint = moving_joints(world.model.tree)[1].index();
+  double coulomb = 0.0;
+  for (const KnownEffect& effect : world.effects) {
+    if (effect.effect == "coulomb") coulomb = effect.size;
+  }
+  EXPECT_NEAR(out.corrected.model.joints[joint].coulomb,
+              world.model.joints[joint].coulomb + coulomb, kSizeTolerance * coulomb);
+  // What is left of the friction is far below what it was, between the ends of the log.
+  const TorqueSamples clean = compensate(out.corrected, samples, trace.model.filter);
+  const Eigen::MatrixXd rigid = inverse_dynamics_of_samples(make_rigid_model(world.model),
+                                                            samples.q, samples.dq, samples.ddq);
+  const double declared = world.model.joints[joint].coulomb;
+  const Eigen::Index middle = samples.size() / 2;
+  const Eigen::VectorXd left = (clean.torque.col(1) - rigid.col(1)).segment(middle / 2, middle);
+  EXPECT_LT(rms(left), 1.5 * (declared + world.model.joints[joint].viscous *
+                                             rms(samples.dq.col(1).segment(middle / 2, middle))));
+  const Eigen::MatrixXd predicted = predict_torque(out.corrected, samples, trace.model.filter);
+  const Eigen::VectorXd error =
+      (samples.torque.col(1) - predicted.col(1)).segment(middle / 2, middle);
+  EXPECT_LT(rms(error), 0.05 * coulomb);
+}
+
+TEST(TorqueEffects, a_push_is_found_and_left_out) {
+  Rng rng = Rng::from_name("effects", 6);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  const EffectWorld world = effect_world({{"contact", 1, 0, 0.5}}, options, rng);
+  TorqueTraceOptions trace;
+  trace.model.filter = {LowPass::kSmoothingSpline, 12.0};
+  const TorqueTrace out = trace_torque(world.model, exact_samples(world, 12.0), trace);
+  ASSERT_EQ(out.contacts.size(), 1U) << out.trace.reason;
+  const double begin = 0.6 * options.duration_s;
+  constexpr double kSmear_s = 0.15;
+  EXPECT_NEAR(out.contacts.front().from_s, begin, kSmear_s);
+  EXPECT_NEAR(out.contacts.front().to_s, begin + 0.4, kSmear_s);
+  ASSERT_EQ(out.trace.accepted.size(), 1U);
+  EXPECT_EQ(out.trace.accepted.front().id.effect, "contact");
+}
+
+TEST(TorqueEffects, logs_that_do_not_fit_are_refused) {
+  Rng rng = Rng::from_name("effects", 8);
+  const EffectWorld world = effect_world({}, quiet_world(), rng);
+  TorqueSamples samples = exact_samples(world);
+  samples.q.conservativeResize(Eigen::NoChange, 2);
+  EXPECT_THROW(TorqueTracedModel(world.model, samples, {}), Error);
+}
+
+}  // namespace
+}  // namespace kinescope
