@@ -29,8 +29,8 @@ TorqueSamples exact_samples(const EffectWorld& world, double cutoff_hz = 25.0) {
   return derive_motion(world.log, options).samples;
 }
 
-TorqueModelOptions declared_options(double cutoff_hz = 25.0) {
-  TorqueModelOptions options;
+TracedTorqueOptions declared_options(double cutoff_hz = 25.0) {
+  TracedTorqueOptions options;
   options.base = TorqueBaseKind::kDeclared;
   options.filter = {LowPass::kSmoothingSpline, cutoff_hz};
   return options;
@@ -158,7 +158,7 @@ TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
   for (InertialParameters& link : world.model.links) {
     link = InertialParameters::from_vector(1.5 * link.vector());
   }
-  TorqueModelOptions options = declared_options();
+  TracedTorqueOptions options = declared_options();
   options.base = TorqueBaseKind::kAuto;
   const TorqueTracedModel model(world.model, exact_samples(world), options);
   EXPECT_EQ(model.base().kind, TorqueBaseKind::kIdentified) << model.base().reason;
