@@ -254,7 +254,10 @@ Eigen::VectorXd units_of(const Sighting& sighting) {
     case MeasurementKind::kPose:
       break;
   }
-  return Eigen::VectorXd::Ones(sighting.dimension());
+  // Of a pose the error is given in metres: the turn's rows have none.
+  Eigen::VectorXd units = Eigen::VectorXd::Zero(6);
+  units.tail<3>() = sighting.whitening.diagonal().tail<3>().cwiseInverse();
+  return units;
 }
 
 }  // namespace

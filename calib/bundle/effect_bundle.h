@@ -36,7 +36,7 @@ struct BundleFit {
   Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant
-  Eigen::VectorXd unit;                 ///< rows: natural unit of a whitened one
+  Eigen::VectorXd unit;                 ///< rows: px or m of a whitened one; 0 for a pose's turn
   double correlation_time_s = 0.0;
   Eigen::VectorXd values;  ///< of the change's parameters
   double time_offset_s = 0.0;

@@ -74,7 +74,7 @@ HeldOutInstants held_out_instants(const NormalSystem& system) {
         linear.jacobian.middleRows(first, rows) * steps[static_cast<std::size_t>(fold)];
     out.whitened[i] = error.squaredNorm();
     out.squared[i] = error.cwiseProduct(linear.unit.segment(first, rows)).squaredNorm();
-    out.rows[i] = static_cast<double>(rows);
+    out.rows[i] = static_cast<double>((linear.unit.segment(first, rows).array() > 0.0).count());
   }
   return out;
 }

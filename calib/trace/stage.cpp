@@ -16,7 +16,7 @@ Stage::Stage(std::vector<AddedEffect> effects, TracedFit fitted)
 double Stage::rms() const {
   const Linearisation& linear = fit.linear;
   return std::sqrt(linear.residual.cwiseProduct(linear.unit).squaredNorm() /
-                   static_cast<double>(std::max<Eigen::Index>(1, linear.residual.size())));
+                   std::max(1.0, static_cast<double>((linear.unit.array() > 0.0).count())));
 }
 
 StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) {

@@ -28,7 +28,9 @@ struct Linearisation {
   std::vector<Eigen::Index> first_row;   ///< of every instant, and one past the last
   Eigen::VectorXd time_s;                ///< of every instant
   std::vector<int> fold;  ///< of every instant: unseen postures (or paths) are held out together
-  Eigen::VectorXd unit;   ///< rows: what one whitened unit is in the unit of `unit_name`
+  /// Rows: what one whitened unit is in the unit of `unit_name`; 0 for rows that have another unit
+  /// and are not counted in errors.
+  Eigen::VectorXd unit;
   std::string unit_name;  ///< "px", "m", "N m"
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.
   bool independent_instants = false;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -161,7 +163,48 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
   return best;
 }
 
+// Several effects at one place may stand for a single one that the search passed by.
+bool Tracer::simplify() {
+  std::map<std::string, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    places[now_->added[i].id.place].push_back(i);
+  }
+  for (const auto& [place, members] : places) {
+    if (members.size() < 2) continue;
+    std::vector<AddedEffect> others;
+    for (const AddedEffect& effect : now_->added) {
+      if (effect.id.place != place) others.push_back(effect);
+    }
+    const StagePtr stage = make_stage(*model_, others);
+    std::optional<AddedEffect> best;
+    double least = 0.0;
+    for (const Contender& contender :
+         contenders(*stage, test_family(stage->system, stage->fit.candidates))) {
+      const bool known = std::ranges::any_of(
+          members, [&](std::size_t i) { return now_->added[i].id == contender.id; });
+      const double loss = contender.held_out.sum();
+      if (contender.id.place != place || known || (best && loss >= least)) continue;
+      best = AddedEffect{contender.id, contender.member.scan};
+      least = loss;
+    }
+    if (!best) continue;
+    others.push_back(*best);
+    StagePtr single = make_stage(*model_, std::move(others));
+    if (!single->fit.converged || single->held_out_sum() > now_->held_out_sum()) continue;
+    for (const std::size_t i : members) removed_.insert(now_->added[i].id);
+    mark(round_, best->id, CandidateState::kAccepted, single->error.value);
+    now_ = std::move(single);
+    add_step(round_,
+             fmt::format("{} takes the place of {} effects at {}", best->id.effect, members.size(),
+                         place),
+             *now_);
+    return true;
+  }
+  return false;
+}
+
 bool Tracer::backward() {
+  if (simplify()) return true;
   search_again(std::nullopt);
   details_.assign(now_->added.size(), {});
   trace_.ambiguities.clear();

@@ -34,6 +34,7 @@ class Tracer {
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   void search_again(const std::optional<std::string>& place);
+  [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);

@@ -72,6 +72,18 @@ void print_details(const std::string& name, const Outcome& o) {
         text(e.before), text(e.fit), text(e.held_out), text(e.held_out_median),
         text(e.held_out_all), e.held_out_px, e.sightings, e.rejected);
   }
+  const nlohmann::json trace = o.result.value("trace", nlohmann::json());
+  if (trace.is_object()) {
+    fmt::print("   traced: {}: {}; {:.4g} -> {:.4g} {}\n", trace.value("verdict", ""),
+               trace.value("reason", ""), trace["held_out_before"].value("value", 0.0),
+               trace["held_out_after"].value("value", 0.0),
+               trace["held_out_after"].value("unit", ""));
+    for (const nlohmann::json& effect : trace["accepted"]) {
+      fmt::print("     {} at {}: {:.4g} {} [{:.4g} {:.4g}]\n", effect.value("effect", ""),
+                 effect.value("place", ""), effect.value("size", 0.0), effect.value("unit", ""),
+                 effect["interval"][0].get<double>(), effect["interval"][1].get<double>());
+    }
+  }
   fmt::print("   {:.1f} s\n", o.seconds);
   std::fflush(stdout);
 }
