@@ -31,6 +31,14 @@ CalibrationStart continued(const CalibrationStart& start, const Calibration& pla
 TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
                               const CalibrationStart& start, const Calibration& plain,
                               const CalibrateOptions& options, const Progress& progress) {
+  if (options.free != FreeGeometry::kGeometry) {
+    TracedCalibration out{{}, plain, {}, {}};
+    out.trace.verdict = TraceVerdict::kNothingToSay;
+    out.trace.reason =
+        "the robot's geometry is held as declared, and its errors cannot be told from effects: "
+        "trace with --free geometry";
+    return out;
+  }
   CalibrationTraceOptions trace_options;
   trace_options.calibrate = options;
   if (recording.entry == RecordingEntry::kVideo) trace_options.trace.floor = kDetectorBias;

@@ -72,7 +72,8 @@ void print_details(const std::string& name, const Outcome& o) {
         text(e.before), text(e.fit), text(e.held_out), text(e.held_out_median),
         text(e.held_out_all), e.held_out_px, e.sightings, e.rejected);
   }
-  const nlohmann::json trace = o.result.value("trace", nlohmann::json());
+  const nlohmann::json trace =
+      o.result.is_object() ? o.result.value("trace", nlohmann::json()) : nlohmann::json();
   if (trace.is_object()) {
     fmt::print("   traced: {}: {}; {:.4g} -> {:.4g} {}\n", trace.value("verdict", ""),
                trace.value("reason", ""), trace["held_out_before"].value("value", 0.0),
