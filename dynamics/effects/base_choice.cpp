@@ -157,6 +157,34 @@ WidestFit widest_fit(const BaseData& data) {
   return out;
 }
 
+BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened) {
+  constexpr double kFar = 5.0;
+  constexpr double kFewest = 0.7;  // of the instants; else it is the description that is too narrow
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < whitened.rows(); ++i) {
+    if (whitened.row(i).cwiseAbs().maxCoeff() < kFar) rows.push_back(i);
+  }
+  if (static_cast<double>(rows.size()) < kFewest * static_cast<double>(whitened.rows())) {
+    return data;
+  }
+  BaseData out;
+  const auto chosen = [&](const Eigen::MatrixXd& all) {
+    return Eigen::MatrixXd(all(rows, Eigen::all));
+  };
+  out.q = chosen(data.q);
+  out.dq = chosen(data.dq);
+  out.ddq = chosen(data.ddq);
+  out.torque = chosen(data.torque);
+  out.declared = chosen(data.declared);
+  for (std::size_t j = 0; j < data.rigid.size(); ++j) {
+    out.rigid.push_back(chosen(data.rigid[j]));
+    out.drives.push_back(chosen(data.drives[j]));
+    out.common.push_back(chosen(data.common[j]));
+  }
+  for (const Eigen::Index row : rows) out.fold.push_back(data.fold[static_cast<std::size_t>(row)]);
+  return out;
+}
+
 BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma) {
   return {.declared = held_out(data, data.torque - data.declared, data.common, sigma),
           .identified = held_out(data, data.torque, data.rigid, sigma)};

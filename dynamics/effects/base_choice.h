@@ -29,6 +29,10 @@ struct WidestFit {
 };
 [[nodiscard]] WidestFit widest_fit(const BaseData& data);
 
+/// The instants whose whitened residuals are all within a few sigmas: contacts and outliers must
+/// not decide about masses.
+[[nodiscard]] BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened);
+
 /// Held-out error of rigid bodies as declared and identified, drives and common terms free for
 /// both: root mean square, whitened.
 struct BaseErrors {

