@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "calib/bundle/choose_sightings.h"
 #include "calib/bundle/folds.h"
 #include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
@@ -24,119 +25,9 @@ using bundle::State;
 
 namespace {
 
-// Neighbours in time on either side that a sighting is compared with.
-constexpr int kNeighbours = 3;
-// A sighting's difference to the median of 2 x 3 neighbours has 1 + pi / 12 of the noise's
-// variance.
-constexpr double kDifferenceVariance = 1.26;
 // Frames beyond this many are thinned evenly: tests of effects gain nothing from more.
 constexpr int kMostFrames = 2500;
 constexpr int kFolds = 5;
-
-std::size_t path_length(const Spec& spec, const Sighting& sighting) {
-  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
-  return spec.path[marker.link.index()].size();
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-// Squared distance, per row, of a sighting's residual to the median of its neighbours'.
-double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
-  const std::size_t first = at < kNeighbours ? 0 : at - kNeighbours;
-  const std::size_t last = std::min(series.size() - 1, at + kNeighbours);
-  const Eigen::VectorXd& own = series[at];
-  double sum = 0.0;
-  for (Eigen::Index row = 0; row < own.size(); ++row) {
-    std::vector<double> others;
-    for (std::size_t i = first; i <= last; ++i) {
-      if (i != at && series[i].size() == own.size()) others.push_back(series[i][row]);
-    }
-    if (others.empty()) return 0.0;
-    const double difference = own[row] - median_of(std::move(others));
-    sum += difference * difference;
-  }
-  return sum / static_cast<double>(own.size()) / kDifferenceVariance;
-}
-
-// Corners are off by this much in ways that repeat with the view.
-constexpr double kCornerBias = 0.02;  // px
-
-// What no pose of the marker explains of its residual and what stays the same over the sightings,
-// root mean square over such rows: the marker may have slipped, the camera may have been bumped,
-// but neither bends a square.
-double lasting_bend(const std::vector<bundle::SightingError>& errors) {
-  const Eigen::Index rows = errors.front().residual.size();
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
-  for (const bundle::SightingError& error : errors) {
-    if (error.residual.size() != rows) continue;
-    const Eigen::Matrix<double, Eigen::Dynamic, 6>& J = error.d_marker;
-    sum += error.residual - J * (J.transpose() * J).ldlt().solve(J.transpose() * error.residual);
-  }
-  const double freedom = std::max(1.0, static_cast<double>(rows) - 6.0);
-  return sum.norm() / static_cast<double>(errors.size()) / std::sqrt(freedom);
-}
-
-// Multiplies a sighting's sigma.
-void widen(Sighting& sighting, double factor) {
-  sighting.sigma *= factor;
-  sighting.whitening /= factor;
-}
-
-// Thins and weighs sightings by how they differ from their neighbours in time; gives those that do
-// not stand out.
-struct Chosen {
-  std::vector<int> used;
-  double bias_px = 0.0;
-};
-
-Chosen choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
-                            double reject_sigma) {
-  const Readings readings(spec, state.time_offset[0]);
-  std::map<int, std::vector<int>> of_marker;
-  std::map<int, std::vector<Eigen::VectorXd>> residuals;
-  std::map<int, std::vector<bundle::SightingError>> errors;
-  for (const int index : usable) {
-    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
-    const auto error = bundle::error_of(spec, state, readings, sighting);
-    if (!error || !error->residual.allFinite()) continue;
-    of_marker[sighting.marker].push_back(index);
-    residuals[sighting.marker].push_back(error->residual);
-    if (path_length(spec, sighting) == 0) errors[sighting.marker].push_back(*error);
-  }
-  Chosen out;
-  for (const auto& [marker, indices] : of_marker) {
-    std::vector<double> distance;
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      distance.push_back(stands_out(residuals[marker], i));
-    }
-    const double typical = std::max(median_of(distance), 1e-12);
-    const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
-    double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
-    // A marker at rest repeats its bias in every frame: all of them together say what one does.
-    const bool rests = path_length(spec, first) == 0;
-    if (rests) {
-      const double seen = lasting_bend(errors[marker]);
-      out.bias_px = std::max(out.bias_px, seen * first.sigma);
-      bias = std::max(bias, seen) * std::sqrt(static_cast<double>(indices.size()));
-    }
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      Sighting& sighting = spec.sightings[static_cast<std::size_t>(indices[i])];
-      const double freedom = sighting.dimension();
-      // Median and scatter of a mean of `freedom` squares, to first order.
-      const double noise = typical / (1.0 - 2.0 / (9.0 * freedom));
-      widen(sighting, std::sqrt(noise + bias * bias));
-      if (distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
-        out.used.push_back(indices[i]);
-      }
-    }
-  }
-  std::ranges::sort(out.used);
-  return out;
-}
 
 std::vector<int> thin_frames(const Spec& spec, const std::vector<int>& usable) {
   std::set<int> frames;
@@ -187,7 +78,8 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
     spec = std::move(robust);
     impl_->used = solution.used;
   } else {
-    Chosen chosen = choose_by_neighbours(spec, state, usable, options.reject_sigma);
+    bundle::ChosenSightings chosen =
+        bundle::choose_by_neighbours(spec, state, usable, options.reject_sigma);
     impl_->used = std::move(chosen.used);
     impl_->bias_px = chosen.bias_px;
   }

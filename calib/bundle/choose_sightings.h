@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which sightings to trust, and how much, without asking the model: an effect that the model lacks
+// must neither lose its evidence as outliers nor pass for noise.
+#pragma once
+
+#include <vector>
+
+#include "calib/bundle/problem.h"
+
+namespace kinescope::bundle {
+
+struct ChosenSightings {
+  std::vector<int> used;  ///< those that do not stand out from their neighbours in time
+  double bias_px = 0.0;   ///< what corners of markers at rest are off by, all the time
+};
+
+/// Sets the sigmas in `spec` to how much residuals at `state` differ from those of their
+/// neighbours; markers at rest count once for all their frames.
+[[nodiscard]] ChosenSightings choose_by_neighbours(Spec& spec, const State& state,
+                                                   const std::vector<int>& usable,
+                                                   double reject_sigma);
+
+}  // namespace kinescope::bundle
