@@ -95,7 +95,7 @@ std::string effect_figure(const TracedEffect& effect) {
                       before ? fmt::format("{}, before it is in the model.", effect_name(effect))
                              : "What is left with it in the model, on the same scale.");
   }
-  return "<div class=\"figures\">" + drawing + "</div>\n";
+  return "<div class=\"figures pair\">" + drawing + "</div>\n";
 }
 
 std::string rest_figure(const Rest& rest) {

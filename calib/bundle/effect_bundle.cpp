@@ -57,6 +57,8 @@ struct EffectBundle::Impl {
   std::vector<int> used;
   std::vector<int> fold;
   double bias_px = 0.0;
+  // Where the last fit of the same change ended: the next one begins there.
+  mutable std::map<std::vector<std::string>, State> ends;
 
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
@@ -165,9 +167,13 @@ BundleFit EffectBundle::fit(const BundleChange& change,
   for (const Correction& correction : spec.corrections) {
     state.corrections.push_back(correction.value);
   }
+  std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
+  for (const Correction& correction : spec.corrections) key.push_back(correction.name);
+  if (const auto end = impl_->ends.find(key); end != impl_->ends.end()) state = end->second;
   constexpr int kIterations = 60;
   const bundle::SolveSummary summary = bundle::solve(spec, state, impl_->used, {}, kIterations);
   BundleFit out;
+  impl_->ends.insert_or_assign(key, state);
   out.converged = summary.converged;
   out.reason = summary.message;
   out.time_offset_s = state.time_offset[0];

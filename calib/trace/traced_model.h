@@ -102,6 +102,7 @@ struct RestPlace {
 struct AddedEffect {
   EffectId id;
   double scan = 0.0;
+  [[nodiscard]] bool operator==(const AddedEffect&) const = default;
 };
 
 /// A model fitted with some effects in it.
@@ -120,8 +121,7 @@ struct TracedFit {
 class TracedModel {
  public:
   virtual ~TracedModel() = default;
-  /// Least squares over everything, from the same start every time. Throws nothing for effects that
-  /// `candidates` named.
+  /// Least squares over everything. Throws nothing for effects that `candidates` named.
   [[nodiscard]] virtual TracedFit fit(const std::vector<AddedEffect>& effects) const = 0;
 
  protected:

@@ -48,8 +48,8 @@ Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Prog
 
 Trace Tracer::run() {
   report_progress(progress_, "trace", 0, 0);
-  base_ = make_stage(*model_, {});
-  now_ = options_.start.empty() ? base_ : make_stage(*model_, options_.start);
+  base_ = stage_of({});
+  now_ = options_.start.empty() ? base_ : stage_of(options_.start);
   if (!can_say(*now_)) return trace_;
   add_step(0, "the model as it is", *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
@@ -61,6 +61,16 @@ Trace Tracer::run() {
   list_not_found();
   conclude();
   return trace_;
+}
+
+StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
+  constexpr std::size_t kKept = 6;
+  for (const StagePtr& stage : last_) {
+    if (stage->added == effects) return stage;
+  }
+  last_.push_front(make_stage(*model_, std::move(effects)));
+  if (last_.size() > kKept) last_.pop_back();
+  return last_.front();
 }
 
 bool Tracer::can_say(const Stage& stage) {
@@ -105,7 +115,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     if (place && effect.id.place != *place) continue;
     const Candidate* known = find_candidate(base_->fit, effect.id);
     if (known == nullptr || known->scan.empty()) continue;
-    const StagePtr stage = make_stage(*model_, kinescope::trace::without(now_->added, i));
+    const StagePtr stage = stage_of(kinescope::trace::without(now_->added, i));
     const Candidate* candidate = find_candidate(stage->fit, effect.id);
     if (candidate == nullptr) continue;
     const double scan = best_scan(stage->system, *candidate);
@@ -113,7 +123,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * before) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects[i].scan = scan;
-    StagePtr moved = make_stage(*model_, std::move(effects));
+    StagePtr moved = stage_of(std::move(effects));
     if (moved->fit.converged && moved->held_out_sum() < now_->held_out_sum()) {
       now_ = std::move(moved);
     }
@@ -155,7 +165,7 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
     ++refits;
     std::vector<AddedEffect> effects = now_->added;
     effects.push_back({contender.id, contender.member.scan});
-    StagePtr stage = make_stage(*model_, std::move(effects));
+    StagePtr stage = stage_of(std::move(effects));
     mark(round, contender.id, CandidateState::kRefitted, stage->error.value);
     const double bar = best ? best->held_out_sum() : now_->held_out_sum();
     if (stage->fit.converged && stage->held_out_sum() < bar) best = std::move(stage);
@@ -175,7 +185,7 @@ bool Tracer::simplify() {
     for (const AddedEffect& effect : now_->added) {
       if (effect.id.place != place) others.push_back(effect);
     }
-    const StagePtr stage = make_stage(*model_, others);
+    const StagePtr stage = stage_of(others);
     std::optional<AddedEffect> best;
     double least = 0.0;
     for (const Contender& contender :
@@ -189,7 +199,7 @@ bool Tracer::simplify() {
     }
     if (!best) continue;
     others.push_back(*best);
-    StagePtr single = make_stage(*model_, std::move(others));
+    StagePtr single = stage_of(std::move(others));
     if (!single->fit.converged || single->held_out_sum() > now_->held_out_sum()) continue;
     for (const std::size_t i : members) removed_.insert(now_->added[i].id);
     mark(round_, best->id, CandidateState::kAccepted, single->error.value);
@@ -217,7 +227,7 @@ bool Tracer::backward() {
 
 bool Tracer::check(std::size_t index) {
   const AddedEffect effect = now_->added[index];
-  const StagePtr stage = make_stage(*model_, kinescope::trace::without(now_->added, index));
+  const StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
   const Candidate* candidate = find_candidate(stage->fit, effect.id);
   if (candidate == nullptr) return false;
   TestedMember own;
@@ -236,7 +246,7 @@ bool Tracer::check(std::size_t index) {
   if (own.p_value > level_ || stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
-    now_ = make_stage(*model_, kinescope::trace::without(now_->added, index));
+    now_ = stage_of(kinescope::trace::without(now_->added, index));
     add_step(round_,
              fmt::format("{} removed: with the others in, it earns nothing", name_of(effect.id)),
              *now_);
@@ -251,7 +261,7 @@ bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous)
   const EffectId id = now_->added[index].id;
   std::vector<AddedEffect> effects = now_->added;
   effects[index] = other;
-  StagePtr swapped = make_stage(*model_, std::move(effects));
+  StagePtr swapped = stage_of(std::move(effects));
   if (!swapped->fit.converged) return false;
   // What says the same predicts as well, within its own doubt.
   const double bar = superfluous ? now_->error.value : now_->error.interval.high;

@@ -3,6 +3,7 @@
 // The search: forward selection, backward check, what cannot be told apart, what is left.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <set>
 #include <string>
@@ -28,6 +29,8 @@ class Tracer {
     Eigen::VectorXd held_out;  // by cell
   };
 
+  /// The model with these effects; those asked for last are kept.
+  [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_say(const Stage& stage);
   void forward();
   [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
@@ -54,6 +57,7 @@ class Tracer {
   TraceOptions options_;
   Progress progress_;
   double level_ = 0.0;  // of all tests of known effects; the same again for the rest
+  std::deque<StagePtr> last_;
   StagePtr base_;
   StagePtr now_;
   std::vector<TracedEffect> details_;  // beside now_->added, filled by the backward check

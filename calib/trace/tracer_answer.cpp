@@ -54,7 +54,7 @@ void Tracer::drop_what_rests_explain() {
     const AddedEffect effect = now_->added[i];
     std::vector<AddedEffect> effects = now_->added;
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
-    StagePtr stage = make_stage(*model_, std::move(effects));
+    StagePtr stage = stage_of(std::move(effects));
     const auto candidate = std::ranges::find(stage->fit.candidates, effect.id, &Candidate::id);
     if (candidate == stage->fit.candidates.end()) continue;
     const Linearisation linear = with_rests(stage->fit.linear, rests_);
@@ -86,7 +86,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     }
     std::vector<AddedEffect> effects = now_->added;
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
-    StagePtr stage = make_stage(*model_, std::move(effects));
+    StagePtr stage = stage_of(std::move(effects));
     const auto alone = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
                                  level_, options_.floor);
     if (!alone || alone->rest.place != found.rest.place ||
@@ -189,16 +189,21 @@ void Tracer::list_not_found() {
           return std::ranges::find(a.effects, candidate.id) != a.effects.end();
         });
     if (named) continue;
-    NotFoundEffect missing{candidate.id, member.score.hidden(), 0.0, candidate.size_unit, ""};
+    // A scan's best value is an accident where there is nothing; its middle is typical.
+    const Score score =
+        candidate.scan.empty()
+            ? member.score
+            : score_test(now_->system,
+                         candidate.columns(candidate.scan[candidate.scan.size() / 2]));
+    NotFoundEffect missing{candidate.id, score.hidden(), 0.0, candidate.size_unit, ""};
     if (missing.hidden) {
       missing.record = candidate.record;
     } else {
-      missing.smallest_size = smallest_size(candidate, member.score, level_ / member.tests);
+      missing.smallest_size = smallest_size(candidate, score, level_ / member.tests);
       // What lies below the sensor's own errors is not looked for either.
-      const double size = std::abs(size_of(candidate, member.score.theta));
-      if (member.score.rms > 0.0) {
-        missing.smallest_size =
-            std::max(missing.smallest_size, size * options_.floor / member.score.rms);
+      const double size = std::abs(size_of(candidate, score.theta));
+      if (score.rms > 0.0) {
+        missing.smallest_size = std::max(missing.smallest_size, size * options_.floor / score.rms);
       }
     }
     trace_.not_found.push_back(std::move(missing));
