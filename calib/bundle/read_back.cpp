@@ -186,7 +186,7 @@ void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncer
   std::size_t next = 0;
   for (const FreeBlock& block : uncertainty.blocks) {
     const bool pose = block.block != "clock" && block.block != "intrinsics" &&
-                      !block.names.front().ends_with("scale") &&
+                      block.block != "effects" && !block.names.front().ends_with("scale") &&
                       !block.names.front().ends_with("offset") &&
                       !block.block.starts_with("target ");
     for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
