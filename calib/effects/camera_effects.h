@@ -27,6 +27,8 @@ struct EffectWorld {
   double first_s = 0.0;                         ///< of the frames
   double last_s = 0.0;
   bool clock_free = false;  ///< the log's clock is declared to agree with the camera's
+  /// Effects are known and to be undone: also at joints that rest here, over whatever range.
+  bool known = false;
 };
 
 struct CameraEffect {

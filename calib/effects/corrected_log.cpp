@@ -2,6 +2,9 @@
 #include "calib/effects/corrected_log.h"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -40,6 +43,7 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   world.frames = motion_of(log, tree);
   world.log = world.frames;
   world.gravity_base = gravity_base;
+  world.known = true;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     if (log.channel(tree.joints[j].channel)) world.driven.push_back(static_cast<int>(j));
   }
@@ -65,6 +69,55 @@ bool undo_clock(const FittedEffect& effect, JointLog& log) {
   return true;
 }
 
+Error refused(const JointLog& log, const FittedEffect& effect, const std::string& what) {
+  return bad_request(log.source.empty() ? "the joint log" : log.source,
+                     fmt::format("{} at {}: {}", effect.id.effect, effect.id.place, what),
+                     "give a log with the channels of the recording, and the run's own results");
+}
+
+// Throws for an effect at a joint that is not there.
+void check_place(const FittedEffect& effect, const KinematicTree& tree, const JointLog& log) {
+  constexpr std::array<std::string_view, 5> kElsewhere{"rolling_shutter", "lens_distortion",
+                                                       "tag_size", "tag_slip", "camera_bump"};
+  if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
+  const auto joint = tree.joint(effect.id.place);
+  if (!joint) throw refused(log, effect, "the robot has no such joint");
+  if (!log.channel(tree.joints[joint->index()].channel)) {
+    throw refused(log, effect, "no column for this joint");
+  }
+}
+
+// Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
+bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
+                const std::vector<effects::CameraEffect>& library, const JointLog& log,
+                JointLog& corrected) {
+  check_place(effect, tree, log);
+  const auto found = std::ranges::find_if(
+      library, [&](const effects::CameraEffect& known) { return known.candidate.id == effect.id; });
+  if (found == library.end()) return false;
+  const Candidate& candidate = found->candidate;
+  if (candidate.scan_listed &&
+      std::ranges::find(candidate.scan, effect.scan) == candidate.scan.end()) {
+    throw refused(log, effect, "no column for what it follows");
+  }
+  const std::vector<Correction> corrections = found->corrections(effect.scan);
+  const Joint& joint = tree.joints[static_cast<std::size_t>(corrections.front().index)];
+  if (!is_joint_value(corrections.front(), joint)) return false;
+  if (std::cmp_not_equal(corrections.size(), effect.values.size())) {
+    throw refused(
+        log, effect,
+        fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
+  }
+  const auto channel = log.channel(joint.channel);
+  for (std::size_t k = 0; k < corrections.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    const double amount =
+        effect.values[at] * corrections[k].reference / effect.references[at] / joint.scale;
+    corrected.values.col(value_of(channel)) += amount * corrections[k].share;
+  }
+  return true;
+}
+
 }  // namespace
 
 CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
@@ -75,38 +128,9 @@ CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
   const effects::EffectWorld world = world_of(log, tree, gravity_base);
   const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
   for (const FittedEffect& effect : effects) {
-    if (undo_clock(effect, out.log)) {
-      out.undone.push_back(effect.id);
-      continue;
-    }
-    const auto found = std::ranges::find_if(library, [&](const effects::CameraEffect& known) {
-      return known.candidate.id == effect.id;
-    });
-    if (found == library.end()) {
-      if (tree.joint(effect.id.place) &&
-          !log.channel(tree.joints[tree.joint(effect.id.place)->index()].channel)) {
-        throw bad_request(
-            log.source.empty() ? "the joint log" : log.source,
-            fmt::format("no column for {}, which has {}", effect.id.place, effect.id.effect),
-            "give a log with the channels of the recording");
-      }
-      out.left.push_back(effect.id);
-      continue;
-    }
-    const std::vector<Correction> corrections = found->corrections(effect.scan);
-    const Joint& joint = tree.joints[static_cast<std::size_t>(corrections.front().index)];
-    if (!is_joint_value(corrections.front(), joint)) {
-      out.left.push_back(effect.id);
-      continue;
-    }
-    const auto channel = log.channel(joint.channel);
-    for (std::size_t k = 0; k < corrections.size(); ++k) {
-      const auto at = static_cast<Eigen::Index>(k);
-      const double amount =
-          effect.values[at] * corrections[k].reference / effect.references[at] / joint.scale;
-      out.log.values.col(*channel) += amount * corrections[k].share;
-    }
-    out.undone.push_back(effect.id);
+    const bool undone =
+        undo_clock(effect, out.log) || undo_joint(effect, tree, library, log, out.log);
+    (undone ? out.undone : out.left).push_back(effect.id);
   }
   return out;
 }

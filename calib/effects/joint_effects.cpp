@@ -299,15 +299,15 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out;
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);
-    if (!(s.value.maxCoeff() > s.value.minCoeff())) continue;
+    if (!world.known && !(s.value.maxCoeff() > s.value.minCoeff())) continue;
     out.push_back(encoder_scale(s));
     if (s.turns) out.push_back(eccentricity(s));
-    if (CameraEffect gear = gear_error(world, s); !gear.candidate.scan.empty()) {
+    if (CameraEffect gear = gear_error(world, s); world.known || !gear.candidate.scan.empty()) {
       out.push_back(std::move(gear));
     }
     if (!world.postures) out.push_back(backlash(world, s));
     out.push_back(compliance(world, s));
-    if (world.driven.size() > 1) out.push_back(coupling(world, s));
+    if (world.known || world.driven.size() > 1) out.push_back(coupling(world, s));
     out.push_back(helical(s));
     out.push_back(s.turns ? axis_wobble(s) : curved_slider(s));
   }
