@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/corrected_log.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kExact = 1e-12;  // rad: a sine and a sum
+
+// Two hinges; the second one's channel counts ticks.
+constexpr double kTick = 1e-3;
+constexpr double kZero = 0.2;
+
+KinematicTree robot() {
+  KinematicTree tree;
+  tree.links = {{"base"}, {"upper"}, {"fore"}};
+  for (int j = 0; j < 2; ++j) {
+    Joint joint;
+    joint.name = "q" + std::to_string(j + 1);
+    joint.channel = "axis" + std::to_string(j + 1);
+    joint.type = JointType::kRevolute;
+    joint.parent = LinkId{j};
+    joint.child = LinkId{j + 1};
+    joint.T_parent_joint.translation = {0.3, 0.0, 0.1};
+    tree.joints.push_back(joint);
+  }
+  tree.joints[1].scale = kTick;
+  tree.joints[1].offset = kZero;
+  return tree;
+}
+
+// What the encoders say, as joint values.
+Eigen::MatrixXd values_as_logged() {
+  Eigen::MatrixXd out(600, 2);
+  for (Eigen::Index i = 0; i < out.rows(); ++i) {
+    const double t = 0.02 * static_cast<double>(i);
+    out(i, 0) = 1.1 * std::sin(0.7 * t) + 0.3 * std::sin(2.3 * t);
+    out(i, 1) = 0.9 * std::sin(1.1 * t + 0.5);
+  }
+  return out;
+}
+
+JointLog log_of(const Eigen::MatrixXd& joint_values) {
+  JointLog log;
+  log.source = "new_joints.csv";
+  log.channels = {"axis2", "axis1"};
+  log.values.resize(joint_values.rows(), 2);
+  log.values.col(0) = (joint_values.col(1).array() - kZero) / kTick;
+  log.values.col(1) = joint_values.col(0);
+  for (Eigen::Index i = 0; i < joint_values.rows(); ++i)
+    log.times_s.push_back(5.0 + 0.02 * static_cast<double>(i));
+  return log;
+}
+
+Eigen::MatrixXd values_of(const JointLog& log) {
+  Eigen::MatrixXd out(log.values.rows(), 2);
+  out.col(0) = log.values.col(1);
+  out.col(1) = (kTick * log.values.col(0).array() + kZero).matrix();
+  return out;
+}
+
+FittedEffect fitted(const std::string& effect, const std::string& place,
+                    std::initializer_list<double> values, double scan = 0.0) {
+  FittedEffect out;
+  out.id = {effect, place};
+  out.scan = scan;
+  out.values.resize(static_cast<Eigen::Index>(values.size()));
+  std::ranges::copy(values, out.values.begin());
+  out.parameters.resize(values.size());
+  out.references = Eigen::VectorXd::Ones(out.values.size());
+  return out;
+}
+
+CorrectedLog undo(const std::vector<FittedEffect>& effects, const JointLog& log) {
+  return corrected_log(log, robot(), effects, std::nullopt);
+}
+
+void expect_values(const CorrectedLog& corrected, const Eigen::MatrixXd& truth) {
+  EXPECT_LT((values_of(corrected.log) - truth).cwiseAbs().maxCoeff(), kExact);
+}
+
+TEST(CorrectedLog, AScaleErrorIsUndoneInTheChannelsOwnUnit) {
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  truth.col(1) *= 1.01;
+  const CorrectedLog corrected = undo({fitted("encoder_scale", "q2", {0.01})}, log_of(logged));
+  expect_values(corrected, truth);
+  EXPECT_EQ(corrected.undone, (std::vector<EffectId>{{"encoder_scale", "q2"}}));
+  EXPECT_TRUE(corrected.left.empty());
+  EXPECT_EQ(corrected.log.times_s, log_of(logged).times_s);
+}
+
+TEST(CorrectedLog, AnEccentricityIsUndone) {
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  const Eigen::ArrayXd q = logged.col(0).array();
+  truth.col(0).array() += 0.004 * (2.0 * q).sin() - 0.003 * (2.0 * q).cos();
+  expect_values(undo({fitted("eccentricity", "q1", {0.004, -0.003}, 2.0)}, log_of(logged)), truth);
+}
+
+// The link stands still while the gap is crossed, then follows half a gap behind.
+TEST(CorrectedLog, BacklashIsUndone) {
+  constexpr double kGap = 0.02;
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  double link = logged(0, 0) + (logged(1, 0) > logged(0, 0) ? -0.5 : 0.5) * kGap;
+  for (Eigen::Index i = 0; i < logged.rows(); ++i) {
+    link = std::max(std::min(link, logged(i, 0) + 0.5 * kGap), logged(i, 0) - 0.5 * kGap);
+    truth(i, 0) = link;
+  }
+  expect_values(undo({fitted("backlash", "q1", {kGap}, kGap)}, log_of(logged)), truth);
+}
+
+TEST(CorrectedLog, ACouplingIsUndoneByTheOtherJointsValue) {
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  truth.col(0) += 0.02 * logged.col(1);
+  expect_values(undo({fitted("coupling", "q1", {0.02}, 1.0)}, log_of(logged)), truth);
+}
+
+TEST(CorrectedLog, SeveralEffectsAddUpOnWhatWasLogged) {
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  const Eigen::ArrayXd q = logged.col(1).array();
+  truth.col(1).array() += 0.01 * q + 0.004 * q.sin() + 0.001 * q.cos();
+  const CorrectedLog corrected = undo(
+      {fitted("encoder_scale", "q2", {0.01}), fitted("eccentricity", "q2", {0.004, 0.001}, 1.0)},
+      log_of(logged));
+  expect_values(corrected, truth);
+  EXPECT_EQ(corrected.undone.size(), 2U);
+}
+
+TEST(CorrectedLog, StampsMoveToTheCamerasClock) {
+  const JointLog log = log_of(values_as_logged());
+  const CorrectedLog offset = undo({fitted("time_offset", "clock", {0.03})}, log);
+  FittedEffect drift = fitted("clock_drift", "clock", {1e-3});
+  drift.references[0] = 7.0;
+  const CorrectedLog drifted = undo({drift}, log);
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    EXPECT_NEAR(offset.log.times_s[i], log.times_s[i] - 0.03, kExact);
+    EXPECT_NEAR(drifted.log.times_s[i], log.times_s[i] - 1e-3 * (log.times_s[i] - 7.0), kExact);
+  }
+  EXPECT_EQ(offset.log.values, log.values);
+  EXPECT_EQ(offset.undone.size(), 1U);
+}
+
+// A sag is told by the largest load of the recording, whatever the loads of this log.
+TEST(CorrectedLog, ASagFollowsItsLoadIntoAnotherPosture) {
+  KinematicTree tree = robot();
+  tree.joints[0].T_parent_joint.rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(-std::acos(0.0), Eigen::Vector3d::UnitX()));
+  Marker marker;
+  marker.link = LinkId{1};
+  tree.markers = {marker};
+  const Eigen::MatrixXd logged = 0.5 * values_as_logged();
+  // Loads of q1: its own link along x and y, the next one's origin, along x, along y.
+  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0});
+  sag.references[0] = 2.0;
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  const CorrectedLog corrected = corrected_log(log_of(logged), tree, {sag}, down);
+  ASSERT_EQ(corrected.undone.size(), 1U);
+  const Eigen::MatrixXd change = values_of(corrected.log) - logged;
+  // The axis is level, x of the link at q = 0 too: a kilogram there pulls with cos q (kg m).
+  for (Eigen::Index i = 0; i < change.rows(); ++i)
+    EXPECT_NEAR(std::abs(change(i, 0)), 0.005 * std::cos(logged(i, 0)), kExact);
+  EXPECT_LT(change.col(1).norm(), kExact);
+}
+
+// A joint that rests in the new log was wrong there all the same.
+TEST(CorrectedLog, AJointThatRestsIsCorrectedWhereItRests) {
+  Eigen::MatrixXd logged = values_as_logged();
+  logged.col(0).setConstant(1.2);
+  Eigen::MatrixXd truth = logged;
+  truth.col(0).array() += 0.012 + 0.004 * std::sin(17.0 * 1.2);
+  const CorrectedLog corrected =
+      undo({fitted("encoder_scale", "q1", {0.01}), fitted("gear_error", "q1", {0.004, 0.0}, 17.0)},
+           log_of(logged));
+  expect_values(corrected, truth);
+  EXPECT_TRUE(corrected.left.empty());
+}
+
+TEST(CorrectedLog, NamesWhatALogCannotShow) {
+  const std::vector<FittedEffect> effects{
+      fitted("helical", "q1", {1e-4}), fitted("axis_wobble", "q2", {1e-3, 0.0}, 1.0),
+      fitted("tag_slip", "tag_12", {0, 0, 0, 1e-3, 0, 0}, 3.0),
+      fitted("camera_bump", "camera", {1e-3, 0, 0, 0, 0, 0}, 3.0),
+      fitted("lens_distortion", "camera tangential", {1e-3, 0.0})};
+  const JointLog log = log_of(values_as_logged());
+  const CorrectedLog corrected = undo(effects, log);
+  EXPECT_TRUE(corrected.undone.empty());
+  ASSERT_EQ(corrected.left.size(), effects.size());
+  for (std::size_t i = 0; i < effects.size(); ++i) EXPECT_EQ(corrected.left[i], effects[i].id);
+  EXPECT_EQ(corrected.log.values, log.values);
+  EXPECT_EQ(corrected.log.times_s, log.times_s);
+}
+
+void expect_bad_request(const std::vector<FittedEffect>& effects, const JointLog& log,
+                        const std::string& part) {
+  try {
+    static_cast<void>(undo(effects, log));
+    ADD_FAILURE() << "accepted: " << part;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadRequest);
+    const std::string what = error.what();
+    EXPECT_NE(what.find(part), std::string::npos) << what;
+    EXPECT_NE(what.find("new_joints.csv"), std::string::npos) << what;
+  }
+}
+
+TEST(CorrectedLog, AnotherLogOrRobotIsRefused) {
+  JointLog log = log_of(values_as_logged());
+  expect_bad_request({fitted("encoder_scale", "q9", {0.01})}, log, "q9");
+  // Of another library, or of another gravity: numbers that nothing takes.
+  expect_bad_request({fitted("eccentricity", "q1", {0.01}, 1.0)}, log, "eccentricity at q1");
+  log.channels[0] = "another";
+  expect_bad_request({fitted("encoder_scale", "q2", {0.01})}, log, "q2");
+  expect_bad_request({fitted("coupling", "q1", {0.01}, 1.0)}, log, "coupling at q1");
+  EXPECT_NO_THROW(static_cast<void>(undo({fitted("encoder_scale", "q1", {0.01})}, log)));
+}
+
+}  // namespace
+}  // namespace kinescope

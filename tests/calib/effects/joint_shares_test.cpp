@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/joint_shares.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kExact = 1e-12;  // sums and products of a few doubles
+
+Eigen::VectorXd values(std::initializer_list<double> list) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(list.size()));
+  std::ranges::copy(list, out.begin());
+  return out;
+}
+
+TEST(PlayState, StandsBehindTheDriveWhicheverWayItMoves) {
+  // Forwards from the start: the link lags; back: the gap of 0.2 is crossed in two steps.
+  const Eigen::VectorXd state = play_state(values({0.0, 0.1, 0.5, 0.4, 0.3, 0.1, 0.2, 0.3}), 0.2);
+  EXPECT_LT((state - values({-0.5, -0.5, -0.5, 0.0, 0.5, 0.5, 0.0, -0.5})).norm(), kExact);
+}
+
+TEST(PlayState, TheFirstMotionTellsTheSideAlsoAfterARest) {
+  const Eigen::VectorXd down = play_state(values({1.0, 1.0, 1.0, 0.9}), 0.1);
+  EXPECT_LT((down - Eigen::VectorXd::Constant(4, 0.5)).norm(), kExact);
+  EXPECT_EQ(play_state(values({}), 0.1).size(), 0);
+  EXPECT_EQ(play_state(values({0.3, 0.3}), 0.1), values({0.0, 0.0}));
+}
+
+TEST(PlayState, LinkFollowsWithinTheGapAndStandsStillWhileItIsCrossed) {
+  constexpr double kWidth = 0.05;
+  Eigen::VectorXd drive(400);
+  for (Eigen::Index i = 0; i < drive.size(); ++i) {
+    const double t = 0.05 * static_cast<double>(i);
+    drive[i] = std::sin(t) + 0.4 * std::sin(2.7 * t);
+  }
+  const Eigen::VectorXd state = play_state(drive, kWidth);
+  const Eigen::VectorXd link = drive + kWidth * state;
+  int crossing = 0;
+  for (Eigen::Index i = 1; i < drive.size(); ++i) {
+    EXPECT_LE(std::abs(state[i]), 0.5 + kExact);
+    const bool inside = std::abs(state[i]) < 0.5 - kExact;
+    if (inside) {
+      EXPECT_NEAR(link[i], link[i - 1], kExact);
+      ++crossing;
+    } else {
+      // Pushed: from behind when moving forwards.
+      EXPECT_EQ(state[i]<0.0, drive[i]> drive[i - 1]);
+    }
+  }
+  EXPECT_GT(crossing, 5);
+}
+
+// Hysteresis: the same place from both sides, the gap's width apart.
+TEST(PlayState, TheSamePlaceFromBothSidesDiffersByTheWidth) {
+  constexpr double kWidth = 0.3;
+  const Eigen::VectorXd drive = values({-1.0, 0.0, 1.0, 0.0, -1.0, 0.0});
+  const Eigen::VectorXd link = drive + kWidth * play_state(drive, kWidth);
+  EXPECT_NEAR(link[3] - link[1], kWidth, kExact);
+  EXPECT_NEAR(link[5], link[1], kExact);
+}
+
+TEST(ReadAt, IsLinearBetweenStampsAndKeepsTheEnds) {
+  const std::vector<double> from{0.0, 1.0, 3.0};
+  const Eigen::VectorXd read =
+      read_at(from, values({2.0, 4.0, 0.0}), {-1.0, 0.0, 0.25, 1.0, 2.5, 3.0, 9.0});
+  EXPECT_LT((read - values({2.0, 2.0, 2.5, 4.0, 1.0, 0.0, 0.0})).norm(), kExact);
+}
+
+// One joint about `axis_base`, its link's mass (a marker) 0.4 m from the axis, along the link's x.
+KinematicTree pendulum(const Eigen::Quaterniond& R_base_joint) {
+  KinematicTree tree;
+  tree.links = {{"base"}, {"arm"}};
+  Joint joint;
+  joint.name = "q1";
+  joint.type = JointType::kRevolute;
+  joint.parent = LinkId{0};
+  joint.child = LinkId{1};
+  joint.T_parent_joint.rotation = R_base_joint;
+  joint.T_parent_joint.translation = {0.3, -0.2, 0.5};
+  tree.joints = {joint};
+  Marker marker;
+  marker.id = TagId{11};
+  marker.link = LinkId{1};
+  marker.T_link_marker.translation = {0.4, 0.0, 0.0};
+  tree.markers = {marker};
+  return tree;
+}
+
+constexpr double kArm = 0.2;  // m: half of the way to the marker, as the link's origin counts too
+
+JointMotion motion_over(const Eigen::VectorXd& angle) {
+  JointMotion motion;
+  for (Eigen::Index i = 0; i < angle.size(); ++i)
+    motion.times_s.push_back(0.1 * static_cast<double>(i));
+  motion.value = angle;
+  motion.rate = Eigen::MatrixXd::Zero(angle.size(), 1);
+  return motion;
+}
+
+const Eigen::VectorXd kAngles = Eigen::VectorXd::LinSpaced(25, -2.5, 3.0);
+
+// z of the joint along -y of the base: x of the link at zero points along x of the base, and at
+// angle q along (cos q, 0, sin q); gravity along -x pulls with sin q times the arm.
+const Eigen::Quaterniond kLevelAxis =
+    Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitX()));
+
+TEST(GravityLoads, APendulumIsPulledWithTheSineOfItsAngle) {
+  const std::vector<Load> loads =
+      gravity_loads(pendulum(kLevelAxis), motion_over(kAngles), 0, -Eigen::Vector3d::UnitX());
+  ASSERT_EQ(loads.size(), 2U);
+  for (Eigen::Index i = 0; i < kAngles.size(); ++i) {
+    // A kilogram at 1 m along x of the link, and across it.
+    EXPECT_NEAR(loads[0].arm_m[i], std::sin(kAngles[i]), kExact);
+    EXPECT_NEAR(loads[1].arm_m[i], std::cos(kAngles[i]), kExact);
+  }
+}
+
+TEST(GravityLoads, WithoutGravitysDirectionThereIsOneLoadAnAxis) {
+  const std::vector<Load> loads =
+      gravity_loads(pendulum(kLevelAxis), motion_over(kAngles), 0, std::nullopt);
+  ASSERT_EQ(loads.size(), 3U);
+  for (Eigen::Index i = 0; i < kAngles.size(); ++i) {
+    EXPECT_NEAR(loads[0].arm_m[i], -kArm * std::sin(kAngles[i]), kExact);
+    EXPECT_NEAR(loads[1].arm_m[i], 0.0, kExact);
+    EXPECT_NEAR(loads[2].arm_m[i], kArm * std::cos(kAngles[i]), kExact);
+  }
+}
+
+TEST(GravityLoads, AnUprightAxisCarriesNothing) {
+  const KinematicTree tree = pendulum(Eigen::Quaterniond::Identity());
+  for (const Load& load : gravity_loads(tree, motion_over(kAngles), 0, -Eigen::Vector3d::UnitZ()))
+    EXPECT_LT(load.arm_m.norm(), kExact) << load.what;
+  const std::vector<Load> each = gravity_loads(tree, motion_over(kAngles), 0, std::nullopt);
+  EXPECT_LT(each[2].arm_m.norm(), kExact);
+  EXPECT_GT(each[0].arm_m.norm(), 0.1);
+}
+
+TEST(GravityLoads, ASlideIsPulledAlongItsAxisWhereverItStands) {
+  KinematicTree tree = pendulum(Eigen::Quaterniond::Identity());
+  tree.joints.front().type = JointType::kPrismatic;
+  const std::vector<Load> loads =
+      gravity_loads(tree, motion_over(kAngles), 0, -Eigen::Vector3d::UnitZ());
+  ASSERT_EQ(loads.size(), 1U);
+  EXPECT_LT((loads[0].arm_m + Eigen::VectorXd::Ones(kAngles.size())).norm(), kExact);
+}
+
+// The second arm's weight hangs on the first joint at the second joint's place.
+TEST(GravityLoads, LinksBehindPullFromTheirOwnPlaces) {
+  KinematicTree tree = pendulum(kLevelAxis);
+  Joint elbow = tree.joints.front();
+  elbow.name = "q2";
+  elbow.parent = LinkId{1};
+  elbow.child = LinkId{2};
+  elbow.T_parent_joint = Pose{};
+  elbow.T_parent_joint.translation = {0.5, 0.0, 0.0};
+  tree.links.push_back({"fore"});
+  tree.joints.push_back(elbow);
+  JointMotion motion = motion_over(kAngles);
+  motion.value = Eigen::MatrixXd(kAngles.size(), 2);
+  motion.value << kAngles, 0.7 * kAngles;
+  motion.rate = Eigen::MatrixXd::Zero(kAngles.size(), 2);
+  const std::vector<Load> loads = gravity_loads(tree, motion, 0, -Eigen::Vector3d::UnitX());
+  ASSERT_EQ(loads.size(), 5U);
+  for (Eigen::Index i = 0; i < kAngles.size(); ++i) {
+    EXPECT_NEAR(loads[2].arm_m[i], 0.5 * std::sin(kAngles[i]), kExact);
+    EXPECT_NEAR(loads[3].arm_m[i], std::sin(1.7 * kAngles[i]), kExact);
+  }
+  EXPECT_EQ(gravity_loads(tree, motion, 1, -Eigen::Vector3d::UnitX()).size(), 2U);
+}
+
+}  // namespace
+}  // namespace kinescope::effects
