@@ -57,6 +57,7 @@ LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<In
   time_s_ = Eigen::VectorXd::LinSpaced(n, 0.0, kStep * static_cast<double>(n - 1));
   q_.resize(n, kJoints);
   for (Eigen::Index j = 0; j < kJoints; ++j) q_.col(j) = smooth_motion(time_s_, rng);
+  if (options.together) q_.col(1) = q_.col(0);
   // Each row answers to each joint in its own way, slowly changing with the posture.
   gains_.resize(n * kRows, kJoints);
   for (Eigen::Index row = 0; row < gains_.rows(); ++row) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/trace/trace.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -63,6 +64,110 @@ TEST(TraceTest, NamesAndSizesEachEffect) {
     EXPECT_GE(right, 19) << injected.shape;
     EXPECT_GE(held, 16) << injected.shape;
   }
+}
+
+bool names(const Ambiguity& ambiguity, const EffectId& id) {
+  return std::ranges::find(ambiguity.effects, id) != ambiguity.effects.end();
+}
+
+// Where both joints move alike, one that goes too far and one that is pulled along look the same.
+TEST(TraceTest, InterchangeableEffectsAreBothNamed) {
+  constexpr int kRuns = 10;
+  int right = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    LinearWorldOptions options;
+    options.seed = static_cast<std::uint64_t>(seed);
+    options.together = true;
+    const Trace trace = trace_effects(LinearWorld(options, {{0, "scale", 0.5}}));
+    if (trace.verdict != TraceVerdict::kAmbiguous || trace.ambiguities.size() != 1) continue;
+    const Ambiguity& found = trace.ambiguities.front();
+    if (!names(found, {"scale", "joint1"}) || !names(found, {"coupling", "joint1"})) continue;
+    ++right;
+    EXPECT_EQ(found.words.size(), found.effects.size());
+    EXPECT_TRUE(found.record == "record scale" || found.record == "record coupling");
+    // The one in the model is the one that is handed on; the other is no effect of its own.
+    ASSERT_EQ(trace.accepted.size(), 1U);
+    EXPECT_EQ(trace.accepted.front().id, found.effects.front());
+    for (const NotFoundEffect& missing : trace.not_found) EXPECT_FALSE(names(found, missing.id));
+  }
+  EXPECT_GE(right, 9);
+}
+
+TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
+  constexpr int kRuns = 10;
+  int right = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    const Trace trace = trace_of(static_cast<std::uint64_t>(seed), {{0, "tanh_other", 1.0}});
+    if (trace.verdict != TraceVerdict::kUnknown || trace.rest.empty()) continue;
+    const Rest& rest = trace.rest.front();
+    if (rest.place != "joint1" || rest.covariate != "value of joint2") continue;
+    ++right;
+    EXPECT_LT(rest.p_value, 0.01);
+    EXPECT_EQ(rest.mean.size(), rest.at.size());
+    EXPECT_LT(trace.held_out_after.value, trace.held_out_before.value);
+    EXPECT_LT(trace.held_out_after.value, 1.05);  // of noise 1
+  }
+  EXPECT_GE(right, 9);
+}
+
+TEST(TraceTest, TwoEffectsAtOnceAreBothFound) {
+  constexpr int kRuns = 10;
+  int right = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    const Trace trace =
+        trace_of(static_cast<std::uint64_t>(seed), {{0, "scale", 0.5}, {1, "direction", 0.5}});
+    if (trace.verdict != TraceVerdict::kEffects || trace.accepted.size() != 2) continue;
+    for (const TracedEffect& effect : trace.accepted) {
+      const EffectId scale{"scale", "joint1"};
+      if (effect.id == scale || effect.id == EffectId{"direction", "joint2"}) {
+        EXPECT_NEAR(effect.size, 0.5, 0.2);
+        EXPECT_LT(effect.held_out_after.value, effect.held_out_before.value);
+        right += 1;
+      }
+    }
+  }
+  EXPECT_GE(right, 2 * kRuns - 2);
+}
+
+TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
+  LinearWorldOptions options;
+  options.seed = 4;
+  TraceOptions known;
+  known.start = {{{"sine", "joint2"}, 0.0}};
+  const Trace idle = trace_effects(LinearWorld(options, {}), known);
+  EXPECT_EQ(idle.verdict, TraceVerdict::kClean) << idle.reason;
+  EXPECT_TRUE(idle.added.empty());
+  EXPECT_NE(idle.steps.back().words.find("sine at joint2 removed"), std::string::npos);
+  const Trace real = trace_effects(LinearWorld(options, {{1, "sine", 2.0}}), known);
+  EXPECT_TRUE(only(real, {"sine", "joint2"})) << real.reason;
+  // Its parameters count as an effect's: before is without it.
+  EXPECT_GT(real.held_out_before.value, 1.1 * real.held_out_after.value);
+}
+
+TEST(TraceTest, TooLittleToJudgeSaysNothing) {
+  const Trace trace = trace_of(1, {{0, "scale", 5.0}}, 0.0, 8);
+  EXPECT_EQ(trace.verdict, TraceVerdict::kNothingToSay);
+  EXPECT_EQ(trace.stretches, 8);
+  EXPECT_NE(trace.reason.find("record longer"), std::string::npos) << trace.reason;
+  EXPECT_TRUE(trace.accepted.empty());
+  LinearWorldOptions one_posture;
+  one_posture.folds = 1;
+  const Trace held = trace_effects(LinearWorld(one_posture, {{0, "scale", 5.0}}));
+  EXPECT_EQ(held.verdict, TraceVerdict::kNothingToSay);
+  EXPECT_NE(held.reason.find("postures"), std::string::npos) << held.reason;
+}
+
+// The noise is 1 and two of 1600 rows' freedom are spent: unseen rows have an error of 1.
+TEST(TraceTest, HeldOutIntervalsCoverTheNoise) {
+  constexpr int kRuns = 60;
+  int covered = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    const HeldOutError error = trace_of(500 + static_cast<std::uint64_t>(seed), {}).held_out_after;
+    EXPECT_LT(error.interval.high - error.interval.low, 0.2);
+    if (error.interval.low <= 1.0 && 1.0 <= error.interval.high) ++covered;
+  }
+  // 95 % of 60: fewer than 52 would be a chance of 4e-3.
+  EXPECT_GE(covered, 52);
 }
 
 }  // namespace
