@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/score_test.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "kinematics/core/rng.h"
+
+namespace kinescope::trace {
+namespace {
+
+constexpr Eigen::Index kInstants = 240;
+constexpr Eigen::Index kRows = 3;  // an instant
+constexpr Eigen::Index kParameters = 4;
+
+// Normal equations lose half of a double's digits, twice solved.
+constexpr double kSame = 1e-7;
+// solve_without() keeps a ridge of 1e-11 on a diagonal scaled to 1.
+constexpr double kRidge = 1e-6;
+
+// A model at a point that is not quite its solution (as after a fit that stopped early), with a
+// prior, noise that remembers, and three carriers of which each row knows two.
+Linearisation linear_model(double memory = 0.5) {
+  Linearisation out;
+  Rng rng = Rng::from_name("score test");
+  const Eigen::Index rows = kInstants * kRows;
+  out.residual.resize(rows);
+  out.jacobian.resize(rows, kParameters);
+  double noise = 0.0;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    for (Eigen::Index c = 0; c < kParameters; ++c) out.jacobian(row, c) = rng.normal();
+    noise = memory * noise + rng.normal();
+    out.residual[row] = noise;
+    for (const Eigen::Index c : {row % 3, (row + 1) % 3})
+      entries.emplace_back(static_cast<int>(row), static_cast<int>(c), rng.normal());
+  }
+  out.carriers.resize(rows, 3);
+  out.carriers.setFromTriplets(entries.begin(), entries.end());
+  out.prior = 5.0 * Eigen::MatrixXd::Identity(kParameters, kParameters);
+  out.time_s = Eigen::VectorXd::LinSpaced(kInstants, 0.0, 0.1 * (kInstants - 1));
+  for (Eigen::Index i = 0; i <= kInstants; ++i) out.first_row.push_back(i * kRows);
+  for (Eigen::Index i = 0; i < kInstants; ++i) out.fold.push_back(static_cast<int>(i / 11 % 5));
+  out.unit = Eigen::VectorXd::Constant(rows, 0.1);
+  out.unit_name = "px";
+  out.correlation_time_s = 0.1;
+  return out;
+}
+
+std::vector<EffectColumn> effect() {
+  const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(kInstants, 0.0, 9.0);
+  return {{0, t.sin()}, {2, (0.7 * t).cos() + 0.3}};
+}
+
+// The effect's columns, row by row.
+Eigen::MatrixXd explicit_columns(const Linearisation& linear,
+                                 const std::vector<EffectColumn>& columns) {
+  Eigen::MatrixXd out(linear.residual.size(), static_cast<Eigen::Index>(columns.size()));
+  const Eigen::MatrixXd carriers(linear.carriers);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    for (Eigen::Index row = 0; row < out.rows(); ++row) {
+      const double share = columns[k].share.size() == 0 ? 1.0 : columns[k].share[row / kRows];
+      out(row, static_cast<Eigen::Index>(k)) = share * carriers(row, columns[k].carrier);
+    }
+  }
+  return out;
+}
+
+// Least squares with prior over the rows that are not left out.
+struct Plain {
+  Eigen::MatrixXd A;        // [J, E]
+  Eigen::MatrixXd inverse;  // (A'A + prior)^-1
+  Eigen::VectorXd solution;
+};
+
+Plain plain_fit(const Linearisation& linear, const Eigen::MatrixXd& E,
+                const Eigen::VectorXd& weights) {
+  Plain out;
+  out.A.resize(linear.residual.size(), kParameters + E.cols());
+  out.A << linear.jacobian, E;
+  Eigen::MatrixXd H = out.A.transpose() * weights.asDiagonal() * out.A;
+  H.topLeftCorner(kParameters, kParameters) += linear.prior;
+  out.inverse = H.inverse();
+  out.solution = out.inverse * (out.A.transpose() * weights.cwiseProduct(linear.residual));
+  return out;
+}
+
+Eigen::VectorXd ones(const Linearisation& linear) {
+  return Eigen::VectorXd::Ones(linear.residual.size());
+}
+
+double relative(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return (a - b).norm() / b.norm();
+}
+
+TEST(ScoreTest, ParametersAreThoseOfLeastSquares) {
+  const Linearisation linear = linear_model();
+  const NormalSystem system(linear, make_partition(linear));
+  const Eigen::MatrixXd E = explicit_columns(linear, effect());
+  const Plain plain = plain_fit(linear, E, ones(linear));
+  const Score score = score_test(system, effect());
+  EXPECT_EQ(score.rank, 2);
+  EXPECT_LT(relative(score.theta, plain.solution.tail(2)), kSame);
+  // The sum of squares (with the prior's) falls by the gain, against the model's own best fit.
+  const Plain own = plain_fit(linear, Eigen::MatrixXd(linear.residual.size(), 0), ones(linear));
+  const auto cost = [&](const Plain& fit) {
+    return (linear.residual - fit.A * fit.solution).squaredNorm() +
+           fit.solution.head(kParameters).dot(linear.prior * fit.solution.head(kParameters));
+  };
+  EXPECT_NEAR(score.gain, cost(own) - cost(plain), kSame * cost(own));
+  EXPECT_NEAR(gain_of(system, effect()), score.gain, kSame * score.gain);
+}
+
+// Liang and Zeger 1986: bread, meat by stretches, bread.
+TEST(ScoreTest, CovarianceIsTheSandwichOverStretches) {
+  const Linearisation linear = linear_model();
+  const Partition partition = make_partition(linear);
+  const NormalSystem system(linear, partition);
+  const Plain plain = plain_fit(linear, explicit_columns(linear, effect()), ones(linear));
+  const Eigen::VectorXd left = linear.residual - plain.A * plain.solution;
+  const auto stretches = static_cast<Eigen::Index>(partition.stretches);
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(kParameters + 2, stretches);
+  for (Eigen::Index row = 0; row < left.size(); ++row) {
+    const int cell = partition.cell[static_cast<std::size_t>(row / kRows)];
+    scores.col(partition.cells[static_cast<std::size_t>(cell)].stretch) +=
+        left[row] * plain.A.row(row).transpose();
+  }
+  const auto m = static_cast<double>(stretches);
+  const Eigen::MatrixXd sandwich = partition.widening * m / (m - 1.0) * plain.inverse * scores *
+                                   scores.transpose() * plain.inverse;
+  const Score score = score_test(system, effect());
+  const Eigen::MatrixXd covariance = sandwich.bottomRightCorner(2, 2);
+  EXPECT_LT(relative(score.covariance, covariance), kSame);
+  const double F = 0.5 * score.theta.dot(covariance.inverse() * score.theta);
+  EXPECT_NEAR(score.statistic, F, kSame * F);
+}
+
+// The same estimates with one stretch left out after the other.
+Eigen::MatrixXd explicit_jackknife(const Linearisation& linear, const Partition& partition,
+                                   const Eigen::MatrixXd& E, Eigen::Index count) {
+  Eigen::MatrixXd estimates(count, partition.stretches);
+  for (int s = 0; s < partition.stretches; ++s) {
+    Eigen::VectorXd weights = ones(linear);
+    for (Eigen::Index row = 0; row < weights.size(); ++row) {
+      const int cell = partition.cell[static_cast<std::size_t>(row / kRows)];
+      if (partition.cells[static_cast<std::size_t>(cell)].stretch == s) weights[row] = 0.0;
+    }
+    estimates.col(s) = plain_fit(linear, E, weights).solution.tail(count);
+  }
+  const Eigen::MatrixXd scatter = estimates.colwise() - estimates.rowwise().mean();
+  const auto m = static_cast<double>(partition.stretches);
+  return partition.widening * (m - 1.0) / m * scatter * scatter.transpose();
+}
+
+TEST(ScoreTest, JackknifeIsThatOfRefits) {
+  const Linearisation linear = linear_model();
+  const Partition partition = make_partition(linear);
+  const NormalSystem system(linear, partition);
+  const Eigen::MatrixXd none(linear.residual.size(), 0);
+  EXPECT_LT(
+      relative(jackknife_covariance(system, 2), explicit_jackknife(linear, partition, none, 2)),
+      kRidge);
+  const Score score = jackknife_test(system, effect());
+  const Eigen::MatrixXd E = explicit_columns(linear, effect());
+  EXPECT_LT(relative(score.covariance, explicit_jackknife(linear, partition, E, 2)), kRidge);
+  EXPECT_LT(relative(score.theta, score_test(system, effect()).theta), kSame);
+}
+
+TEST(ScoreTest, WhatTheModelCanDoItselfIsHidden) {
+  Linearisation linear = linear_model();
+  linear.prior.resize(0, 0);
+  // The model's parameters 0 and 1 together do what the first column does.
+  const Eigen::MatrixXd E = explicit_columns(linear, effect());
+  linear.jacobian.col(0) = E.col(0) - 2.0 * linear.jacobian.col(1);
+  const NormalSystem system(linear, make_partition(linear));
+  const std::vector<EffectColumn> first{effect()[0]};
+  EXPECT_TRUE(score_test(system, first).hidden());
+  EXPECT_TRUE(jackknife_test(system, first).hidden());
+  EXPECT_EQ(gain_of(system, first), 0.0);
+  // Beside it the other one is still seen, alone.
+  const Score both = score_test(system, effect());
+  EXPECT_EQ(both.rank, 1);
+  EXPECT_NEAR(both.theta[1], score_test(system, {effect()[1]}).theta[0], kSame);
+}
+
+TEST(ScoreTest, AnEffectThatNeverActsIsHidden) {
+  const Linearisation linear = linear_model();
+  const NormalSystem system(linear, make_partition(linear));
+  EXPECT_TRUE(score_test(system, {{1, Eigen::VectorXd::Zero(kInstants)}}).hidden());
+}
+
+// p-values of pure noise are even: of 400 about 20 below 5 %, give or take 4.4.
+TEST(ScoreTest, OfNoiseOneTestInTwentyIsSignificant) {
+  constexpr int kRuns = 400;
+  Linearisation linear = linear_model();
+  Rng rng = Rng::from_name("noise of the score test");
+  int significant = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    for (double& r : linear.residual) r = rng.normal();
+    const NormalSystem system(linear, make_partition(linear));
+    if (score_test(system, effect()).p_value < 0.05) ++significant;
+  }
+  EXPECT_GE(significant, 7);
+  EXPECT_LE(significant, 36);
+}
+
+}  // namespace
+}  // namespace kinescope::trace
