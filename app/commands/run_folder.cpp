@@ -165,10 +165,10 @@ RunAgain read_run_again(const fs::path& folder) {
   const fs::path path = folder / "run.json";
   const json document = json::parse(read_text_file(path), nullptr, false);
   RunAgain out;
-  const bool complete = document.is_object() && document.value("schema", "") == "kinescope.run" &&
-                        document.contains("arguments") && document.at("arguments").is_array() &&
-                        document.contains("working_folder") &&
-                        document.at("working_folder").is_string();
+  const bool complete =
+      document.is_object() && document.value("schema", json()) == "kinescope.run" &&
+      document.contains("arguments") && document.at("arguments").is_array() &&
+      document.contains("working_folder") && document.at("working_folder").is_string();
   if (complete) {
     for (const json& word : document.at("arguments")) {
       if (word.is_string()) out.arguments.push_back(word.get<std::string>());

@@ -80,12 +80,14 @@ json effects_json(const std::vector<FittedEffect>& effects) {
 
 CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
   const json document = json::parse(read_text_file(calibration_json), nullptr, false);
-  if (!document.is_object() || document.value("schema", "") != "kinescope.calibration") {
+  if (!document.is_object() || document.value("schema", json()) != "kinescope.calibration") {
     throw wrong(calibration_json, "this is no calibration");
   }
   CalibratedEffects out;
-  if (const auto gravity = document.find("gravity_base");
-      gravity != document.end() && gravity->is_array() && gravity->size() == 3) {
+  if (const auto gravity = document.find("gravity_base"); gravity != document.end()) {
+    if (!gravity->is_array() || gravity->size() != 3) {
+      throw wrong(calibration_json, "gravity_base is no vector");
+    }
     out.gravity_base = Eigen::Vector3d(finite((*gravity)[0], calibration_json, "gravity_base"),
                                        finite((*gravity)[1], calibration_json, "gravity_base"),
                                        finite((*gravity)[2], calibration_json, "gravity_base"));
