@@ -47,8 +47,17 @@ Candidate gravity_direction(const SharedContext& c) {
   out.size_unit = "deg";
   out.parameters = {{"tilt_1", "deg"}, {"tilt_2", "deg"}};
   out.size_weights = Eigen::Vector2d::Ones();
-  out.columns = [carriers](double) {
-    return std::vector<EffectColumn>{{carriers.gravity(0), {}}, {carriers.gravity(1), {}}};
+  // A base on a wall is far from one on the floor: in a straight line, only its own direction says
+  // what it does. The fit finds the tilt itself.
+  for (int k = 0; k < kGravityStarts; ++k) out.scan.push_back(k);
+  out.scan_name = "direction looked from";
+  out.columns = [carriers](double scan) {
+    const int start = std::clamp(static_cast<int>(scan + 0.5), 0, kGravityStarts - 1);
+    if (start == 0)
+      return std::vector<EffectColumn>{{carriers.gravity(0), {}}, {carriers.gravity(1), {}}};
+    const bool first = gravity_starts()[static_cast<std::size_t>(start)].x() != 0.0;
+    return std::vector<EffectColumn>{{carriers.turned_gravity(start), {}},
+                                     {carriers.gravity(first ? 1 : 0), {}}};
   };
   return out;
 }

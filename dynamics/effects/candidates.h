@@ -3,6 +3,7 @@
 // The pieces of the library, by what causes them. Internal to this room.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -11,6 +12,10 @@
 namespace kinescope::effects {
 
 using SharedContext = std::shared_ptr<const EffectContext>;
+
+/// Tilts (deg) from which the base's is sought: as declared, on the walls, on the ceiling.
+inline constexpr int kGravityStarts = 6;
+[[nodiscard]] std::array<Eigen::Vector2d, kGravityStarts> gravity_starts();
 
 /// Carriers by name; see effect_library.h for the rows.
 struct Carriers {
@@ -23,7 +28,11 @@ struct Carriers {
   [[nodiscard]] int gravity(int axis) const {
     return static_cast<int>(joints + 2 * (joints - 1)) + axis;
   }
-  [[nodiscard]] int body(int tip, int parameter) const { return gravity(2) + 10 * tip + parameter; }
+  /// Gravity as it is from a base that stands as the `start`-th of gravity_starts() says.
+  [[nodiscard]] int turned_gravity(int start) const { return gravity(2) + start; }
+  [[nodiscard]] int body(int tip, int parameter) const {
+    return turned_gravity(kGravityStarts) + 10 * tip + parameter;
+  }
   [[nodiscard]] int count(int tips) const { return body(tips, 0); }
 };
 

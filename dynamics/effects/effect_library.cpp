@@ -47,11 +47,18 @@ void put_joints(const EffectContext& context, const Carriers& carriers, Triplets
 /// Torque a degree of tilt: d torque / d gravity times the way gravity moves.
 void put_gravity(const EffectContext& context, const Eigen::MatrixXd& q, const Carriers& carriers,
                  Triplets& triplets) {
-  if (!(context.rigid.gravity_m_s2.norm() > 0.0)) return;
+  const Eigen::Vector3d& gravity = context.rigid.gravity_m_s2;
+  if (!(gravity.norm() > 0.0)) return;
+  Eigen::Matrix<double, 3, 2 + effects::kGravityStarts> moves;
+  moves.leftCols<2>() = context.gravity_moves;
+  const auto starts = effects::gravity_starts();
+  for (int k = 0; k < effects::kGravityStarts; ++k) {
+    const Eigen::Vector2d& start = starts[static_cast<std::size_t>(k)];
+    moves.col(2 + k) = (tilted(gravity, start) - gravity) / std::max(1.0, start.norm());
+  }
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Eigen::MatrixXd torque =
-        gravity_jacobian(context.rigid, q.row(i).transpose()) * context.gravity_moves;
-    for (int a = 0; a < 2; ++a) {
+    const Eigen::MatrixXd torque = gravity_jacobian(context.rigid, q.row(i).transpose()) * moves;
+    for (int a = 0; a < moves.cols(); ++a) {
       for (Eigen::Index j = 0; j < carriers.joints; ++j) {
         triplets.emplace_back(static_cast<int>(i * carriers.joints + j), carriers.gravity(a),
                               torque(j, a));
@@ -78,6 +85,13 @@ void put_bodies(const EffectContext& context, const TorqueSamples& rows, const C
 }  // namespace
 
 namespace effects {
+
+std::array<Eigen::Vector2d, kGravityStarts> gravity_starts() {
+  constexpr double kRight = 90.0;
+  return {Eigen::Vector2d{0, 0},       Eigen::Vector2d{kRight, 0},
+          Eigen::Vector2d{-kRight, 0}, Eigen::Vector2d{0, kRight},
+          Eigen::Vector2d{0, -kRight}, Eigen::Vector2d{2.0 * kRight, 0}};
+}
 
 Eigen::VectorXd joint_column(const EffectContext& context, std::size_t joint,
                              const std::string& name,

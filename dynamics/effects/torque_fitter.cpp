@@ -167,10 +167,11 @@ Eigen::MatrixXd TorqueFitter::effect_columns() const {
       out(own_rows, added.first) = torque.col(added.kind == Kind::kGain ? added.joint : added.from);
     } else {
       const Candidate& candidate = candidate_of(candidates_, added.effect.id);
+      const double scan = added.kind == Kind::kGravity ? 0.0 : added.effect.scan;
       for (Eigen::Index k = 0; k < added.values.size(); ++k) {
         const Eigen::VectorXd unit = Eigen::VectorXd::Unit(added.values.size(), k);
-        out.col(added.first + k) = through_sensor(
-            as_rows(effect_torque(case_->carriers, candidate, added.effect.scan, unit, joints_)));
+        out.col(added.first + k) =
+            through_sensor(as_rows(effect_torque(case_->carriers, candidate, scan, unit, joints_)));
       }
     }
   }
@@ -293,10 +294,7 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
 
 /// A base on a wall is far from one on the floor: the axes' directions are tried first.
 void TorqueFitter::choose_gravity_start(Added& gravity) {
-  constexpr double kRight = 90.0;
-  const std::array<Eigen::Vector2d, 6> starts = {
-      Eigen::Vector2d{0, 0},      Eigen::Vector2d{kRight, 0},  Eigen::Vector2d{-kRight, 0},
-      Eigen::Vector2d{0, kRight}, Eigen::Vector2d{0, -kRight}, Eigen::Vector2d{2.0 * kRight, 0}};
+  const auto starts = gravity_starts();
   double best = std::numeric_limits<double>::infinity();
   Eigen::Vector2d chosen = starts[0];
   for (const Eigen::Vector2d& start : starts) {

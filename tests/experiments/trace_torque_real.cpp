@@ -5,6 +5,7 @@
 // `trace_torque_real [SET...]`; default: all. The sets stay where they are.
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <numbers>
 
@@ -241,6 +242,21 @@ void run(const RealSet& set) {
     fmt::print("    cannot tell:");
     for (const EffectId& id : a.effects) fmt::print(" {}@{}", id.effect, id.place);
     fmt::print("\n");
+  }
+  if (std::getenv("TRACE_VERBOSE") != nullptr) {
+    for (const TraceStep& step : trace.steps) {
+      fmt::print("    step {} {}: {:.4g}\n", step.round, step.words, step.held_out.value);
+    }
+    std::vector<TestedCandidate> last;
+    for (const TestedCandidate& c : trace.candidates) {
+      if (c.round == trace.candidates.back().round) last.push_back(c);
+    }
+    std::ranges::sort(last, {}, &TestedCandidate::p_value);
+    for (std::size_t k = 0; k < std::min<std::size_t>(12, last.size()); ++k) {
+      fmt::print("    {:<16} {:<16} p {:.2g} F {:.3g} ({}, {}) size {:.3g} {}\n", last[k].id.effect,
+                 last[k].id.place, last[k].p_value, last[k].statistic, last[k].parameters,
+                 last[k].freedom, last[k].size, to_string(last[k].state));
+    }
   }
   for (const Rest& rest : trace.rest) {
     fmt::print("    left: {} over {}, {:.2g} of the squares\n", rest.place, rest.covariate,
