@@ -37,8 +37,8 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   linear.unit = parts_.base.sigma.replicate(instants, 1);
   linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
   const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());
-  const Eigen::MatrixXd left = residual_.reshaped(joints_, instants).transpose();
-  linear.correlation_time_s = identify::correlation_samples(left, trajectory) *
+  // The memory of the noise, not of what the model still lacks: that of the widest description.
+  linear.correlation_time_s = identify::correlation_samples(parts_.widest, trajectory) *
                               (linear.time_s[instants - 1] - linear.time_s[0]) /
                               static_cast<double>(instants);
   for (const Added& added : added_) out.values.push_back(added.values);
