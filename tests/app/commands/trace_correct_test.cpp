@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope trace` and `kinescope correct`: what they refuse, and a log that is corrected.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "app/io/effects_file.h"
+#include "kinematics/log/joint_log.h"
+#include "kinematics/urdf/urdf.h"
+#include "tests/app/commands/program.h"
+#include "tests/app/io/recording_folder.h"
+
+namespace kinescope {
+namespace {
+
+using nlohmann::json;
+
+class TraceRefusals : public testing::Test {
+ protected:
+  void refused(const std::string& part, ExitCode code = ExitCode::kBadInput) const {
+    expect_refusal({"trace", folder_.path().string(), "--quiet"}, code, part);
+  }
+  void refused(const json& run, const std::string& part) const {
+    folder_.write("run.json", run.dump());
+    refused(part);
+  }
+  [[nodiscard]] json run_of(const std::vector<std::string>& arguments) const {
+    return {{"schema", "kinescope.run"},
+            {"arguments", arguments},
+            {"working_folder", folder_.path().string()}};
+  }
+  RecordingFolder folder_;
+};
+
+TEST_F(TraceRefusals, AFolderWithoutARun) {
+  refused("run.json");
+  expect_refusal({"trace", (folder_.path() / "nowhere").string()}, ExitCode::kBadInput,
+                 "nowhere/run.json");
+  expect_refusal({"trace"}, ExitCode::kBadRequest, "RUN_FOLDER");
+}
+
+TEST_F(TraceRefusals, ARunThatDoesNotSayHowItWasStarted) {
+  const json whole = run_of({"run", "somewhere"});
+  folder_.write("run.json", whole.dump().substr(0, 30));
+  refused("does not say how the run was started");
+  refused(json::array(), "does not say how the run was started");
+  for (const char* key : {"schema", "arguments", "working_folder"}) {
+    json run = whole;
+    run.erase(key);
+    refused(run, "does not say how the run was started");
+    run[key] = 3;
+    refused(run, "does not say how the run was started");
+  }
+  refused(run_of({}), "does not say how the run was started");
+}
+
+TEST_F(TraceRefusals, AFolderOfAnotherCommand) {
+  refused(run_of({"inspect", "somewhere"}), "no folder of kinescope run");
+  refused(run_of({"run", "somewhere", "--no-such-option"}), "not understood");
+}
+
+TEST_F(TraceRefusals, ARecordingThatIsNoLongerThere) {
+  refused(run_of({"run", "moved_away"}), "moved_away");
+}
+
+// A finished run of two hinges, the second of which has an encoder out of scale.
+class Correct : public testing::Test {
+ protected:
+  Correct() {
+    KinematicTree tree;
+    tree.links = {{"base"}, {"upper"}, {"fore"}};
+    for (int j = 0; j < 2; ++j) {
+      Joint joint;
+      joint.name = fmt::format("joint{}", j + 1);
+      joint.type = JointType::kRevolute;
+      joint.parent = LinkId{j};
+      joint.child = LinkId{j + 1};
+      joint.T_parent_joint.translation = {0.2, 0.0, 0.1};
+      tree.joints.push_back(joint);
+    }
+    folder_.write("out/robot.urdf", write_urdf(tree));
+    FittedEffect scale;
+    scale.id = {"encoder_scale", "joint2"};
+    scale.parameters = {{"scale", ""}};
+    scale.values = Eigen::VectorXd::Constant(1, 0.01);
+    scale.references = Eigen::VectorXd::Ones(1);
+    calibration_ = {{"schema", "kinescope.calibration"},
+                    {"robot",
+                     {{"joints",
+                       {{{"name", "joint1"}, {"channel", "a"}, {"scale", 1.0}, {"offset", 0.0}},
+                        {{"name", "joint2"}, {"channel", "b"}, {"scale", 0.5}, {"offset", 0.2}}}}}},
+                    {"effects", effects_json({scale})}};
+    write_calibration();
+    folder_.write("new.csv", "t,a,b\n0,0.1,2\n0.1,0.2,4\n0.2,0.3,6\n");
+  }
+
+  void write_calibration() const { folder_.write("out/calibration.json", calibration_.dump(1)); }
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder_.path() / name).string();
+  }
+  [[nodiscard]] std::vector<std::string> command() const {
+    return {"correct", path("out"), path("new.csv"), "--output", path("corrected.csv")};
+  }
+  void refused(ExitCode code, const std::string& part) const {
+    expect_refusal(command(), code, part);
+    EXPECT_FALSE(std::filesystem::exists(path("corrected.csv")));
+  }
+
+  RecordingFolder folder_;
+  json calibration_;
+};
+
+TEST_F(Correct, UndoesWhatTheRunFound) {
+  const Outcome outcome = run(command());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("Undone: encoder_scale at joint2."), std::string::npos);
+  const JointLog log = read_joint_log(path("corrected.csv"));
+  ASSERT_EQ(log.values.rows(), 3);
+  // Of 0.5 x 4 + 0.2 = 2.2 rad 1 % are 0.022 rad, 0.044 of the channel's units.
+  EXPECT_NEAR(log.values(1, 1), 4.044, 1e-12);
+  EXPECT_EQ(log.values(1, 0), 0.2);
+}
+
+TEST_F(Correct, SaysWhatALogCannotShow) {
+  calibration_["effects"][0]["effect"] = "helical";
+  write_calibration();
+  const Outcome outcome = run(command());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("A joint log cannot show: helical at joint2."), std::string::npos)
+      << outcome.out;
+  EXPECT_EQ(read_joint_log(path("corrected.csv")).values, read_joint_log(path("new.csv")).values);
+}
+
+TEST_F(Correct, NeedsTheFilesOfTheRun) {
+  folder_.remove("out/robot.urdf");
+  refused(ExitCode::kBadInput, "robot.urdf");
+  folder_.remove("out/calibration.json");
+  refused(ExitCode::kBadInput, "calibration.json");
+  folder_.write("out/calibration.json", R"({"schema": "kinescope.structure"})");
+  refused(ExitCode::kBadInput, "no calibration");
+}
+
+TEST_F(Correct, NeedsALogWithTheChannels) {
+  folder_.write("new.csv", "t,a,c\n0,0.1,2\n0.1,0.2,4\n");
+  refused(ExitCode::kBadRequest, "joint2");
+  folder_.remove("new.csv");
+  refused(ExitCode::kBadInput, "new.csv");
+}
+
+TEST_F(Correct, NeedsEffectsOfThisRobot) {
+  calibration_["effects"][0]["place"] = "joint9";
+  write_calibration();
+  refused(ExitCode::kBadRequest, "joint9");
+}
+
+}  // namespace
+}  // namespace kinescope
