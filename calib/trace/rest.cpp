@@ -21,6 +21,8 @@ constexpr Eigen::Index kCurveKnots =
 constexpr std::array<double, 5> kLengths{1.0, 0.5, 0.25, 0.125,
                                          0.0625};  // of the covariate's range
 constexpr int kVariances = 25;
+// Of the residual's sum of squares: less changes the error by less than half a per cent.
+constexpr double kLeastShare = 0.01;
 
 // Values of the covariate that split the instants evenly; for a covariate of few values, those.
 std::vector<double> even_knots(const Eigen::VectorXd& values, std::size_t most) {
@@ -219,8 +221,11 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   const double left =
       after.total().rr - 2.0 * step.dot(after.total().g) + step.dot(after.total().H * step);
   out.rest.explained = 1.0 - left / system.total().rr;
+  if (out.rest.explained < kLeastShare) return std::nullopt;
   out.rest.held_out_before = held_out_error(system, held_out_instants(system));
   out.rest.held_out_after = held_out_error(after, held_out_instants(after));
+  // What does not help to predict is no structure.
+  if (out.rest.held_out_after.value >= out.rest.held_out_before.value) return std::nullopt;
   return out;
 }
 

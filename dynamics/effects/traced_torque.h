@@ -36,7 +36,7 @@ struct TracedTorqueOptions {
   TorqueBaseKind base = TorqueBaseKind::kAuto;
   /// Declared masses are trusted while their held-out error is not above that of identified ones by
   /// more than this factor, all other terms being free for both.
-  double trust_factor = 1.1;
+  double trust_factor = 1.05;
   TorqueFilter filter = {};  ///< that the samples went through
   int most_instants = 2500;
   int folds = 8;  ///< trajectories where there are at least five paths, else stretches of time
