@@ -15,6 +15,9 @@ namespace {
 // A direction of which less than this share (of its square) is left when the model's own parameters
 // have taken what they can is not shown by the data.
 constexpr double kHidden = 1e-7;
+// Effective stretches beyond the effect's own parameters below which their scatter alone is no
+// judge.
+constexpr double kFewStretches = 8.0;
 
 // The effect's columns combined so that they are of unit length and all shown: E -> E T.
 Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& S) {
@@ -89,6 +92,24 @@ StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
   return out;
 }
 
+// Of the gain, by the noise of all rows, widened for its correlation in time as if the effect
+// changed slowly.
+double pooled_p_value(const NormalSystem& system, double gain, double k) {
+  const Linearisation& linear = system.linear();
+  const auto rows = static_cast<double>(linear.residual.size());
+  const double freedom = rows - static_cast<double>(system.parameters()) - k;
+  if (freedom < 1.0) return 1.0;
+  double memory = 1.0;
+  if (!linear.independent_instants && linear.instants() > 1) {
+    const double step = (linear.time_s[linear.instants() - 1] - linear.time_s[0]) /
+                        static_cast<double>(linear.instants() - 1);
+    memory = std::max(1.0, 2.0 * linear.correlation_time_s / step);
+  }
+  const double variance = (system.total().rr - gain) / freedom;
+  if (!(variance > 0.0)) return 0.0;
+  return f_survival(gain / (k * variance * memory), k, std::max(1.0, freedom / memory));
+}
+
 void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
            const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
            Score& out) {
@@ -105,11 +126,16 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.rms =
       std::sqrt(std::max(0.0, p.theta.dot(p.S * p.theta)) / rows) * mean_unit(system.linear());
   out.freedom = std::floor(effective) - k;
-  if (out.freedom < 2.0) return;
+  const bool few = out.freedom < kFewStretches;
+  if (few) out.freedom = system.partition().stretches - k;
+  if (std::floor(effective) < k + 2.0) return;
   // Of the covariance, directions that no stretch disagrees about are not certain but unknown.
   const Eigen::MatrixXd inverse = scaled_pseudo_inverse(covariance, 1e-12);
   out.statistic = p.theta.dot(inverse * p.theta) / k;
   out.p_value = f_survival(out.statistic, k, out.freedom);
+  // The scatter of few stretches says little by itself, however clear the effect: then noise at its
+  // usual level and memory must not explain it either.
+  if (few) out.p_value = std::max(out.p_value, pooled_p_value(system, p.gain, k));
 }
 
 // Scatter of the last `count` parameters when each stretch is left out in turn.
