@@ -44,6 +44,8 @@ class Tracer {
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   void look_for_rest();
+  /// True where a rest is large enough beside what an effect explains to put its name in doubt.
+  [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   void drop_what_rests_explain();
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);

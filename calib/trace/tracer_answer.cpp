@@ -47,11 +47,22 @@ void Tracer::look_for_rest() {
   if (!rests_.empty()) drop_what_rests_explain();
 }
 
+bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
+  return found.rest.explained * now_->system.total().rr >=
+         kDoubtfulShare * details_[effect].explained * base_->system.total().rr;
+}
+
 // Effects that explain nothing where what is left is in the model as curves: they stood in for it,
 // at whatever place.
 void Tracer::drop_what_rests_explain() {
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const AddedEffect effect = now_->added[i];
+    // A curve at the effect's own place takes its shape; it puts the name in doubt where it is
+    // large.
+    const bool stands = std::ranges::all_of(rests_, [&](const FoundRest& found) {
+      return same_place(found.rest.place, effect.id.place) && !is_doubtful(found, i);
+    });
+    if (stands) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
     StagePtr stage = stage_of(std::move(effects));
@@ -80,10 +91,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
     if (!same_place(found.rest.place, id.place)) continue;
-    if (found.rest.explained * now_->system.total().rr <
-        kDoubtfulShare * details_[i].explained * base_->system.total().rr) {
-      continue;
-    }
+    if (!is_doubtful(found, i)) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
     StagePtr stage = stage_of(std::move(effects));
