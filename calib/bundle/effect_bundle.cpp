@@ -60,6 +60,7 @@ struct EffectBundle::Impl {
   // Where the last fit of the same change ended: the next one begins there.
   mutable std::map<std::vector<std::string>, State> ends;
 
+  [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
 
@@ -156,24 +157,25 @@ Eigen::VectorXd units_of(const Sighting& sighting) {
 
 }  // namespace
 
-BundleFit EffectBundle::fit(const BundleChange& change,
-                            const std::vector<Correction>& probes) const {
-  Spec spec = impl_->spec;
-  State state = impl_->start;
-  spec.free_time_offset = change.time_offset;
-  state.time_offset[0] = change.time_offset ? impl_->offset_start_s : 0.0;
-  spec.corrections = change.corrections;
+// The least squares fit; `spec` and `state` are left with the change in them.
+BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
+                                         State& state) const {
+  with = spec;
+  state = start;
+  with.free_time_offset = change.time_offset;
+  state.time_offset[0] = change.time_offset ? offset_start_s : 0.0;
+  with.corrections = change.corrections;
   state.corrections.clear();
-  for (const Correction& correction : spec.corrections) {
+  for (const Correction& correction : with.corrections) {
     state.corrections.push_back(correction.value);
   }
   std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
-  for (const Correction& correction : spec.corrections) key.push_back(correction.name);
-  if (const auto end = impl_->ends.find(key); end != impl_->ends.end()) state = end->second;
+  for (const Correction& correction : with.corrections) key.push_back(correction.name);
+  if (const auto end = ends.find(key); end != ends.end()) state = end->second;
   constexpr int kIterations = 60;
-  const bundle::SolveSummary summary = bundle::solve(spec, state, impl_->used, {}, kIterations);
-  BundleFit out;
-  impl_->ends.insert_or_assign(key, state);
+  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
+  ends.insert_or_assign(key, state);
+  BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;
   out.time_offset_s = state.time_offset[0];
@@ -183,6 +185,21 @@ BundleFit EffectBundle::fit(const BundleChange& change,
     out.values.conservativeResize(out.values.size() + 1);
     out.values[out.values.size() - 1] = state.time_offset[0];
   }
+  return out;
+}
+
+BundleSolution EffectBundle::solve(const BundleChange& change) const {
+  Spec spec;
+  State state;
+  return impl_->solve(change, spec, state);
+}
+
+BundleFit EffectBundle::fit(const BundleChange& change,
+                            const std::vector<Correction>& probes) const {
+  Spec spec;
+  State state;
+  BundleFit out;
+  static_cast<BundleSolution&>(out) = impl_->solve(change, spec, state);
 
   // Probes stand beside the corrections, at zero.
   spec.corrections.insert(spec.corrections.end(), probes.begin(), probes.end());
@@ -236,16 +253,6 @@ BundleFit EffectBundle::fit(const BundleChange& change,
     out.prior_information += J.transpose() * J;
   }
   out.correlation_time_s = spec.postures ? 0.0 : bundle::correlation_time(spec, state, impl_->used);
-  out.tree = spec.tree;
-  for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
-    out.tree.joints[j].T_parent_joint = bundle::from_block(state.joint_frames[j].data());
-    out.tree.joints[j].scale = state.joint_maps[j][0];
-    out.tree.joints[j].offset = state.joint_maps[j][1];
-  }
-  for (std::size_t m = 0; m < out.tree.markers.size(); ++m) {
-    out.tree.markers[m].T_link_marker = bundle::from_block(state.mounts[m].data());
-  }
-  out.T_camera_base = bundle::from_block(state.camera_base.data());
   return out;
 }
 

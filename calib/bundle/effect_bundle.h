@@ -25,10 +25,15 @@ struct BundleChange {
   bool time_offset = false;
 };
 
-/// Which column of the Jacobian belongs to the change, in its order: corrections, then the offset.
-struct BundleFit {
+struct BundleSolution {
   bool converged = false;
   std::string reason;
+  Eigen::VectorXd values;  ///< of the change's parameters: corrections, then the time offset
+  double time_offset_s = 0.0;
+};
+
+/// A solution, and how its residual answers to the parameters and to probes.
+struct BundleFit : BundleSolution {
   Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
       jacobian;                       ///< rows x parameters, d predicted; the change's columns last
@@ -38,10 +43,6 @@ struct BundleFit {
   std::vector<int> frames;              ///< of every instant
   Eigen::VectorXd unit;                 ///< rows: px or m of a whitened one; 0 for a pose's turn
   double correlation_time_s = 0.0;
-  Eigen::VectorXd values;  ///< of the change's parameters
-  double time_offset_s = 0.0;
-  KinematicTree tree;
-  Pose T_camera_base;
 };
 
 /// Joint values and rates at some instants, by the model's own idea of the channels' units.
@@ -60,6 +61,7 @@ class EffectBundle {
   EffectBundle(const EffectBundle&) = delete;
   EffectBundle& operator=(const EffectBundle&) = delete;
 
+  [[nodiscard]] BundleSolution solve(const BundleChange& change) const;
   /// Shares of corrections and probes have one entry a frame of the measurements.
   [[nodiscard]] BundleFit fit(const BundleChange& change,
                               const std::vector<Correction>& probes) const;

@@ -192,7 +192,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   std::vector<CameraEffect> library = all_effects(world);
   BundleChange change = change_of(library, effects);
   if (change.time_offset) {
-    world = world_at(bundle_->fit(change, {}).time_offset_s);
+    world = world_at(bundle_->solve(change).time_offset_s);
     library = all_effects(world);
     change = change_of(library, effects);
   }
@@ -263,9 +263,9 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
 
 TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& effects) const {
   std::vector<CameraEffect> library = all_effects(world_at(0.0));
-  BundleFit fit = bundle_->fit(change_of(library, effects), {});
+  BundleSolution fit = bundle_->solve(change_of(library, effects));
   library = all_effects(world_at(fit.time_offset_s));
-  fit = bundle_->fit(change_of(library, effects), {});
+  fit = bundle_->solve(change_of(library, effects));
   Corrected out;
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {

@@ -72,6 +72,11 @@ double best_scan(const NormalSystem& system, const Candidate& candidate) {
   return candidate.scan_listed ? candidate.scan[best] : refine(system, candidate, best);
 }
 
+double number_of_tests(const std::vector<Candidate>& candidates, const Candidate& candidate) {
+  return static_cast<double>(candidates.size()) *
+         static_cast<double>(std::max<std::size_t>(1, candidate.scan.size()));
+}
+
 std::vector<TestedMember> test_family(const NormalSystem& system,
                                       const std::vector<Candidate>& candidates) {
   std::vector<TestedMember> out;
@@ -83,8 +88,7 @@ std::vector<TestedMember> test_family(const NormalSystem& system,
     member.columns = candidate.columns(member.scan);
     KINESCOPE_CHECK(member.columns.size() == candidate.parameters.size(), "one column a parameter");
     member.score = score_test(system, member.columns);
-    member.tests = static_cast<double>(candidates.size()) *
-                   static_cast<double>(std::max<std::size_t>(1, candidate.scan.size()));
+    member.tests = number_of_tests(candidates, candidate);
     member.p_value = std::min(1.0, member.score.p_value * member.tests);
     out.push_back(std::move(member));
   }

@@ -22,6 +22,10 @@ struct TestedMember {
 /// The value of the scan at which the effect explains most; 0 where there is none.
 [[nodiscard]] double best_scan(const NormalSystem& system, const Candidate& candidate);
 
+/// Candidates times the values of this one's scan: by which a single p-value is multiplied.
+[[nodiscard]] double number_of_tests(const std::vector<Candidate>& candidates,
+                                     const Candidate& candidate);
+
 [[nodiscard]] std::vector<TestedMember> test_family(const NormalSystem& system,
                                                     const std::vector<Candidate>& candidates);
 

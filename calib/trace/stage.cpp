@@ -24,6 +24,16 @@ StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) 
   return std::make_shared<const Stage>(std::move(effects), std::move(fit));
 }
 
+const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {
+  const auto found = std::ranges::find(fit.candidates, id, &Candidate::id);
+  return found == fit.candidates.end() ? nullptr : &*found;
+}
+
+std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index) {
+  effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(index));
+  return effects;
+}
+
 Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
                      const Eigen::MatrixXd& prior) {
   Linearisation out = linear;

@@ -31,6 +31,11 @@ using StagePtr = std::shared_ptr<const Stage>;
 
 [[nodiscard]] StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects);
 
+/// Nothing where the fit does not name it.
+[[nodiscard]] const Candidate* find_candidate(const TracedFit& fit, const EffectId& id);
+
+[[nodiscard]] std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index);
+
 /// The linear model with more columns, and priors on them (empty: none).
 [[nodiscard]] Linearisation extend(const Linearisation& linear,
                                    const std::vector<EffectColumn>& columns,

@@ -20,16 +20,6 @@ constexpr std::size_t kMostRivals = 6;
 // Held-out losses further apart than this (Student's t of the stretches) need no refit to compare.
 constexpr double kClearlyWorse = 3.0;
 
-const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {
-  const auto found = std::ranges::find(fit.candidates, id, &Candidate::id);
-  return found == fit.candidates.end() ? nullptr : &*found;
-}
-
-std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index) {
-  effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(index));
-  return effects;
-}
-
 bool refines(const Candidate& candidate, const EffectId& id) {
   return std::ranges::find(candidate.refines, id) != candidate.refines.end();
 }
@@ -234,8 +224,7 @@ bool Tracer::check(std::size_t index) {
   own.scan = effect.scan;
   own.columns = candidate->columns(effect.scan);
   own.score = jackknife_test(stage->system, own.columns);
-  own.tests = static_cast<double>(stage->fit.candidates.size()) *
-              static_cast<double>(std::max<std::size_t>(1, candidate->scan.size()));
+  own.tests = number_of_tests(stage->fit.candidates, *candidate);
   own.p_value = std::min(1.0, own.score.p_value * own.tests);
   TracedEffect& detail = details_[index];
   detail.p_value = own.p_value;

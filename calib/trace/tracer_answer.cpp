@@ -63,16 +63,13 @@ void Tracer::drop_what_rests_explain() {
       return same_place(found.rest.place, effect.id.place) && !is_doubtful(found, i);
     });
     if (stands) continue;
-    std::vector<AddedEffect> effects = now_->added;
-    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
-    StagePtr stage = stage_of(std::move(effects));
-    const auto candidate = std::ranges::find(stage->fit.candidates, effect.id, &Candidate::id);
-    if (candidate == stage->fit.candidates.end()) continue;
+    StagePtr stage = stage_of(without(now_->added, i));
+    const Candidate* candidate = find_candidate(stage->fit, effect.id);
+    if (candidate == nullptr) continue;
     const Linearisation linear = with_rests(stage->fit.linear, rests_);
     const NormalSystem system(linear, stage->system.partition());
     const Score score = jackknife_test(system, candidate->columns(effect.scan));
-    const double tests = static_cast<double>(stage->fit.candidates.size() *
-                                             std::max<std::size_t>(1, candidate->scan.size()));
+    const double tests = number_of_tests(stage->fit.candidates, *candidate);
     if (!score.hidden() && score.p_value * tests < level_) continue;
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
@@ -92,9 +89,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     const EffectId id = now_->added[i].id;
     if (!same_place(found.rest.place, id.place)) continue;
     if (!is_doubtful(found, i)) continue;
-    std::vector<AddedEffect> effects = now_->added;
-    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(i));
-    StagePtr stage = stage_of(std::move(effects));
+    StagePtr stage = stage_of(without(now_->added, i));
     const auto alone = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
                                  level_, options_.floor);
     if (!alone || alone->rest.place != found.rest.place ||
@@ -161,8 +156,7 @@ void Tracer::summarise() {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const AddedEffect& added = now_->added[i];
     const Eigen::VectorXd& values = now_->fit.values[i];
-    const Candidate& candidate =
-        *std::ranges::find(base_->fit.candidates, added.id, &Candidate::id);
+    const Candidate& candidate = *find_candidate(base_->fit, added.id);
     const Eigen::MatrixXd block = covariance.block(at, at, values.size(), values.size());
     at += values.size();
     TracedEffect effect = details_[i];
