@@ -18,6 +18,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/log/channel_table.h"
 #include "kinematics/urdf/dynamic_urdf.h"
+#include "tests/experiments/real_logs.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
@@ -33,53 +34,6 @@ struct RealSet {
   TorqueSamples samples = {};
   TorqueTraceOptions options = {};
 };
-
-Eigen::MatrixXd columns(const ChannelTable& table, const std::string& prefix, int count) {
-  Eigen::MatrixXd out(table.rows(), count);
-  for (int j = 0; j < count; ++j) {
-    const auto column = table.column(prefix + std::to_string(j + 1));
-    KINESCOPE_CHECK(column.has_value(), "the set has the columns of its README");
-    out.col(j) = table.values.col(*column);
-  }
-  return out;
-}
-
-/// A log as its file has it: t, q, dq and torque columns.
-TorqueLog read_log(const fs::path& path, int joints, const std::string& torque) {
-  const ChannelTable table = read_channel_table(path);
-  TorqueLog log;
-  log.sources = {path.string()};
-  for (int j = 0; j < joints; ++j) log.joints.push_back({.name = fmt::format("joint{}", j + 1)});
-  log.t_s = table.values.col(*table.column("t"));
-  log.q = columns(table, "q", joints);
-  log.dq = columns(table, "dq", joints);
-  log.torque = columns(table, torque, joints);
-  log.trajectory = Eigen::VectorXi::Zero(log.rows());
-  log.trajectory_names = {path.stem().string()};
-  log.source.assign(static_cast<std::size_t>(log.rows()), 0);
-  log.lines = table.lines;
-  return log;
-}
-
-/// A serial arm by modified Denavit-Hartenberg rows (a, alpha, d), Craig's convention, no masses.
-DynamicModel dh_arm(const std::vector<std::array<double, 3>>& rows) {
-  KinematicTree tree;
-  tree.links.push_back({"base"});
-  for (const auto& [a, alpha, d] : rows) {
-    const auto index = static_cast<int>(tree.joints.size());
-    Joint joint;
-    joint.name = fmt::format("joint{}", index + 1);
-    joint.type = JointType::kRevolute;
-    joint.parent = LinkId{index};
-    joint.child = LinkId{index + 1};
-    joint.T_parent_joint =
-        Pose{exp_rotation(Eigen::Vector3d::UnitX() * alpha), Eigen::Vector3d::UnitX() * a} *
-        Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitZ() * d};
-    tree.joints.push_back(joint);
-    tree.links.push_back({fmt::format("link{}", index + 1)});
-  }
-  return without_masses(tree);
-}
 
 void use(RealSet& set, const Motion& motion) {
   set.samples = motion.samples;
