@@ -27,21 +27,20 @@ namespace kinescope::truth {
 ///   helical          m the joint advances along its axis in one turn
 ///   curved_slider    1/m, the slide runs on a circle of this curvature, the carriage along the
 ///                    tangent
-///   axis_wobble      rad, cone that the shaft's axis describes; detail: turns of its tilt a turn
-///   of
-///                    the joint, seen from the frame (0 and 1 would be a tilted bearing, a bent
-///                    shaft: no wobble but another geometry)
+///   axis_wobble      rad, cone that the shaft's axis describes; detail: turns of its tilt while
+///                    the joint turns once, seen from the frame (0 and 1 would be a tilted bearing,
+///                    a bent shaft: no wobble but another geometry)
 ///   lens_distortion  1, change of k1; detail: of k2. `with` "tangential": of p1 and p2
-///   rolling_shutter  s a row; detail: row that is exposed at the frame's stamp, share of the
-///   height tag_size         1, the tag is (1 + size) x as large as declared tag_slip         m, in
-///   the tag's plane, with a small turn; detail: when, share of the recording camera_bump      rad,
-///   about a point 0.3 m away; detail: when, share of the recording
+///   rolling_shutter  s a row; detail: row exposed at the frame's stamp, share of the height
+///   tag_size         1, the tag is (1 + size) x as large as declared
+///   tag_slip         m, in the tag's plane, with a small turn; detail: when, share of the time
+///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
 /// and of the test's own making, in no library:
-///   own_tanh         true value of `place` += size x tanh(5 (logged value of `with` - detail) /
-///   reach) own_speed        true value of `place` += size x (speed of `with` / its largest)^2
+///   own_tanh         true value of `place` +=
+///                    size x tanh(5 (logged value of `with` - detail) / reach)
+///   own_speed        true value of `place` += size x (speed of `with` / its largest)^2
 ///   own_chequer      px, corners shift one way on the black fields of a chequered image and back
-///   on
-///                    the white ones; detail: px, edge of a field
+///                    on the white ones; detail: px, edge of a field
 struct InjectedEffect {
   std::string effect;
   std::string place;

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Videos of random robots with undeclared effects, through the whole program, against their truth:
+//   filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] [--effect NAME|none]
+//          [--strength X] [--keep FOLDER]
+// One line a recording: structure, error of the markers at unseen postures, answer of the tracing.
+// The seed chooses robot, motion, noise and the place of the effect; --strength is in weakest ones
+// (tests/truth/injected_effect.h). --keep leaves the recordings and their run folders there.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/urdf.h"
+#include "tests/acceptance/truth_robot.h"
+#include "tests/experiments/trace_camera_worlds.h"
+#include "tests/truth/film.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using truth::InjectedEffect;
+using truth::RobotKind;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kFrameRate = 30.0;
+constexpr const char* kNothing = "none";
+
+struct Request {
+  int seeds = 1;
+  int first_seed = 0;
+  int frames = 330;
+  double strength = 10.0;
+  std::vector<RobotKind> kinds{truth::kRobotKinds.begin(), truth::kRobotKinds.end()};
+  std::vector<std::string> effects;
+  fs::path keep;
+};
+
+struct Outcome {
+  bool structure = false;
+  bool named = false;  ///< exactly what was injected, at its place; clean where that is nothing
+};
+
+truth::EffectWorldOptions exact_world(RobotKind kind, int seed, const Request& request) {
+  truth::EffectWorldOptions options;
+  options.seed = 9000 + static_cast<std::uint64_t>(seed);
+  options.kind = kind;
+  options.frames = request.frames;
+  options.frame_rate_hz = kFrameRate;
+  options.sigma_px = 0.0;
+  options.tag_size_m = 0.06;
+  options.encoder_step_rad = 1e-4;
+  return options;
+}
+
+std::optional<InjectedEffect> pick(const std::string& effect, double strength,
+                                   const truth::EffectWorldOptions& options) {
+  const auto places = truth::weakest_effects(effect, truth::robot_of(options));
+  if (places.empty()) return std::nullopt;
+  Rng rng = Rng::from_name("place of " + effect, options.seed);
+  InjectedEffect out = places[static_cast<std::size_t>(rng.index(static_cast<int>(places.size())))];
+  out.size *= strength;
+  return out;
+}
+
+acceptance::TruthRobot truth_of(const truth::World& world) {
+  acceptance::TruthRobot truth;
+  truth.tree = world.tree;
+  for (Eigen::Index j = 0; j < world.joint_values.cols(); ++j) {
+    const auto values = world.joint_values.col(j);
+    truth.range.push_back({values.minCoeff(), values.maxCoeff()});
+  }
+  return truth;
+}
+
+std::string answer_of(const json& trace) {
+  std::string out = trace.at("verdict").get<std::string>();
+  for (const json& found : trace.at("accepted")) {
+    out += fmt::format(", {} {} {:.4g}", found.at("effect").get<std::string>(),
+                       found.at("place").get<std::string>(), found.at("size").get<double>());
+  }
+  return out;
+}
+
+bool is_exact(const json& trace, const std::optional<InjectedEffect>& injected) {
+  const json& accepted = trace.at("accepted");
+  if (!injected) return trace.at("verdict") == "clean";
+  if (accepted.size() != 1 || trace.at("verdict") != "effects") return false;
+  const std::string place = accepted[0].at("place");
+  return accepted[0].at("effect") == injected->effect && place.starts_with(injected->place);
+}
+
+Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& injected,
+              const fs::path& folder, const std::string& name) {
+  RunOptions options;
+  options.recording.folder = folder;
+  options.output = folder / "run";
+  const auto begin = std::chrono::steady_clock::now();
+  ExitCode code = ExitCode::kDone;
+  std::string words;
+  try {
+    code = run_command(options, {false, true, {}});
+  } catch (const Error& error) {
+    words = error.what();
+    code = error.code();
+  }
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
+  fmt::print("{:32} [{}] ", name, injected ? describe(*injected) : kNothing);
+  Outcome out;
+  if (code != ExitCode::kDone) {
+    fmt::print("exit {}: {}\n", static_cast<int>(code), words);
+    return out;
+  }
+  const acceptance::TruthRobot truth = truth_of(world);
+  const KinematicTree learned = read_urdf(folder / "run" / "robot.urdf");
+  const std::string difference = acceptance::structure_difference(truth, learned);
+  const json trace = json::parse(read_text_file(folder / "run" / "trace.json"));
+  out.structure = difference.empty();
+  out.named = is_exact(trace, injected);
+  if (!out.structure) {
+    fmt::print("STRUCTURE {}\n", difference);
+    return out;
+  }
+  const auto error = acceptance::compare_with_truth(truth, learned);
+  fmt::print("{:.3f} mm {:.4f} deg; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
+             1e3 * error.marker_rms_m, error.worst_direction_rad / kDegree,
+             trace.at("held_out_before").at("value").get<double>(),
+             trace.at("held_out_after").at("value").get<double>(), out.named ? "" : "NOT ",
+             answer_of(trace), time.count());
+  return out;
+}
+
+Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect,
+                       const Request& request) {
+  truth::EffectWorldOptions options = exact_world(kind, seed, request);
+  std::optional<InjectedEffect> injected;
+  if (effect != kNothing) injected = pick(effect, request.strength, options);
+  if (injected) options.effects = {*injected};
+  const std::string name = fmt::format("{}_{}_{}", to_string(kind), seed, effect);
+  const bool keeps = !request.keep.empty();
+  const fs::path folder =
+      (keeps ? request.keep : fs::temp_directory_path() / "kinescope_filmed") / name;
+  fs::create_directories(folder);
+  const truth::World world = truth::make_effect_world(options);
+  truth::write_recording(folder, world, {.frame_rate_hz = kFrameRate, .seed = options.seed});
+  const Outcome out = judge(world, injected, folder, name);
+  std::fflush(stdout);
+  if (!keeps) fs::remove_all(folder);
+  return out;
+}
+
+bool can_have(RobotKind kind, int seed, const std::string& effect, const Request& request) {
+  return effect == kNothing || pick(effect, 1.0, exact_world(kind, seed, request)).has_value();
+}
+
+void run(const Request& request) {
+  int count = 0;
+  int right = 0;
+  int named = 0;
+  for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed) {
+    for (const RobotKind kind : request.kinds) {
+      for (const std::string& effect : request.effects) {
+        if (!can_have(kind, seed, effect, request)) continue;
+        const Outcome outcome = film_and_judge(kind, seed, effect, request);
+        ++count;
+        right += outcome.structure ? 1 : 0;
+        named += outcome.named ? 1 : 0;
+      }
+    }
+  }
+  fmt::print("{} recordings: structure right in {}, answer exactly right in {}\n", count, right,
+             named);
+}
+
+bool parse(int argc, char** argv, Request& request) {
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string key = argv[i];
+    const std::string value = argv[i + 1];
+    if (key == "--seeds") {
+      request.seeds = std::atoi(value.c_str());
+    } else if (key == "--first-seed") {
+      request.first_seed = std::atoi(value.c_str());
+    } else if (key == "--frames") {
+      request.frames = std::atoi(value.c_str());
+    } else if (key == "--strength") {
+      request.strength = std::atof(value.c_str());
+    } else if (key == "--effect") {
+      request.effects.push_back(value);
+    } else if (key == "--keep") {
+      request.keep = value;
+    } else if (key == "--robot") {
+      std::erase_if(request.kinds, [&](RobotKind kind) { return to_string(kind) != value; });
+    } else {
+      return false;
+    }
+  }
+  if (request.effects.empty()) {
+    request.effects = truth::library_effects();
+    request.effects.insert(request.effects.begin(), kNothing);
+  }
+  return argc % 2 == 1;
+}
+
+}  // namespace
+}  // namespace kinescope
+
+int main(int argc, char** argv) {
+  kinescope::Request request;
+  if (!kinescope::parse(argc, argv, request)) {
+    fmt::print(stderr,
+               "filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] "
+               "[--effect NAME|none] [--strength X] [--keep FOLDER]\n");
+    return 2;
+  }
+  kinescope::run(request);
+  return 0;
+}
