@@ -12,9 +12,9 @@ packages=(
   esbuild libjs-three
 )
 if [[ "${1:-}" == tests ]]; then
-  packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev chromium)
+  packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev)
   # Not in every release; the tests that want them say so and skip.
-  optional=(libmujoco-dev clang-format-19)
+  optional=(libmujoco-dev clang-format-19 chromium)
 else
   optional=()
 fi

@@ -2,7 +2,7 @@
 //
 // Videos of random robots with undeclared effects, through the whole program, against their truth:
 //   filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] [--effect NAME|none]
-//          [--strength X] [--keep FOLDER]
+//          [--strength X] [--scale X] [--keep FOLDER]
 // One line a recording: structure, error of the markers at unseen postures, answer of the tracing.
 // The seed chooses robot, motion, noise and the place of the effect; --strength is in weakest ones
 // (tests/truth/injected_effect.h). --keep leaves the recordings and their run folders there.
@@ -45,6 +45,7 @@ struct Request {
   int first_seed = 0;
   int frames = 330;
   double strength = 10.0;
+  double scale = 2.0;  ///< of the robot: smaller ones hide their tags
   std::vector<RobotKind> kinds{truth::kRobotKinds.begin(), truth::kRobotKinds.end()};
   std::vector<std::string> effects;
   fs::path keep;
@@ -63,6 +64,7 @@ truth::EffectWorldOptions exact_world(RobotKind kind, int seed, const Request& r
   options.frame_rate_hz = kFrameRate;
   options.sigma_px = 0.0;
   options.tag_size_m = 0.06;
+  options.scale = request.scale;
   options.encoder_step_rad = 1e-4;
   return options;
 }
@@ -198,6 +200,8 @@ bool parse(int argc, char** argv, Request& request) {
       request.frames = std::atoi(value.c_str());
     } else if (key == "--strength") {
       request.strength = std::atof(value.c_str());
+    } else if (key == "--scale") {
+      request.scale = std::atof(value.c_str());
     } else if (key == "--effect") {
       request.effects.push_back(value);
     } else if (key == "--keep") {
@@ -223,7 +227,7 @@ int main(int argc, char** argv) {
   if (!kinescope::parse(argc, argv, request)) {
     fmt::print(stderr,
                "filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] "
-               "[--effect NAME|none] [--strength X] [--keep FOLDER]\n");
+               "[--effect NAME|none] [--strength X] [--scale X] [--keep FOLDER]\n");
     return 2;
   }
   kinescope::run(request);

@@ -298,6 +298,7 @@ FilmedRobot robot_of(const EffectWorldOptions& options) {
   robot.duration_s = options.frames / options.frame_rate_hz;
   robot.amplitude_rad = options.amplitude_rad;
   robot.tag_size_m = options.tag_size_m;
+  robot.scale = options.scale;
   robot.down = options.down;
   return draw_filmed_robot(robot);
 }

@@ -24,6 +24,7 @@ struct EffectWorldOptions {
   double log_rate_hz = 200.0;
   double amplitude_rad = 1.0;
   double tag_size_m = 0.05;
+  double scale = 1.0;                                ///< of the robot, not of its tags
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< gravity, base frame
   double sigma_px = 0.1;                             ///< noise of a corner's coordinate; 0: exact
   double correlated_share = 0.0;  ///< of the noise's variance, correlated in time

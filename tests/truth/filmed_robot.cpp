@@ -218,17 +218,18 @@ FilmedRobot draw_filmed_robot(const FilmedRobotOptions& options) {
   Rng rng = Rng::from_name(fmt::format("filmed robot {}", to_string(options.kind)), options.seed);
   FilmedRobot robot;
   robot.duration_s = options.duration_s;
-  robot.prismatic_m_per_rad = options.prismatic_m_per_rad;
+  robot.prismatic_m_per_rad = options.scale * options.prismatic_m_per_rad;
   robot.seed = options.seed;
   robot.down = options.down.normalized();
   robot.camera = pinhole_guess(1280, 720, 900.0);
   robot.camera.distortion = {-0.08, 0.03, 0.0005, -0.0004, 0.0};
   robot.markers.default_size_m = options.tag_size_m;
   robot.tree = tree_of(plan_of(options.kind, rng));
+  for (Joint& joint : robot.tree.joints) joint.T_parent_joint.translation *= options.scale;
   robot.T_camera_base = place_camera(robot.tree, options.distance_m, rng);
   mount_tags(options, rng, robot);
   for (const Joint& joint : robot.tree.joints) {
-    const double unit = joint.type == JointType::kPrismatic ? options.prismatic_m_per_rad : 1.0;
+    const double unit = joint.type == JointType::kPrismatic ? robot.prismatic_m_per_rad : 1.0;
     robot.motions.emplace_back(unit * options.amplitude_rad, options, rng);
   }
   return robot;

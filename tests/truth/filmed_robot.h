@@ -37,6 +37,7 @@ struct FilmedRobotOptions {
   double lowest_hz = 0.1;             ///< of the three sines of every joint
   double highest_hz = 0.4;
   double tag_size_m = 0.05;
+  double scale = 1.0;                                ///< of the links' lengths and the slides' ways
   double distance_m = 1.3;                           ///< of the camera from the middle of the robot
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< gravity, base frame
 };
