@@ -2,7 +2,10 @@
 #include "kinematics/structure/structure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/structure/assemble.h"
@@ -32,6 +35,102 @@ PoseTracks without_rare(const PoseTracks& tracks) {
   PoseTracks out = tracks;
   std::erase_if(out.tracks, [](const PoseTrack& t) { return t.samples.size() < kFewestSightings; });
   return out;
+}
+
+// Errors that are no noise, as a share of the distance to the camera and in rad, that are allowed
+// for where the sightings' own noise makes no whole robot: a marker of another size than declared
+// or one that slips, a camera that is bumped.
+constexpr std::array kAllowances{0.003, 0.01};
+
+struct Answer {
+  FoundTree found;
+  Series full;  ///< with the allowance
+  Series thin;
+  double allowance = 0.0;
+};
+
+// The median over all sightings, m.
+double distance_of(const Series& series) {
+  std::vector<double> distances;
+  for (const Body& body : series.bodies) {
+    for (const Sighting& s : body.at) {
+      if (s.seen) distances.push_back(s.pose.translation.norm());
+    }
+  }
+  return median_of(std::move(distances));
+}
+
+Series with_allowance(Series series, double share) {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(share * share),
+      Eigen::Vector3d::Constant(std::pow(share * distance_of(series), 2));
+  for (Body& body : series.bodies) {
+    for (Sighting& s : body.at) {
+      if (!s.seen) continue;
+      s.covariance.diagonal() += variance;
+      s.whitening = whitening_of(s.covariance);
+    }
+  }
+  return series;
+}
+
+// Channels that drive joints, each once for every joint.
+std::vector<int> driving_channels(const GrownTree& tree) {
+  std::vector<int> channels;
+  for (const GrownLink& link : tree.links) {
+    if (link.founder < 0) continue;
+    for (const ChainJoint& joint : link.attachment.fit.model.joints) {
+      if (!joint.terms.empty()) channels.push_back(joint.terms.front().channel);
+    }
+  }
+  std::ranges::sort(channels);
+  return channels;
+}
+
+// Every body hangs by joints that channels drive, no channel drives two of them.
+bool is_whole(const GrownTree& tree) {
+  const bool driven = std::ranges::all_of(tree.links, [](const GrownLink& link) {
+    return link.founder < 0 || link.attachment.driven();
+  });
+  const bool free = std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
+  const std::vector<int> channels = driving_channels(tree);
+  return driven && !free && !channels.empty() &&
+         std::ranges::adjacent_find(channels) == channels.end();
+}
+
+std::size_t used_channels(const GrownTree& tree) {
+  std::vector<int> channels = driving_channels(tree);
+  const auto rest = std::ranges::unique(channels);
+  return channels.size() - rest.size();
+}
+
+// With the sightings' own noise or, where that makes no whole robot, with the smallest allowance
+// that makes one of as many channels.
+Answer search(Series full, const JointLog& log, const StructureOptions& options) {
+  Answer answer;
+  answer.thin = thinned(full, kInstants);
+  answer.full = std::move(full);
+  answer.found = search_tree(answer.full, answer.thin, log, options);
+  if (log.channels.empty() || is_whole(answer.found.tree)) return answer;
+  for (const double allowance : kAllowances) {
+    Answer other;
+    other.full = with_allowance(answer.full, allowance);
+    other.thin = thinned(other.full, kInstants);
+    other.found = search_tree(other.full, other.thin, log, options);
+    other.allowance = allowance;
+    const bool as_many = used_channels(other.found.tree) >= used_channels(answer.found.tree);
+    if (as_many && is_whole(other.found.tree)) return other;
+  }
+  return answer;
+}
+
+StructureDoubt allowance_doubt(double allowance) {
+  return {fmt::format("the markers move as the joints say to {:.1f} % of their distance from the "
+                      "camera only, which is more than their noise",
+                      100.0 * allowance),
+          "check that no marker has slipped, that the camera stood still and that tags.yaml has "
+          "every marker's size",
+          {}};
 }
 
 Structure nothing(StructureDoubt doubt) {
@@ -66,19 +165,21 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
     return nothing(
         {"no marker was seen often enough", "record with the markers in view of the camera", {}});
   }
-  const Series full = clean_series(seen);
-  const Series thin = thinned(full, kInstants);
-  const Readings overlap = readings_at(log, thin, 0.0, options.max_gap_s);
+  Series clean = clean_series(seen);
+  const Readings overlap = readings_at(log, thinned(clean, kInstants), 0.0, options.max_gap_s);
   if (!log.channels.empty() && std::ranges::count(overlap.valid, 1) < kFewestSightings) {
     return nothing({"the joint log and the frames share no time",
                     "check that both clocks start together, or give the offset between them",
                     {}});
   }
-  const FoundTree s = search_tree(full, thin, log, options);
-  const Verdict verdict = judge(s.tree, thin, s.readings, log, options);
+  const Answer answer = search(std::move(clean), log, options);
+  const FoundTree& s = answer.found;
+  const Series& full = answer.full;
+  const Verdict verdict = judge(s.tree, answer.thin, s.readings, log, options);
   const Readings every = readings_like(s.readings, log, full, s.offset.value_s, options.max_gap_s);
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
+  if (answer.allowance > 0.0) out.doubts.push_back(allowance_doubt(answer.allowance));
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;
   for (const PoseTrack& t : tracks.tracks) {

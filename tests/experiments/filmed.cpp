@@ -4,6 +4,8 @@
 //   filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] [--effect NAME|none]
 //          [--strength X] [--scale X] [--keep FOLDER]
 // One line a recording: structure, error of the markers at unseen postures, answer of the tracing.
+// An effect counts as visible where it is larger than the smallest one that the tracing of the same
+// recording without effects says it would have found.
 // The seed chooses robot, motion, noise and the place of the effect; --strength is in weakest ones
 // (tests/truth/injected_effect.h). --keep leaves the recordings and their run folders there.
 #include <algorithm>
@@ -11,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -54,7 +57,11 @@ struct Request {
 struct Outcome {
   bool structure = false;
   bool named = false;  ///< exactly what was injected, at its place; clean where that is nothing
+  bool visible = true;
 };
+
+/// Smallest size that would have been found, by effect and place.
+using Floor = std::map<std::pair<std::string, std::string>, double>;
 
 truth::EffectWorldOptions exact_world(RobotKind kind, int seed, const Request& request) {
   truth::EffectWorldOptions options;
@@ -106,8 +113,26 @@ bool is_exact(const json& trace, const std::optional<InjectedEffect>& injected) 
   return accepted[0].at("effect") == injected->effect && place.starts_with(injected->place);
 }
 
+Floor floor_of(const json& trace) {
+  Floor out;
+  for (const json& missing : trace.at("not_found")) {
+    const json& size = missing.at("smallest_size");
+    out[{missing.at("effect"), missing.at("place")}] =
+        size.is_number() ? size.get<double>() : std::numeric_limits<double>::infinity();
+  }
+  return out;
+}
+
+bool is_visible(const Floor& floor, const InjectedEffect& injected) {
+  for (const auto& [key, size] : floor) {
+    if (key.first == injected.effect && key.second.starts_with(injected.place))
+      return std::abs(injected.size) > size;
+  }
+  return true;
+}
+
 Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& injected,
-              const fs::path& folder, const std::string& name) {
+              const fs::path& folder, const std::string& name, Floor& floor) {
   RunOptions options;
   options.recording.folder = folder;
   options.output = folder / "run";
@@ -133,6 +158,8 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
   const json trace = json::parse(read_text_file(folder / "run" / "trace.json"));
   out.structure = difference.empty();
   out.named = is_exact(trace, injected);
+  if (!injected) floor = floor_of(trace);
+  out.visible = !injected || is_visible(floor, *injected);
   if (!out.structure) {
     fmt::print("STRUCTURE {}\n", difference);
     return out;
@@ -141,13 +168,16 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
   fmt::print("{:.3f} mm {:.4f} deg; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
              1e3 * error.marker_rms_m, error.worst_direction_rad / kDegree,
              trace.at("held_out_before").at("value").get<double>(),
-             trace.at("held_out_after").at("value").get<double>(), out.named ? "" : "NOT ",
+             trace.at("held_out_after").at("value").get<double>(),
+             out.named     ? ""
+             : out.visible ? "NOT "
+                           : "too small, ",
              answer_of(trace), time.count());
   return out;
 }
 
-Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect,
-                       const Request& request) {
+Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect, const Request& request,
+                       Floor& floor) {
   truth::EffectWorldOptions options = exact_world(kind, seed, request);
   std::optional<InjectedEffect> injected;
   if (effect != kNothing) injected = pick(effect, request.strength, options);
@@ -159,7 +189,7 @@ Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect,
   fs::create_directories(folder);
   const truth::World world = truth::make_effect_world(options);
   truth::write_recording(folder, world, {.frame_rate_hz = kFrameRate, .seed = options.seed});
-  const Outcome out = judge(world, injected, folder, name);
+  const Outcome out = judge(world, injected, folder, name, floor);
   std::fflush(stdout);
   if (!keeps) fs::remove_all(folder);
   return out;
@@ -172,20 +202,23 @@ bool can_have(RobotKind kind, int seed, const std::string& effect, const Request
 void run(const Request& request) {
   int count = 0;
   int right = 0;
+  int visible = 0;
   int named = 0;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed) {
     for (const RobotKind kind : request.kinds) {
+      Floor floor;
       for (const std::string& effect : request.effects) {
         if (!can_have(kind, seed, effect, request)) continue;
-        const Outcome outcome = film_and_judge(kind, seed, effect, request);
+        const Outcome outcome = film_and_judge(kind, seed, effect, request, floor);
         ++count;
         right += outcome.structure ? 1 : 0;
-        named += outcome.named ? 1 : 0;
+        visible += outcome.visible ? 1 : 0;
+        named += outcome.visible && outcome.named ? 1 : 0;
       }
     }
   }
-  fmt::print("{} recordings: structure right in {}, answer exactly right in {}\n", count, right,
-             named);
+  fmt::print("{} recordings: structure right in {}; answer exactly right in {} of {} visible\n",
+             count, right, named, visible);
 }
 
 bool parse(int argc, char** argv, Request& request) {
