@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Errors that are no noise must not break a robot apart: they are what tracing looks for later.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/kinematics/structure/scenes.h"
+
+namespace kinescope {
+namespace {
+
+constexpr int kRobots = 3;
+
+// Refined corners of tags of 40 px at 1 m or so.
+RecordingOptions exact() {
+  RecordingOptions o;
+  o.frames = 330;
+  o.sigma_m = 3e-4;
+  o.sigma_rad = 0.1 * kDegree;
+  return o;
+}
+
+PoseTrack& track_on(Scene& scene, int link) {
+  for (PoseTrack& track : scene.recording.tracks.tracks) {
+    if (scene.robot.tree.marker(track.id)->link.value == link) return track;
+  }
+  throw std::logic_error("no marker on the link");
+}
+
+void expect_right(const Scene& scene, const std::string& what) {
+  const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_EQ(described(s, scene.robot), described(scene)) << what;
+  EXPECT_TRUE(s.free_markers.empty()) << what;
+}
+
+class SystematicErrors : public testing::TestWithParam<int> {
+ protected:
+  [[nodiscard]] static Scene scene() {
+    return make_scene("Systematic " + std::to_string(GetParam()), {.joints = 3 + GetParam()},
+                      exact());
+  }
+};
+
+TEST_P(SystematicErrors, AMarkerOfAnotherSize) {
+  for (const double factor : {1.01, 0.97}) {
+    Scene s = scene();
+    for (PoseSample& sample : track_on(s, 1).samples) sample.T_camera_marker.translation *= factor;
+    expect_right(s, "size");
+  }
+}
+
+TEST_P(SystematicErrors, AMarkerThatSlips) {
+  Scene s = scene();
+  const Pose slip{exp_rotation({0.0, 0.0, 0.03}), {0.004, -0.002, 0.0}};
+  for (PoseSample& sample : track_on(s, 2).samples) {
+    if (sample.frame > 180) sample.T_camera_marker = sample.T_camera_marker * slip;
+  }
+  expect_right(s, "slip");
+}
+
+TEST_P(SystematicErrors, ACameraThatIsBumped) {
+  Scene s = scene();
+  const Pose bump{exp_rotation({0.003, -0.002, 0.001}), {0.001, 0.002, 0.0}};
+  for (PoseTrack& track : s.recording.tracks.tracks) {
+    for (PoseSample& sample : track.samples) {
+      if (sample.frame > 150) sample.T_camera_marker = bump * sample.T_camera_marker;
+    }
+  }
+  expect_right(s, "bump");
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, SystematicErrors, testing::Range(0, kRobots));
+
+}  // namespace
+}  // namespace kinescope
