@@ -9,6 +9,7 @@
 
 #include "kinematics/core/error.h"
 #include "kinematics/structure/assemble.h"
+#include "kinematics/structure/natural_units.h"
 #include "kinematics/structure/readings.h"
 #include "kinematics/structure/search.h"
 #include "kinematics/structure/series.h"
@@ -38,9 +39,11 @@ PoseTracks without_rare(const PoseTracks& tracks) {
 }
 
 // Errors that are no noise, as a share of the distance to the camera and in rad, that are allowed
-// for where the sightings' own noise makes no whole robot: a marker of another size than declared
-// or one that slips, a camera that is bumped.
+// for where the sightings' own noise makes no whole robot or leaves far more than itself: a marker
+// of another size than declared or one that slips, a camera that is bumped.
 constexpr std::array kAllowances{0.003, 0.01};
+// Variance across a joint over the declared one.
+constexpr double kFarMore = 10.0;
 
 struct Answer {
   FoundTree found;
@@ -98,30 +101,40 @@ bool is_whole(const GrownTree& tree) {
          std::ranges::adjacent_find(channels) == channels.end();
 }
 
+bool leaves_far_more(const GrownTree& tree) {
+  return std::ranges::any_of(
+      tree.bodies, [](const GrownBody& b) { return b.attachment.fit.variance > kFarMore; });
+}
+
 std::size_t used_channels(const GrownTree& tree) {
   std::vector<int> channels = driving_channels(tree);
   const auto rest = std::ranges::unique(channels);
   return channels.size() - rest.size();
 }
 
-// With the sightings' own noise or, where that makes no whole robot, with the smallest allowance
-// that makes one of as many channels.
+Answer search_with(Series full, double allowance, const JointLog& log,
+                   const StructureOptions& options) {
+  Answer out;
+  out.full = std::move(full);
+  out.thin = thinned(out.full, kInstants);
+  out.allowance = allowance;
+  out.found = search_tree(out.full, out.thin, log, options);
+  out.found.tree = in_natural_units(std::move(out.found.tree), out.thin, out.found.readings);
+  return out;
+}
+
+// With the sightings' own noise or, where that makes no whole robot or leaves far more than itself,
+// with the smallest allowance that makes one of as many channels.
 Answer search(Series full, const JointLog& log, const StructureOptions& options) {
-  Answer answer;
-  answer.thin = thinned(full, kInstants);
-  answer.full = std::move(full);
-  answer.found = search_tree(answer.full, answer.thin, log, options);
-  if (log.channels.empty() || is_whole(answer.found.tree)) return answer;
+  Answer plain = search_with(std::move(full), 0.0, log, options);
+  const bool whole = is_whole(plain.found.tree);
+  if (log.channels.empty() || (whole && !leaves_far_more(plain.found.tree))) return plain;
   for (const double allowance : kAllowances) {
-    Answer other;
-    other.full = with_allowance(answer.full, allowance);
-    other.thin = thinned(other.full, kInstants);
-    other.found = search_tree(other.full, other.thin, log, options);
-    other.allowance = allowance;
-    const bool as_many = used_channels(other.found.tree) >= used_channels(answer.found.tree);
+    Answer other = search_with(with_allowance(plain.full, allowance), allowance, log, options);
+    const bool as_many = used_channels(other.found.tree) >= used_channels(plain.found.tree);
     if (as_many && is_whole(other.found.tree)) return other;
   }
-  return answer;
+  return plain;
 }
 
 StructureDoubt allowance_doubt(double allowance) {

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/natural_units.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "kinematics/structure/screening.h"
+
+namespace kinescope::structure_search {
+namespace {
+
+// A scale this close to that of a usual unit is no accident.
+constexpr double kClose = 0.05;
+// What the other type of joint may leave: errors that are no noise are of this size.
+constexpr double kRotation = 0.03;     // rad
+constexpr double kTranslation = 0.01;  // of the distance to the camera
+
+// The channel is in rad or degrees, m or millimetres.
+bool is_natural(JointType type, double scale) {
+  const std::array<double, 2> units = type == JointType::kRevolute
+                                          ? std::array{1.0, std::numbers::pi / 180.0}
+                                          : std::array{1.0, 1e-3};
+  return std::ranges::any_of(
+      units, [&](double unit) { return std::abs(std::abs(scale) - unit) < kClose * unit; });
+}
+
+// rad or m per unit of the channel.
+double scale_of(const ChainFit& fit, const Readings& readings) {
+  const ChainTerm& term = fit.model.joints.front().terms.front();
+  return term.scale / readings.rms[static_cast<std::size_t>(term.channel)];
+}
+
+double distance_of(const Body& body) {
+  std::vector<double> distances;
+  for (const Sighting& s : body.at) {
+    if (s.seen) distances.push_back(s.pose.translation.norm());
+  }
+  return median_of(std::move(distances));
+}
+
+// The body by a joint of the other type and the same channel, where that is natural and fits.
+std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
+                                        const LinkPath& parent, const Readings& readings) {
+  const RelativeMotion relative = relative_motion(body, parent, readings);
+  std::vector<char> only(static_cast<std::size_t>(readings.channels()), 0);
+  only[static_cast<std::size_t>(now.channel())] = 1;
+  const JointType type = now.fit.model.joints.front().type;
+  for (const Candidate& candidate :
+       screen_motion(relative.motion, readings.value, only, {.coordinate_free = false})) {
+    if (candidate.start.joints.size() != 1 || candidate.channel != now.channel()) continue;
+    const JointType other = candidate.start.joints.front().type;
+    if (other == type) continue;
+    ChainFit fit = fit_chain(relative.motion, readings.value, candidate.start);
+    const bool fits =
+        fit.rotation_rms < kRotation && fit.translation_rms < kTranslation * distance_of(body);
+    if (!fits || !is_natural(other, scale_of(fit, readings))) continue;
+    return attachment_from(std::move(fit), now.parent, relative, body, readings);
+  }
+  return std::nullopt;
+}
+
+bool is_odd(const Attachment& attachment, const Readings& readings) {
+  return attachment.driven() && attachment.fit.model.joints.size() == 1 &&
+         !is_natural(attachment.fit.model.joints.front().type, scale_of(attachment.fit, readings));
+}
+
+}  // namespace
+
+GrownTree in_natural_units(GrownTree tree, const Series& series, const Readings& readings) {
+  for (std::size_t l = 1; l < tree.links.size(); ++l) {
+    if (!is_odd(tree.links[l].attachment, readings)) continue;
+    const std::size_t founder = tree.founder_of(static_cast<int>(l));
+    const Attachment before = tree.links[l].attachment;
+    std::optional<Attachment> other = as_other_type(before, series.bodies[founder],
+                                                    tree.link(tree.links[l].parent).path, readings);
+    if (!other) continue;
+    tree.links[l].attachment = std::move(*other);
+    std::erase_if(tree.bodies[founder].alternatives, [&](const Attachment& a) {
+      return a.parent == before.parent && a.channel() == before.channel();
+    });
+    tree = refit_tree(tree, series, readings);
+  }
+  return tree;
+}
+
+}  // namespace kinescope::structure_search

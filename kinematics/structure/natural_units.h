@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a grown tree.
+// Gives   the same with slides in place of turns (and turns in place of slides) where the channel
+//         then is in m (or rad) and was in no unit that a log would have.
+// Method  a short slide that is bent, whose marker slips or whose lens is not as declared looks
+//         like a turn about a far axis; by the noise alone it is one beyond doubt. But a channel
+//         that tells a slide's metres to a few per cent does not do so by accident.
+#pragma once
+
+#include "kinematics/structure/grown_tree.h"
+
+namespace kinescope::structure_search {
+
+[[nodiscard]] GrownTree in_natural_units(GrownTree tree, const Series& series,
+                                         const Readings& readings);
+
+}  // namespace kinescope::structure_search
