@@ -6,7 +6,7 @@ namespace {
 
 // The detector's corners are off by this much in ways that repeat with the view (H.264, light,
 // small markers). Corners from elsewhere are taken at their word.
-constexpr double kDetectorBias = 0.02;  // px
+constexpr double kDetectorBias = 0.01;  // px
 
 // From where the plain calibration ended; a nominal robot stays the start, since its prior is
 // around it.

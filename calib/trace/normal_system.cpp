@@ -74,7 +74,8 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
     const auto i = static_cast<Eigen::Index>(instant_[static_cast<std::size_t>(entry.row())]);
     sums.with_residual[i] += entry.value() * linear_->residual[entry.row()];
     with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
-    sums.rows[i] += 1.0;
+    const double unit = linear_->unit[entry.row()];
+    if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
   }
   sums.with_jacobian = with_jacobian;
   return carriers_.emplace(index, std::move(sums)).first->second;
@@ -160,16 +161,17 @@ std::vector<EffectSums> NormalSystem::cell_sums(const std::vector<EffectColumn>&
   return out;
 }
 
-double NormalSystem::touched_rows(const std::vector<EffectColumn>& columns) const {
-  Eigen::VectorXd rows = Eigen::VectorXd::Zero(linear_->instants());
+double NormalSystem::shift_of(double gain, const std::vector<EffectColumn>& columns) const {
+  Eigen::VectorXd weight = Eigen::VectorXd::Zero(linear_->instants());
   for (const EffectColumn& column : columns) {
     const Eigen::VectorXd share = share_of(column);
-    const Eigen::VectorXd& touched = carrier(column.carrier).rows;
-    for (Eigen::Index i = 0; i < rows.size(); ++i) {
-      if (share[i] != 0.0) rows[i] = std::max(rows[i], touched[i]);
+    const Eigen::VectorXd& touched = carrier(column.carrier).weight;
+    for (Eigen::Index i = 0; i < weight.size(); ++i) {
+      if (share[i] != 0.0) weight[i] = std::max(weight[i], touched[i]);
     }
   }
-  return rows.sum();
+  const double sum = weight.sum();
+  return sum > 0.0 ? std::sqrt(std::max(0.0, gain) / sum) : 0.0;
 }
 
 }  // namespace kinescope::trace

@@ -47,15 +47,17 @@ class NormalSystem {
   [[nodiscard]] EffectSums sums(const std::vector<EffectColumn>& columns) const;
   /// Sums over each cell.
   [[nodiscard]] std::vector<EffectSums> cell_sums(const std::vector<EffectColumn>& columns) const;
-  /// Rows that the carriers of these columns touch while their share is not zero.
-  [[nodiscard]] double touched_rows(const std::vector<EffectColumn>& columns) const;
+  /// By how much columns move the prediction where they take `gain` from the whitened sum of
+  /// squares: the same shift of every row they touch would take as much; in the residual's unit.
+  [[nodiscard]] double shift_of(double gain, const std::vector<EffectColumn>& columns) const;
 
  private:
-  // Of one carrier at each instant: carrier'residual, carrier'J, and how many rows it touches.
+  // Of one carrier at each instant: carrier'residual, carrier'J, and the weight of the rows
+  // it touches, in the inverse square of the residual's unit.
   struct CarrierSums {
     Eigen::VectorXd with_residual;
     Eigen::MatrixXd with_jacobian;  // instants x parameters
-    Eigen::VectorXd rows;
+    Eigen::VectorXd weight;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;

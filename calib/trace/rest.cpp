@@ -222,6 +222,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
       after.total().rr - 2.0 * step.dot(after.total().g) + step.dot(after.total().H * step);
   out.rest.explained = 1.0 - left / system.total().rr;
   if (out.rest.explained < kLeastShare) return std::nullopt;
+  if (system.shift_of(system.total().rr - left, out.columns) < floor) return std::nullopt;
   out.rest.held_out_before = held_out_error(system, held_out_instants(system));
   out.rest.held_out_after = held_out_error(after, held_out_instants(after));
   // What does not help to predict is no structure.

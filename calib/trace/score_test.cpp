@@ -60,12 +60,6 @@ Projected project(const NormalSystem& system, const EffectSums& raw) {
   return out;
 }
 
-// Rows touched by natural unit: what one whitened unit is on average.
-double mean_unit(const Linearisation& linear) {
-  return std::sqrt(linear.unit.squaredNorm() /
-                   static_cast<double>(std::max<Eigen::Index>(1, linear.unit.size())));
-}
-
 // What the stretches say about the effect, one column each, and how much of it each one carries.
 struct StretchScores {
   Eigen::MatrixXd scores;
@@ -122,9 +116,7 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.theta = p.T * p.theta;
   out.covariance = p.T * covariance * p.T.transpose();
   out.gain = p.gain;
-  const double rows = std::max(1.0, system.touched_rows(columns));
-  out.rms =
-      std::sqrt(std::max(0.0, p.theta.dot(p.S * p.theta)) / rows) * mean_unit(system.linear());
+  out.rms = system.shift_of(p.theta.dot(p.S * p.theta), columns);
   out.freedom = std::floor(effective) - k;
   const bool few = out.freedom < kFewStretches;
   if (few) out.freedom = system.partition().stretches - k;

@@ -21,7 +21,7 @@ struct TraceOptions {
   double false_alarm_rate = 0.01;  ///< of finding anything at all in a recording without effects
   int max_effects = 12;
   int refits = 3;  ///< candidates refitted in full before one is chosen
-  /// Effects that move the prediction by less than this (rms over the rows they touch, in the
+  /// Effects that move the prediction by less than this (over the rows that they touch, in the
   /// residual's unit) are below what the sensor itself gets wrong and are not looked for.
   double floor = 0.0;
   /// Effects that the model has already: they stay if they earn their place.

@@ -287,6 +287,12 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const Candidate& candidate = without.fit.candidates[rival.index];
     const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
     if (comparison == Comparison::kFirst) continue;
+    // A richer one that says less is no rival.
+    const bool richer = rival.columns.size() > own.columns.size();
+    if (comparison == Comparison::kInterchangeable && richer &&
+        rival.score.gain <= own.score.gain) {
+      continue;
+    }
     // Of two that say the same the plainer one comes first.
     const bool plainer = rival.columns.size() < own.columns.size();
     if (comparison == Comparison::kSecond || plainer) {
