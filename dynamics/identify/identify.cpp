@@ -13,7 +13,6 @@
 #include "dynamics/identify/gain_system.h"
 #include "dynamics/identify/prediction.h"
 #include "kinematics/core/error.h"
-#include "kinematics/core/rng.h"
 
 namespace kinescope {
 namespace {
@@ -67,26 +66,6 @@ StackedSystem used_rows(TorqueSamples& samples, const Eigen::MatrixXd& weights) 
   system.torque = (system.weights.array() > 0.0).select(system.torque, 0.0);
   samples.torque = system.torque;
   return system;
-}
-
-/// Independent terms of the robot, whatever the log: from random motions. Drives come last, so what
-/// they share with the links (the motor of a first, vertical axis) is named after the links.
-ColumnBasis structural_basis(const RigidModel& rigid, const DriveTerms& drives,
-                             const std::vector<TorqueTerm>& terms) {
-  constexpr double kTolerance = 1e-9;  // as BaseParameterOptions
-  const RandomMotion motion = random_motion(rigid, 60 + 4 * rigid.size(), 1);
-  const std::vector<Eigen::MatrixXd> columns =
-      term_columns(rigid, drives, terms, motion.q, motion.dq, motion.ddq);
-  const Eigen::Index rows = motion.q.rows();
-  Eigen::MatrixXd W(rows * rigid.size(), static_cast<Eigen::Index>(terms.size()));
-  for (Eigen::Index j = 0; j < rigid.size(); ++j) {
-    W.middleRows(rows * j, rows) = columns[static_cast<std::size_t>(j)];
-  }
-  std::vector<int> preference = usual_preference(rigid);
-  for (std::size_t k = preference.size(); k < terms.size(); ++k) {
-    preference.push_back(static_cast<int>(k));
-  }
-  return independent_columns(W, preference, kTolerance);
 }
 
 /// What the model's own masses and joints say.
@@ -205,7 +184,7 @@ Identification identify_dynamics(const DynamicModel& model, const TorqueSamples&
                          : Eigen::MatrixXd::Ones(samples.torque.rows(), samples.torque.cols());
   check_samples(out.rigid, rows, all_weights);
   out.terms = torque_terms(out.rigid, options.drives);
-  out.basis = structural_basis(out.rigid, options.drives, out.terms);
+  out.basis = independent_terms(out.rigid, options.drives, out.terms);
   StackedSystem system = used_rows(rows, all_weights);
   const auto count = static_cast<Eigen::Index>(out.basis.kept.size());
   if ((system.weights.array() > 0.0).count() <= 2 * count ||

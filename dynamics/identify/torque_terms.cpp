@@ -162,4 +162,22 @@ std::vector<Eigen::MatrixXd> term_columns(const RigidModel& model, const DriveTe
   return out;
 }
 
+ColumnBasis independent_terms(const RigidModel& rigid, const DriveTerms& drives,
+                              const std::vector<TorqueTerm>& terms) {
+  constexpr double kTolerance = 1e-9;  // as BaseParameterOptions
+  const RandomMotion motion = random_motion(rigid, 60 + 4 * rigid.size(), 1);
+  const std::vector<Eigen::MatrixXd> columns =
+      term_columns(rigid, drives, terms, motion.q, motion.dq, motion.ddq);
+  const Eigen::Index rows = motion.q.rows();
+  Eigen::MatrixXd W(rows * rigid.size(), static_cast<Eigen::Index>(terms.size()));
+  for (Eigen::Index j = 0; j < rigid.size(); ++j) {
+    W.middleRows(rows * j, rows) = columns[static_cast<std::size_t>(j)];
+  }
+  std::vector<int> preference = usual_preference(rigid);
+  for (std::size_t k = preference.size(); k < terms.size(); ++k) {
+    preference.push_back(static_cast<int>(k));
+  }
+  return independent_columns(W, preference, kTolerance);
+}
+
 }  // namespace kinescope

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/rigid/base_parameters.h"
 #include "dynamics/rigid/rigid_model.h"
 
 namespace kinescope {
@@ -53,5 +54,10 @@ struct TorqueTerm {
 [[nodiscard]] std::vector<Eigen::MatrixXd> term_columns(
     const RigidModel& model, const DriveTerms& drives, const std::vector<TorqueTerm>& terms,
     const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq);
+
+/// Independent terms of the robot, whatever the log: from random motions. Drives come last, so what
+/// they share with the links (the motor of a first, vertical axis) is named after the links.
+[[nodiscard]] ColumnBasis independent_terms(const RigidModel& model, const DriveTerms& drives,
+                                            const std::vector<TorqueTerm>& terms);
 
 }  // namespace kinescope
