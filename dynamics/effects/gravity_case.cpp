@@ -34,6 +34,21 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
 
 }  // namespace
 
+void GravityCase::set_carriers(Eigen::SparseMatrix<double> all) {
+  carriers = std::move(all);
+  const Eigen::Index joints = fixed.cols();
+  carrier_torques.assign(static_cast<std::size_t>(carriers.cols()),
+                         JointTorques(static_cast<std::size_t>(joints)));
+  for (int c = 0; c < carriers.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(carriers, c); entry; ++entry) {
+      Eigen::VectorXd& torque = carrier_torques[static_cast<std::size_t>(c)]
+                                               [static_cast<std::size_t>(entry.row() % joints)];
+      if (torque.size() == 0) torque.setZero(fixed.rows());
+      torque[entry.row() / joints] = entry.value();
+    }
+  }
+}
+
 std::shared_ptr<const GravityCase> make_gravity_case(const TorqueTracedModel::Parts& parts,
                                                      const Eigen::Vector2d& tilt_deg) {
   auto out = std::make_shared<GravityCase>();
@@ -47,26 +62,23 @@ std::shared_ptr<const GravityCase> make_gravity_case(const TorqueTracedModel::Pa
     out->context.load =
         inverse_dynamics_of_samples(out->context.rigid, parts.q, parts.dq, parts.ddq);
   }
-  out->carriers = make_carriers(out->context);
   const Eigen::Index joints = parts.q.cols();
-  const Eigen::Index rows = parts.q.rows() * joints;
-  if (parts.base.kind == TorqueBaseKind::kDeclared) {
-    const Eigen::MatrixXd torque =
-        inverse_dynamics_of_samples(out->rigid, parts.q, parts.dq, parts.ddq) +
-        parts.dq * parts.viscous.asDiagonal();
-    out->fixed = torque.transpose().reshaped();
-    out->base.resize(rows, 0);
-    return out;
+  const bool declared = parts.base.kind == TorqueBaseKind::kDeclared;
+  out->fixed = Eigen::MatrixXd::Zero(parts.q.rows(), joints);
+  if (declared) {
+    out->fixed = inverse_dynamics_of_samples(out->rigid, parts.q, parts.dq, parts.ddq) +
+                 parts.dq * parts.viscous.asDiagonal();
+    out->base.assign(static_cast<std::size_t>(joints), Eigen::MatrixXd(parts.q.rows(), 0));
+  } else {
+    const std::vector<Eigen::MatrixXd> Y =
+        regressors_of_samples(out->rigid, parts.q, parts.dq, parts.ddq);
+    out->bodies = shown_bodies(Y, parts.base.sigma);
+    for (const Eigen::MatrixXd& joint : Y) out->base.emplace_back(joint * out->bodies);
   }
-  out->fixed = Eigen::VectorXd::Zero(rows);
-  const std::vector<Eigen::MatrixXd> Y =
-      regressors_of_samples(out->rigid, parts.q, parts.dq, parts.ddq);
-  out->bodies = shown_bodies(Y, parts.base.sigma);
-  out->base.resize(rows, out->bodies.cols());
-  for (Eigen::Index j = 0; j < joints; ++j) {
-    out->base(Eigen::seqN(j, parts.q.rows(), joints), Eigen::all) =
-        Y[static_cast<std::size_t>(j)] * out->bodies;
+  for (const Eigen::MatrixXd& base : out->base) {
+    out->base_squares.emplace_back(base.transpose() * base);
   }
+  out->set_carriers(make_carriers(out->context));
   return out;
 }
 

@@ -14,15 +14,24 @@ namespace kinescope {
 
 namespace effects {
 
+/// Torque joint by joint, instants each; empty where a joint has none.
+using JointTorques = std::vector<Eigen::VectorXd>;
+
 /// The base under one direction of gravity.
 struct GravityCase {
   Eigen::Vector2d tilt_deg;
   RigidModel rigid;  ///< bodies of the base; of the reference where they are free
   EffectContext context;
   Eigen::SparseMatrix<double> carriers;
-  Eigen::VectorXd fixed;   ///< torque that is not free, rows
-  Eigen::MatrixXd base;    ///< torque a base parameter, rows x parameters
-  Eigen::MatrixXd bodies;  ///< the bodies' parameters from the base parameters
+  std::vector<JointTorques> carrier_torques;  ///< the same, by carrier
+  Eigen::MatrixXd fixed;                      ///< torque that is not free, instants x joints
+  std::vector<Eigen::MatrixXd> base;          ///< of each joint: torque a base parameter, instants
+                                              ///< x parameters
+  std::vector<Eigen::MatrixXd> base_squares;  ///< of each joint: base' base
+  Eigen::MatrixXd bodies;                     ///< the bodies' parameters from the base parameters
+
+  [[nodiscard]] Eigen::Index parameters() const { return base.front().cols(); }
+  void set_carriers(Eigen::SparseMatrix<double> all);
 };
 
 [[nodiscard]] std::shared_ptr<const GravityCase> make_gravity_case(
@@ -51,7 +60,12 @@ struct TorqueTracedModel::Parts {
 
 namespace effects {
 
-/// Gauss-Newton over base parameters and effects.
+/// The one of this name; there must be one.
+[[nodiscard]] const Candidate& candidate_of(const std::vector<Candidate>& candidates,
+                                            const EffectId& id);
+
+/// Gauss-Newton over base parameters, widths of the turn of friction, and effects. All but sensors'
+/// shares in each other acts on few joints: sums are made joint by joint.
 class TorqueFitter {
  public:
   TorqueFitter(const TorqueTracedModel::Parts& parts, const std::vector<AddedEffect>& effects);
@@ -68,6 +82,23 @@ class TorqueFitter {
     Eigen::Index from = 0;   ///< of cross-talk
     Eigen::Index first = 0;  ///< of its parameters, among those of all effects
     Eigen::VectorXd values;
+    std::vector<JointTorques> torques;  ///< a unit of each parameter, before the sensors
+  };
+  /// One joint's rows: d measured / d parameter, whitened. Base parameters stand in `base`, times
+  /// `base_gain`; of the others, those that act on the joint.
+  struct JointDesign {
+    const Eigen::MatrixXd* base = nullptr;
+    const Eigen::MatrixXd* base_squares = nullptr;
+    double base_gain = 1.0;
+    Eigen::MatrixXd mixed, mixed_squares;  ///< base where the sensor sees other joints, too
+    Eigen::MatrixXd columns;
+    std::vector<Eigen::Index> parameters;  ///< of the columns
+    Eigen::VectorXd residual;
+  };
+  struct Normal {
+    Eigen::MatrixXd H;  ///< without priors
+    Eigen::VectorXd g;
+    double squares = 0.0;  ///< of the residual
   };
 
   void read(const std::vector<AddedEffect>& effects);
@@ -76,27 +107,31 @@ class TorqueFitter {
   void set_widths(const Eigen::VectorXd& widths);
   void choose_gravity_start(Added& gravity);
   [[nodiscard]] double step();
+  [[nodiscard]] Eigen::VectorXd solve(const Normal& normal) const;
   void apply(const Eigen::VectorXd& change);
-  [[nodiscard]] Eigen::VectorXd observed() const;
+  void move_widths(const Eigen::VectorXd& change);
+  [[nodiscard]] bool at_a_bound(Eigen::Index turning, double change) const;
+  [[nodiscard]] Eigen::MatrixXd observed() const;
   [[nodiscard]] Eigen::MatrixXd sensor() const;
-  [[nodiscard]] Eigen::MatrixXd effect_columns() const;
+  void make_torques();
+  [[nodiscard]] std::vector<JointTorques> measured_columns(const Eigen::MatrixXd& physical) const;
   [[nodiscard]] Eigen::MatrixXd width_columns() const;
-  [[nodiscard]] Eigen::VectorXd friction_of(Eigen::Index joint, double width) const;
+  [[nodiscard]] Eigen::MatrixXd turning_friction(double factor) const;
   [[nodiscard]] Eigen::VectorXd declared_coulomb(Eigen::Index joint,
                                                  const EffectContext& context) const;
-  [[nodiscard]] Eigen::VectorXd physical() const;
-  [[nodiscard]] Eigen::VectorXd through_sensor(const Eigen::VectorXd& rows) const;
-  [[nodiscard]] Eigen::VectorXd whitened(const Eigen::VectorXd& rows) const;
+  [[nodiscard]] Eigen::MatrixXd physical() const;
   [[nodiscard]] Eigen::Index own_parameters() const { return base_values_.size() + free_widths(); }
   [[nodiscard]] Eigen::Index free_widths() const { return std::ssize(turning_); }
   void make_design();
+  void put_base(Eigen::Index joint, const Eigen::MatrixXd& sensor);
+  [[nodiscard]] Normal normal() const;
   [[nodiscard]] TracedFit read_back(bool converged) const;
   [[nodiscard]] Eigen::MatrixXd own_prior() const;
   void name_covariates(TracedFit& out) const;
 
   const TorqueTracedModel::Parts& parts_;
   Eigen::Index joints_ = 0;
-  Eigen::Index rows_ = 0;
+  Eigen::Index instants_ = 0;
   std::vector<Added> added_;
   std::vector<Eigen::Index> turning_;  ///< joints with Coulomb friction: their widths are free
   Eigen::Index effect_parameters_ = 0;
@@ -104,9 +139,10 @@ class TorqueFitter {
   EffectContext context_;
   std::vector<Candidate> candidates_;  ///< of the added effects' kinds, at the present state
   Eigen::VectorXd base_values_;
-  // Of the last step. Columns: base, widths, effects.
-  RowMatrix design_;
-  Eigen::VectorXd residual_;
+  // Logarithms of the widths a step ago, and what that step asked for: for the secant.
+  Eigen::VectorXd last_widths_, last_change_;
+  // Of the last step, one a joint. Parameters: base, widths, effects.
+  std::vector<JointDesign> design_;
 };
 
 }  // namespace effects

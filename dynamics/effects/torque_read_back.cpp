@@ -19,8 +19,18 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   out.converged = converged;
   if (!converged) out.reason = "delay, gain or gravity did not settle";
   Linearisation& linear = out.linear;
-  linear.residual = residual_;
-  linear.jacobian = design_;
+  const Eigen::Index p = base_values_.size();
+  linear.residual.resize(instants_ * joints_);
+  linear.jacobian.setZero(instants_ * joints_, own_parameters() + effect_parameters_);
+  for (Eigen::Index j = 0; j < joints_; ++j) {
+    const JointDesign& rows = design_[static_cast<std::size_t>(j)];
+    const auto own = Eigen::seqN(j, instants_, joints_);
+    linear.residual(own) = rows.residual;
+    linear.jacobian(own, Eigen::seqN(0, p)) = rows.base_gain * *rows.base;
+    for (Eigen::Index c = 0; c < rows.columns.cols(); ++c) {
+      linear.jacobian(own, rows.parameters[static_cast<std::size_t>(c)]) = rows.columns.col(c);
+    }
+  }
   linear.prior = own_prior();
   linear.carriers = case_->carriers;
   for (int c = 0; c < linear.carriers.outerSize(); ++c) {
@@ -28,22 +38,21 @@ TracedFit TorqueFitter::read_back(bool converged) const {
       entry.valueRef() /= parts_.base.sigma[entry.row() % joints_];
     }
   }
-  const Eigen::Index instants = parts_.motion->instants();
-  for (Eigen::Index i = 0; i <= instants; ++i) linear.first_row.push_back(i * joints_);
+  for (Eigen::Index i = 0; i <= instants_; ++i) linear.first_row.push_back(i * joints_);
   linear.time_s = parts_.motion->at_instants(parts_.motion->time_s());
   for (const Eigen::Index row : parts_.motion->kept()) {
     linear.fold.push_back(parts_.fold[static_cast<std::size_t>(row)]);
   }
-  linear.unit = parts_.base.sigma.replicate(instants, 1);
+  linear.unit = parts_.base.sigma.replicate(instants_, 1);
   linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
   const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());
   // The memory of the noise, not of what the model still lacks: that of the widest description.
   linear.correlation_time_s = identify::correlation_samples(parts_.widest, trajectory) *
-                              (linear.time_s[instants - 1] - linear.time_s[0]) /
-                              static_cast<double>(instants);
+                              (linear.time_s[instants_ - 1] - linear.time_s[0]) /
+                              static_cast<double>(instants_);
   for (const Added& added : added_) out.values.push_back(added.values);
   EffectContext now = context_;
-  now.torque = physical().reshaped(joints_, instants).transpose();
+  now.torque = physical();
   for (Candidate& candidate : make_candidates(now)) {
     if (is_open(candidate.id)) out.candidates.push_back(std::move(candidate));
   }
