@@ -13,6 +13,9 @@ namespace {
 // Golden-section steps around the best value of a scan: to a hundredth of its spacing.
 constexpr int kRefinements = 10;
 constexpr double kGolden = 0.6180339887498949;
+// Between two listed values an effect explains at most this many times what it explains at the
+// better of them.
+constexpr double kMostRefined = 2.0;
 
 double refine(const NormalSystem& system, const Candidate& candidate, std::size_t best) {
   const std::vector<double>& scan = candidate.scan;
@@ -56,20 +59,52 @@ double refine(const NormalSystem& system, const Candidate& candidate, std::size_
   return std::max(at_left, at_right) > gain(scan[best]) ? middle : scan[best];
 }
 
+// The best of the listed values.
+struct CoarseScan {
+  std::size_t best = 0;
+  double gain = 0.0;
+  [[nodiscard]] double value(const Candidate& candidate) const {
+    return candidate.scan.empty() ? 0.0 : candidate.scan[best];
+  }
+};
+
+CoarseScan coarse_scan(const NormalSystem& system, const Candidate& candidate) {
+  CoarseScan out;
+  for (std::size_t i = 0; i < std::max<std::size_t>(1, candidate.scan.size()); ++i) {
+    const double value = candidate.scan.empty() ? 0.0 : candidate.scan[i];
+    const double gain = gain_of(system, candidate.columns(value));
+    if (i > 0 && gain <= out.gain) continue;
+    out = {i, gain};
+  }
+  return out;
+}
+
+bool is_refined(const Candidate& candidate) {
+  return !candidate.scan.empty() && !candidate.scan_listed;
+}
+
+// Could a value between the listed ones be significant?
+bool may_pass(const Score& score, double tests) {
+  constexpr double kLoose = 0.05;
+  return !score.hidden() &&
+         tests * f_survival(kMostRefined * score.statistic, score.rank, score.freedom) < kLoose;
+}
+
+TestedMember tested(const NormalSystem& system, const Candidate& candidate, double scan) {
+  TestedMember out;
+  out.scan = scan;
+  out.columns = candidate.columns(scan);
+  KINESCOPE_CHECK(out.columns.size() == candidate.parameters.size(), "one column a parameter");
+  out.score = score_test(system, out.columns);
+  return out;
+}
+
 }  // namespace
 
 double best_scan(const NormalSystem& system, const Candidate& candidate) {
   if (candidate.scan.empty()) return 0.0;
-  std::size_t best = 0;
-  double most = -1.0;
-  for (std::size_t i = 0; i < candidate.scan.size(); ++i) {
-    const double gain = gain_of(system, candidate.columns(candidate.scan[i]));
-    if (gain > most) {
-      most = gain;
-      best = i;
-    }
-  }
-  return candidate.scan_listed ? candidate.scan[best] : refine(system, candidate, best);
+  const CoarseScan coarse = coarse_scan(system, candidate);
+  return is_refined(candidate) ? refine(system, candidate, coarse.best) : coarse.value(candidate);
 }
 
 double number_of_tests(const std::vector<Candidate>& candidates, const Candidate& candidate) {
@@ -78,18 +113,22 @@ double number_of_tests(const std::vector<Candidate>& candidates, const Candidate
 }
 
 std::vector<TestedMember> test_family(const NormalSystem& system,
-                                      const std::vector<Candidate>& candidates) {
+                                      const std::vector<Candidate>& candidates, double least_gain) {
   std::vector<TestedMember> out;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& candidate = candidates[i];
-    TestedMember member;
+    const CoarseScan coarse = coarse_scan(system, candidate);
+    const bool refined = is_refined(candidate);
+    if ((refined ? kMostRefined : 1.0) * coarse.gain < least_gain) continue;
+    const double tests = number_of_tests(candidates, candidate);
+    TestedMember member = tested(system, candidate, coarse.value(candidate));
+    if (refined && may_pass(member.score, tests)) {
+      const double scan = refine(system, candidate, coarse.best);
+      if (scan != member.scan) member = tested(system, candidate, scan);
+    }
     member.index = i;
-    member.scan = best_scan(system, candidate);
-    member.columns = candidate.columns(member.scan);
-    KINESCOPE_CHECK(member.columns.size() == candidate.parameters.size(), "one column a parameter");
-    member.score = score_test(system, member.columns);
-    member.tests = number_of_tests(candidates, candidate);
-    member.p_value = std::min(1.0, member.score.p_value * member.tests);
+    member.tests = tests;
+    member.p_value = std::min(1.0, member.score.p_value * tests);
     out.push_back(std::move(member));
   }
   return out;

@@ -26,8 +26,11 @@ struct TestedMember {
 [[nodiscard]] double number_of_tests(const std::vector<Candidate>& candidates,
                                      const Candidate& candidate);
 
+/// Scans are searched between their values where that can matter. Candidates that cannot make the
+/// sum of squares fall by `least_gain` are left out.
 [[nodiscard]] std::vector<TestedMember> test_family(const NormalSystem& system,
-                                                    const std::vector<Candidate>& candidates);
+                                                    const std::vector<Candidate>& candidates,
+                                                    double least_gain = 0.0);
 
 /// Signed parameter where there is one, else the weighted length.
 [[nodiscard]] double size_of(const Candidate& candidate, const Eigen::VectorXd& theta);

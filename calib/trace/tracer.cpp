@@ -269,14 +269,15 @@ bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous)
 bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
   const AddedEffect effect = now_->added[index];
   std::vector<TestedMember> rivals;
-  for (TestedMember& member : test_family(without.system, without.fit.candidates)) {
+  const double least_gain = kRivalShare * own.score.gain;
+  for (TestedMember& member : test_family(without.system, without.fit.candidates, least_gain)) {
     const EffectId& id = without.fit.candidates[member.index].id;
     const bool in_model =
         std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
     if (in_model || removed_.contains(id) || member.p_value > level_) continue;
     // What it says beyond the effect, the forward search would have found.
     if (refines(without.fit.candidates[member.index], effect.id)) continue;
-    if (member.score.gain < kRivalShare * own.score.gain) continue;
+    if (member.score.gain < least_gain) continue;
     rivals.push_back(std::move(member));
   }
   std::ranges::stable_sort(rivals, std::greater{},
