@@ -10,14 +10,17 @@
 namespace kinescope::trace {
 namespace {
 
-// Golden-section steps around the best value of a scan: to a hundredth of its spacing.
+// Golden-section steps around the best value of a scan: to a hundredth of its spacing, and to a
+// tenth where it is only tested.
 constexpr int kRefinements = 10;
+constexpr int kTestRefinements = 4;
 constexpr double kGolden = 0.6180339887498949;
 // Between two listed values an effect explains at most this many times what it explains at the
 // better of them.
 constexpr double kMostRefined = 2.0;
 
-double refine(const NormalSystem& system, const Candidate& candidate, std::size_t best) {
+double refine(const NormalSystem& system, const Candidate& candidate, std::size_t best,
+              int refinements) {
   const std::vector<double>& scan = candidate.scan;
   double low = scan[best == 0 ? 0 : best - 1];
   double high = scan[std::min(best + 1, scan.size() - 1)];
@@ -40,7 +43,7 @@ double refine(const NormalSystem& system, const Candidate& candidate, std::size_
   double right = low + kGolden * (high - low);
   double at_left = gain(left);
   double at_right = gain(right);
-  for (int i = 0; i < kRefinements; ++i) {
+  for (int i = 0; i < refinements; ++i) {
     if (at_left > at_right) {
       high = right;
       right = left;
@@ -104,7 +107,8 @@ TestedMember tested(const NormalSystem& system, const Candidate& candidate, doub
 double best_scan(const NormalSystem& system, const Candidate& candidate) {
   if (candidate.scan.empty()) return 0.0;
   const CoarseScan coarse = coarse_scan(system, candidate);
-  return is_refined(candidate) ? refine(system, candidate, coarse.best) : coarse.value(candidate);
+  return is_refined(candidate) ? refine(system, candidate, coarse.best, kRefinements)
+                               : coarse.value(candidate);
 }
 
 double number_of_tests(const std::vector<Candidate>& candidates, const Candidate& candidate) {
@@ -123,7 +127,7 @@ std::vector<TestedMember> test_family(const NormalSystem& system,
     const double tests = number_of_tests(candidates, candidate);
     TestedMember member = tested(system, candidate, coarse.value(candidate));
     if (refined && may_pass(member.score, tests)) {
-      const double scan = refine(system, candidate, coarse.best);
+      const double scan = refine(system, candidate, coarse.best, kTestRefinements);
       if (scan != member.scan) member = tested(system, candidate, scan);
     }
     member.index = i;

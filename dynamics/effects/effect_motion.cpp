@@ -123,13 +123,22 @@ FinePath EffectMotion::fine(const Piece& piece, const Eigen::VectorXd& weights) 
   return out;
 }
 
-Eigen::VectorXd EffectMotion::column(
-    const Eigen::VectorXd& weights,
+std::vector<FinePath> EffectMotion::fine_paths(const Eigen::VectorXd& weights) const {
+  std::vector<FinePath> out;
+  for (const Piece& piece : pieces_) {
+    out.push_back(piece.rows < kFewestRows ? FinePath{} : fine(piece, weights));
+  }
+  return out;
+}
+
+Eigen::VectorXd EffectMotion::column_of(
+    const std::vector<FinePath>& paths,
     const std::function<Eigen::ArrayXd(const FinePath&)>& torque) const {
   Eigen::VectorXd all = Eigen::VectorXd::Zero(samples_.size());
-  for (const Piece& piece : pieces_) {
+  for (std::size_t p = 0; p < pieces_.size(); ++p) {
+    const Piece& piece = pieces_[p];
     if (piece.rows < kFewestRows) continue;
-    Eigen::VectorXd values = torque(fine(piece, weights)).matrix();
+    Eigen::VectorXd values = torque(paths[p]).matrix();
     if (parts_ > 1) {
       values = filter_zero_phase(values, order_of(options_.filter.kind), options_.filter.cutoff_hz,
                                  parts_ / piece.step_s);
@@ -140,8 +149,18 @@ Eigen::VectorXd EffectMotion::column(
 }
 
 Eigen::VectorXd EffectMotion::column(
+    const Eigen::VectorXd& weights,
+    const std::function<Eigen::ArrayXd(const FinePath&)>& torque) const {
+  return column_of(fine_paths(weights), torque);
+}
+
+Eigen::VectorXd EffectMotion::column(
     Eigen::Index joint, const std::function<Eigen::ArrayXd(const FinePath&)>& torque) const {
-  return column(Eigen::VectorXd::Unit(joints(), joint), torque);
+  const auto found = paths_.find(joint);
+  if (found != paths_.end()) return column_of(found->second, torque);
+  return column_of(
+      paths_.emplace(joint, fine_paths(Eigen::VectorXd::Unit(joints(), joint))).first->second,
+      torque);
 }
 
 Eigen::VectorXd EffectMotion::at_instants(const Eigen::VectorXd& samples) const {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -82,6 +83,10 @@ class EffectMotion {
     double step_s = 0.0;
   };
   [[nodiscard]] FinePath fine(const Piece& piece, const Eigen::VectorXd& weights) const;
+  [[nodiscard]] std::vector<FinePath> fine_paths(const Eigen::VectorXd& weights) const;
+  [[nodiscard]] Eigen::VectorXd column_of(
+      const std::vector<FinePath>& paths,
+      const std::function<Eigen::ArrayXd(const FinePath&)>& torque) const;
   void lay_out();
   void choose_instants();
 
@@ -91,6 +96,8 @@ class EffectMotion {
   std::vector<Eigen::Index> kept_;
   Eigen::VectorXd time_s_;
   int parts_ = 1;  ///< of a step between samples
+  // Of each joint, by piece; made when it is first asked for.
+  mutable std::map<Eigen::Index, std::vector<FinePath>> paths_;
 };
 
 }  // namespace kinescope

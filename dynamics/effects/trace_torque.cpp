@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -194,10 +195,12 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   TorqueTrace out;
   HeldOutError before;
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    TorqueTracedModel traced(model, samples, options.model);
+    std::optional<TorqueTracedModel> outside;
     if (!out.contacts.empty()) {
-      traced.leave_out(outside_spans(traced.motion(), out.contacts, margin_s));
+      outside.emplace(model, samples, options.model);
+      outside->leave_out(outside_spans(whole.motion(), out.contacts, margin_s));
     }
+    const TorqueTracedModel& traced = outside ? *outside : whole;
     out.trace = trace_with(traced, options, progress);
     out.base = traced.base();
     out.corrected = correct(model, traced, out.trace);
