@@ -32,6 +32,27 @@ struct FreeAv {
 template <typename T>
 using Av = std::unique_ptr<T, FreeAv>;
 
+// FFmpeg 6.1 moved these.
+const std::int32_t* display_matrix(const AVStream& stream) {
+#if LIBAVCODEC_VERSION_INT >= AV_VERSION_INT(60, 31, 100)
+  const AVPacketSideData* side =
+      av_packet_side_data_get(stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data,
+                              AV_PKT_DATA_DISPLAYMATRIX);
+  return side == nullptr ? nullptr : reinterpret_cast<const std::int32_t*>(side->data);
+#else
+  return reinterpret_cast<const std::int32_t*>(
+      av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+#endif
+}
+
+bool is_key(const AVFrame& frame) {
+#ifdef AV_FRAME_FLAG_KEY
+  return (frame.flags & AV_FRAME_FLAG_KEY) != 0;
+#else
+  return frame.key_frame != 0;
+#endif
+}
+
 // The first plane holds 8-bit brightness, one byte a pixel.
 bool has_luma_plane(AVPixelFormat format) {
   const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(format);
@@ -169,8 +190,7 @@ class VideoFileReader final : public VideoReader {
     if (container_->start_time != AV_NOPTS_VALUE) {
       start_s_ = static_cast<double>(container_->start_time) / AV_TIME_BASE;
     }
-    if (const auto* matrix = reinterpret_cast<const std::int32_t*>(
-            av_stream_get_side_data(&s, AV_PKT_DATA_DISPLAYMATRIX, nullptr))) {
+    if (const std::int32_t* matrix = display_matrix(s)) {
       const double angle = av_display_rotation_get(matrix);  // degrees counterclockwise
       if (std::isfinite(angle)) {
         quarters_ = ((static_cast<int>(std::lround(angle / 90.0)) % 4) + 4) % 4;
@@ -188,7 +208,7 @@ class VideoFileReader final : public VideoReader {
       const bool damaged =
           (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
       if (damaged) after_damage_ = true;
-      if (!damaged && frame_->key_frame != 0) after_damage_ = false;
+      if (!damaged && is_key(*frame_)) after_damage_ = false;
       if (after_damage_) {
         ++damaged_;
         continue;
