@@ -25,6 +25,9 @@ int decimals_for(double value, int digits) {
   return std::max(0, digits - 1 - static_cast<int>(carried));
 }
 
+// Less than this is rounding, in any unit of a report.
+constexpr double kNothing = 1e-12;
+
 /// "-0.00" is zero.
 std::string without_negative_zero(std::string text) {
   if (text.starts_with('-') && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
@@ -33,7 +36,7 @@ std::string without_negative_zero(std::string text) {
 
 std::string significant(double value, int digits) {
   if (!std::isfinite(value)) return "n/a";
-  if (value == 0.0) return "0";
+  if (std::abs(value) < kNothing) return "0";
   if (std::abs(value) < 1e-5 || std::abs(value) >= 1e7) {
     return fmt::format("{:.{}e}", value, digits - 1);
   }
