@@ -166,7 +166,11 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     line.contact.data = log_settings(line, line.contact.logs.front(), line.contact.data);
     return contact_command(line.contact, console);
   }
-  if (app.got_subcommand("inspect")) return inspect_command(line.inspect, console);
+  if (app.got_subcommand("inspect")) {
+    if (std::filesystem::is_regular_file(line.inspect.recording.folder))
+      line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
+    return inspect_command(line.inspect, console);
+  }
   return camera_command(line.camera, console);
 }
 

@@ -172,11 +172,14 @@ void add_correct(CLI::App& app, CommandLine& line) {
 
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
-      "inspect", "What a recording holds and what is wrong with it, in a few seconds");
+      "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
   add_recording_options(inspect, line.inspect.recording);
+  add_inspect_log_options(inspect, line);
   add_output_options(inspect, line.output);
   inspect.footer(
-      fmt::format("Example:\n  kinescope inspect sample_videos/scara4_none\n\n{}", kExitCodes));
+      fmt::format("Examples:\n  kinescope inspect sample_videos/scara4_none\n"
+                  "  kinescope inspect torque_log.csv --robot robot.urdf\n\n{}",
+                  kExitCodes));
 }
 
 void add_board_options(CLI::App& camera, BoardSpec& board) {

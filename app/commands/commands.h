@@ -68,6 +68,11 @@ struct DynamicsOptions {
   std::vector<std::string> models;              ///< names; empty: all
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   bool learning_curve = false;
+  bool robust = true;  ///< the robust regressions beside the models
+  /// What the robot carries: against the URDF's masses, or against logs without the load.
+  bool payload = false;
+  std::vector<std::filesystem::path> unloaded_logs;  ///< ask for the payload too
+  std::string payload_link;                          ///< empty: the last one
   bool trace = true;                      ///< close the loop: look for effects beyond rigid bodies
   std::string trace_file = "trace.json";  ///< in the output folder
   std::string command_line;               ///< for the report
@@ -91,7 +96,9 @@ struct ContactCommandOptions {
                                        const Console& console);
 
 struct InspectOptions {
-  RecordingPaths recording;
+  RecordingPaths recording;                    ///< its folder may be a file: a torque log
+  TorqueDataOptions data;                      ///< of a torque log
+  std::optional<std::filesystem::path> robot;  ///< URDF that a torque log must fit
 };
 
 [[nodiscard]] ExitCode inspect_command(const InspectOptions& options, const Console& console);

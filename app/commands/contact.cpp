@@ -9,10 +9,10 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
+#include "app/commands/torque_inputs.h"
 #include "app/commands/torque_stages.h"
 #include "dynamics/contact/momentum_observer.h"
 #include "dynamics/identify/consistent_model.h"
-#include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
 namespace {
@@ -70,11 +70,6 @@ TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel&
   return log;
 }
 
-bool has_masses(const DynamicModel& model) {
-  return std::ranges::any_of(model.links,
-                             [](const InertialParameters& link) { return link.mass_kg > 0.0; });
-}
-
 // The masses of the URDF, or those that the log to learn from shows.
 RigidBalance make_balance(const ContactCommandOptions& options, const DynamicModel& model,
                           ContactSummary& summary) {
@@ -122,8 +117,8 @@ void print_result(const ContactSummary& summary, const OutputFolder& folder,
 
 ContactSummary find_contacts(const ContactCommandOptions& options) {
   ContactSummary summary;
-  DynamicModel model = read_dynamic_urdf(options.robot);
-  if (options.gravity_m_s2) model.gravity_m_s2 = *options.gravity_m_s2;
+  const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
+  const DynamicModel& model = robot.model;
   validate(options.contact);
   const OutputFolder folder(options.output);
   summary.robot = model.tree.name;
@@ -131,11 +126,8 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.version = program_version();
   summary.command = options.command_line;
   summary.inputs = hashed_inputs({options.logs, options.learn_logs, {options.robot}});
-  for (const JointId id : moving_joints(model.tree)) {
-    const Joint& joint = model.tree.joints[id.index()];
-    summary.joints.push_back(joint.name);
-    summary.links.push_back(model.tree.links[joint.child.index()].name);
-  }
+  summary.joints = robot.joints;
+  summary.links = robot.links;
   const TorqueLogReport log = read_log(options.logs, model, options.data);
   summary.findings = log.findings;
   summary.torque_unit = log.log.torque_unit;

@@ -11,6 +11,8 @@
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/stopwatch.h"
+#include "app/commands/torque_inputs.h"
+#include "app/commands/torque_robust_stage.h"
 #include "app/commands/torque_stages.h"
 #include "app/commands/torque_trace_stage.h"
 #include "app/io/nearest_name.h"
@@ -65,9 +67,7 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
 
 // The scale of the torque against the nominal masses, where there are any.
 void check_scale(const DynamicModel& model, TorqueSummary& summary) {
-  double mass = 0.0;
-  for (const InertialParameters& link : model.links) mass += link.mass_kg;
-  if (!(mass > 0.0) || summary.data.samples.torque_unit == "A") return;
+  if (!has_masses(model) || summary.data.samples.torque_unit == "A") return;
   const TorqueSamples& samples = summary.data.samples;
   const TorqueScales scales = compare_torque_scale(
       samples,
@@ -165,6 +165,18 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
   }
 }
 
+void add_trace(const DynamicsOptions& options, const DynamicModel& model,
+               const TorqueLogReport& log, const OutputFolder& folder, const Progress& progress,
+               TorqueSummary& summary) {
+  const TorqueTrace traced =
+      trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
+  summary.trace = traced.trace;
+  for (const TracedEffect& effect : traced.trace.accepted) {
+    if (effect.id.effect != "gravity_direction") continue;
+    summary.traced_gravity_m_s2 = traced.corrected.model.gravity_m_s2;
+  }
+}
+
 void print_scores(const TorqueSummary& summary) {
   fmt::print("nMSE on {}, %\n{:<16} {:>8}", summary.split, "model", "samples");
   for (const std::string& joint : summary.joints) fmt::print(" {:>10}", joint);
@@ -186,21 +198,22 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   Stopwatch clock;
   TorqueSummary summary;
   const std::vector<TorqueModelKind> kinds = parse_models(options.models);
-  DynamicModel model = read_dynamic_urdf(options.robot);
-  if (options.gravity_m_s2) model.gravity_m_s2 = *options.gravity_m_s2;
+  const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
+  const DynamicModel& model = robot.model;
   const OutputFolder folder(options.output);
   summary.robot = model.tree.name;
   summary.log = "Log " + file_list(options.logs);
   summary.version = program_version();
   summary.command = options.command_line;
   summary.gravity_m_s2 = model.gravity_m_s2;
-  summary.inputs = hashed_inputs({options.logs, options.test_logs, {options.robot}});
-  for (const JointId id : moving_joints(model.tree)) {
-    const Joint& joint = model.tree.joints[id.index()];
-    summary.joints.push_back(joint.name);
-    summary.types.push_back(joint.type);
-  }
-  summary.data = read_torque_data(options.logs, wanted_joints(model.tree), options.data);
+  summary.gravity_declared = options.gravity_m_s2.has_value();
+  summary.inputs =
+      hashed_inputs({options.logs, options.test_logs, options.unloaded_logs, {options.robot}});
+  summary.joints = robot.joints;
+  summary.types = robot.types;
+  const TorqueLogReport log =
+      read_checked_log(options.logs, wanted_joints(model.tree), options.data);
+  summary.data = filtered_data(log, options.data.motion);
   check_scale(model, summary);
   split_samples(options, model, summary);
   clock.lap("read", summary.times);
@@ -216,8 +229,16 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     clock.lap("learning curve", summary.times);
   }
 
+  if (options.robust) {
+    add_robust_regressions(model, options.models_options, summary);
+    clock.lap("robust regression", summary.times);
+  }
+  if (options.payload || !options.unloaded_logs.empty()) {
+    add_payload(options, model, summary);
+    clock.lap("payload", summary.times);
+  }
   if (options.trace) {
-    summary.trace = trace_torque_stage(options, model, summary.data, folder, progress).trace;
+    add_trace(options, model, log, folder, progress, summary);
     clock.lap("trace", summary.times);
   }
   folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
@@ -235,6 +256,8 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   }
   const TorqueVerdict verdict = torque_verdict(summary);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  if (!verdict.payload.empty()) fmt::print("{}\n", verdict.payload);
+  if (!verdict.gravity.empty()) fmt::print("{}\n", verdict.gravity);
   print_scores(summary);
   if (summary.trace) {
     for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);

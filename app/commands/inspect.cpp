@@ -211,6 +211,15 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
 }
 
 ExitCode inspect_command(const InspectOptions& options, const Console& console) {
+  if (std::filesystem::is_regular_file(options.recording.folder)) {
+    const TorqueLogFacts facts = look_at_torques(options);
+    if (console.json) {
+      fmt::print("{}\n", torque_log_json(facts).dump(2));
+    } else {
+      print_torque_log(facts);
+    }
+    return facts.ready() ? ExitCode::kDone : ExitCode::kBadInput;
+  }
   const Inspection inspection = inspect_recording(options.recording, console.progress);
   if (console.json) {
     fmt::print("{}\n", inspection_json(inspection).dump(2));

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a recording.
-// Gives   Inspection: what it holds and what is wrong with it, from a quick look: about 20 frames
-// searched
-//         for markers, all samples of the log.
+// Takes   a recording, or a torque log.
+// Gives   Inspection, TorqueLogFacts: what it holds and what is wrong with it, from a quick look:
+//         about 20 frames searched for markers, all samples of the log.
 // Not here: anything that takes longer than a few seconds; structure, calibration.
 #pragma once
 
@@ -11,6 +10,9 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
 #include "app/io/recording.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/progress.h"
@@ -83,5 +85,38 @@ struct Inspection {
 /// Decodes at most the first 900 frames. Throws bad_input for a video that cannot be read.
 [[nodiscard]] VideoFacts look_at_video(const Recording& recording, const Progress& progress,
                                        std::vector<Finding>& findings);
+
+/// One signal of one joint; an empty column: not logged.
+struct SignalFacts {
+  std::string column;
+  std::string unit;  ///< that of the range, after conversion to SI
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
+struct TorqueJointFacts {
+  std::string name;
+  SignalFacts position, velocity, acceleration, torque;
+};
+
+/// What `kinescope dynamics` would take from a log.
+struct TorqueLogFacts {
+  std::string log;
+  int rows = 0;
+  int rows_used = 0;  ///< after the checks
+  int trajectories = 0;
+  double duration_s = 0.0;  ///< of all trajectories
+  double rate_hz = 0.0;     ///< from the median step
+  std::vector<TorqueJointFacts> joints;
+  std::vector<Finding> findings;
+
+  [[nodiscard]] bool ready() const;
+};
+
+/// A file that is no recording's folder, with the robot where one is named. Throws bad_request for
+/// columns or units that were asked for and cannot be; a bad log is findings.
+[[nodiscard]] TorqueLogFacts look_at_torques(const InspectOptions& options);
+void print_torque_log(const TorqueLogFacts& facts);
+[[nodiscard]] nlohmann::json torque_log_json(const TorqueLogFacts& facts);
 
 }  // namespace kinescope

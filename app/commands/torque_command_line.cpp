@@ -9,8 +9,9 @@ namespace kinescope {
 namespace {
 
 template <typename Path>
-void add_files(CLI::App& command, const char* name, Path& paths, const char* help, bool required) {
-  command
+CLI::Option* add_files(CLI::App& command, const char* name, Path& paths, const char* help,
+                       bool required) {
+  return command
       .add_option_function<std::vector<std::string>>(
           name,
           [&paths](const std::vector<std::string>& texts) {
@@ -56,6 +57,9 @@ void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& da
       ->check(number_in(0.1, 1e6))
       ->type_name("HZ")
       ->group(group);
+}
+
+void add_cutoff(CLI::App& command, TorqueDataOptions& data) {
   command
       .add_option("--cutoff", data.motion.cutoff_hz,
                   "Cut-off of the low-pass for motion and torque (default: chosen from the log)")
@@ -88,6 +92,15 @@ void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2
 
 }  // namespace
 
+void add_inspect_log_options(CLI::App& inspect, CommandLine& line) {
+  inspect
+      .add_option_function<std::string>(
+          "--robot", [&line](const std::string& text) { line.inspect.robot = text; },
+          "URDF whose joints and masses a torque log must fit")
+      ->type_name("FILE");
+  add_log_options(inspect, line, line.inspect.data);
+}
+
 void add_dynamics(CLI::App& app, CommandLine& line) {
   CLI::App& command =
       *app.add_subcommand("dynamics", "From a log with torques and a URDF to a torque model");
@@ -104,6 +117,22 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   add_gravity(command, dynamics.gravity_m_s2);
   command.add_flag("--gains", dynamics.models_options.identify.gains,
                    "Estimate a gain a joint: currents, or doubtful drive constants");
+  const char* load = "What the robot carries";
+  command
+      .add_flag("--payload", dynamics.payload,
+                "Mass and centre of what the last link carries and the URDF lacks; the URDF's "
+                "masses are trusted")
+      ->group(load);
+  add_files(command, "--unloaded", dynamics.unloaded_logs,
+            "Logs of the same robot without the load: no masses are needed", false)
+      ->group(load);
+  command
+      .add_option("--payload-link", dynamics.payload_link,
+                  "Link that carries it (default: the last one)")
+      ->type_name("LINK")
+      ->group(load);
+  command.add_flag("!--no-robust", dynamics.robust,
+                   "No robust regressions (trimmed, Student's t) beside the models");
   command.add_flag("!--no-trace", dynamics.trace,
                    "Do not look for effects beyond rigid bodies (trace.json)");
   command.add_flag("--learning-curve", dynamics.learning_curve,
@@ -115,15 +144,18 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       ->capture_default_str()
       ->type_name("N");
   add_log_options(command, line, dynamics.data);
+  add_cutoff(command, dynamics.data);
   command
       .add_option_function<std::string>(
           "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
           "Folder for the results (default: <first log's name>_dynamics here)")
       ->type_name("FOLDER");
   add_output_options(command, line.output);
-  command.footer(fmt::format(
-      "Example:\n  kinescope dynamics log.csv --robot robot.urdf --test log_test.csv\n\n{}",
-      kExitCodes));
+  command.footer(
+      fmt::format("Examples:\n"
+                  "  kinescope dynamics log.csv --robot robot.urdf --test log_test.csv\n"
+                  "  kinescope dynamics loaded.csv --robot robot.urdf --unloaded empty.csv\n\n{}",
+                  kExitCodes));
 }
 
 void add_contact(CLI::App& app, CommandLine& line) {
@@ -145,6 +177,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
       ->type_name("N");
   add_gravity(command, contact.gravity_m_s2);
   add_log_options(command, line, contact.data);
+  add_cutoff(command, contact.data);
   command
       .add_option_function<std::string>(
           "--output", [&contact](const std::string& text) { contact.output = text; },

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "app/io/dynamics_settings.h"
-#include "app/io/sha256.h"
 #include "kinematics/core/csv.h"
 
 namespace kinescope {
@@ -66,22 +65,6 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
 
 }  // namespace
 
-std::string file_list(const std::vector<fs::path>& files) {
-  std::string out;
-  for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + file.filename().string();
-  return out;
-}
-
-std::vector<InputFile> hashed_inputs(const std::vector<std::vector<fs::path>>& lists) {
-  std::vector<InputFile> out;
-  for (const auto& files : lists) {
-    for (const fs::path& file : files) {
-      out.push_back({file.filename().string(), sha256_of_file(file)});
-    }
-  }
-  return out;
-}
-
 std::vector<std::string> torque_stages(const Recording& recording, const RunOptions& options,
                                        const KinematicTree& tree, const fs::path& folder,
                                        const Progress& progress) {
@@ -105,6 +88,7 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
     dynamics.output = folder;
     dynamics.data = data;
     dynamics.trace = options.trace;
+    dynamics.robust = false;                      // on request, by kinescope dynamics
     dynamics.trace_file = "dynamics_trace.json";  // trace.json is the calibration's
     dynamics.models = {"parametric", "gip"};      // the others on request, by kinescope dynamics
     dynamics.models_options.samples = kGpSamples;

@@ -12,13 +12,6 @@
 
 namespace kinescope {
 
-/// "a.csv, b.csv": names of files without their folders.
-[[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);
-
-/// The files of all lists by name and content, in order.
-[[nodiscard]] std::vector<InputFile> hashed_inputs(
-    const std::vector<std::vector<std::filesystem::path>>& lists);
-
 /// Writes dynamics.json, robot_dynamics.urdf and dynamics.html.
 [[nodiscard]] TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progress);
 

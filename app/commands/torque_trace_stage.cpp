@@ -59,11 +59,11 @@ nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts) {
 }  // namespace
 
 TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,
-                               const TorqueData& data, const OutputFolder& folder,
-                               const Progress& progress) {
-  TorqueDataOptions read = options.data;
-  if (read.motion.cutoff_hz <= 0.0) read.motion.cutoff_hz = tracing_cutoff_hz(data.cutoff);
-  const TorqueData traced = read_torque_data(options.logs, wanted_joints(model.tree), read);
+                               const TorqueLogReport& log, const CutoffChoice& cutoff,
+                               const OutputFolder& folder, const Progress& progress) {
+  MotionOptions motion = options.data.motion;
+  if (motion.cutoff_hz <= 0.0) motion.cutoff_hz = tracing_cutoff_hz(cutoff);
+  const TorqueData traced = filtered_data(log, motion);
   TorqueTraceOptions trace_options;
   trace_options.model.filter = {traced.filter, traced.cutoff.cutoff_hz};
   TorqueTrace out = trace_torque(model, traced.samples, trace_options, progress);

@@ -10,11 +10,12 @@
 
 namespace kinescope {
 
-/// Reads the logs again at the cut-off that tracing asks for. Writes trace.json (or the name
-/// given), robot_traced.urdf and torque_compensated.csv. Throws as read_torque_data() and
-/// trace_torque().
+/// Filters the log at the cut-off that tracing asks for, given the one chosen for identification.
+/// Writes trace.json (or the name given), robot_traced.urdf and torque_compensated.csv. Throws as
+/// filtered_data() and trace_torque().
 [[nodiscard]] TorqueTrace trace_torque_stage(const DynamicsOptions& options,
-                                             const DynamicModel& model, const TorqueData& data,
-                                             const OutputFolder& folder, const Progress& progress);
+                                             const DynamicModel& model, const TorqueLogReport& log,
+                                             const CutoffChoice& cutoff, const OutputFolder& folder,
+                                             const Progress& progress);
 
 }  // namespace kinescope

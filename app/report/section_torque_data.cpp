@@ -31,7 +31,9 @@ std::string findings_table(const TorqueFacts& facts) {
 std::string torque_verdict_section(const TorqueFacts& facts) {
   const TorqueVerdict verdict = torque_verdict(facts.summary);
   return section_head("verdict", "Verdict") + paragraph(verdict.found) +
-         paragraph(verdict.accurate) + paragraph(verdict.limits) + "</section>\n";
+         paragraph(verdict.accurate) + paragraph(verdict.limits) +
+         (verdict.payload.empty() ? "" : paragraph(verdict.payload)) +
+         (verdict.gravity.empty() ? "" : paragraph(verdict.gravity)) + "</section>\n";
 }
 
 std::string torque_data_section(const TorqueFacts& facts) {

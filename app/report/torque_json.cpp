@@ -116,6 +116,73 @@ json consistent_json(const ConsistentModel& consistent) {
   return {{"links", links}, {"joints", joints}, {"misfit", number(consistent.misfit)}};
 }
 
+json robust_json(const std::optional<RobustSummary>& robust) {
+  if (!robust) return nullptr;
+  json methods = json::array();
+  for (std::size_t k = 0; k < robust->scores.size(); ++k) {
+    const TorqueScore& score = robust->scores[k];
+    methods.push_back({{"method", to_string(kRobustMethods[k])},
+                       {"samples", score.training_samples},
+                       {"nmse_percent", numbers(score.nmse_percent)},
+                       {"rms", numbers(score.rms)},
+                       {"coverage_90", numbers(score.coverage_90)},
+                       {"coverage_95", numbers(score.coverage_95)}});
+  }
+  json joints = json::array();
+  for (std::size_t j = 0; j < robust->joints.size(); ++j) {
+    const RobustJoint& joint = robust->joints[j];
+    const TorquePart& part = robust->parts[j];
+    json profile = json::array();
+    for (const FrictionBin& bin : part.profile) {
+      profile.push_back({{"velocity", number(bin.velocity)},
+                         {"friction", number(bin.friction)},
+                         {"spread", number(bin.spread)},
+                         {"samples", bin.samples}});
+    }
+    joints.push_back({{"bandwidth", numbers(joint.bandwidth)},
+                      {"beyond", number(joint.beyond)},
+                      {"noise", number(joint.noise)},
+                      {"unseen_rms", number(joint.unseen_rms)},
+                      {"down_weighted", number(joint.down_weighted)},
+                      {"friction_rms", number(part.friction_rms)},
+                      {"gravity_rms", number(part.gravity_rms)},
+                      {"inertia_rms", number(part.inertia_rms)},
+                      {"profile", std::move(profile)}});
+  }
+  return {{"folds", robust->folds},
+          {"by_trajectory", robust->by_trajectory},
+          {"methods", methods},
+          {"joints", joints}};
+}
+
+json estimate_json(const PayloadEstimate& payload, const std::vector<std::string>& names) {
+  json joints = json::array();
+  for (const MassOfJoint& joint : payload.joints) {
+    joints.push_back({{"joint", text(names[static_cast<std::size_t>(joint.joint)])},
+                      {"mass_kg", number(joint.mass_kg)},
+                      {"sigma_kg", number(joint.sigma_kg)}});
+  }
+  return {{"mass_kg", number(payload.mass_kg)},
+          {"sigma_kg", number(payload.sigma_kg)},
+          {"lower_kg", number(payload.lower_kg)},
+          {"upper_kg", number(payload.upper_kg)},
+          {"freedom", payload.freedom},
+          {"centre_m", numbers(payload.centre_m)},
+          {"centre_sigma_m", numbers(payload.centre_sigma_m)},
+          {"disagreement", number(payload.disagreement)},
+          {"joints", joints}};
+}
+
+json payload_json(const TorqueSummary& summary) {
+  if (!summary.payload) return nullptr;
+  const PayloadSummary& payload = *summary.payload;
+  return {{"against", text(payload.against)},
+          {"by_gains", payload.by_gains},
+          {"link", text(payload.motion.link)},
+          {"motion", estimate_json(payload.motion, summary.joints)},
+          {"at_rest", payload.at_rest ? estimate_json(*payload.at_rest, summary.joints) : json()}};
+}
+
 }  // namespace
 
 json torque_json(const TorqueSummary& summary) {
@@ -131,6 +198,9 @@ json torque_json(const TorqueSummary& summary) {
       {"unit", text(summary.train.torque_unit)},
       {"joints", joints},
       {"gravity_m_s2", numbers(summary.gravity_m_s2)},
+      {"gravity_declared", summary.gravity_declared},
+      {"traced_gravity_m_s2",
+       summary.traced_gravity_m_s2 ? numbers(*summary.traced_gravity_m_s2) : json()},
       {"data", data_json(summary)},
       {"models", scores_json(summary.scores)},
       {"best", summary.scores.empty()
@@ -141,6 +211,8 @@ json torque_json(const TorqueSummary& summary) {
       {"noise_sigma", numbers(summary.identification.sigma)},
       {"correlation_samples", number(summary.identification.correlation_samples)},
       {"drives", drives_json(summary.drives)},
+      {"robust", robust_json(summary.robust)},
+      {"payload", payload_json(summary)},
       {"consistent", consistent_json(summary.consistent)},
       {"trace", summary.trace ? trace_json(*summary.trace) : json(nullptr)},
       {"warnings", report::texts(summary.warnings)}};

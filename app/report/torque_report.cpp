@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <array>
+#include <vector>
 
 #include "app/report/page.h"
 #include "app/report/torque_sections.h"
@@ -8,24 +8,29 @@
 namespace kinescope {
 namespace {
 
-constexpr std::array<report::ContentsEntry, 7> kContents = {{
-    {"verdict", "Verdict"},
-    {"data", "Data quality"},
-    {"models", "Models side by side"},
-    {"prediction", "Measured and predicted"},
-    {"parameters", "Friction and parameters"},
-    {"trace", "Closing the loop"},
-    {"reproduce", "How to reproduce"},
-}};
+// Without those sections that this page does not have.
+std::vector<report::ContentsEntry> contents(const TorqueSummary& summary) {
+  std::vector<report::ContentsEntry> out = {{"verdict", "Verdict"},
+                                            {"data", "Data quality"},
+                                            {"models", "Models side by side"},
+                                            {"prediction", "Measured and predicted"}};
+  if (summary.robust) out.emplace_back("robust", "Robust regression");
+  if (summary.payload) out.emplace_back("payload", "Payload");
+  out.emplace_back("parameters", "Friction and parameters");
+  if (summary.trace) out.emplace_back("trace", "Closing the loop");
+  out.emplace_back("reproduce", "How to reproduce");
+  return out;
+}
 
 }  // namespace
 
 std::string torque_report_html(const TorqueSummary& summary) {
   const report::TorqueFacts facts{summary, torque_json(summary)};
   return report::page_begin("torque report", summary.robot, summary.log, summary.version,
-                            kContents) +
+                            contents(summary)) +
          "<main>\n" + report::torque_verdict_section(facts) + report::torque_data_section(facts) +
          report::torque_models_section(facts) + report::torque_prediction_section(facts) +
+         report::torque_robust_section(facts) + report::torque_payload_section(facts) +
          report::torque_parameters_section(facts) +
          (facts.summary.trace ? report::trace_section(*facts.summary.trace) : "") +
          report::torque_reproduce_section(facts) + "</main>\n</body>\n</html>\n";

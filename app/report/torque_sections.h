@@ -20,6 +20,10 @@ struct TorqueFacts {
 [[nodiscard]] std::string torque_models_section(const TorqueFacts& facts);
 /// Measured and predicted torque over time with its band, one plot a joint.
 [[nodiscard]] std::string torque_prediction_section(const TorqueFacts& facts);
+/// The robust regressions, and the torque in friction, gravity and inertia parts.
+[[nodiscard]] std::string torque_robust_section(const TorqueFacts& facts);
+/// What the robot carries; empty where it was not asked for.
+[[nodiscard]] std::string torque_payload_section(const TorqueFacts& facts);
 /// Friction over velocity, drive and base parameters.
 [[nodiscard]] std::string torque_parameters_section(const TorqueFacts& facts);
 [[nodiscard]] std::string torque_reproduce_section(const TorqueFacts& facts);

@@ -12,6 +12,8 @@
 #include "app/report/run_summary.h"
 #include "dynamics/data/torque_data.h"
 #include "dynamics/identify/consistent_model.h"
+#include "dynamics/identify/payload.h"
+#include "dynamics/identify/robust_torque.h"
 #include "dynamics/models/comparison.h"
 
 namespace kinescope {
@@ -29,6 +31,29 @@ struct DriveEstimate {
   double sigma = 0.0;  ///< infinite where it cannot be told from other terms
 };
 
+/// What the learned torque of a joint consists of, root mean square over the samples.
+struct TorquePart {
+  double friction_rms = 0.0;
+  double gravity_rms = 0.0;
+  double inertia_rms = 0.0;
+  std::vector<FrictionBin> profile;  ///< of the friction part
+};
+
+struct RobustSummary {
+  std::vector<TorqueScore> scores;  ///< one a RobustMethod, on `test`; their `kind` says nothing
+  std::vector<RobustJoint> joints;
+  int folds = 0;
+  bool by_trajectory = false;
+  std::vector<TorquePart> parts;  ///< one a joint
+};
+
+struct PayloadSummary {
+  std::string against;  ///< in words: the URDF's masses, or a log
+  PayloadEstimate motion;
+  std::optional<PayloadEstimate> at_rest;
+  bool by_gains = false;  ///< torques are currents times declared gains: the mass scales with them
+};
+
 struct TorqueSummary {
   std::string robot;
   std::string log;      ///< what was learned from, in words
@@ -40,6 +65,9 @@ struct TorqueSummary {
   std::vector<std::string> joints;
   std::vector<JointType> types;  ///< beside joints
   Eigen::Vector3d gravity_m_s2 = Eigen::Vector3d::Zero();
+  bool gravity_declared = false;  ///< else down along z
+  /// As tracing found it, where it found another one.
+  std::optional<Eigen::Vector3d> traced_gravity_m_s2;
   TorqueData data;    ///< of the log learned from; its samples are `train` and, without a log of
                       ///< its own, `test`
   std::string split;  ///< in words: what was held out
@@ -51,16 +79,19 @@ struct TorqueSummary {
   Identification identification;  ///< on `train`
   ConsistentModel consistent;
   std::vector<DriveEstimate> drives;
-  int best = 0;                 ///< index into scores: what `prediction` is from
-  TorquePrediction prediction;  ///< of `test`
-  std::optional<Trace> trace;   ///< none where it was not asked for
+  std::optional<RobustSummary> robust;    ///< none where it was not asked for
+  std::optional<PayloadSummary> payload;  ///< none where it was not asked for
+  int best = 0;                           ///< index into scores: what `prediction` is from
+  TorquePrediction prediction;            ///< of `test`
+  std::optional<Trace> trace;             ///< none where it was not asked for
   std::vector<std::string> warnings;
 };
 
 /// dynamics.json: schema "kinescope.dynamics". Arrays beside `joints` hold one entry a joint.
 /// Numbers that are not known are null. Torques in `unit`, everything else SI.
 ///
-///   robot, version, unit, joints [name, type], gravity_m_s2
+///   robot, version, unit, joints [name, type], gravity_m_s2, gravity_declared,
+///   traced_gravity_m_s2 (null: as declared)
 ///   data      rows_read, rows_used, log_rate_hz, rate_hz, filter, source, cutoff_hz, training,
 ///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
 ///             place, what, remedy]
@@ -69,6 +100,13 @@ struct TorqueSummary {
 ///   learning  [model, points [samples, nmse_percent]]
 ///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
 ///   drives    [term, joint, value, sigma]
+///   robust    null, or folds, by_trajectory, methods [method, nmse_percent, rms, coverage_90,
+///             coverage_95], joints [bandwidth (q, dq, ddq in standard deviations), beyond, noise,
+///             unseen_rms, down_weighted, friction_rms, gravity_rms, inertia_rms,
+///             profile [velocity, friction, spread, samples]]
+///   payload   null, or against, by_gains, link, motion and at_rest {mass_kg, sigma_kg, lower_kg,
+///             upper_kg (95 %), freedom, centre_m, centre_sigma_m, disagreement,
+///             joints [joint, mass_kg, sigma_kg]}
 ///   consistent  links [name, mass_kg, first_moment_kg_m, inertia_kg_m2 (Ixx Ixy Ixz Iyy Iyz Izz)],
 ///             joints [viscous, coulomb, motor_inertia], misfit
 [[nodiscard]] nlohmann::json torque_json(const TorqueSummary& summary);
@@ -78,6 +116,8 @@ struct TorqueVerdict {
   std::string found;
   std::string accurate;
   std::string limits;
+  std::string payload;  ///< what it carries; empty where it was not asked for
+  std::string gravity;  ///< where it was taken to point and nobody said so; empty where declared
 };
 [[nodiscard]] TorqueVerdict torque_verdict(const TorqueSummary& summary);
 

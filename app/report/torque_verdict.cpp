@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,8 @@ namespace {
 // A joint whose best model leaves more than this share of the torque unexplained is spoken of, per
 // cent.
 constexpr double kPoor = 5.0;
+// Of a payload: joints that disagree by less may do so by chance.
+constexpr double kDisagree = 2.0;
 // A 95 % band that holds fewer of the unseen samples than this is too narrow.
 constexpr double kLeastCoverage = 0.90;
 
@@ -39,10 +42,70 @@ Eigen::Index worst_joint(const TorqueScore& score) {
   return worst;
 }
 
+// Masses to the place of two digits of half their interval.
+std::string kilograms(double mass_kg, const PayloadEstimate& found) {
+  const double half = found.upper_kg - found.mass_kg;
+  const int places = half > 0.0 ? static_cast<int>(std::ceil(1.0 - std::log10(half))) : 6;
+  return fmt::format("{:.{}f}", mass_kg, std::clamp(places, 0, 6));
+}
+
+std::string interval_text(const PayloadEstimate& found) {
+  return fmt::format("95 %: {} to {} kg", kilograms(found.lower_kg, found),
+                     kilograms(found.upper_kg, found));
+}
+
+std::string payload_words(const PayloadSummary& payload) {
+  const PayloadEstimate& found = payload.motion;
+  std::string out =
+      found.is_seen()
+          ? fmt::format("{} carries {} kg more than {} ({})", found.link,
+                        kilograms(found.mass_kg, found), payload.against, interval_text(found))
+          : fmt::format("{} carries nothing that shows: {} kg against {} ({})", found.link,
+                        kilograms(found.mass_kg, found), payload.against, interval_text(found));
+  if (payload.at_rest) {
+    out += fmt::format("; at rest, from the learned torque without friction: {} kg ({})",
+                       kilograms(payload.at_rest->mass_kg, *payload.at_rest),
+                       interval_text(*payload.at_rest));
+  }
+  out += ".";
+  if (found.disagreement > kDisagree) {
+    out += fmt::format(
+        " The joints disagree about it {:.1f} times more than their noise lets "
+        "them: torque scales or the geometry are wrong, and the interval is "
+        "widened for that only as far as they differ.",
+        found.disagreement);
+  }
+  if (payload.by_gains) {
+    out += " Torques are logged values times declared factors: the mass is as right as these are.";
+  }
+  return out;
+}
+
+std::string gravity_words(const TorqueSummary& summary) {
+  const Eigen::Vector3d& used = summary.gravity_m_s2;
+  const std::string from =
+      summary.gravity_declared
+          ? std::string("Gravity was declared")
+          : fmt::format(
+                "Nothing was declared about gravity, which was taken as {:.4g} m/s^2 down "
+                "along z of the base",
+                used.norm());
+  if (!summary.traced_gravity_m_s2) return summary.gravity_declared ? "" : from + " (--gravity).";
+  const Eigen::Vector3d& found = *summary.traced_gravity_m_s2;
+  const double cosine = std::clamp(used.normalized().dot(found.normalized()), -1.0, 1.0);
+  return fmt::format(
+      "{}, but the torques say that it points {:.0f} degrees from there: is the base on a wall, a "
+      "ceiling, a slope? Check how it stands and say --gravity={:.3g},{:.3g},{:.3g}; the models "
+      "above were fitted with the wrong direction.",
+      from, std::acos(cosine) * 180.0 / std::numbers::pi, found.x(), found.y(), found.z());
+}
+
 }  // namespace
 
 TorqueVerdict torque_verdict(const TorqueSummary& summary) {
   TorqueVerdict out;
+  if (summary.payload) out.payload = payload_words(*summary.payload);
+  out.gravity = gravity_words(summary);
   const Identification& found = summary.identification;
   out.found = fmt::format(
       "{} joints; {} base and drive parameters from {} samples; noise cut at {:.3g} Hz.",

@@ -90,15 +90,25 @@ TorqueLogReport look_at_torque_log(const std::vector<std::filesystem::path>& fil
   return read_and_check(files, joints, options, false);
 }
 
+TorqueLogReport read_checked_log(const std::vector<std::filesystem::path>& files,
+                                 const std::vector<WantedJoint>& joints,
+                                 const TorqueDataOptions& options) {
+  TorqueLogReport report = read_and_check(files, joints, options, true);
+  throw_refusals(report.findings);
+  return report;
+}
+
 TorqueData read_torque_data(const std::vector<std::filesystem::path>& files,
                             const std::vector<WantedJoint>& joints,
                             const TorqueDataOptions& options) {
-  TorqueLogReport report = read_and_check(files, joints, options, true);
-  throw_refusals(report.findings);
-  Motion motion = derive_motion(report.log, options.motion);
+  return filtered_data(read_checked_log(files, joints, options), options.motion);
+}
+
+TorqueData filtered_data(const TorqueLogReport& report, const MotionOptions& options) {
+  Motion motion = derive_motion(report.log, options);
   TorqueData out;
   out.samples = std::move(motion.samples);
-  out.findings = std::move(report.findings);
+  out.findings = report.findings;
   append(out.findings, motion.findings);
   std::ranges::stable_sort(out.findings, std::greater<>{}, &LogFinding::weight);
   out.filter = motion.filter;

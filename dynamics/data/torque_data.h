@@ -44,19 +44,27 @@ struct TorqueData {
 /// The movable joints of a tree in its order, as the log is asked for them.
 [[nodiscard]] std::vector<WantedJoint> wanted_joints(const KinematicTree& tree);
 
+/// A log as the checks left it.
+struct TorqueLogReport {
+  TorqueLog log;  ///< after the repairs
+  std::vector<LogFinding> findings;
+  Eigen::Index rows_read = 0;
+};
+
 /// Reads, checks, filters. `joints` empty: all joints of the log, as named there. Throws Error for
 /// what cannot be read and for findings that are refusals.
 [[nodiscard]] TorqueData read_torque_data(const std::vector<std::filesystem::path>& files,
                                           const std::vector<WantedJoint>& joints,
                                           const TorqueDataOptions& options = {});
 
-/// The same checks without filtering and without throwing refusals: for looking at a log. Torques
-/// may be missing.
-struct TorqueLogReport {
-  TorqueLog log;  ///< after the repairs
-  std::vector<LogFinding> findings;
-  Eigen::Index rows_read = 0;
-};
+/// The two halves of it, for samples of one log at several cut-offs.
+[[nodiscard]] TorqueLogReport read_checked_log(const std::vector<std::filesystem::path>& files,
+                                               const std::vector<WantedJoint>& joints,
+                                               const TorqueDataOptions& options = {});
+[[nodiscard]] TorqueData filtered_data(const TorqueLogReport& report,
+                                       const MotionOptions& options = {});
+
+/// The same checks without throwing refusals: for looking at a log. Torques may be missing.
 [[nodiscard]] TorqueLogReport look_at_torque_log(const std::vector<std::filesystem::path>& files,
                                                  const std::vector<WantedJoint>& joints,
                                                  const TorqueDataOptions& options = {});

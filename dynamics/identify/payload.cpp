@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -23,6 +24,7 @@ using identify::StackedSystem;
 using identify::WeightedFit;
 
 constexpr Index kBodyParameters = 10;
+constexpr double kSaysSomething = 0.5;  // relative sigma of a joint's own mass
 
 int carrier_of(const RigidModel& rigid, const DynamicModel& model, const std::string& link) {
   std::vector<int> last;
@@ -145,11 +147,16 @@ void refuse_unseen_mass(const MatrixXd& H, double ridge, const std::string& link
                      "move the joints that lift it, through postures that tilt the link all ways");
 }
 
+/// Standard deviation of a jackknife over groups.
+double jackknife_sigma(const VectorXd& without) {
+  const auto count = static_cast<double>(without.size());
+  return std::sqrt((count - 1.0) / count * (without.array() - without.mean()).square().sum());
+}
+
 /// What each joint's torque says of the size of the load that all joints found together: the load's
 /// torque, without what the joint's own drive can say, regressed on itself plus what is left.
 std::vector<MassOfJoint> masses_by_joint(const PayloadSystem& data, const WeightedFit& fit,
                                          double mass_kg, const std::vector<Block>& blocks) {
-  constexpr double kSaysSomething = 0.5;  // relative sigma
   std::vector<MassOfJoint> out;
   const Index first = data.first_loaded;
   const Index rows = data.system.torque.rows() - first;
@@ -178,10 +185,8 @@ std::vector<MassOfJoint> masses_by_joint(const PayloadSystem& data, const Weight
       parts.push_back((top.sum() - top.segment(at, block.rows).sum()) /
                       (bottom.sum() - bottom.segment(at, block.rows).sum()));
     }
-    const auto count = static_cast<double>(parts.size());
-    const Eigen::Map<const VectorXd> values(parts.data(), static_cast<Index>(parts.size()));
     const double sigma =
-        std::sqrt((count - 1.0) / count * (values.array() - values.mean()).square().sum());
+        jackknife_sigma(Eigen::Map<const VectorXd>(parts.data(), static_cast<Index>(parts.size())));
     if (!(sigma < kSaysSomething)) continue;
     const double share = 1.0 + top.sum() / bottom.sum();
     out.push_back(
@@ -259,9 +264,15 @@ void check_unit(const TorqueSamples& samples) {
                     "give the drives' gains in N m/A with --torque-factor");
 }
 
-/// Payload from differences of torque at rest: ten parameters and an offset a joint.
-Vector10d at_rest(const std::vector<MatrixXd>& load, const MatrixXd& difference,
-                  const std::string& link, double ridge) {
+/// Payload from differences of torque at rest: ten parameters and an offset a joint; and how large
+/// each joint alone would have it, 1 being what all found. NaN for joints that do not feel it.
+struct AtRest {
+  Vector10d parameters;
+  VectorXd shares;
+};
+
+AtRest at_rest(const std::vector<MatrixXd>& load, const MatrixXd& difference,
+               const std::string& link, double ridge) {
   StackedSystem system;
   system.torque = difference;
   system.weights = MatrixXd::Ones(difference.rows(), difference.cols());
@@ -274,7 +285,29 @@ Vector10d at_rest(const std::vector<MatrixXd>& load, const MatrixXd& difference,
   }
   const WeightedFit fit = identify::weighted_fit(system, {.ridge = ridge, .prior = {}});
   refuse_unseen_mass(identify::gram(system, fit.final_weights, 0, difference.rows()), ridge, link);
-  return fit.parameters.head<10>();
+  AtRest out{fit.parameters.head<10>(), VectorXd(difference.cols())};
+  for (std::size_t k = 0; k < load.size(); ++k) {
+    const auto j = static_cast<Index>(k);
+    VectorXd torque = load[k] * out.parameters;
+    torque.array() -= torque.mean();
+    const double square = torque.squaredNorm();
+    out.shares[j] = square > 0.0 ? 1.0 + torque.dot(fit.residuals.col(j)) / square
+                                 : std::numeric_limits<double>::quiet_NaN();
+  }
+  return out;
+}
+
+/// As masses_by_joint(), from the fits without a fold (columns: shares of each joint).
+std::vector<MassOfJoint> masses_at_rest(const AtRest& whole, const MatrixXd& shares) {
+  std::vector<MassOfJoint> out;
+  const double mass_kg = whole.parameters[0];
+  for (Index j = 0; j < whole.shares.size(); ++j) {
+    const double sigma = jackknife_sigma(shares.row(j));
+    if (!(sigma < kSaysSomething)) continue;
+    out.push_back({static_cast<int>(j), whole.shares[j] * mass_kg,
+                   std::max(sigma, 1e-12) * std::abs(mass_kg)});
+  }
+  return out;
 }
 
 }  // namespace
@@ -324,22 +357,27 @@ PayloadEstimate payload_at_rest(const DynamicModel& model, const RobustTorque& l
   const auto student = static_cast<std::size_t>(RobustMethod::kStudent);
   const MatrixXd reference =
       unloaded == nullptr ? declared : even(unloaded->fits[student], unloaded->threads);
-  const Vector10d whole =
+  const AtRest whole =
       at_rest(load, even(loaded.fits[student], loaded.threads) - reference, link, options.ridge);
   const int folds = unloaded == nullptr ? loaded.folds : std::min(loaded.folds, unloaded->folds);
   MatrixXd without(10, folds);
+  MatrixXd shares(q.cols(), folds);
   for (int k = 0; k < folds; ++k) {
     const MatrixXd other =
         unloaded == nullptr ? declared : even(without_fold(*unloaded, k), unloaded->threads);
-    without.col(k) =
+    const AtRest one =
         at_rest(load, even(without_fold(loaded, k), loaded.threads) - other, link, options.ridge);
+    without.col(k) = one.parameters;
+    shares.col(k) = one.shares;
   }
   const VectorXd mean = without.rowwise().mean();
   without.colwise() -= mean;
   const double factor = static_cast<double>(folds - 1) / folds;
   PayloadEstimate out;
   out.link = link;
-  fill(whole, factor * without * without.transpose(), folds - 1, out);
+  out.joints = masses_at_rest(whole, shares);
+  out.disagreement = birge_ratio(out.joints);
+  fill(whole.parameters, factor * without * without.transpose(), folds - 1, out);
   return out;
 }
 

@@ -46,7 +46,7 @@ struct PayloadEstimate {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d centre_sigma_m = Eigen::Vector3d::Zero();
   Vector10d parameters = Vector10d::Zero();  ///< InertialParameters::vector()
-  std::vector<MassOfJoint> joints;           ///< those that say something; empty of at_rest
+  std::vector<MassOfJoint> joints;           ///< those that say something
   /// What the sigmas were multiplied by because the joints disagree more than their noise lets them
   /// (Birge 1932): wrong drive gains, or wrong geometry. 1: they agree.
   double disagreement = 1.0;

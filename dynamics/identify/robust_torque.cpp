@@ -103,6 +103,7 @@ class JointModel {
 struct Judged {
   double score = 0.0;
   double unseen_rms = 0.0;
+  double noise = 0.0;  ///< what of it the doubt about the function does not say
 };
 
 /// Log density of the left-out samples as Student's t: outliers must not choose the bandwidth.
@@ -120,6 +121,10 @@ Judged judge(const JointModel& joint, const Search& search, const RobustTorque& 
   }
   constexpr double kMedianToSigma = 1.4826;
   out.unseen_rms = kMedianToSigma * median_of(to_vector(left.residual.col(0).cwiseAbs()));
+  const double noise_square = std::pow(joint.scale() * std::exp(search[4]), 2);
+  const double function = median_of(to_vector(left.variance.col(0))) - noise_square;
+  const double unseen_square = out.unseen_rms * out.unseen_rms;
+  out.noise = std::sqrt(std::max(unseen_square - function, 0.25 * unseen_square));
   return out;
 }
 
@@ -167,7 +172,7 @@ void learn_joint(const DynamicModel& model, int index, const RobustTorqueOptions
   RobustJoint facts;
   facts.bandwidth = found.search.head<3>().array().exp();
   facts.beyond = joint.scale() * std::exp(found.search[3]);
-  facts.noise = joint.scale() * kNormalScale * std::exp(found.search[4]);
+  facts.noise = found.judged.noise;
   facts.unseen_rms = found.judged.unseen_rms;
 
   const gp::GpModel heavy = joint.at(found.search);
@@ -186,6 +191,7 @@ void learn_joint(const DynamicModel& model, int index, const RobustTorqueOptions
   student.degrees_of_freedom = kFreedom;
   student.max_iterations = 20;
   student.tolerance = 1e-2;
+  student.estimate_scale = false;  // cross-validation knows it better than the fit's own residuals
   student.fit = fit;
   gp::RobustFit robust = gp::fit_student(heavy, joint.data(), student);
   out.weight.col(index) = robust.weight.col(0);
@@ -215,7 +221,6 @@ TorquePrediction RobustTorque::predict(RobustMethod method, const MatrixXd& q, c
                                        const MatrixXd& ddq) const {
   const std::vector<gp::FittedGp>& all = fits[static_cast<std::size_t>(method)];
   const MatrixXd inputs = motion_inputs(q, dq, ddq);
-  const double widen = method == RobustMethod::kStudent ? kNormalScale * kNormalScale : 1.0;
   TorquePrediction out;
   out.mean.resize(q.rows(), q.cols());
   out.model_sigma.resize(q.rows(), q.cols());
@@ -226,7 +231,7 @@ TorquePrediction RobustTorque::predict(RobustMethod method, const MatrixXd& q, c
     const VectorXd variance = p.variance.col(0).cwiseMax(0.0);
     out.mean.col(j) = p.mean;
     out.model_sigma.col(j) = variance.cwiseSqrt();
-    out.sigma.col(j) = (variance.array() + widen * p.noise_variance[0]).sqrt();
+    out.sigma.col(j) = (variance.array() + std::pow(joints[k].noise, 2)).sqrt();
   }
   return out;
 }

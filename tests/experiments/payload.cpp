@@ -147,7 +147,11 @@ void ur10e() {
       {"authors'", {10.0, 10.6956, 8.4566, 9.0029, 9.48, 10.1232}}};
   for (const auto& [name, factors] : gains) {
     TorqueDataOptions options;
-    options.mapping.torque = {"i*"};
+    for (int j = 1; j <= 6; ++j) {
+      options.mapping.position.push_back(fmt::format("q{}", j));
+      options.mapping.velocity.push_back(fmt::format("dq{}", j));
+      options.mapping.torque.push_back(fmt::format("i{}", j));
+    }
     options.mapping.torque_unit = {"A"};
     options.mapping.torque_factor = factors;
     const auto read = [&](const char* file) {

@@ -86,5 +86,31 @@ TEST_F(DynamicsCommand, TorquesInTheWrongUnitAreNamed) {
   EXPECT_EQ(run(words()).code, 0) << "the settings beside the log count too";
 }
 
+TEST_F(DynamicsCommand, RobustRegressionsAndPartsAreInTheResult) {
+  ASSERT_EQ(run(words({"--no-trace"})).code, 0);
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  const auto& robust = document.at("robust");
+  ASSERT_EQ(robust.at("methods").size(), 3U);
+  EXPECT_EQ(robust.at("methods")[2].at("method"), "student");
+  for (const auto& nmse : robust.at("methods")[2].at("nmse_percent")) {
+    EXPECT_LT(nmse.get<double>(), 1.0);
+  }
+  ASSERT_EQ(robust.at("joints").size(), 2U);
+  EXPECT_GT(robust.at("joints")[0].at("gravity_rms").get<double>() +
+                robust.at("joints")[1].at("gravity_rms").get<double>(),
+            0.0);
+  EXPECT_FALSE(robust.at("joints")[0].at("profile").empty());
+  EXPECT_TRUE(document.at("payload").is_null());
+  EXPECT_NE(read_text_file(folder_.path() / "out/dynamics.html").find("Robust regression"),
+            std::string::npos);
+}
+
+TEST_F(DynamicsCommand, GravityThatNobodyDeclaredIsSaid) {
+  const Outcome silent = run(words({"--no-trace", "--no-robust"}));
+  EXPECT_NE(silent.out.find("Nothing was declared about gravity"), std::string::npos) << silent.out;
+  const Outcome declared = run(words({"--no-trace", "--no-robust", "--gravity=0,0,-9.81"}));
+  EXPECT_EQ(declared.out.find("Nothing was declared"), std::string::npos) << declared.out;
+}
+
 }  // namespace
 }  // namespace kinescope

@@ -99,7 +99,8 @@ TEST(Inspect, NamesEveryProblemAndEndsWithThree) {
   EXPECT_TRUE(says(inspection.findings, "separated by ';'")) << all(inspection.findings);
   EXPECT_TRUE(says(inspection.findings, "video.mp4")) << all(inspection.findings);
   testing::internal::CaptureStdout();
-  EXPECT_EQ(inspect_command({folder.paths()}, {}), ExitCode::kBadInput);
+  EXPECT_EQ(inspect_command({.recording = folder.paths(), .data = {}, .robot = {}}, {}),
+            ExitCode::kBadInput);
   const std::string text = testing::internal::GetCapturedStdout();
   EXPECT_NE(text.find("verdict   not ready: 3 problems\n"), std::string::npos) << text;
 }
@@ -168,7 +169,8 @@ TEST_F(InspectVideo, AGoodRecording) {
 
 TEST_F(InspectVideo, JsonSaysTheSame) {
   testing::internal::CaptureStdout();
-  EXPECT_EQ(inspect_command({paths_}, {.json = true, .quiet = true, .progress = {}}),
+  EXPECT_EQ(inspect_command({.recording = paths_, .data = {}, .robot = {}},
+                            {.json = true, .quiet = true, .progress = {}}),
             ExitCode::kDone);
   const nlohmann::json json = nlohmann::json::parse(testing::internal::GetCapturedStdout());
   EXPECT_TRUE(json["ready"]);

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/torque_inputs.h"
+
+#include <algorithm>
+
+#include "app/io/sha256.h"
+#include "kinematics/urdf/dynamic_urdf.h"
+
+namespace kinescope {
+
+namespace fs = std::filesystem;
+
+TorqueRobot read_torque_robot(const fs::path& urdf,
+                              const std::optional<Eigen::Vector3d>& gravity_m_s2) {
+  TorqueRobot out;
+  out.model = read_dynamic_urdf(urdf);
+  if (gravity_m_s2) out.model.gravity_m_s2 = *gravity_m_s2;
+  const KinematicTree& tree = out.model.tree;
+  for (const JointId id : moving_joints(tree)) {
+    const Joint& joint = tree.joints[id.index()];
+    out.joints.push_back(joint.name);
+    out.links.push_back(tree.links[joint.child.index()].name);
+    out.types.push_back(joint.type);
+  }
+  return out;
+}
+
+bool has_masses(const DynamicModel& model) {
+  return std::ranges::any_of(model.links,
+                             [](const InertialParameters& link) { return link.mass_kg > 0.0; });
+}
+
+std::string file_list(const std::vector<fs::path>& files) {
+  std::string out;
+  for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + file.filename().string();
+  return out;
+}
+
+std::vector<InputFile> hashed_inputs(const std::vector<std::vector<fs::path>>& lists) {
+  std::vector<InputFile> out;
+  for (const auto& files : lists) {
+    for (const fs::path& file : files) {
+      out.push_back({file.filename().string(), sha256_of_file(file)});
+    }
+  }
+  return out;
+}
+
+}  // namespace kinescope

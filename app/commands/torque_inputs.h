@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What every command on a torque log begins with: the robot, the names of its parts, the inputs.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/report/run_summary.h"
+#include "kinematics/model/dynamic_model.h"
+
+namespace kinescope {
+
+/// A URDF with the gravity that was declared, and its movable joints in order.
+struct TorqueRobot {
+  DynamicModel model;
+  std::vector<std::string> joints;
+  std::vector<std::string> links;  ///< the one that each joint moves
+  std::vector<JointType> types;
+};
+
+/// Throws what reading a URDF throws.
+[[nodiscard]] TorqueRobot read_torque_robot(const std::filesystem::path& urdf,
+                                            const std::optional<Eigen::Vector3d>& gravity_m_s2);
+
+/// Some link has a mass.
+[[nodiscard]] bool has_masses(const DynamicModel& model);
+
+/// "a.csv, b.csv": names of files without their folders.
+[[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);
+
+/// The files of all lists by name and content, in order.
+[[nodiscard]] std::vector<InputFile> hashed_inputs(
+    const std::vector<std::vector<std::filesystem::path>>& lists);
+
+}  // namespace kinescope
