@@ -3,6 +3,8 @@
 // What a robot carries, from its torques.
 #include "dynamics/identify/payload.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "kinematics/core/error.h"
@@ -73,6 +75,31 @@ TEST(Payload, NoiseAndOutliersStayWithinTheInterval) {
   EXPECT_TRUE(found.is_seen());
   EXPECT_LT(found.lower_kg, found.mass_kg);
   EXPECT_FALSE(found.joints.empty());
+}
+
+TEST(Payload, TheIntervalHoldsTheTruthAsOftenAsItSays) {
+  constexpr int kSeeds = 150;
+  // 95 % less four sigmas of a count of 150. More is no fault: the joints' disagreement can only
+  // widen.
+  constexpr double kFewest = 0.88;
+  const DynamicModel bare = arm(4);
+  const DynamicModel full = with_load(bare);
+  int held = 0;
+  double error = 0.0;
+  double claimed = 0.0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Rng rng = Rng::from_name("payload scatter", static_cast<std::uint64_t>(seed));
+    const TorqueSamples loaded = torque_log_of(
+        full, {.samples = 1000, .noise = 0.02, .noise_memory = 0.7, .common_noise = 0.3}, rng);
+    const PayloadEstimate found = estimate_payload(bare, loaded);
+    held += found.lower_kg <= kMass && kMass <= found.upper_kg ? 1 : 0;
+    error += std::pow(found.mass_kg - kMass, 2);
+    claimed += std::pow(found.sigma_kg, 2);
+  }
+  EXPECT_GE(held, kFewest * kSeeds);
+  const double ratio = std::sqrt(claimed / error);
+  EXPECT_GT(ratio, 0.8);
+  EXPECT_LT(ratio, 1.6) << "an interval that is too wide says nothing";
 }
 
 TEST(Payload, NoLoadIsNotSeen) {
