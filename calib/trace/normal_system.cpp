@@ -68,6 +68,8 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
   if (found != carriers_.end()) return found->second;
   CarrierSums sums{Eigen::VectorXd::Zero(linear_->instants()),
                    Eigen::MatrixXd::Zero(linear_->instants(), parameters()),
+                   Eigen::VectorXd::Zero(linear_->instants()),
+                   Eigen::VectorXd::Zero(linear_->instants()),
                    Eigen::VectorXd::Zero(linear_->instants())};
   RowMatrix with_jacobian = RowMatrix::Zero(linear_->instants(), parameters());
   for (Eigen::SparseMatrix<double>::InnerIterator entry(linear_->carriers, index); entry; ++entry) {
@@ -76,6 +78,8 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
     with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
     const double unit = linear_->unit[entry.row()];
     if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
+    sums.rows[i] += 1.0;
+    sums.squares[i] += linear_->residual[entry.row()] * linear_->residual[entry.row()];
   }
   sums.with_jacobian = with_jacobian;
   return carriers_.emplace(index, std::move(sums)).first->second;
@@ -172,6 +176,21 @@ double NormalSystem::shift_of(double gain, const std::vector<EffectColumn>& colu
   }
   const double sum = weight.sum();
   return sum > 0.0 ? std::sqrt(std::max(0.0, gain) / sum) : 0.0;
+}
+
+NormalSystem::Touched NormalSystem::touched(const std::vector<EffectColumn>& columns) const {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(linear_->instants());
+  Eigen::VectorXd squares = rows;
+  for (const EffectColumn& column : columns) {
+    const Eigen::VectorXd share = share_of(column);
+    const CarrierSums& sums = carrier(column.carrier);
+    for (Eigen::Index i = 0; i < rows.size(); ++i) {
+      if (share[i] == 0.0) continue;
+      rows[i] = std::max(rows[i], sums.rows[i]);
+      squares[i] = std::max(squares[i], sums.squares[i]);
+    }
+  }
+  return {rows.sum(), squares.sum()};
 }
 
 }  // namespace kinescope::trace

@@ -51,13 +51,23 @@ class NormalSystem {
   /// squares: the same shift of every row they touch would take as much; in the residual's unit.
   [[nodiscard]] double shift_of(double gain, const std::vector<EffectColumn>& columns) const;
 
+  /// Rows that the carriers of these columns touch while their share is not zero, and the squares
+  /// of the residual there.
+  struct Touched {
+    double rows = 0.0;
+    double squares = 0.0;
+  };
+  [[nodiscard]] Touched touched(const std::vector<EffectColumn>& columns) const;
+
  private:
-  // Of one carrier at each instant: carrier'residual, carrier'J, and the weight of the rows
-  // it touches, in the inverse square of the residual's unit.
+  // Of one carrier at each instant: carrier'residual, carrier'J, of the rows it touches the weight
+  // (in the inverse square of the residual's unit), their number and the residual's squares.
   struct CarrierSums {
     Eigen::VectorXd with_residual;
     Eigen::MatrixXd with_jacobian;  // instants x parameters
     Eigen::VectorXd weight;
+    Eigen::VectorXd rows;
+    Eigen::VectorXd squares;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;

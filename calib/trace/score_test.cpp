@@ -86,12 +86,15 @@ StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
   return out;
 }
 
-// Of the gain, by the noise of all rows, widened for its correlation in time as if the effect
-// changed slowly.
-double pooled_p_value(const NormalSystem& system, double gain, double k) {
+// Of the gain, by the noise of the rows that the effect touches, widened for its correlation in
+// time as if the effect changed slowly.
+double pooled_p_value(const NormalSystem& system, const NormalSystem::Touched& touched, double gain,
+                      double k) {
   const Linearisation& linear = system.linear();
-  const auto rows = static_cast<double>(linear.residual.size());
-  const double freedom = rows - static_cast<double>(system.parameters()) - k;
+  // Of the model's own parameters, these rows pay their part.
+  const double own = static_cast<double>(system.parameters()) * touched.rows /
+                     static_cast<double>(linear.residual.size());
+  const double freedom = touched.rows - own - k;
   if (freedom < 1.0) return 1.0;
   double memory = 1.0;
   if (!linear.independent_instants && linear.instants() > 1) {
@@ -99,7 +102,7 @@ double pooled_p_value(const NormalSystem& system, double gain, double k) {
                         static_cast<double>(linear.instants() - 1);
     memory = std::max(1.0, 2.0 * linear.correlation_time_s / step);
   }
-  const double variance = (system.total().rr - gain) / freedom;
+  const double variance = (touched.squares - gain) / freedom;
   if (!(variance > 0.0)) return 0.0;
   return f_survival(gain / (k * variance * memory), k, std::max(1.0, freedom / memory));
 }
@@ -127,7 +130,8 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.p_value = f_survival(out.statistic, k, out.freedom);
   // The scatter of few stretches says little by itself, however clear the effect: then noise at its
   // usual level and memory must not explain it either.
-  if (few) out.p_value = std::max(out.p_value, pooled_p_value(system, p.gain, k));
+  if (few)
+    out.p_value = std::max(out.p_value, pooled_p_value(system, system.touched(columns), p.gain, k));
 }
 
 // Scatter of the last `count` parameters when each stretch is left out in turn.
