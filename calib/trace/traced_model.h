@@ -74,6 +74,8 @@ struct Candidate {
   /// Where that is no size: another function of the parameters. Empty: the above.
   std::function<double(const Eigen::VectorXd& theta)> size;
   std::string size_unit;
+  /// Parameters that can be: friction does not drive. Empty: all.
+  std::function<bool(const Eigen::VectorXd& theta)> possible;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;
   bool scan_listed = false;  ///< only the listed values make sense; else those between them too

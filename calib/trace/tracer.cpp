@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/trace/distribution.h"
 #include "calib/trace/encompassing.h"
 #include "calib/trace/picture.h"
 
@@ -19,6 +20,10 @@ constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
 // Held-out losses further apart than this (Student's t of the stretches) need no refit to compare.
 constexpr double kClearlyWorse = 3.0;
+
+bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta) {
+  return !candidate.possible || candidate.possible(theta);
+}
 
 bool refines(const Candidate& candidate, const EffectId& id) {
   return std::ranges::find(candidate.refines, id) != candidate.refines.end();
@@ -129,6 +134,7 @@ std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
     }
     const EffectId& id = stage.fit.candidates[member.index].id;
     if (removed_.contains(id)) continue;
+    if (!is_possible(stage.fit.candidates[member.index], member.score.theta)) continue;
     const Score confirmed = jackknife_test(stage.system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;
     out.push_back({member, id, held_out_cells(stage.system, member.columns)});
@@ -208,11 +214,42 @@ bool Tracer::backward() {
   search_again(std::nullopt);
   details_.assign(now_->added.size(), {});
   trace_.ambiguities.clear();
+  if (drop_without_size()) return true;
   // The latest first: an early one may have stood for several that came after it.
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     if (check(i)) return true;
   }
   return false;
+}
+
+// An effect that bends the model can be significant where it is absent and of no certain size where
+// it is fitted: a gain of 7 that may be -5.
+bool Tracer::drop_without_size() {
+  Eigen::Index count = 0;
+  for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
+  if (count == 0) return false;
+  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
+  std::optional<std::size_t> weakest;
+  double least = t;
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    const Eigen::VectorXd& values = now_->fit.values[i];
+    const double variance = covariance(at, at);
+    at += values.size();
+    if (values.size() > 1 || !(variance > 0.0)) continue;
+    const double ratio = std::abs(values[0]) / std::sqrt(variance);
+    if (ratio >= least) continue;
+    least = ratio;
+    weakest = i;
+  }
+  if (!weakest) return false;
+  const EffectId id = now_->added[*weakest].id;
+  removed_.insert(id);
+  now_ = stage_of(kinescope::trace::without(now_->added, *weakest));
+  mark(round_, id, CandidateState::kRemoved, now_->error.value);
+  add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
+  return true;
 }
 
 bool Tracer::check(std::size_t index) {
@@ -232,7 +269,12 @@ bool Tracer::check(std::size_t index) {
   detail.held_out_after = now_->error;
   detail.explained =
       (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
-  if (own.p_value > level_ || stage->held_out_sum() < now_->held_out_sum()) {
+  // What clearly helps to predict stays, however few stretches judge its parameters.
+  const bool needed = paired_t(now_->system.partition(), stage->held_out.whitened,
+                               now_->held_out.whitened) > kClearlyWorse;
+  const bool possible = is_possible(*candidate, now_->fit.values[index]);
+  if (!possible || (own.p_value > level_ && !needed) ||
+      stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = stage_of(kinescope::trace::without(now_->added, index));
@@ -275,6 +317,7 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const bool in_model =
         std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
     if (in_model || removed_.contains(id) || member.p_value > level_) continue;
+    if (!is_possible(without.fit.candidates[member.index], member.score.theta)) continue;
     // What it says beyond the effect, the forward search would have found.
     if (refines(without.fit.candidates[member.index], effect.id)) continue;
     if (member.score.gain < least_gain) continue;

@@ -39,10 +39,12 @@ class Tracer {
   void search_again(const std::optional<std::string>& place);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
+  [[nodiscard]] bool drop_without_size();
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
+  void replace_waves_by_a_curve();
   void look_for_rest();
   /// True where a rest is large enough beside what an effect explains to put its name in doubt.
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;

@@ -3,6 +3,7 @@
 // The second half of the search: what is left, and the answer as it is handed on.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -29,8 +30,39 @@ bool same_place(const std::string& rest, const std::string& effect) {
 
 }  // namespace
 
+// Several waves at one place are what any function is made of. Where one curve in their stead
+// predicts as well, none of them is the cause.
+void Tracer::replace_waves_by_a_curve() {
+  std::map<EffectId, std::vector<std::size_t>> same;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) same[now_->added[i].id].push_back(i);
+  for (const auto& [id, members] : same) {
+    if (members.size() < 2) continue;
+    std::vector<AddedEffect> others = now_->added;
+    std::erase_if(others, [&](const AddedEffect& effect) { return effect.id == id; });
+    StagePtr stage = stage_of(std::move(others));
+    const auto curve = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
+                                 level_, options_.floor);
+    if (!curve || !same_place(curve->rest.place, id.place) ||
+        curve->rest.held_out_after.value > now_->error.interval.high) {
+      continue;
+    }
+    removed_.insert(id);
+    mark(round_, id, CandidateState::kRemoved, stage->error.value);
+    now_ = std::move(stage);
+    for (std::size_t k = members.size(); k-- > 0;) {
+      details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(members[k]));
+    }
+    add_step(round_,
+             fmt::format("{} waves at {} removed: a curve over {} explains as much", members.size(),
+                         id.place, curve->rest.covariate),
+             *now_);
+    return replace_waves_by_a_curve();
+  }
+}
+
 void Tracer::look_for_rest() {
   rests_.clear();
+  replace_waves_by_a_curve();
   while (rests_.size() < kMostRests) {
     const Linearisation linear = with_rests(now_->fit.linear, rests_);
     const NormalSystem system(linear, now_->system.partition());
@@ -57,16 +89,17 @@ bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
 void Tracer::drop_what_rests_explain() {
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const AddedEffect effect = now_->added[i];
-    // A curve at the effect's own place takes its shape; it puts the name in doubt where it is
-    // large.
-    const bool stands = std::ranges::all_of(rests_, [&](const FoundRest& found) {
-      return same_place(found.rest.place, effect.id.place) && !is_doubtful(found, i);
+    // A curve at the effect's own place takes its shape, whatever that is; it puts the name in
+    // doubt where it is large.
+    std::vector<FoundRest> others;
+    std::ranges::copy_if(rests_, std::back_inserter(others), [&](const FoundRest& found) {
+      return !same_place(found.rest.place, effect.id.place) || is_doubtful(found, i);
     });
-    if (stands) continue;
+    if (others.empty()) continue;
     StagePtr stage = stage_of(without(now_->added, i));
     const Candidate* candidate = find_candidate(stage->fit, effect.id);
     if (candidate == nullptr) continue;
-    const Linearisation linear = with_rests(stage->fit.linear, rests_);
+    const Linearisation linear = with_rests(stage->fit.linear, others);
     const NormalSystem system(linear, stage->system.partition());
     const Score score = jackknife_test(system, candidate->columns(effect.scan));
     const double tests = number_of_tests(stage->fit.candidates, *candidate);

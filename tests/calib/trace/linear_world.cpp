@@ -102,7 +102,11 @@ std::vector<Candidate> LinearWorld::candidates() const {
       candidate.columns = columns;
       out.push_back(std::move(candidate));
     };
-    add(simple("scale", j, 1), [=](double) { return std::vector<EffectColumn>{{carrier, q}}; });
+    Candidate scale = simple("scale", j, 1);
+    if (options_.scale_grows) {
+      scale.possible = [](const Eigen::VectorXd& theta) { return theta[0] >= 0.0; };
+    }
+    add(scale, [=](double) { return std::vector<EffectColumn>{{carrier, q}}; });
     add(simple("sine", j, 2), [=](double) {
       return std::vector<EffectColumn>{{carrier, q.array().sin()}, {carrier, q.array().cos()}};
     });

@@ -18,7 +18,8 @@ struct LinearWorldOptions {
   double noise = 1.0;         ///< of a row
   double noise_memory = 0.0;  ///< AR(1) from instant to instant
   int folds = 5;
-  bool together = false;  ///< the second joint moves as the first one does
+  bool together = false;     ///< the second joint moves as the first one does
+  bool scale_grows = false;  ///< a scale below zero cannot be
 };
 
 /// What is in the data and not in the model: one term of `LinearWorld::share`.

@@ -144,6 +144,17 @@ TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
   EXPECT_GT(real.held_out_before.value, 1.1 * real.held_out_after.value);
 }
 
+TEST(TraceTest, ParametersThatCannotBeAreNotFound) {
+  LinearWorldOptions options;
+  const EffectId scale{"scale", "joint1"};
+  EXPECT_TRUE(only(trace_effects(LinearWorld(options, {{0, "scale", -0.5, 0.0}})), scale));
+  options.scale_grows = true;
+  EXPECT_TRUE(only(trace_effects(LinearWorld(options, {{0, "scale", 0.5, 0.0}})), scale));
+  const Trace trace = trace_effects(LinearWorld(options, {{0, "scale", -0.5, 0.0}}));
+  EXPECT_NE(trace.verdict, TraceVerdict::kClean);
+  EXPECT_EQ(std::ranges::find(trace.accepted, scale, &TracedEffect::id), trace.accepted.end());
+}
+
 TEST(TraceTest, TooLittleToJudgeSaysNothing) {
   const Trace trace = trace_of(1, {{0, "scale", 5.0}}, 0.0, 8);
   EXPECT_EQ(trace.verdict, TraceVerdict::kNothingToSay);
