@@ -29,6 +29,49 @@ Eigen::VectorXd factor_of(const Linearisation& linear, const Eigen::VectorXd& re
   return up;
 }
 
+// What an effect does to every row, whitened.
+Eigen::VectorXd rows_of(const Linearisation& linear, const TestedMember& effect) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(linear.residual.size());
+  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
+    const EffectColumn& column = effect.columns[k];
+    const double theta = effect.score.theta[static_cast<Eigen::Index>(k)];
+    Eigen::Index instant = 0;
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, column.carrier); entry;
+         ++entry) {
+      while (linear.first_row[static_cast<std::size_t>(instant) + 1] <= entry.row()) ++instant;
+      const double share = column.share.size() == 0 ? 1.0 : column.share[instant];
+      out[entry.row()] += theta * share * entry.value();
+    }
+  }
+  return out;
+}
+
+// Where an effect is seen best that is one constant factor on many rows (a load on all joints): as
+// the factor of the place whose rows it moves most; none where it moves none of them.
+struct SeenAt {
+  const RestPlace* place = nullptr;
+  Eigen::VectorXd factor;
+};
+SeenAt seen_at(const TracedFit& fit, const TestedMember& effect) {
+  const Eigen::VectorXd rows = rows_of(fit.linear, effect);
+  SeenAt out;
+  double most = 0.0;
+  for (const RestPlace& place : fit.rest_places) {
+    const Eigen::VectorXd factor = factor_of(fit.linear, rows, place.carrier);
+    double energy = 0.0;
+    Eigen::Index instant = 0;
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(fit.linear.carriers, place.carrier);
+         entry; ++entry) {
+      while (fit.linear.first_row[static_cast<std::size_t>(instant) + 1] <= entry.row()) ++instant;
+      energy += std::pow(factor[instant] * entry.value(), 2);
+    }
+    if (energy <= most) continue;
+    most = energy;
+    out = {&place, factor.array().isFinite().select(factor, 0.0)};
+  }
+  return out;
+}
+
 // Share of the curve's variance that bins of the covariate explain.
 double explained_by(const Eigen::VectorXd& covariate, const Eigen::VectorXd& curve) {
   std::vector<Eigen::Index> order(static_cast<std::size_t>(covariate.size()));
@@ -84,10 +127,24 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
       out.effect += theta * column.share;
     }
   }
+  std::string unit = candidate.parameters.front().unit;
+  for (const RestPlace& place : without.fit.rest_places) {
+    if (place.carrier == carrier) unit = place.unit;
+  }
+  const bool constant = (out.effect.array() == out.effect[0]).all();
+  const SeenAt seen =
+      constant && effect.columns.size() > 1 ? seen_at(without.fit, effect) : SeenAt{};
+  if (seen.place != nullptr) {
+    carrier = seen.place->carrier;
+    unit = seen.place->unit;
+    out.effect = seen.factor;
+  }
   // A constant depends on nothing: it is shown over the last one, time.
   const Covariate* best = &without.fit.covariates.back();
   double share = 0.0;
   for (const Covariate& covariate : without.fit.covariates) {
+    // A load depends on the posture; any slow motion is a curve over time, too.
+    if (seen.place != nullptr && covariate.name == "time") continue;
     const double explained = explained_by(covariate.value, out.effect);
     // The first of equals: a joint's value comes before what follows from it.
     if (explained > share + 0.02) {
@@ -97,10 +154,7 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
   }
   out.covariate = best->name;
   out.covariate_unit = best->unit;
-  out.unit = candidate.parameters.front().unit;
-  for (const RestPlace& place : without.fit.rest_places) {
-    if (place.carrier == carrier) out.unit = place.unit;
-  }
+  out.unit = std::move(unit);
   out.at = best->value;
   // The residual with the effect in the model, and the effect on top of it: what the plain model's
   // parameters took of the effect is given back. Component-plus-residual plot, Cook 1993.
