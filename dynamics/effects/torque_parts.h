@@ -126,6 +126,7 @@ class TorqueFitter {
   void put_base(Eigen::Index joint, const Eigen::MatrixXd& sensor);
   [[nodiscard]] Normal normal() const;
   [[nodiscard]] TracedFit read_back(bool converged) const;
+  [[nodiscard]] double noise_memory(const Eigen::VectorXi& trajectory) const;
   [[nodiscard]] Eigen::MatrixXd own_prior() const;
   void name_covariates(TracedFit& out) const;
 

@@ -14,6 +14,19 @@ bool TorqueFitter::is_open(const EffectId& id) const {
   return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
 }
 
+/// Integral time of the noise, in instants: not of what the model still lacks, which the widest
+/// description knows best, nor of what that lacks and the model has by now. What is left in either
+/// makes it seem longer.
+double TorqueFitter::noise_memory(const Eigen::VectorXi& trajectory) const {
+  Eigen::MatrixXd residual(instants_, joints_);
+  for (Eigen::Index j = 0; j < joints_; ++j) {
+    residual.col(j) = design_[static_cast<std::size_t>(j)].residual;
+  }
+  constexpr double kBothSides = 0.5;
+  return kBothSides * std::min(identify::correlation_samples(parts_.widest, trajectory),
+                               identify::correlation_samples(residual, trajectory));
+}
+
 TracedFit TorqueFitter::read_back(bool converged) const {
   TracedFit out;
   out.converged = converged;
@@ -46,8 +59,7 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   linear.unit = parts_.base.sigma.replicate(instants_, 1);
   linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
   const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());
-  // The memory of the noise, not of what the model still lacks: that of the widest description.
-  linear.correlation_time_s = identify::correlation_samples(parts_.widest, trajectory) *
+  linear.correlation_time_s = noise_memory(trajectory) *
                               (linear.time_s[instants_ - 1] - linear.time_s[0]) /
                               static_cast<double>(instants_);
   for (const Added& added : added_) out.values.push_back(added.values);
