@@ -88,9 +88,9 @@ Eigen::MatrixXd system_columns(const BaseData& data, std::size_t joint,
   return out;
 }
 
-/// Held-out root mean square of `target` (instants x joints, whitened by sigma).
-double held_out(const BaseData& data, const Eigen::MatrixXd& target,
-                const std::vector<Eigen::MatrixXd>& shared, const Eigen::VectorXd& sigma) {
+/// Held-out mean square of `target` (instants x joints, whitened by sigma) in each fold.
+Eigen::VectorXd held_out(const BaseData& data, const Eigen::MatrixXd& target,
+                         const std::vector<Eigen::MatrixXd>& shared, const Eigen::VectorXd& sigma) {
   const int folds = 1 + *std::ranges::max_element(data.fold);
   std::vector<std::vector<Eigen::Index>> rows(static_cast<std::size_t>(folds));
   for (std::size_t i = 0; i < data.fold.size(); ++i) {
@@ -112,7 +112,8 @@ double held_out(const BaseData& data, const Eigen::MatrixXd& target,
     total.g += part.g;
     parts.push_back(std::move(part));
   }
-  std::vector<double> squares;
+  std::vector<std::vector<double>> squares(rows.size());
+  std::vector<double> all;
   for (std::size_t f = 0; f < rows.size(); ++f) {
     Normal others(total.g.size());
     others.H = total.H - parts[f].H;
@@ -122,20 +123,33 @@ double held_out(const BaseData& data, const Eigen::MatrixXd& target,
       const auto c = static_cast<Eigen::Index>(j);
       const Eigen::VectorXd error =
           target(rows[f], c) / sigma[c] - X[j](rows[f], Eigen::all) * solution;
-      for (const double e : error) squares.push_back(e * e);
+      for (const double e : error) squares[f].push_back(e * e);
     }
+    all.insert(all.end(), squares[f].begin(), squares[f].end());
   }
   // Contacts and outliers must not decide: the bulk does.
   constexpr double kBulk = 0.9;
-  const double limit = quantile(squares, kBulk);
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (const double s : squares) {
-    if (s > limit) continue;
-    sum += s;
-    ++count;
+  const double limit = quantile(all, kBulk);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(std::ssize(rows));
+  for (std::size_t f = 0; f < rows.size(); ++f) {
+    double count = 0.0;
+    for (const double s : squares[f]) {
+      if (s > limit) continue;
+      out[static_cast<Eigen::Index>(f)] += s;
+      count += 1.0;
+    }
+    out[static_cast<Eigen::Index>(f)] /= std::max(1.0, count);
   }
-  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, count)));
+  return out;
+}
+
+/// Student's t of the folds' differences.
+double paired_t(const Eigen::VectorXd& worse, const Eigen::VectorXd& better) {
+  const auto n = static_cast<double>(worse.size());
+  const Eigen::VectorXd difference = worse - better;
+  const double variance =
+      (difference.array() - difference.mean()).square().sum() / std::max(1.0, n - 1.0);
+  return variance > 0.0 ? difference.mean() / std::sqrt(variance / n) : 0.0;
 }
 
 }  // namespace
@@ -186,8 +200,11 @@ BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened)
 }
 
 BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma) {
-  return {.declared = held_out(data, data.torque - data.declared, data.common, sigma),
-          .identified = held_out(data, data.torque, data.rigid, sigma)};
+  const Eigen::VectorXd declared = held_out(data, data.torque - data.declared, data.common, sigma);
+  const Eigen::VectorXd identified = held_out(data, data.torque, data.rigid, sigma);
+  return {.declared = std::sqrt(declared.mean()),
+          .identified = std::sqrt(identified.mean()),
+          .t = paired_t(declared, identified)};
 }
 
 Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma) {

@@ -34,10 +34,11 @@ struct WidestFit {
 [[nodiscard]] BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened);
 
 /// Held-out error of rigid bodies as declared and identified, drives and common terms free for
-/// both: root mean square, whitened.
+/// both: root mean square, whitened; Student's t of the folds' squares, declared less identified.
 struct BaseErrors {
   double declared = 0.0;
   double identified = 0.0;
+  double t = 0.0;
 };
 [[nodiscard]] BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma);
 

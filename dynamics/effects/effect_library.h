@@ -66,7 +66,10 @@ struct EffectContext {
   Eigen::VectorXd temperature_c;              ///< instants; empty: not logged
   std::vector<JointTravel> travels;
   LogSpan log;
-  Eigen::VectorXd widths;          ///< of each joint's sign of the speed, rad/s or m/s
+  Eigen::VectorXd widths;  ///< of each joint's sign of the speed, rad/s or m/s
+  /// Least viscous and Coulomb friction that can be added to what the model declares: friction does
+  /// not drive. Empty: anything, where the model is one of differences.
+  Eigen::VectorXd least_viscous, least_coulomb;
   std::string torque_unit = "Nm";  ///< "Nm" or "A"
 
   [[nodiscard]] std::string unit(std::size_t joint) const;  ///< of the joint's torque

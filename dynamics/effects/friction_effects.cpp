@@ -188,10 +188,20 @@ std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t j
   return {{"coulomb", context.joints[joint]}, {"viscous", context.joints[joint]}};
 }
 
+/// Of what the model declares and the effect adds together.
+void forbid_driving(const EffectContext& c, std::size_t j, Candidate& out) {
+  if (c.least_coulomb.size() == 0) return;
+  const bool viscous = out.id.effect == "viscous";
+  if (!viscous && out.id.effect != "coulomb") return;
+  const double least = (viscous ? c.least_viscous : c.least_coulomb)[static_cast<Eigen::Index>(j)];
+  out.possible = [least](const Eigen::VectorXd& theta) { return theta[0] >= least; };
+}
+
 void add_friction_of(const SharedContext& context, std::size_t joint, std::vector<Candidate>& out) {
   for (const auto& make : {viscous, coulomb, asymmetric, stribeck, cubic_viscous, load_friction,
                            position_friction, hysteresis}) {
     out.push_back(make(context, joint));
+    forbid_driving(*context, joint, out.back());
   }
 }
 

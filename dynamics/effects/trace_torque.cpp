@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/effects/disagreement.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -202,6 +203,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
     }
     const TorqueTracedModel& traced = outside ? *outside : whole;
     out.trace = trace_with(traced, options, progress);
+    effects::widen_by_disagreement(traced, out.trace);
     out.base = traced.base();
     out.corrected = correct(model, traced, out.trace);
     if (pass == 0) before = out.trace.held_out_before;

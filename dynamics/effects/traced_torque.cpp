@@ -210,6 +210,10 @@ void TorqueTracedModel::Parts::refresh() {
     if (!has_masses(nominal)) context.rigid = identified;
   }
   context.torque = context.load;
+  if (has_masses(nominal) || base.kind == TorqueBaseKind::kIdentified) {
+    context.least_viscous = -viscous;
+    context.least_coulomb = -coulomb;
+  }
   upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
 }
 
@@ -227,11 +231,15 @@ void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool m
   const effects::BaseErrors errors = effects::compare_bases(data, base.sigma);
   base.declared_error = errors.declared;
   base.identified_error = errors.identified;
-  const bool trusted = errors.declared <= options.trust_factor * errors.identified;
+  // Identified masses bend to what a short or slow log shows: that they fit better must be clear.
+  constexpr double kClear = 3.0;
+  const bool trusted =
+      errors.declared <= options.trust_factor * errors.identified || errors.t < kClear;
   if (trusted) base.kind = TorqueBaseKind::kDeclared;
-  base.reason =
-      fmt::format("declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g}",
-                  errors.declared, errors.identified);
+  base.reason = fmt::format(
+      "declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g} "
+      "(Student's t over the stretches {:.1f})",
+      errors.declared, errors.identified, errors.t);
 }
 
 TracedFit TorqueTracedModel::fit(const std::vector<AddedEffect>& effects) const {

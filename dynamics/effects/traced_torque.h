@@ -35,7 +35,7 @@ enum class TorqueBaseKind {
 struct TracedTorqueOptions {
   TorqueBaseKind base = TorqueBaseKind::kAuto;
   /// Declared masses are trusted while their held-out error is not above that of identified ones by
-  /// more than this factor, all other terms being free for both.
+  /// more than this factor, all other terms being free for both, or that is not clear.
   double trust_factor = 1.05;
   TorqueFilter filter = {};  ///< that the samples went through
   int most_instants = 2500;

@@ -168,6 +168,33 @@ TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
   EXPECT_EQ(model.base().kind, TorqueBaseKind::kIdentified) << model.base().reason;
 }
 
+// A drive whose gain is wrong says another mass than the others do: how well all of them are known
+// together is then no matter of noise.
+TEST(TorqueEffects, joints_that_disagree_about_a_payload_widen_its_interval) {
+  const auto payload_of = [](const std::vector<TrueEffect>& effects) {
+    Rng rng = Rng::from_name("disagreement", 4);
+    const EffectWorld world = effect_world(effects, quiet_world(), rng);
+    TorqueTraceOptions options;
+    options.model = declared_options();
+    const TorqueTrace out = trace_torque(world.model, exact_samples(world), options);
+    const auto found = std::ranges::find_if(
+        out.trace.accepted, [](const TracedEffect& e) { return e.id.effect == "payload"; });
+    EXPECT_NE(found, out.trace.accepted.end());
+    return found == out.trace.accepted.end() ? TracedEffect{} : *found;
+  };
+  const TracedEffect alone = payload_of({{"payload", 2, 0, 0.3}});
+  const TracedEffect beside = payload_of({{"payload", 2, 0, 0.3}, {"torque_gain", 0, 0, 0.1}});
+  const auto width = [](const TracedEffect& e) {
+    return (e.interval.high - e.interval.low) / e.size;
+  };
+  EXPECT_LT(width(alone), 0.05);
+  // What one joint feels of it, over what that depends on.
+  EXPECT_NE(alone.picture.covariate, "time");
+  EXPECT_EQ(alone.picture.unit, "N m");
+  EXPECT_GT(rms(alone.picture.before), 10.0 * rms(alone.picture.after));
+  EXPECT_GT(width(beside), 3.0 * width(alone));
+}
+
 TEST(TorqueEffects, found_friction_goes_into_the_model_and_out_of_the_log) {
   Rng rng = Rng::from_name("effects", 5);
   EffectWorldOptions options = quiet_world();
