@@ -6,7 +6,6 @@
 // `identify_real [SET...]`; default: all. The sets stay where they are.
 #include <chrono>
 #include <functional>
-#include <numbers>
 
 #include <fmt/format.h>
 
@@ -15,17 +14,14 @@
 #include "dynamics/identify/consistent_model.h"
 #include "dynamics/identify/identify.h"
 #include "dynamics/identify/prediction.h"
-#include "kinematics/core/error.h"
-#include "kinematics/log/channel_table.h"
 #include "kinematics/urdf/dynamic_urdf.h"
-#include "tests/experiments/real_logs.h"
+#include "tests/experiments/torque_robots.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kQuarter = 0.5 * std::numbers::pi;
 
 struct RealSet {
   std::string name;
@@ -37,7 +33,7 @@ struct RealSet {
   IdentifyOptions options = {};
 };
 
-TorqueSamples rows_between(const TorqueSamples& samples, double from_s, double to_s) {
+TorqueSamples samples_between(const TorqueSamples& samples, double from_s, double to_s) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index t = 0; t < samples.size(); ++t) {
     if (samples.t_s[t] >= from_s && samples.t_s[t] < to_s) rows.push_back(t);
@@ -52,53 +48,37 @@ TorqueSamples filtered(const TorqueLog& log, double cutoff_hz) {
 }
 
 RealSet ur10e(const fs::path& folder) {
-  // Drive gains (N m / A) from the literature, as the set's README quotes them.
-  Eigen::VectorXd gains(6);
-  gains << 14.87, 13.26, 11.13, 10.62, 11.03, 11.47;
-  const auto read = [&](const char* file) {
-    TorqueLog log = read_log(folder / file, 6, "i");
-    log.torque = (log.torque * gains.asDiagonal()).eval();
-    return filtered(log, 7.0);
-  };
+  const auto read = [&](const char* file) { return filtered(ur10e_log(folder, file), 7.0); };
   RealSet set{.name = "ur10e",
               .split = "12harm_50s -> 15harm_50s_unloaded, 7 Hz",
               .first_fit = "0.63 0.78 0.27 0.58 1.86 1.18"};
   set.model = read_dynamic_urdf(folder / "ur10e.urdf");
   // The authors' own cut of the start-up motion; of the other file, the same three seconds.
-  set.train = rows_between(read("ident_12harm_50s.csv"), 3.8, 54.2);
+  set.train = samples_between(read("ident_12harm_50s.csv"), 3.8, 54.2);
   const TorqueSamples test = read("ident_15harm_50s_unloaded.csv");
-  set.test = rows_between(test, 3.8, test.t_s[test.size() - 1] - 3.0);
+  set.test = samples_between(test, 3.8, test.t_s[test.size() - 1] - 3.0);
   return set;
 }
 
 RealSet tx40(const fs::path& folder) {
-  const ChannelTable table = read_channel_table(folder / "tx40_motor.csv.gz");
-  const Eigen::MatrixXd qm = columns(table, "qm", 6);
-  const Eigen::MatrixXd taum = columns(table, "taum", 6);
-  TorqueLog log;
-  for (int j = 0; j < 6; ++j) log.joints.push_back({.name = fmt::format("joint{}", j + 1)});
-  log.t_s = table.values.col(*table.column("t"));
-  Eigen::VectorXd gears(6);
-  gears << 32, 32, 45, -48, 45, 32;
-  log.q = qm * gears.cwiseInverse().asDiagonal();
-  log.q.col(5) -= log.q.col(4);  // motor 6 also turns with joint 5
-  log.q.col(1).array() -= kQuarter;
-  log.q.col(2).array() += kQuarter;
-  log.torque = taum * gears.asDiagonal();
-  log.torque.col(4) += gears[5] * taum.col(5);
-  log.trajectory = Eigen::VectorXi::Zero(log.rows());
-  log.trajectory_names = {"tx40"};
   RealSet set{.name = "tx40",
               .split = "0.1 .. 5.5 s -> 5.5 .. 7.5 s, 50 Hz, with the wrist's coupled drive",
               .first_fit = "0.62 0.75 1.28 1.34 12.4 3.8"};
   set.model = read_dynamic_urdf(folder / "tx40_mdh_modified.urdf");
-  const TorqueSamples all = filtered(log, 50.0);
-  set.train = rows_between(all, 0.1, 5.5);
-  set.test = rows_between(all, 5.5, 7.5);
+  const TorqueSamples all = filtered(tx40_log(folder), 50.0);
+  set.train = samples_between(all, 0.1, 5.5);
+  set.test = samples_between(all, 5.5, 7.5);
   Eigen::VectorXd wrist = Eigen::VectorXd::Zero(6);
   wrist.tail<2>().setOnes();
   set.options.drives.coupled_drives = {wrist};
   return set;
+}
+
+/// The first 65 % to learn from, the rest to be judged on.
+void split(RealSet& set, const TorqueSamples& all) {
+  const double cut = 0.65 * all.t_s[all.size() - 1];
+  set.train = samples_between(all, 0.0, cut);
+  set.test = samples_between(all, cut, 1e9);
 }
 
 RealSet panda(const fs::path& folder) {
@@ -108,17 +88,8 @@ RealSet panda(const fs::path& folder) {
                   "0.37 0.03 0.05 0.11 0.45 0.18 2.6 (with position harmonics 0.33 0.02 "
                   "0.04 0.08 0.37 0.10 2.3)"};
   set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
-  set.model = dh_arm({{0, 0, 0.333},
-                      {0, -kQuarter, 0},
-                      {0, kQuarter, 0.316},
-                      {0.0825, kQuarter, 0},
-                      {-0.0825, -kQuarter, 0.384},
-                      {0, kQuarter, 0},
-                      {0.088, kQuarter, 0}});
-  const TorqueSamples all = filtered(read_log(folder / "exciting_traj.csv.gz", 7, "tau"), 10.0);
-  const double cut = 0.65 * all.t_s[all.size() - 1];
-  set.train = rows_between(all, 0.0, cut);
-  set.test = rows_between(all, cut, 1e9);
+  set.model = panda_model();
+  split(set, filtered(panda_log(folder), 10.0));
   return set;
 }
 
@@ -129,10 +100,7 @@ RealSet rokae(const fs::path& folder) {
   set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = read_dynamic_urdf(folder / "AR5-5_07R-W4C4A2.urdf");
   set.model.gravity_m_s2 = {kUsualGravity_m_s2, 0.0, 0.0};
-  const TorqueSamples all = filtered(read_log(folder / "ident.csv", 7, "tau"), 4.0);
-  const double cut = 0.65 * all.t_s[all.size() - 1];
-  set.train = rows_between(all, 0.0, cut);
-  set.test = rows_between(all, cut, 1e9);
+  split(set, filtered(rokae_log(folder), 4.0));
   return set;
 }
 
@@ -142,8 +110,8 @@ RealSet lwr4(const fs::path& folder) {
               .first_fit = "6.9 0.08 0.83 0.29 12 30 32"};
   set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
   set.model = read_dynamic_urdf(folder / "kuka_lwr4.urdf");
-  set.train = filtered(read_log(folder / "measurements_1.csv", 7, "tau"), 8.0);
-  set.test = filtered(read_log(folder / "measurements_2.csv", 7, "tau"), 8.0);
+  set.train = filtered(lwr4_log(folder, 1), 8.0);
+  set.test = filtered(lwr4_log(folder, 2), 8.0);
   return set;
 }
 

@@ -7,25 +7,20 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <numbers>
 
 #include <fmt/format.h>
 
 #include "dynamics/data/torque_data.h"
 #include "dynamics/effects/trace_torque.h"
-#include "dynamics/identify/consistent_model.h"
-#include "dynamics/identify/identify.h"
 #include "kinematics/core/error.h"
-#include "kinematics/log/channel_table.h"
 #include "kinematics/urdf/dynamic_urdf.h"
-#include "tests/experiments/real_logs.h"
+#include "tests/experiments/torque_robots.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kQuarter = 0.5 * std::numbers::pi;
 
 struct RealSet {
   std::string name;
@@ -60,116 +55,97 @@ RealSet synthetic(const fs::path& folder, const std::string& truth) {
   return set;
 }
 
-/// Currents of the UR10e as torques, with the drive gains (N m / A) of the literature.
-TorqueLog ur10e_log(const fs::path& folder, const char* file) {
-  Eigen::VectorXd gains(6);
-  gains << 14.87, 13.26, 11.13, 10.62, 11.03, 11.47;
-  TorqueLog log = read_log(folder / file, 6, "i");
-  log.torque = (log.torque * gains.asDiagonal()).eval();
-  std::vector<char> keep(static_cast<std::size_t>(log.rows()), 0);
-  const double end_s = log.t_s[log.rows() - 1] - 3.8;
-  for (Eigen::Index t = 0; t < log.rows(); ++t) {
-    keep[static_cast<std::size_t>(t)] = log.t_s[t] >= 3.8 && log.t_s[t] <= end_s ? 1 : 0;
-  }
-  return keep_rows(log, keep);
-}
-
 RealSet ur10e(const fs::path& folder) {
   RealSet set{
       .name = "ur10e",
       .reference = "viscous, Coulomb; cubic j1; load j2 j3; motor inertia; 20 ms delay j4-j6"};
   set.model = read_dynamic_urdf(folder / "ur10e.urdf");
-  use(set, filtered(ur10e_log(folder, "ident_12harm_50s.csv"), 7.0));
+  use(set, filtered(ur10e_steady_log(folder, "ident_12harm_50s.csv"), 7.0));
   return set;
 }
 
-/// The robot as identified without the load declares the masses.
-RealSet ur10e_payload(const fs::path& folder) {
-  RealSet set{.name = "ur10e_payload", .reference = "2.805 kg (first look 2.75)"};
-  const Motion unloaded = filtered(ur10e_log(folder, "ident_15harm_50s_unloaded.csv"), 7.0);
-  const Identification fit =
-      identify_dynamics(read_dynamic_urdf(folder / "ur10e.urdf"), unloaded.samples);
-  set.model = consistent_model(fit).model;
-  use(set, filtered(ur10e_log(folder, "ident_15harm_50s_loaded.csv"), 7.0));
+/// Three runs at once.
+RealSet ur10e_runs(const fs::path& folder) {
+  RealSet set{.name = "ur10e_runs", .reference = "the same robot, more of it"};
+  set.model = read_dynamic_urdf(folder / "ur10e.urdf");
+  use(set, filtered(join({ur10e_steady_log(folder, "ident_12harm_40s.csv"),
+                          ur10e_steady_log(folder, "ident_12harm_50s.csv"),
+                          ur10e_steady_log(folder, "ident_15harm_50s_unloaded.csv")}),
+                    7.0));
+  return set;
+}
+
+/// What the traced model of the robot without a load leaves of the torque with it: the masses of
+/// the model are zero, so that all that is found came with the load.
+void use_beside(RealSet& set, const Motion& unloaded, const Motion& loaded) {
+  use(set, unloaded);
+  const TorqueTrace without = trace_torque(set.model, set.samples, set.options);
+  use(set, loaded);
+  set.samples.torque -= predict_torque(without.corrected, set.samples, set.options.model.filter);
+  set.model = without_masses(set.model.tree);
   set.options.model.base = TorqueBaseKind::kDeclared;
+}
+
+RealSet ur10e_payload(const fs::path& folder) {
+  RealSet set{.name = "ur10e_payload", .reference = "2.805 kg (first look 2.75, 2.95)"};
+  set.model = read_dynamic_urdf(folder / "ur10e.urdf");
+  use_beside(set, filtered(ur10e_steady_log(folder, "ident_15harm_50s_unloaded.csv"), 7.0),
+             filtered(ur10e_steady_log(folder, "ident_15harm_50s_loaded.csv"), 7.0));
   return set;
 }
 
 RealSet tx40(const fs::path& folder) {
   RealSet set{.name = "tx40",
               .reference = "friction v/c j1 8.05 7.14, j2 5.53 8.26; wrist j5 + j6"};
-  const ChannelTable table = read_channel_table(folder / "tx40_motor.csv.gz");
-  const Eigen::MatrixXd qm = columns(table, "qm", 6);
-  const Eigen::MatrixXd taum = columns(table, "taum", 6);
-  TorqueLog log;
-  for (int j = 0; j < 6; ++j) log.joints.push_back({.name = fmt::format("joint{}", j + 1)});
-  log.t_s = table.values.col(*table.column("t"));
-  Eigen::VectorXd gears(6);
-  gears << 32, 32, 45, -48, 45, 32;
-  log.q = qm * gears.cwiseInverse().asDiagonal();
-  log.q.col(5) -= log.q.col(4);  // motor 6 also turns with joint 5
-  log.q.col(1).array() -= kQuarter;
-  log.q.col(2).array() += kQuarter;
-  log.torque = taum * gears.asDiagonal();
-  log.torque.col(4) += gears[5] * taum.col(5);
-  log.trajectory = Eigen::VectorXi::Zero(log.rows());
-  log.trajectory_names = {"tx40"};
   set.model = read_dynamic_urdf(folder / "tx40_mdh_modified.urdf");
-  std::vector<char> keep(static_cast<std::size_t>(log.rows()), 0);
-  for (Eigen::Index t = 0; t < log.rows(); ++t) {
-    keep[static_cast<std::size_t>(t)] = log.t_s[t] >= 0.1 && log.t_s[t] <= 7.5 ? 1 : 0;
-  }
-  log.sources = {"tx40"};
-  log.source.assign(static_cast<std::size_t>(log.rows()), 0);
-  log.lines.assign(static_cast<std::size_t>(log.rows()), 0);
-  use(set, filtered(keep_rows(log, keep), 50.0));
+  use(set, filtered(rows_between(tx40_log(folder), 0.1, 7.5), 50.0));
   return set;
 }
 
 RealSet panda(const fs::path& folder) {
   RealSet set{.name = "panda", .reference = "joint 7: Coulomb, nMSE 82 -> 19 (v) -> 2.6 % (v+c)"};
-  set.model = dh_arm({{0, 0, 0.333},
-                      {0, -kQuarter, 0},
-                      {0, kQuarter, 0.316},
-                      {0.0825, kQuarter, 0},
-                      {-0.0825, -kQuarter, 0.384},
-                      {0, kQuarter, 0},
-                      {0.088, kQuarter, 0}});
-  use(set, filtered(read_log(folder / "exciting_traj.csv.gz", 7, "tau"), 10.0));
+  set.model = panda_model();
+  use(set, filtered(panda_log(folder), 10.0));
   return set;
 }
 
 RealSet rokae(const fs::path& folder) {
   RealSet set{.name = "rokae", .reference = "gravity along base x: 90 deg"};
   set.model = read_dynamic_urdf(folder / "AR5-5_07R-W4C4A2.urdf");
-  use(set, filtered(read_log(folder / "ident.csv", 7, "tau"), 4.0));
+  use(set, filtered(rokae_log(folder), 4.0));
   return set;
 }
 
 RealSet lwr4(const fs::path& folder) {
-  RealSet set{.name = "lwr4", .reference = "torque offsets; j1 140 -> 26 % with offsets alone"};
+  RealSet set{.name = "lwr4", .reference = "torque offsets of joints 5 to 7, 0.5 to 1 N m on 6"};
   set.model = read_dynamic_urdf(folder / "kuka_lwr4.urdf");
-  use(set, filtered(read_log(folder / "measurements_1.csv", 7, "tau"), 8.0));
+  use(set, filtered(lwr4_log(folder, 1), 8.0));
   return set;
 }
 
-/// One joint whose rigid torque was taken out by the set's makers.
-RealSet franka_joint7(const fs::path& folder) {
-  RealSet set{.name = "franka_joint7",
-              .reference = "Coulomb + viscous 18 %, Dahl of 0.5 to 1 mrad 7.6 %"};
-  const ChannelTable table = read_channel_table(folder / "franka_case4_slow_joint7.csv.gz");
-  TorqueLog log;
-  log.sources = {"franka"};
-  log.joints = {{.name = "joint1"}};
-  log.t_s = table.values.col(*table.column("t"));
-  log.q = table.values.col(*table.column("q7"));
-  log.torque = table.values.col(*table.column("tau_friction7"));
-  log.trajectory = Eigen::VectorXi::Zero(log.rows());
-  log.trajectory_names = {"franka"};
-  log.source.assign(static_cast<std::size_t>(log.rows()), 0);
-  log.lines = table.lines;
-  set.model = dh_arm({{0, 0, 0}});
-  use(set, filtered(log, 10.0));
+RealSet franka(const fs::path& folder, const std::string& name, const std::string& file, int joint,
+               const std::string& reference) {
+  RealSet set{.name = name, .reference = reference};
+  set.model = lone_joint();
+  use(set, filtered(franka_log(folder, file, joint), 10.0));
+  return set;
+}
+
+RealSet kinova(const fs::path& folder) {
+  RealSet set{.name = "kinova_joint7", .reference = "dip near 0.12 rad/s: 1.50 1.42 2.46 N m"};
+  set.model = lone_joint();
+  use(set, filtered(kinova_log(folder), 10.0));
+  return set;
+}
+
+RealSet feetech(const fs::path& folder) {
+  RealSet set{.name = "feetech", .reference = "viscous, Coulomb, load friction; temperature"};
+  set.model = pendulum();
+  const PendulumLog runs = pendulum_log(folder, "sts3215", 1.1682, 0.15);
+  const Motion motion = filtered(runs.log, 8.0);
+  use(set, motion);
+  set.samples.torque_unit = "A";
+  set.options.model.temperature_c = at_samples(runs.log, runs.temperature_c, motion.samples);
   return set;
 }
 
@@ -228,6 +204,11 @@ int main(int argc, char** argv) {
   const auto synthetic = [](const char* truth) -> Maker {
     return [truth](const Path& folder) { return kinescope::synthetic(folder, truth); };
   };
+  const auto franka = [](const char* name, const char* file, int joint, const char* reference) {
+    return Maker{[=](const Path& folder) {
+      return kinescope::franka(folder, name, file, joint, reference);
+    }};
+  };
   const std::vector<std::tuple<std::string, std::string, Maker>> sets = {
       {"scara4_none", "synthetic_dynamics/scara4_none", synthetic("nothing")},
       {"wam7_payload", "synthetic_dynamics/wam7_payload", synthetic("0.25 kg at link7")},
@@ -237,12 +218,20 @@ int main(int argc, char** argv) {
       {"scara4_stribeck_ripple", "synthetic_dynamics/scara4_stribeck_ripple",
        synthetic("Stribeck friction of all joints, ripple of joints 1 and 2")},
       {"ur10e", "dynamics/ur10e_innopolis", kinescope::ur10e},
+      {"ur10e_runs", "dynamics/ur10e_innopolis", kinescope::ur10e_runs},
       {"ur10e_payload", "dynamics/ur10e_innopolis", kinescope::ur10e_payload},
       {"tx40", "dynamics/tx40_staubli", kinescope::tx40},
       {"panda", "dynamics/panda_gaz2019", kinescope::panda},
       {"rokae", "dynamics/rokae_ar5", kinescope::rokae},
       {"lwr4", "dynamics/kuka_lwr4", kinescope::lwr4},
-      {"franka_joint7", "dynamics/franka_fairino_friction", kinescope::franka_joint7}};
+      {"franka_joint7", "dynamics/franka_fairino_friction",
+       franka("franka_joint7", "franka_case4_slow_joint7.csv.gz", 7,
+              "Coulomb + viscous 18 %, Dahl of 0.5 to 1 mrad 7.6 %")},
+      {"franka_joint2", "dynamics/franka_fairino_friction",
+       franka("franka_joint2", "franka_case3_slow_joint2.csv.gz", 2,
+              "Dahl 18 %, with q and q^2 10 %")},
+      {"kinova_joint7", "dynamics/kinova_gen3_joint7", kinescope::kinova},
+      {"feetech", "dynamics/feetech_pendulum", kinescope::feetech}};
   const std::vector<std::string> wanted(argv + 1, argv + argc);
   for (const auto& [name, folder, make] : sets) {
     if (!wanted.empty() && std::ranges::find(wanted, name) == wanted.end()) continue;
