@@ -136,9 +136,13 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   const std::vector<BalanceSample> samples = balance_of(balance, log.log);
   const bool apart = !options.learn_logs.empty();
   summary.learned = apart ? file_list(options.learn_logs) : "the log itself";
+  ContactOptions contact = options.contact;
+  for (const RigidBody& body : make_rigid_model(model).bodies) {
+    contact.parents.push_back(body.parent);
+  }
   summary.calibration = calibrate_contacts(
       apart ? balance_of(balance, read_log(options.learn_logs, model, options.data).log) : samples,
-      options.contact);
+      contact);
 
   summary.events = detect_contacts(summary.calibration, samples);
   std::vector<TimeSpan> spans;

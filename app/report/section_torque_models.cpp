@@ -108,7 +108,15 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   plot.line(predicted, series_class(0));
   plot.legend("measured", series_class(7));
   plot.legend("predicted, 95 % band", series_class(0));
-  return figure(plot.str(), fmt::format("{}: samples that the model has not seen.", name), "wide");
+  const TorqueScore& score = summary.scores[static_cast<std::size_t>(summary.best)];
+  const double error = score.rms[joint];
+  // A line on a line is no riddle to leave to the reader.
+  const bool alike = error < 0.005 * (high - low);
+  return figure(
+      plot.str(),
+      fmt::format("{}: samples that the model has not seen; rms error {:.2g} {}{}.", name, error,
+                  summary.test.torque_unit, alike ? ", less than the lines are wide" : ""),
+      "wide");
 }
 
 }  // namespace

@@ -65,6 +65,15 @@ std::string joint_table(const TorqueFacts& facts) {
   return table.str();
 }
 
+std::string friction_caption(const TorqueSummary& summary, std::size_t joint) {
+  const double friction = summary.robust->parts[joint].friction_rms;
+  const auto column = summary.train.torque.col(static_cast<Eigen::Index>(joint));
+  const double torque = column.norm() / std::sqrt(static_cast<double>(column.size()));
+  return fmt::format("{}: {:.2g} {} rms, {:.2g} % of its torque{}.", summary.joints[joint],
+                     friction, summary.train.torque_unit, 100.0 * friction / torque,
+                     friction < summary.robust->joints[joint].noise ? ": below its noise" : "");
+}
+
 std::string profile_plot(const TorqueSummary& summary, std::size_t joint) {
   const std::vector<FrictionBin>& bins = summary.robust->parts[joint].profile;
   if (bins.size() < 2) return "";
@@ -94,9 +103,7 @@ std::string profile_plot(const TorqueSummary& summary, std::size_t joint) {
   plot.band(velocity, lower, upper, series_class(2));
   plot.line(means, series_class(2));
   plot.legend("part that turns round with the velocity", series_class(2));
-  return figure(plot.str(), fmt::format("Friction of {} as learned; the band is its spread at one "
-                                        "velocity: what else it depends on.",
-                                        name));
+  return figure(plot.str(), friction_caption(summary, joint));
 }
 
 std::string mass_text(const PayloadEstimate& found) {
@@ -134,9 +141,11 @@ std::string torque_robust_section(const TorqueFacts& facts) {
   out += paragraph(
       "Parts of the learned torque F, by Student's t, at zero acceleration: friction is what turns "
       "round with the velocity, (F(q, dq) - F(q, -dq)) / 2; gravity what does not, with offsets "
-      "and centrifugal torque, (F(q, dq) + F(q, -dq)) / 2; inertia is what the acceleration adds.");
+      "and centrifugal torque, (F(q, dq) + F(q, -dq)) / 2; inertia is what the acceleration adds. "
+      "The curves show friction over each joint's own velocity; the band is its spread at one "
+      "velocity: what else it depends on.");
   out += joint_table(facts);
-  out += "<div class=\"columns\">";
+  out += "<div class=\"figures\">";
   for (std::size_t j = 0; j < facts.summary.joints.size(); ++j) {
     out += profile_plot(facts.summary, j);
   }

@@ -52,6 +52,10 @@ void validate(const ContactOptions& options) {
           "give a time above 0, at most 10 s");
   require(options.link_level > 0.0 && options.link_level < 1.0, "link_level",
           "give a probability between 0 and 1");
+  for (std::size_t k = 0; k < options.parents.size(); ++k) {
+    require(options.parents[k] >= -1 && options.parents[k] < static_cast<int>(k), "parents",
+            "give for each joint the number of the one that carries it, -1 for the base");
+  }
   require(options.guard_s >= 0.0 && options.guard_s <= 60.0, "guard_s",
           "give a time of at most 60 s");
 }

@@ -26,6 +26,8 @@ struct ContactOptions {
   /// Level of the hypothesis "joints beyond the link answer nothing": the share of contacts that
   /// are put on too far a link.
   double link_level = 0.001;
+  /// The joint that carries each joint's own, as RigidBody::parent; empty: joints in series.
+  std::vector<int> parents = {};
   /// The calibration log may itself hold contacts that nobody declared: what stands out is left
   /// out.
   bool may_contain_contacts = true;
@@ -76,9 +78,9 @@ struct ContactEvent {
   double end_s = 0.0;    ///< when the external torque ended; of an open contact, the last sample
   bool open = true;      ///< not over yet
   bool cut_off = false;  ///< ended by a gap or the end of the samples
-  /// The smallest number such that joints beyond it are consistent with no external torque
-  /// (ContactOptions::link_level), minus one: index of the joint whose link was touched, or of one
-  /// beyond where its joint is in line with the force.
+  /// Index of the joint whose link was touched, or of one beyond where its joint is in line with
+  /// the force: the nearest to the base such that joints that do not carry it are consistent with
+  /// no external torque (ContactOptions::link_level). -1: several branches were touched at once.
   int link = -1;
   Eigen::VectorXd link_probability;   ///< one a joint's link
   Eigen::VectorXd beyond_p_value;     ///< of "the joints beyond answer nothing", one a joint's link

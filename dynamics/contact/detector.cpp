@@ -113,7 +113,9 @@ void ContactDetector::raise_alarm(int age) {
   event_.onset_s = std::min(contact::bend_time(bend_t_, bend_y_), record_[last - 1].stamp_s);
   onset_ = record_[record_.at_or_before(event_.onset_s)];
   segment_ = onset_;
-  segments_ = {.squares = Eigen::VectorXd::Zero(calibration_.joints())};
+  const bool series = is_series(calibration_.options.parents);
+  segments_ = {
+      .squares = Eigen::MatrixXd::Zero(series ? 1 : calibration_.joints(), calibration_.joints())};
   estimate(last);
 }
 
@@ -121,7 +123,7 @@ void ContactDetector::raise_alarm(int age) {
 void ContactDetector::look_at_segment() {
   if (record_.back().stamp_s - segment_.stamp_s < calibration_.options.end_window_s) return;
   mean_torque(segment_, record_.back());
-  segments_.squares += joint_answers(mean_, covariance_).cwiseAbs2();
+  segments_.squares += joint_answers(mean_, covariance_, calibration_.options.parents).cwiseAbs2();
   ++segments_.count;
   segment_ = record_.back();
 }
@@ -165,11 +167,12 @@ void ContactDetector::estimate(std::size_t end) {
   event_.end_s = record_[end].stamp_s;
   event_.torque = mean_;
   event_.torque_covariance = covariance_;
+  const std::vector<int>& parents = calibration_.options.parents;
   const std::array looks{
-      JointAnswers{.squares = joint_answers(mean_, covariance_).cwiseAbs2(), .count = 1},
+      JointAnswers{.squares = joint_answers(mean_, covariance_, parents).cwiseAbs2(), .count = 1},
       segments_};
   LinkEvidence evidence = link_evidence(std::span(looks).first(segments_.count > 0 ? 2U : 1U),
-                                        calibration_.options.link_level);
+                                        calibration_.options.link_level, parents);
   event_.link = evidence.link;
   event_.link_probability = std::move(evidence.probability);
   event_.beyond_p_value = std::move(evidence.beyond_p_value);

@@ -105,6 +105,44 @@ TEST_F(DynamicsCommand, RobustRegressionsAndPartsAreInTheResult) {
             std::string::npos);
 }
 
+TEST_F(DynamicsCommand, SaysWhatTheRobotCarries) {
+  constexpr double kMass = 0.8;
+  Rng rng = Rng::from_name("payload command");
+  // Four joints: two turn a load through too few postures to weigh it.
+  const DynamicModel empty =
+      random_masses(random_robot({.joints = 4, .prismatic_share = 0.0}, rng).tree,
+                    {.every_direction = false}, rng);
+  DynamicModel full = empty;
+  const std::string hand = make_rigid_model(empty).bodies.back().name;
+  for (std::size_t l = 0; l < full.links.size(); ++l) {
+    if (full.tree.links[l].name != hand) continue;
+    full.links[l] += from_central({.mass_kg = kMass,
+                                   .centre_m = {0.0, 0.02, 0.1},
+                                   .inertia_kgm2 = 1e-3 * Eigen::Matrix3d::Identity()});
+  }
+  const TorqueWorldOptions world{.samples = 2500, .trajectories = 1};
+  folder_.write("robot.urdf", write_urdf(empty))
+      .write("log.csv", torque_log_csv(torque_log_of(full, world, rng)))
+      .write("empty.csv", torque_log_csv(torque_log_of(empty, world, rng)));
+  for (const bool two_logs : {false, true}) {
+    const Outcome outcome = run(two_logs ? words({"--no-trace", "--unloaded", path("empty.csv")})
+                                         : words({"--no-trace", "--payload"}));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find(hand + " carries"), std::string::npos) << outcome.out;
+    const auto document =
+        nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+    for (const char* how : {"motion", "at_rest"}) {
+      const auto& found = document.at("payload").at(how);
+      // Twice the 95 % interval: once in ten thousand logs.
+      const double half = found.at("upper_kg").get<double>() - found.at("mass_kg").get<double>();
+      EXPECT_NEAR(found.at("mass_kg").get<double>(), kMass, 2.0 * half) << how;
+      EXPECT_LT(half, 0.5 * kMass) << how;
+    }
+    EXPECT_NE(read_text_file(folder_.path() / "out/dynamics.html").find("payload-table"),
+              std::string::npos);
+  }
+}
+
 TEST_F(DynamicsCommand, GravityThatNobodyDeclaredIsSaid) {
   const Outcome silent = run(words({"--no-trace", "--no-robust"}));
   EXPECT_NE(silent.out.find("Nothing was declared about gravity"), std::string::npos) << silent.out;

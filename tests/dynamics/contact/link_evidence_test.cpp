@@ -2,6 +2,7 @@
 #include "dynamics/contact/link_evidence.h"
 
 #include <array>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
@@ -58,12 +59,53 @@ TEST(LinkEvidence, ErrsAtTheStatedLevel) {
 
 /// A torque that changes its sign has no mean; its segments tell.
 TEST(LinkEvidence, SegmentsShowWhatTheMeanHides) {
-  JointAnswers mean{.squares = Eigen::VectorXd::Zero(3), .count = 1};
+  JointAnswers mean{.squares = Eigen::RowVectorXd::Zero(3), .count = 1};
   mean.squares << 400.0, 400.0, 1.0;
-  JointAnswers segments{.squares = Eigen::VectorXd::Zero(3), .count = 6};
+  JointAnswers segments{.squares = Eigen::RowVectorXd::Zero(3), .count = 6};
   segments.squares << 2000.0, 2000.0, 900.0;
   EXPECT_EQ(link_evidence(std::array{mean}, kLevel).link, 1);
   EXPECT_EQ(link_evidence(std::array{mean, segments}, kLevel).link, 2);
+}
+
+/// A trunk that carries two arms of two joints each.
+TEST(LinkEvidence, FollowsTheBranchesOfATree) {
+  const std::array<int, kJoints> parents = {-1, 0, 1, 0, 3};
+  const std::array<std::vector<int>, kJoints> answering = {
+      {{0}, {0, 1}, {0, 1, 2}, {0, 3}, {0, 3, 4}}};
+  Rng rng = Rng::from_name("link_evidence tree");
+  for (int link = 0; link < kJoints; ++link) {
+    int right = 0;
+    for (int t = 0; t < kTrials; ++t) {
+      const Eigen::MatrixXd S = random_covariance(rng);
+      Eigen::VectorXd torque = S.llt().matrixL() * normals(rng);
+      for (const int joint : answering[static_cast<std::size_t>(link)]) torque[joint] += 300.0;
+      const std::array looks{
+          JointAnswers{.squares = joint_answers(torque, S, parents).cwiseAbs2(), .count = 1}};
+      const LinkEvidence evidence = link_evidence(looks, kLevel, parents);
+      right += evidence.link == link ? 1 : 0;
+      ASSERT_NEAR(evidence.probability.sum(), 1.0, 1e-12);
+    }
+    // The link itself and those that carry it each err at the level; some torques nearly cancel.
+    EXPECT_GT(right, 0.93 * kTrials) << link;
+  }
+}
+
+TEST(LinkEvidence, TwoBranchesAtOnceAreNoLink) {
+  const std::array<int, kJoints> parents = {-1, 0, 1, 0, 3};
+  const Eigen::MatrixXd S = Eigen::MatrixXd::Identity(kJoints, kJoints);
+  const Eigen::VectorXd torque = Eigen::VectorXd::Constant(kJoints, 50.0);
+  const std::array looks{
+      JointAnswers{.squares = joint_answers(torque, S, parents).cwiseAbs2(), .count = 1}};
+  EXPECT_EQ(link_evidence(looks, kLevel, parents).link, -1);
+}
+
+TEST(LinkEvidence, ASeriesIsTheTreeWithoutBranches) {
+  const std::array<int, kJoints> parents = {-1, 0, 1, 2, 3};
+  Rng rng = Rng::from_name("link_evidence series");
+  const Eigen::MatrixXd S = random_covariance(rng);
+  const Eigen::VectorXd torque = normals(rng);
+  EXPECT_TRUE(is_series(parents));
+  EXPECT_EQ(joint_answers(torque, S), joint_answers(torque, S, parents));
 }
 
 }  // namespace
