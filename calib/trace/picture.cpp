@@ -77,12 +77,17 @@ double explained_by(const Eigen::VectorXd& covariate, const Eigen::VectorXd& cur
   std::vector<Eigen::Index> order(static_cast<std::size_t>(covariate.size()));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return covariate[i]; });
+  const auto at = [&](Eigen::Index k) { return covariate[order[static_cast<std::size_t>(k)]]; };
   const Eigen::Index n = covariate.size();
   const Eigen::Index bins = std::min(kBins, std::max<Eigen::Index>(1, n / 4));
   double within = 0.0;
+  Eigen::Index last = 0;
   for (Eigen::Index b = 0; b < bins; ++b) {
-    const Eigen::Index first = b * n / bins;
-    const Eigen::Index last = (b + 1) * n / bins;
+    const Eigen::Index first = last;
+    last = std::max(last, (b + 1) * n / bins);
+    // Equal values stay together, or their order in time would explain what they do not.
+    while (last > 0 && last < n && at(last) == at(last - 1)) ++last;
+    if (first == last) continue;
     double sum = 0.0;
     double squares = 0.0;
     for (Eigen::Index k = first; k < last; ++k) {

@@ -76,6 +76,8 @@ struct Candidate {
   std::string size_unit;
   /// Parameters that can be: friction does not drive. Empty: all.
   std::function<bool(const Eigen::VectorXd& theta)> possible;
+  /// As TraceOptions::floor, where the sensor errs by more in what this one touches.
+  double floor = 0.0;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;
   bool scan_listed = false;  ///< only the listed values make sense; else those between them too

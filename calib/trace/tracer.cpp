@@ -129,12 +129,12 @@ std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
                                                   const std::vector<TestedMember>& family) const {
   std::vector<Contender> out;
   for (const TestedMember& member : family) {
-    if (member.score.hidden() || member.p_value > level_ || member.score.rms < options_.floor) {
-      continue;
-    }
-    const EffectId& id = stage.fit.candidates[member.index].id;
+    const Candidate& candidate = stage.fit.candidates[member.index];
+    if (member.score.hidden() || member.p_value > level_) continue;
+    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
+    const EffectId& id = candidate.id;
     if (removed_.contains(id)) continue;
-    if (!is_possible(stage.fit.candidates[member.index], member.score.theta)) continue;
+    if (!is_possible(candidate, member.score.theta)) continue;
     const Score confirmed = jackknife_test(stage.system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;
     out.push_back({member, id, held_out_cells(stage.system, member.columns)});

@@ -238,7 +238,8 @@ void Tracer::list_not_found() {
       // What lies below the sensor's own errors is not looked for either.
       const double size = std::abs(size_of(candidate, score.theta));
       if (score.rms > 0.0) {
-        missing.smallest_size = std::max(missing.smallest_size, size * options_.floor / score.rms);
+        const double floor = std::max(options_.floor, candidate.floor);
+        missing.smallest_size = std::max(missing.smallest_size, size * floor / score.rms);
       }
     }
     trace_.not_found.push_back(std::move(missing));
