@@ -7,7 +7,7 @@ set -euo pipefail
 packages=(
   g++ cmake ninja-build pkg-config git ca-certificates
   libopencv-dev libapriltag-dev libopenblas-pthread-dev libceres-dev libeigen3-dev liburdfdom-dev
-  libtinyxml2-dev libyaml-cpp-dev libcli11-dev libfmt-dev nlohmann-json3-dev libssl-dev zlib1g-dev libsvm-dev
+  libtinyxml2-dev libyaml-cpp-dev libcli11-dev libfmt-dev nlohmann-json3-dev libssl-dev zlib1g-dev libsvm-dev libdlib-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev
   esbuild libjs-three
 )

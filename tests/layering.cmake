@@ -37,6 +37,7 @@ set(rooms
 set(third_parties
     "opencv2/: calib/vision"
     "libsvm/: dynamics/models"
+    "dlib/: dynamics/models"
     "apriltag: calib/vision"
     "libav: calib/vision"
     "libsw: calib/vision"

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 constexpr double kHeldOut = 0.3;
 
 std::vector<TorqueModelKind> parse_models(const std::vector<std::string>& names) {
-  if (names.empty()) return all_torque_models();
+  if (names.empty()) return usual_torque_models();
   std::vector<TorqueModelKind> kinds;
   for (const std::string& name : names) {
     const auto kind = torque_model_kind(name);

@@ -110,8 +110,10 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   add_files(command, "--test", dynamics.test_logs,
             "Logs to judge on (default: the last part of the log)", false);
   command
-      .add_option("--model", dynamics.models,
-                  "parametric, rbf, gip, model_based, semi_parametric, lip, svr (default: all)")
+      .add_option(
+          "--model", dynamics.models,
+          "parametric, rbf, gip, model_based, semi_parametric, lip, svr, network (default: all "
+          "but network, which takes a minute)")
       ->delimiter(',')
       ->type_name("LIST");
   add_gravity(command, dynamics.gravity_m_s2);

@@ -12,6 +12,7 @@
 #include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/identify/torque_terms.h"
+#include "dynamics/models/neural_network.h"
 #include "dynamics/models/support_vectors.h"
 
 namespace kinescope {
@@ -22,7 +23,7 @@ using Matrix = Eigen::MatrixXd;
 // Of normalised torques, to begin with.
 constexpr double kNoiseStart = 1e-3;
 
-constexpr std::array<std::pair<TorqueModelKind, std::string_view>, 7> kNames{{
+constexpr std::array<std::pair<TorqueModelKind, std::string_view>, 8> kNames{{
     {TorqueModelKind::kParametric, "parametric"},
     {TorqueModelKind::kRbf, "rbf"},
     {TorqueModelKind::kGip, "gip"},
@@ -30,6 +31,7 @@ constexpr std::array<std::pair<TorqueModelKind, std::string_view>, 7> kNames{{
     {TorqueModelKind::kSemiParametric, "semi_parametric"},
     {TorqueModelKind::kLip, "lip"},
     {TorqueModelKind::kSupportVectors, "svr"},
+    {TorqueModelKind::kNeuralNetwork, "network"},
 }};
 
 Matrix inputs_of(const Matrix& q, const Matrix& dq, const Matrix& ddq) {
@@ -182,6 +184,15 @@ const std::vector<TorqueModelKind>& all_torque_models() {
   return kinds;
 }
 
+const std::vector<TorqueModelKind>& usual_torque_models() {
+  static const std::vector<TorqueModelKind> kinds = [] {
+    std::vector<TorqueModelKind> out = all_torque_models();
+    std::erase(out, TorqueModelKind::kNeuralNetwork);
+    return out;
+  }();
+  return kinds;
+}
+
 FittedTorqueModel parametric_model(const Identification& found, int samples) {
   const auto shared = std::make_shared<const Identification>(found);
   FittedTorqueModel out{TorqueModelKind::kParametric, samples, {}};
@@ -209,6 +220,11 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
   if (kind == TorqueModelKind::kSupportVectors) {
     return models::fit_support_vectors(
         select_rows(samples, evenly_chosen(samples.size(), options.samples)));
+  }
+  if (kind == TorqueModelKind::kNeuralNetwork) {
+    return models::fit_neural_network(
+        select_rows(samples, evenly_chosen(samples.size(), options.samples)), options.network,
+        options.seed);
   }
   const gp::JointKinds joints = kinds_of(make_rigid_model(model));
   const int n = static_cast<int>(joints.size());

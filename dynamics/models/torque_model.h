@@ -29,13 +29,25 @@ enum class TorqueModelKind {
   kModelBased,      ///< features of the parametric model, each joint by itself
   kSemiParametric,  ///< the same plus a squared exponential for what they lack
   kLip,             ///< Lagrangian-inspired polynomial of all joints together, and friction
-  kSupportVectors   ///< epsilon-SVR with a Gaussian kernel, each joint by itself
+  kSupportVectors,  ///< epsilon-SVR with a Gaussian kernel, each joint by itself
+  kNeuralNetwork    ///< two hidden layers of 400 sigmoids, all joints together
 };
 
 [[nodiscard]] std::string_view to_string(TorqueModelKind kind);
 /// Nothing for an unknown name.
 [[nodiscard]] std::optional<TorqueModelKind> torque_model_kind(std::string_view name);
 [[nodiscard]] const std::vector<TorqueModelKind>& all_torque_models();
+/// All but the network, which takes longer than the others together.
+[[nodiscard]] const std::vector<TorqueModelKind>& usual_torque_models();
+
+struct NeuralNetworkOptions {
+  int epochs = 600;             ///< at most; passes over the training samples
+  int batch = 50;               ///< samples a step
+  double learning_rate = 2e-3;  ///< of Adam, at the start
+  double smallest_rate = 3e-5;  ///< the training ends below it
+  double weight_decay = 3e-4;   ///< relative to the rate of learning
+  int patience = 20;            ///< epochs without a better held-out error before the rate halves
+};
 
 struct TorqueModelOptions {
   IdentifyOptions identify;
@@ -44,6 +56,7 @@ struct TorqueModelOptions {
   int samples_of_all_joints = 400;   ///< the same for kLip, whose matrix is joints times as wide
   int hyperparameter_samples = 600;  ///< of them, for the search
   int starts = 3;
+  NeuralNetworkOptions network;
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: all of the machine; never changes a result
 };

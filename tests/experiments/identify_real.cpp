@@ -16,6 +16,7 @@
 #include "dynamics/identify/prediction.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/experiments/torque_robots.h"
+#include "tests/truth/reference_arms.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
@@ -88,7 +89,7 @@ RealSet panda(const fs::path& folder) {
                   "0.37 0.03 0.05 0.11 0.45 0.18 2.6 (with position harmonics 0.33 0.02 "
                   "0.04 0.08 0.37 0.10 2.3)"};
   set.options.drives.motor_inertia = false;  // the sensors sit behind the motors
-  set.model = panda_model();
+  set.model = panda_kinematics();
   split(set, filtered(panda_log(folder), 10.0));
   return set;
 }

@@ -33,23 +33,4 @@ TorqueLog read_log(const std::filesystem::path& path, int joints, const std::str
   return log;
 }
 
-DynamicModel dh_arm(const std::vector<std::array<double, 3>>& rows) {
-  KinematicTree tree;
-  tree.links.push_back({"base"});
-  for (const auto& [a, alpha, d] : rows) {
-    const auto index = static_cast<int>(tree.joints.size());
-    Joint joint;
-    joint.name = fmt::format("joint{}", index + 1);
-    joint.type = JointType::kRevolute;
-    joint.parent = LinkId{index};
-    joint.child = LinkId{index + 1};
-    joint.T_parent_joint =
-        Pose{exp_rotation(Eigen::Vector3d::UnitX() * alpha), Eigen::Vector3d::UnitX() * a} *
-        Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitZ() * d};
-    tree.joints.push_back(joint);
-    tree.links.push_back({fmt::format("link{}", index + 1)});
-  }
-  return without_masses(tree);
-}
-
 }  // namespace kinescope

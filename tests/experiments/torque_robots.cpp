@@ -9,6 +9,7 @@
 
 #include "kinematics/core/error.h"
 #include "tests/experiments/real_logs.h"
+#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {
@@ -83,16 +84,6 @@ TorqueLog tx40_log(const fs::path& folder) {
   Eigen::MatrixXd torque = taum * gears.asDiagonal();
   torque.col(4) += gears[5] * taum.col(5);
   return log_of("tx40", column(table, "t"), std::move(q), std::move(torque));
-}
-
-DynamicModel panda_model() {
-  return dh_arm({{0, 0, 0.333},
-                 {0, -kQuarter, 0},
-                 {0, kQuarter, 0.316},
-                 {0.0825, kQuarter, 0},
-                 {-0.0825, -kQuarter, 0.384},
-                 {0, kQuarter, 0},
-                 {0.088, kQuarter, 0}});
 }
 
 TorqueLog panda_log(const fs::path& folder) {

@@ -25,7 +25,6 @@ namespace kinescope {
 /// Motor side taken to the joints: gear ratios, and motor 6, which also turns with joint 5.
 [[nodiscard]] TorqueLog tx40_log(const std::filesystem::path& folder);
 
-[[nodiscard]] DynamicModel panda_model();
 [[nodiscard]] TorqueLog panda_log(const std::filesystem::path& folder);
 [[nodiscard]] TorqueLog rokae_log(const std::filesystem::path& folder);
 /// `run` 1 or 2: the same path twice.

@@ -15,6 +15,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/experiments/torque_robots.h"
+#include "tests/truth/reference_arms.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
@@ -104,7 +105,7 @@ RealSet tx40(const fs::path& folder) {
 
 RealSet panda(const fs::path& folder) {
   RealSet set{.name = "panda", .reference = "joint 7: Coulomb, nMSE 82 -> 19 (v) -> 2.6 % (v+c)"};
-  set.model = panda_model();
+  set.model = panda_kinematics();
   use(set, filtered(panda_log(folder), 10.0));
   return set;
 }

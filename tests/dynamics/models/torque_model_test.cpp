@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/models/torque_model.h"
 
+#include <algorithm>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -42,6 +43,7 @@ TorqueModelOptions quick() {
   options.samples_of_all_joints = 120;
   options.hyperparameter_samples = 150;
   options.starts = 1;
+  options.network.epochs = 150;
   return options;
 }
 
@@ -53,6 +55,8 @@ TEST(TorqueModel, NamesGoBothWays) {
   }
   EXPECT_EQ(names.size(), all_torque_models().size());
   EXPECT_FALSE(torque_model_kind("perceptron"));
+  EXPECT_EQ(usual_torque_models().size() + 1, all_torque_models().size());
+  EXPECT_EQ(std::ranges::count(usual_torque_models(), TorqueModelKind::kNeuralNetwork), 0);
 }
 
 TEST(TorqueModel, EveryKindExplainsUnseenMotion) {
