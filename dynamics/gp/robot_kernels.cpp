@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/gp/robot_kernels.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,6 +15,25 @@ namespace {
 Kernel renamed(const Kernel& kernel, const std::string& prefix) {
   std::vector<Parameter> parameters = kernel.parameters();
   for (Parameter& parameter : parameters) parameter.name = prefix + " " + parameter.name;
+  return kernel.with_parameters(std::move(parameters));
+}
+
+// Mean square of every feature over the inputs, averaged over the features.
+double mean_square(const FeatureMap& map, const Inputs& inputs) {
+  Eigen::MatrixXd features(inputs.rows(), map.size());
+  map.map(inputs, features);
+  const double square = features.size() > 0 ? features.array().square().mean() : 0.0;
+  return square > 0.0 ? square : 1.0;
+}
+
+// A linear kernel whose free offset, if it has one, and whose weights start at these values.
+Kernel with_start(const Kernel& kernel, Eigen::Index weights, double offset, double weight) {
+  std::vector<Parameter> parameters = kernel.parameters();
+  const std::size_t offsets = parameters.size() - static_cast<std::size_t>(weights);
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    Parameter& parameter = parameters[p];
+    parameter.value = std::clamp(p < offsets ? offset : weight, parameter.lower, parameter.upper);
+  }
   return kernel.with_parameters(std::move(parameters));
 }
 
@@ -52,6 +73,34 @@ Kernel gip(const JointKinds& joints) {
     out =
         out * renamed(multiplicative_polynomial(joint_position(joints, j), kDegree, Offset::kUnit),
                       "gip");
+  }
+  return out;
+}
+
+Kernel gip(const JointKinds& joints, const Inputs& inputs) {
+  const int n = static_cast<int>(joints.size());
+  KINESCOPE_CHECK(n > 0, "at least one joint");
+  // A joint's factor is (1 + first weight) (1 + second weight) for features of mean square 1.
+  constexpr double kFirst = 1.0;
+  constexpr double kSecond = 0.1;
+  const double factors = std::pow((1.0 + kFirst) * (1.0 + kSecond), n);
+  const FeatureMap motion = accelerations_and_velocity_products(n);
+  // A point mass at one metre: torque = m (ddq + g cos q).
+  constexpr double kGravitySquared = 9.81 * 9.81;
+  const double sum = mean_square(motion, inputs) * static_cast<double>(motion.size());
+  const double weight = 1.0 / (factors * (kGravitySquared + sum));
+  Kernel out =
+      renamed(with_start(linear(motion), motion.size(), kGravitySquared * weight, weight), "gip");
+  for (int j = 0; j < n; ++j) {
+    const FeatureMap position = joint_position(joints, j);
+    // cos^2 + sin^2 is 1 as it is.
+    const bool turns = joints[static_cast<std::size_t>(j)] == JointKind::kRevolute;
+    const double square = turns ? 1.0 : mean_square(position, inputs);
+    for (const double share : {kFirst, kSecond}) {
+      out = out * renamed(with_start(linear(position, Offset::kUnit), position.size(), 1.0,
+                                     share / square),
+                          "gip");
+    }
   }
   return out;
 }

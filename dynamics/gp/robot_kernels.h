@@ -21,6 +21,10 @@ using JointKinds = std::vector<JointKind>;
 /// products, times, for every joint, a multiplicative polynomial of degree 2 in its position. Each
 /// factor has its own weights; the common scale is in the first.
 [[nodiscard]] Kernel gip(const JointKinds& joints);
+/// The same kernel with a start for normalised targets: over these inputs the prior variance is
+/// about 1, and weight against offset are those of a point mass at one metre under gravity. From
+/// weights of 1 the variance grows with every joint, and a search can end far off.
+[[nodiscard]] Kernel gip(const JointKinds& joints, const Inputs& inputs);
 
 /// Linear kernel of viscous and Coulomb friction of one joint.
 [[nodiscard]] Kernel joint_friction(int joints, int joint, double transition_velocity = 0.0);

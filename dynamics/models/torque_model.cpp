@@ -95,7 +95,8 @@ gp::Kernel kernel_of_joint(TorqueModelKind kind, const DynamicModel& model,
   const int n = static_cast<int>(joints.size());
   if (kind == TorqueModelKind::kRbf) return gp::rbf(gp::first_columns(3 * n));
   if (kind == TorqueModelKind::kGip) {
-    return gp::gip(joints) + gp::joint_friction(n, joint, drives.coulomb_width_rad_s);
+    return gp::gip(joints, inputs_of(samples.q, samples.dq, samples.ddq)) +
+           gp::joint_friction(n, joint, drives.coulomb_width_rad_s);
   }
   const ModelFeatures features = model_features(model, samples, joint, drives);
   if (kind == TorqueModelKind::kModelBased) {

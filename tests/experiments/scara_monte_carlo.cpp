@@ -34,6 +34,7 @@ struct Options {
   bool efficiency = false;
   int samples = 2000;
   int efficiency_samples = 4000;
+  int starts = 1;
   double noise = 0.01;
   double tilt_deg = 2.0;
   double shift_m = 0.01;
@@ -138,6 +139,7 @@ void monte_carlo(const Options& options) {
   const std::vector<TorqueModelKind> kinds = kinds_of(options);
   TorqueModelOptions models;
   models.samples = options.samples;
+  models.starts = options.starts;
   Errors errors;
   errors.seconds.assign(kinds.size(), 0.0);
   fmt::print(
@@ -200,6 +202,7 @@ void efficiency(const Options& options) {
                     {.label = "global nMSE, %", .lower = -5.0, .upper = 2.2, .log10 = true},
                     {.width = 620.0, .height = 360.0});
   TorqueModelOptions models;
+  models.starts = options.starts;
   std::size_t series = 0;
   for (const TorqueModelKind kind : kinds_of(options)) {
     fmt::print("{:<16}", to_string(kind));
@@ -232,6 +235,7 @@ int main(int argc, char** argv) {
   app.add_option("--noise", options.noise, "share of the spread of each joint's torque");
   app.add_option("--tilt", options.tilt_deg, "of the believed geometry, degrees");
   app.add_option("--shift", options.shift_m, "of the believed geometry, m");
+  app.add_option("--starts", options.starts, "of every hyperparameter search");
   app.add_option("--models", options.models, "which ones, in this order");
   app.add_option("--figure", options.figure, "SVG file");
   CLI11_PARSE(app, argc, argv);

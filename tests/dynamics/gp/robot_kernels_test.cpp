@@ -72,6 +72,31 @@ TEST(RobotKernels, GipLearnsEachTorqueExactly) {
   }
 }
 
+TEST(RobotKernels, GipStartsAtTheData) {
+  Arm arm = make_arm(150);
+  arm.data.inputs.rightCols(4) *= 30.0;  // a fast robot: squared speeds of about 1000
+  for (Eigen::Index i = 0; i < 150; ++i) {
+    arm.data.targets.row(i) = torques(arm.data.inputs.row(i));
+  }
+  const Kernel unit = gip(kJoints);
+  const Kernel scaled = gip(kJoints, arm.data.inputs);
+  // The same function of its parameters.
+  EXPECT_TRUE(covariance(unit, arm.unseen)
+                  .isApprox(covariance(scaled.with_log_values(unit.log_values()), arm.unseen)));
+  // "About": the mean of a product is not the product of the means.
+  const double variance = covariance(scaled, arm.data.inputs).diagonal().mean();
+  EXPECT_GT(variance, 1.0 / 3.0);
+  EXPECT_LT(variance, 3.0);
+  EXPECT_GT(covariance(unit, arm.data.inputs).diagonal().mean(), 1e4);
+  for (Eigen::Index o = 0; o < 2; ++o) {
+    const Dataset data = one_output(arm.data, o);
+    const auto likelihood = [&](const Kernel& kernel) {
+      return fit(make_model(kernel, 1e-3, standardise_targets(data)), data).log_likelihood;
+    };
+    EXPECT_GT(likelihood(scaled), likelihood(unit));
+  }
+}
+
 TEST(RobotKernels, LipLearnsAllTorquesExactlyFromFewerSamples) {
   const Arm arm = make_arm(60);
   const GpModel model = make_model(lip(kJoints), kNoise);
