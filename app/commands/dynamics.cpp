@@ -216,6 +216,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   summary.data = filtered_data(log, options.data.motion);
   check_scale(model, summary);
   split_samples(options, model, summary);
+  check_torque_memory(kinds, summary.train.size(), summary.train.joints(), options.models_options);
   clock.lap("read", summary.times);
 
   summary.identification = identify_dynamics(model, summary.train, options.models_options.identify);

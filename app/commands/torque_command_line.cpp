@@ -142,8 +142,13 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   command
       .add_option("--samples", dynamics.models_options.samples,
                   "Training samples of a Gaussian process")
-      ->check(number_in(50, 20000))
+      ->check(number_in(50, 200000))
       ->capture_default_str()
+      ->type_name("N");
+  command
+      .add_option("--inducing", dynamics.models_options.inducing_points,
+                  "Learn from all samples through so many inducing points")
+      ->check(number_in(10, 20000))
       ->type_name("N");
   add_log_options(command, line, dynamics.data);
   add_cutoff(command, dynamics.data);

@@ -52,6 +52,21 @@ class Composite : public KernelNode {
     }
     return total;
   }
+  /// The children's features side by side: those of child c in rows `first_row(c)` and on.
+  template <typename FirstRow>
+  [[nodiscard]] Basis bases_side_by_side(const Inputs& inputs, FirstRow first_row) const {
+    const auto features = static_cast<Index>(feature_count().value_or(0.0));
+    Basis out{Eigen::MatrixXd::Zero(inputs.rows() * outputs(), features),
+              Eigen::MatrixXd::Zero(features, parameter_count())};
+    Index at = 0;
+    for (std::size_t c = 0; c < children_.size(); ++c) {
+      const Basis own = children_[c]->basis(inputs);
+      out.values.block(first_row(c), at, own.values.rows(), own.values.cols()) = own.values;
+      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) = own.exponents;
+      at += own.values.cols();
+    }
+    return out;
+  }
 
  private:
   std::vector<NodePtr> children_;
@@ -90,18 +105,7 @@ class SumNode : public Composite {
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
-    Basis out;
-    const auto features = static_cast<Index>(feature_count().value_or(0.0));
-    out.values.resize(inputs.rows() * outputs(), features);
-    out.exponents = Eigen::MatrixXd::Zero(features, parameter_count());
-    Index at = 0;
-    for (std::size_t c = 0; c < children().size(); ++c) {
-      const Basis own = children()[c]->basis(inputs);
-      out.values.middleCols(at, own.values.cols()) = own.values;
-      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) = own.exponents;
-      at += own.values.cols();
-    }
-    return out;
+    return bases_side_by_side(inputs, [](std::size_t) { return Index{0}; });
   }
 };
 
@@ -202,18 +206,8 @@ class IndependentNode : public Composite {
   }
 
   [[nodiscard]] Basis basis(const Inputs& inputs) const override {
-    const auto features = static_cast<Index>(feature_count().value_or(0.0));
-    Basis out{Eigen::MatrixXd::Zero(inputs.rows() * outputs(), features),
-              Eigen::MatrixXd::Zero(features, parameter_count())};
-    Index at = 0;
-    for (std::size_t c = 0; c < children().size(); ++c) {
-      const Basis own = children()[c]->basis(inputs);
-      out.values.block(static_cast<Index>(c) * inputs.rows(), at, inputs.rows(),
-                       own.values.cols()) = own.values;
-      out.exponents.block(at, start(c), own.exponents.rows(), own.exponents.cols()) = own.exponents;
-      at += own.values.cols();
-    }
-    return out;
+    return bases_side_by_side(inputs,
+                              [&](std::size_t c) { return static_cast<Index>(c) * inputs.rows(); });
   }
 };
 

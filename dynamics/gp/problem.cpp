@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <string>
 #include <utility>
 
@@ -135,39 +134,18 @@ Route choose_route(const Kernel& kernel, const Problem& problem, Route wanted) {
   return few ? Route::kFeatures : Route::kDense;
 }
 
-std::size_t available_memory_bytes() {
-  std::ifstream file("/proc/meminfo");
-  std::string key;
-  std::size_t kilobytes = 0;
-  std::string unit;
-  while (file >> key >> kilobytes) {
-    std::getline(file, unit);
-    if (key == "MemAvailable:") return kilobytes * 1024;
-  }
-  return std::size_t{8} << 30U;
-}
-
 void check_memory(Index samples, Index outputs, double matrices, std::size_t limit_bytes) {
-  const double rows = static_cast<double>(samples * outputs);
-  const double needed = matrices * rows * rows * sizeof(double);
-  const double available =
-      static_cast<double>(limit_bytes > 0 ? limit_bytes : available_memory_bytes());
-  if (needed <= available) return;
-  constexpr double kGigabyte = 1e9;
-  // sparse.h keeps two matrices of rows x m.
-  const double inducing = std::floor(available / (2.5 * rows * sizeof(double)));
-  const double fitting =
-      std::floor(std::sqrt(available / (matrices * sizeof(double))) / static_cast<double>(outputs));
+  const auto shortage = memory_shortage(samples, outputs, matrices, limit_bytes);
+  if (!shortage) return;
   throw bad_request(
       "kernel matrix",
       fmt::format("N = {}{} needs {:.1f} GB, {:.1f} GB are available", samples,
-                  outputs > 1 ? fmt::format(" x {} outputs", outputs) : "", needed / kGigabyte,
-                  available / kGigabyte),
-      outputs > 1
-          ? fmt::format("use a subset of at most {:.0f} samples", fitting)
-          : fmt::format("use fit_sparse with at most {:.0f} inducing points, or a subset of "
-                        "at most {:.0f} samples",
-                        inducing, fitting));
+                  outputs > 1 ? fmt::format(" x {} outputs", outputs) : "", shortage->needed_gb,
+                  shortage->available_gb),
+      outputs > 1 ? fmt::format("use a subset of at most {} samples", shortage->fitting_samples)
+                  : fmt::format("use fit_sparse with at most {} inducing points, or a subset of "
+                                "at most {} samples",
+                                shortage->fitting_inducing, shortage->fitting_samples));
 }
 
 }  // namespace kinescope::gp

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "dynamics/gp/gaussian_process.h"
+#include "dynamics/gp/memory.h"
 
 namespace kinescope::gp {
 
@@ -37,7 +38,5 @@ struct Problem {
 /// remedy names the number of inducing points or samples that would fit.
 void check_memory(Eigen::Index samples, Eigen::Index outputs, double matrices,
                   std::size_t limit_bytes);
-/// Memory that can be had without swapping, bytes.
-[[nodiscard]] std::size_t available_memory_bytes();
 
 }  // namespace kinescope::gp

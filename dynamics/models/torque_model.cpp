@@ -7,13 +7,18 @@
 #include <memory>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "dynamics/data/splits.h"
 #include "dynamics/gp/hyperparameters.h"
 #include "dynamics/gp/lip_kernel.h"
+#include "dynamics/gp/memory.h"
 #include "dynamics/gp/robot_kernels.h"
+#include "dynamics/gp/sparse.h"
 #include "dynamics/identify/torque_terms.h"
 #include "dynamics/models/neural_network.h"
 #include "dynamics/models/support_vectors.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
@@ -115,9 +120,23 @@ gp::Normalisation common_scale(const gp::Dataset& data) {
   return out;
 }
 
+// How a Gaussian process of this kind holds its samples.
+struct Share {
+  int samples = 0;
+  bool sparse = false;
+};
+
+Share share_of(TorqueModelKind kind, Eigen::Index samples, const TorqueModelOptions& options) {
+  const auto all = static_cast<int>(samples);
+  if (kind == TorqueModelKind::kModelBased) return {all, false};  // few features
+  if (kind == TorqueModelKind::kLip) return {std::min(all, options.samples_of_all_joints), false};
+  if (options.inducing_points > 0) return {all, true};
+  return {std::min(all, options.samples), false};
+}
+
 // The hyperparameters on part of the samples, then the fit on all of them.
 gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool physical_inputs,
-                    const TorqueModelOptions& options) {
+                    bool sparse, const TorqueModelOptions& options) {
   const gp::Normalisation normalisation = data.targets.cols() > 1 ? common_scale(data)
                                           : physical_inputs       ? gp::standardise_targets(data)
                                                                   : gp::standardise(data);
@@ -131,7 +150,11 @@ gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool phys
   const gp::Estimate found = gp::estimate_hyperparameters(start, gp::subset(data, few), estimate);
   gp::FitOptions fit;
   fit.threads = options.threads;
-  return gp::fit(found.model, data, fit);
+  fit.memory_limit_bytes = options.memory_limit_bytes;
+  if (!sparse) return gp::fit(found.model, data, fit);
+  const Matrix inducing = gp::choose_inducing(
+      found.model, data, {.count = options.inducing_points, .seed = options.seed});
+  return gp::fit_sparse(found.model, data, inducing, fit);
 }
 
 TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matrix& inputs,
@@ -211,6 +234,33 @@ std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count) {
   return rows;
 }
 
+void check_torque_memory(const std::vector<TorqueModelKind>& kinds, Eigen::Index samples,
+                         Eigen::Index joints, const TorqueModelOptions& options) {
+  for (const TorqueModelKind kind : kinds) {
+    const bool process = kind == TorqueModelKind::kRbf || kind == TorqueModelKind::kGip ||
+                         kind == TorqueModelKind::kSemiParametric || kind == TorqueModelKind::kLip;
+    if (!process) continue;
+    const Share share = share_of(kind, samples, options);
+    const bool together = kind == TorqueModelKind::kLip;
+    constexpr double kSparseMatrices = 16.0;  // of inducing points, as in dynamics/gp/memory.h
+    const auto shortage = gp::memory_shortage(
+        share.sparse ? options.inducing_points : share.samples, together ? joints : 1,
+        share.sparse ? kSparseMatrices : 1.0, options.memory_limit_bytes);
+    if (!shortage) continue;
+    throw bad_request(
+        to_string(kind),
+        fmt::format("the kernel matrix of {}{} needs {:.1f} GB, {:.1f} GB are available",
+                    share.sparse ? fmt::format("{} inducing points", options.inducing_points)
+                                 : fmt::format("{} samples", share.samples),
+                    together ? " of all joints" : "", shortage->needed_gb, shortage->available_gb),
+        share.sparse ? fmt::format("take at most {} inducing points", shortage->fitting_inducing)
+        : together   ? fmt::format("take at most {} samples", shortage->fitting_samples)
+                     : fmt::format("take at most {} samples (--samples), or all of them through at "
+                                     "most {} inducing points (--inducing)",
+                                   shortage->fitting_samples, shortage->fitting_inducing));
+  }
+}
+
 FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
                                    const TorqueSamples& samples,
                                    const TorqueModelOptions& options) {
@@ -227,30 +277,27 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
         select_rows(samples, evenly_chosen(samples.size(), options.samples)), options.network,
         options.seed);
   }
+  check_torque_memory({kind}, samples.size(), samples.joints(), options);
   const gp::JointKinds joints = kinds_of(make_rigid_model(model));
   const int n = static_cast<int>(joints.size());
-  const bool together = kind == TorqueModelKind::kLip;
   const gp::Dataset all{inputs_of(samples.q, samples.dq, samples.ddq), samples.torque, {}, {}};
-  const bool few_features = kind == TorqueModelKind::kModelBased;
-  const auto rows = evenly_chosen(samples.size(), few_features ? static_cast<int>(samples.size())
-                                                  : together   ? options.samples_of_all_joints
-                                                               : options.samples);
-  const gp::Dataset chosen = gp::subset(all, rows);
+  const Share share = share_of(kind, samples.size(), options);
+  const gp::Dataset chosen = gp::subset(all, evenly_chosen(samples.size(), share.samples));
   std::vector<gp::FittedGp> fits;
-  if (together) {
+  if (kind == TorqueModelKind::kLip) {
     std::vector<gp::Kernel> friction;
     friction.reserve(joints.size());
     for (int j = 0; j < n; ++j) {
       friction.push_back(gp::joint_friction(n, j, options.identify.drives.coulomb_width_rad_s));
     }
     fits.push_back(
-        fit_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true, options));
+        fit_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true, false, options));
   } else {
     for (int j = 0; j < n; ++j) {
       const gp::Dataset one{chosen.inputs, chosen.targets.col(j), {}, {}};
       const gp::Kernel kernel =
           kernel_of_joint(kind, model, joints, samples, j, options.identify.drives);
-      fits.push_back(fit_gp(kernel, one, kind != TorqueModelKind::kRbf, options));
+      fits.push_back(fit_gp(kernel, one, kind != TorqueModelKind::kRbf, share.sparse, options));
     }
   }
   return with_gps(kind, static_cast<int>(chosen.samples()), std::move(fits), options.threads);

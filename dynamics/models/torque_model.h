@@ -8,6 +8,7 @@
 // Not here: filtering (dynamics/data), what a model lacks (dynamics/effects).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -53,12 +54,16 @@ struct TorqueModelOptions {
   IdentifyOptions identify;
   /// Training samples of a Gaussian process, evenly chosen; kernels of few features take all.
   int samples = 1500;
+  /// > 0: Gaussian processes of single joints learn from all samples, through so many inducing
+  /// points (dynamics/gp/sparse.h); for more samples than an exact one can hold.
+  int inducing_points = 0;
   int samples_of_all_joints = 400;   ///< the same for kLip, whose matrix is joints times as wide
   int hyperparameter_samples = 600;  ///< of them, for the search
   int starts = 3;
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
-  int threads = 0;  ///< 0: all of the machine; never changes a result
+  int threads = 0;                     ///< 0: all of the machine; never changes a result
+  std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
 };
 
 struct FittedTorqueModel {
@@ -70,7 +75,12 @@ struct FittedTorqueModel {
       predict;
 };
 
-/// Throws what identification and fit throw.
+/// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what
+/// would: to be asked before any work.
+void check_torque_memory(const std::vector<TorqueModelKind>& kinds, Eigen::Index samples,
+                         Eigen::Index joints, const TorqueModelOptions& options);
+
+/// Throws what check_torque_memory, identification and fit throw.
 [[nodiscard]] FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
                                                  const TorqueSamples& samples,
                                                  const TorqueModelOptions& options = {});

@@ -8,6 +8,7 @@
 
 #include "dynamics/data/splits.h"
 #include "dynamics/models/comparison.h"
+#include "kinematics/core/error.h"
 #include "tests/truth/torque_world.h"
 
 namespace kinescope {
@@ -108,6 +109,54 @@ TEST(TorqueModel, WhatCannotBeFittedIsSaid) {
   const auto scores =
       compare_torque_models({TorqueModelKind::kParametric}, e.model, few, e.test, quick());
   EXPECT_NE(scores[0].failure, "");
+}
+
+TEST(TorqueModel, InducingPointsStandForAllSamples) {
+  const Experiment e = two_joints();
+  TorqueModelOptions options = quick();
+  for (const TorqueModelKind kind : {TorqueModelKind::kRbf, TorqueModelKind::kGip}) {
+    SCOPED_TRACE(to_string(kind));
+    options.inducing_points = 0;
+    options.samples = static_cast<int>(e.train.size());
+    const FittedTorqueModel exact = fit_torque_model(kind, e.model, e.train, options);
+    options.samples = 50;  // does not count
+    options.inducing_points = 150;
+    const FittedTorqueModel sparse = fit_torque_model(kind, e.model, e.train, options);
+    EXPECT_EQ(sparse.samples, e.train.size());
+    const Eigen::VectorXd close = score_torque_model(exact, e.test).nmse_percent;
+    const Eigen::VectorXd got = score_torque_model(sparse, e.test).nmse_percent;
+    // Per cent of the variance, and a share of what is left anyway.
+    EXPECT_LT((got - 1.3 * close).maxCoeff(), 0.5) << got.transpose() << " / " << close.transpose();
+  }
+}
+
+TEST(TorqueModel, TooLittleMemoryIsSaidBeforeAnyWork) {
+  const Experiment e = two_joints();
+  TorqueModelOptions options = quick();
+  options.memory_limit_bytes = 100'000;  // 111 samples squared
+  const auto message = [&](TorqueModelKind kind) -> std::string {
+    try {
+      check_torque_memory({TorqueModelKind::kParametric, kind}, e.train.size(), e.train.joints(),
+                          options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message(TorqueModelKind::kRbf).find("at most 111 samples"), std::string::npos)
+      << message(TorqueModelKind::kRbf);
+  EXPECT_NE(message(TorqueModelKind::kGip).find("27 inducing points"), std::string::npos);
+  EXPECT_NE(message(TorqueModelKind::kLip).find("at most 55 samples"), std::string::npos);
+  EXPECT_EQ(message(TorqueModelKind::kModelBased), "");
+  EXPECT_THROW((void)fit_torque_model(TorqueModelKind::kRbf, e.model, e.train, options), Error);
+  // What was offered fits.
+  options.inducing_points = 27;
+  EXPECT_EQ(message(TorqueModelKind::kGip), "");
+  options.inducing_points = 28;
+  EXPECT_NE(message(TorqueModelKind::kGip), "");
+  options.inducing_points = 0;
+  options.samples = 111;
+  EXPECT_EQ(message(TorqueModelKind::kGip), "");
 }
 
 TEST(EvenlyChosen, SpreadsOverAll) {
