@@ -147,10 +147,9 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
     TorqueScore score;
     score.kind = kinds[k];
     try {
-      fitted[k] =
-          kinds[k] == TorqueModelKind::kParametric
-              ? parametric_model(summary.identification, static_cast<int>(summary.train.size()))
-              : fit_torque_model(kinds[k], model, summary.train, options);
+      fitted[k] = kinds[k] == TorqueModelKind::kParametric
+                      ? parametric_model(summary.identification, model, summary.train, options)
+                      : fit_torque_model(kinds[k], model, summary.train, options);
       score = score_torque_model(fitted[k], summary.test);
     } catch (const Error& error) {
       score.failure = error.what();
@@ -160,6 +159,7 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
   }
   summary.best = best_of(summary.scores);
   const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];
+  summary.bands = best.bands;
   if (best.predict) {
     summary.prediction = best.predict(summary.test.q, summary.test.dq, summary.test.ddq);
   }

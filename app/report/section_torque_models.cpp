@@ -75,7 +75,7 @@ std::string learning_plot(const TorqueSummary& summary) {
 std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.test.size();
   const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
-  constexpr double kBand = 1.96;
+  const double band = summary.bands.width_95(joint);
   std::vector<double> time;
   std::vector<double> lower;
   std::vector<double> upper;
@@ -86,8 +86,8 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
     const double mean = summary.prediction.mean(i, joint);
     const double sigma = summary.prediction.sigma(i, joint);
     time.push_back(t);
-    lower.push_back(mean - kBand * sigma);
-    upper.push_back(mean + kBand * sigma);
+    lower.push_back(mean - band * sigma);
+    upper.push_back(mean + band * sigma);
     measured.emplace_back(t, summary.test.torque(i, joint));
     predicted.emplace_back(t, mean);
   }

@@ -83,6 +83,7 @@ struct TorqueSummary {
   std::optional<PayloadSummary> payload;  ///< none where it was not asked for
   int best = 0;                           ///< index into scores: what `prediction` is from
   TorquePrediction prediction;            ///< of `test`
+  BandFactors bands;                      ///< of that model
   std::optional<Trace> trace;             ///< none where it was not asked for
   std::vector<std::string> warnings;
 };

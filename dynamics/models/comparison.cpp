@@ -7,14 +7,15 @@
 namespace kinescope {
 namespace {
 
-// Two-sided quantiles of the normal distribution.
-constexpr double kNormal90 = 1.6448536;
-constexpr double kNormal95 = 1.9599640;
-
-Eigen::VectorXd coverage(const Eigen::MatrixXd& error, const Eigen::MatrixXd& sigma,
-                         double quantile) {
-  const auto held = (error.array().abs() <= quantile * sigma.array()).cast<double>();
-  return held.colwise().mean();
+/// Share of the errors within `width(joint)` sigmas.
+template <typename Width>
+Eigen::VectorXd coverage(const Eigen::MatrixXd& error, const Eigen::MatrixXd& sigma, Width width) {
+  Eigen::VectorXd out(error.cols());
+  for (Eigen::Index j = 0; j < error.cols(); ++j) {
+    const auto held = (error.col(j).array().abs() <= width(j) * sigma.col(j).array()).count();
+    out[j] = static_cast<double>(held) / static_cast<double>(error.rows());
+  }
+  return out;
 }
 
 }  // namespace
@@ -29,8 +30,10 @@ TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamp
   score.nmse_percent = normalised_error_percent(test.torque, prediction.mean);
   score.rms = error.colwise().squaredNorm().transpose() / static_cast<double>(test.size());
   score.rms = score.rms.cwiseSqrt();
-  score.coverage_90 = coverage(error, prediction.sigma, kNormal90);
-  score.coverage_95 = coverage(error, prediction.sigma, kNormal95);
+  score.coverage_90 =
+      coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_90(j); });
+  score.coverage_95 =
+      coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_95(j); });
   return score;
 }
 
@@ -58,11 +61,13 @@ std::vector<LearningPoint> learning_curve(TorqueModelKind kind, const DynamicMod
                                           const std::vector<int>& sizes,
                                           const TorqueModelOptions& options) {
   std::vector<LearningPoint> curve;
+  TorqueModelOptions without_bands = options;
+  without_bands.band_folds = 0;
   const Eigen::RowVectorXd mean = test.torque.colwise().mean();
   const double variance = (test.torque.rowwise() - mean).squaredNorm();
   for (const int size : sizes) {
     const TorqueSamples part = select_rows(train, evenly_chosen(train.size(), size));
-    const FittedTorqueModel fitted = fit_torque_model(kind, model, part, options);
+    const FittedTorqueModel fitted = fit_torque_model(kind, model, part, without_bands);
     const Eigen::MatrixXd error = test.torque - fitted.predict(test.q, test.dq, test.ddq).mean;
     curve.push_back({fitted.samples, 100.0 * error.squaredNorm() / variance});
   }

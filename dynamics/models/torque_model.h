@@ -19,6 +19,7 @@
 #include "dynamics/data/torque_samples.h"
 #include "dynamics/identify/identify.h"
 #include "dynamics/identify/prediction.h"
+#include "dynamics/models/bands.h"
 #include "kinematics/model/dynamic_model.h"
 
 namespace kinescope {
@@ -62,7 +63,8 @@ struct TorqueModelOptions {
   int starts = 3;
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
-  int threads = 0;                     ///< 0: all of the machine; never changes a result
+  int band_folds = 8;  ///< that bands are calibrated on; below 2: bands of the normal distribution
+  int threads = 0;     ///< 0: all of the machine; never changes a result
   std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
 };
 
@@ -73,6 +75,7 @@ struct FittedTorqueModel {
   std::function<TorquePrediction(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                                  const Eigen::MatrixXd& ddq)>
       predict;
+  BandFactors bands = {};
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what
@@ -85,8 +88,11 @@ void check_torque_memory(const std::vector<TorqueModelKind>& kinds, Eigen::Index
                                                  const TorqueSamples& samples,
                                                  const TorqueModelOptions& options = {});
 
-/// The parametric model of an identification that is already there.
-[[nodiscard]] FittedTorqueModel parametric_model(const Identification& found, int samples);
+/// The parametric model of an identification of these samples that is already there.
+[[nodiscard]] FittedTorqueModel parametric_model(const Identification& found,
+                                                 const DynamicModel& model,
+                                                 const TorqueSamples& samples,
+                                                 const TorqueModelOptions& options = {});
 
 /// `count` rows at most, evenly spread over the samples.
 [[nodiscard]] std::vector<Eigen::Index> evenly_chosen(Eigen::Index samples, int count);

@@ -140,6 +140,7 @@ void monte_carlo(const Options& options) {
   TorqueModelOptions models;
   models.samples = options.samples;
   models.starts = options.starts;
+  models.band_folds = 0;
   Errors errors;
   errors.seconds.assign(kinds.size(), 0.0);
   fmt::print(
@@ -203,6 +204,7 @@ void efficiency(const Options& options) {
                     {.width = 620.0, .height = 360.0});
   TorqueModelOptions models;
   models.starts = options.starts;
+  models.band_folds = 0;
   std::size_t series = 0;
   for (const TorqueModelKind kind : kinds_of(options)) {
     fmt::print("{:<16}", to_string(kind));

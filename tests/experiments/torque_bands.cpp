@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the 90 and 95 % bands of torque models hold on motion that no fit has seen: measured logs of
+// others and simulated ones (white noise, noise with memory, friction that the model lacks). Beside
+// the calibrated bands those of the normal distribution, from the same sigma.
+//   build/test/torque_bands [--sets ur10e,..] [--models parametric,gip] [--samples 1000]
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "dynamics/data/splits.h"
+#include "dynamics/models/comparison.h"
+#include "tests/experiments/torque_sets.h"
+#include "tests/truth/shared_data.h"
+#include "tests/truth/torque_world.h"
+
+namespace kinescope {
+namespace {
+
+struct Options {
+  std::vector<std::string> sets = {"white", "coloured", "stribeck", "ur10e",
+                                   "tx40",  "panda",    "rokae"};
+  std::vector<std::string> models = {"parametric", "rbf", "gip", "semi_parametric"};
+  int samples = 1000;
+  int robots = 3;  ///< of each simulated set
+};
+
+// A random arm with 2 % noise; the last two of eight trajectories are held out.
+TorqueSet simulated(const std::string& name, int number) {
+  Rng rng = Rng::from_name("bands " + name, static_cast<std::uint64_t>(number));
+  const RandomRobot robot = random_robot({.joints = 4, .prismatic_share = 0.0}, rng);
+  TorqueSet set{};
+  set.name = fmt::format("{} {}", name, number);
+  set.split = "six trajectories -> two others";
+  set.model = random_masses(robot.tree, {}, rng);
+  TorqueSamples all = torque_log_of(set.model,
+                                    {.samples = 4000,
+                                     .noise = 0.02,
+                                     .noise_memory = name == "white" ? 0.0 : 0.9,
+                                     .trajectories = 8},
+                                    rng);
+  if (name == "stribeck") {
+    const Eigen::ArrayXXd speed = all.dq.array();
+    all.torque.array() += (speed / 0.01).tanh() * (-(speed / 0.2).square()).exp();
+  }
+  const Fold fold = split_last(all, 0.24);
+  set.train = select_rows(all, fold.train);
+  set.test = select_rows(all, fold.test);
+  return set;
+}
+
+std::string per_cent(const Eigen::VectorXd& shares) {
+  std::string out;
+  for (const double share : shares) out += fmt::format("{:6.1f}", 100.0 * share);
+  return out + fmt::format("   mean{:6.1f}", 100.0 * shares.mean());
+}
+
+void judge(const TorqueSet& set, const Options& options) {
+  TorqueModelOptions models;
+  models.identify = set.options;
+  models.samples = options.samples;
+  models.starts = 1;
+  fmt::print("\n{}: {}; {} training and {} test samples\n", set.name, set.split, set.train.size(),
+             set.test.size());
+  for (const std::string& name : options.models) {
+    FittedTorqueModel fitted =
+        fit_torque_model(torque_model_kind(name).value(), set.model, set.train, models);
+    const TorqueScore calibrated = score_torque_model(fitted, set.test);
+    const int folds = fitted.bands.folds;
+    fitted.bands = {};
+    const TorqueScore normal = score_torque_model(fitted, set.test);
+    fmt::print("{:<16} 90 % {}   normal {}\n{:>16} 95 % {}   normal {}\n", name,
+               per_cent(calibrated.coverage_90), per_cent(normal.coverage_90),
+               fmt::format("{} folds", folds), per_cent(calibrated.coverage_95),
+               per_cent(normal.coverage_95));
+    std::fflush(stdout);
+  }
+}
+
+void run(const Options& options) {
+  fmt::print("share (%) of unseen torques within the bands, a joint each, and their mean\n");
+  for (const std::string& name : options.sets) {
+    const auto measured = std::ranges::find(torque_sets(), name, &NamedTorqueSet::name);
+    if (measured == torque_sets().end()) {
+      for (int k = 1; k <= options.robots; ++k) judge(simulated(name, k), options);
+      continue;
+    }
+    const auto folder = shared_data(measured->folder);
+    folder ? judge(measured->make(*folder), options)
+           : fmt::print("{}: not on this machine\n", name);
+  }
+}
+
+}  // namespace
+}  // namespace kinescope
+
+int main(int argc, char** argv) {
+  kinescope::Options options;
+  CLI::App app("Coverage of the torque models' bands");
+  app.add_option("--sets", options.sets,
+                 "white, coloured, stribeck, ur10e, tx40, panda, rokae, lwr4")
+      ->delimiter(',');
+  app.add_option("--models", options.models, "torque models")->delimiter(',');
+  app.add_option("--samples", options.samples, "training samples of a Gaussian process");
+  app.add_option("--robots", options.robots, "simulated robots a set");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    kinescope::run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
