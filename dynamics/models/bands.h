@@ -4,7 +4,9 @@
 // and that the model lacks nothing; on measured robots neither is so. Hence the width of a band is
 // a multiple of sigma that is read from residuals on motion that was left out of the fit: whole
 // trajectories, or blocks with a gap (cross-conformal prediction, Vovk 2015; Barber, Candes,
-// Ramdas, Tibshirani 2021).
+// Ramdas, Tibshirani 2021). Everything must be estimated anew in every fold: Gaussian processes
+// that keep the hyperparameters of all samples cover less with such factors than without
+// (tests/experiments/torque_bands), so theirs are not calibrated.
 #pragma once
 
 #include <functional>

@@ -134,20 +134,9 @@ Share share_of(TorqueModelKind kind, Eigen::Index samples, const TorqueModelOpti
   return {std::min(all, options.samples), false};
 }
 
-gp::FittedGp fit_gp(const gp::GpModel& model, const gp::Dataset& data, bool sparse,
-                    const TorqueModelOptions& options) {
-  gp::FitOptions fit;
-  fit.threads = options.threads;
-  fit.memory_limit_bytes = options.memory_limit_bytes;
-  if (!sparse) return gp::fit(model, data, fit);
-  const Matrix inducing =
-      gp::choose_inducing(model, data, {.count = options.inducing_points, .seed = options.seed});
-  return gp::fit_sparse(model, data, inducing, fit);
-}
-
 // The hyperparameters on part of the samples, then the fit on all of them.
-gp::FittedGp learn_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool physical_inputs,
-                      bool sparse, const TorqueModelOptions& options) {
+gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool physical_inputs,
+                    bool sparse, const TorqueModelOptions& options) {
   const gp::Normalisation normalisation = data.targets.cols() > 1 ? common_scale(data)
                                           : physical_inputs       ? gp::standardise_targets(data)
                                                                   : gp::standardise(data);
@@ -159,7 +148,13 @@ gp::FittedGp learn_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool ph
   estimate.fit.threads = options.threads;
   const auto few = evenly_chosen(data.samples(), options.hyperparameter_samples);
   const gp::Estimate found = gp::estimate_hyperparameters(start, gp::subset(data, few), estimate);
-  return fit_gp(found.model, data, sparse, options);
+  gp::FitOptions fit;
+  fit.threads = options.threads;
+  fit.memory_limit_bytes = options.memory_limit_bytes;
+  if (!sparse) return gp::fit(found.model, data, fit);
+  const Matrix inducing = gp::choose_inducing(
+      found.model, data, {.count = options.inducing_points, .seed = options.seed});
+  return gp::fit_sparse(found.model, data, inducing, fit);
 }
 
 TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matrix& inputs,
@@ -179,26 +174,6 @@ TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matr
     column += width;
   }
   return out;
-}
-
-// Hyperparameters stay those of all samples.
-BandFactors gp_bands(const std::vector<gp::FittedGp>& fits, const TorqueSamples& samples,
-                     bool sparse, const TorqueModelOptions& options) {
-  if (options.band_folds < 2) return {};
-  return cross_validated_bands(
-      samples, options.band_folds, [&](const TorqueSamples& train, const TorqueSamples& test) {
-        std::vector<gp::FittedGp> parts;
-        const Matrix inputs = inputs_of(train.q, train.dq, train.ddq);
-        Eigen::Index column = 0;
-        for (const gp::FittedGp& fitted : fits) {
-          const Eigen::Index width = fitted.model.kernel.outputs();
-          const gp::Dataset part{inputs, train.torque.middleCols(column, width), {}, {}};
-          parts.push_back(fit_gp(fitted.model, part, sparse, options));
-          column += width;
-        }
-        return prediction_of(parts, inputs_of(test.q, test.dq, test.ddq), test.joints(),
-                             options.threads);
-      });
 }
 
 FittedTorqueModel with_gps(TorqueModelKind kind, int samples, std::vector<gp::FittedGp> fits,
@@ -324,21 +299,17 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
     for (int j = 0; j < n; ++j) {
       friction.push_back(gp::joint_friction(n, j, options.identify.drives.coulomb_width_rad_s));
     }
-    fits.push_back(learn_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true,
-                            false, options));
+    fits.push_back(
+        fit_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true, false, options));
   } else {
     for (int j = 0; j < n; ++j) {
       const gp::Dataset one{chosen.inputs, chosen.targets.col(j), {}, {}};
       const gp::Kernel kernel =
           kernel_of_joint(kind, model, joints, samples, j, options.identify.drives);
-      fits.push_back(learn_gp(kernel, one, kind != TorqueModelKind::kRbf, share.sparse, options));
+      fits.push_back(fit_gp(kernel, one, kind != TorqueModelKind::kRbf, share.sparse, options));
     }
   }
-  const BandFactors bands = gp_bands(fits, select_rows(samples, rows), share.sparse, options);
-  FittedTorqueModel out =
-      with_gps(kind, static_cast<int>(chosen.samples()), std::move(fits), options.threads);
-  out.bands = bands;
-  return out;
+  return with_gps(kind, static_cast<int>(chosen.samples()), std::move(fits), options.threads);
 }
 
 }  // namespace kinescope

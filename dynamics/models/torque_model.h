@@ -63,7 +63,7 @@ struct TorqueModelOptions {
   int starts = 3;
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
-  int band_folds = 8;  ///< that bands are calibrated on; below 2: bands of the normal distribution
+  int band_folds = 8;  ///< of the parametric model's bands; below 2: the normal distribution's
   int threads = 0;     ///< 0: all of the machine; never changes a result
   std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
 };
@@ -75,7 +75,7 @@ struct FittedTorqueModel {
   std::function<TorquePrediction(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                                  const Eigen::MatrixXd& ddq)>
       predict;
-  BandFactors bands = {};
+  BandFactors bands = {};  ///< calibrated for the parametric model only, see bands.h
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what
