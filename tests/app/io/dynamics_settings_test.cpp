@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "app/io/recording.h"
 #include "kinematics/core/error.h"
@@ -13,7 +14,8 @@ namespace kinescope {
 namespace {
 
 std::filesystem::path write_settings(const std::string& text) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "kinescope_dynamics_settings";
+  const auto folder = std::filesystem::path(testing::TempDir()) /
+                      ("kinescope_dynamics_settings_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   write_file_atomically(folder / "recording.yaml", text);
   return folder / "recording.yaml";

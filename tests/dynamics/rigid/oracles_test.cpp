@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/mass_matrix.h"
@@ -123,7 +124,8 @@ void refine_inertia(const InertialParameters& ours, mjModel& model, int body) {
 }
 
 MujocoModel load(const DynamicModel& model) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "kinescope_rigid_oracle.urdf";
+  const auto path = std::filesystem::path(testing::TempDir()) /
+                    ("kinescope_rigid_oracle_" + std::to_string(::getpid()) + ".urdf");
   std::ofstream(path) << write_urdf(model);
   char error[1000] = "";
   MujocoModel loaded(mj_loadXML(path.c_str(), nullptr, error, sizeof error));

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "kinematics/core/error.h"
 
@@ -15,7 +16,8 @@ class FileTest : public testing::Test {
  protected:
   FileTest() { fs::create_directories(folder_); }
   ~FileTest() override { fs::remove_all(folder_); }
-  fs::path folder_ = fs::path(testing::TempDir()) / "kinescope_file_test";
+  fs::path folder_ =
+      fs::path(testing::TempDir()) / ("kinescope_file_test_" + std::to_string(::getpid()));
 };
 
 ExitCode code_of(const std::function<void()>& call) {
