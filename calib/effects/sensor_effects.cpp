@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -115,13 +116,12 @@ std::string marker_name(const EffectWorld& world, int marker) {
   return fmt::format("tag_{}", world.tree.markers[static_cast<std::size_t>(marker)].id.value);
 }
 
-// A marker at rest repeats its corners' errors in every frame, until a bump gives it others.
-double floor_of(const EffectWorld& world, int marker) {
-  constexpr double kRestingBias = 0.05;  // px
-  const LinkId link = world.tree.markers[static_cast<std::size_t>(marker)].link;
-  const bool rests = world.tree.path_to(link).empty();
-  return rests && world.kind == MeasurementKind::kCorners ? kRestingBias : 0.0;
+bool rests(const EffectWorld& world, int marker) {
+  return world.tree.path_to(world.tree.markers[static_cast<std::size_t>(marker)].link).empty();
 }
+
+// A marker at rest repeats its corners' errors in every frame, until a bump gives it others.
+constexpr double kRestingBias = 0.05;  // px
 
 CameraEffect tag_size(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
@@ -129,7 +129,8 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
                             {{"relative size", ""}}, "");
   out.candidate.check = "measure the black square's edge; printers scale";
   out.candidate.record = "bring the marker nearer to the camera and farther away";
-  out.candidate.floor = floor_of(world, marker);
+  // One view, for ever: what it says of the size is the errors of its corners.
+  if (rests(world, marker)) out.candidate.floor = std::numeric_limits<double>::infinity();
   out.corrections = [like = out, marker](double) {
     Correction size = correct(CorrectedPart::kMarkerSize, like, 0);
     size.index = marker;
@@ -178,7 +179,8 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
   out.candidate.size_weights.head<3>().setZero();
   out.candidate.check = "glue or screws of the marker's plate";
   out.candidate.record = "more frames with this marker in view, before and after";
-  out.candidate.floor = floor_of(world, marker);
+  if (rests(world, marker) && world.kind == MeasurementKind::kCorners)
+    out.candidate.floor = kRestingBias;
   happens_at_a_time(world, CorrectedPart::kMarker, marker, out);
   return out;
 }

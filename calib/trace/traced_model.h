@@ -76,7 +76,8 @@ struct Candidate {
   std::string size_unit;
   /// Parameters that can be: friction does not drive. Empty: all.
   std::function<bool(const Eigen::VectorXd& theta)> possible;
-  /// As TraceOptions::floor, where the sensor errs by more in what this one touches.
+  /// As TraceOptions::floor, where the sensor errs by more in what this one touches; infinite: the
+  /// recording cannot show it.
   double floor = 0.0;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;

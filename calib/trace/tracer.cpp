@@ -318,6 +318,8 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
         std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
     if (in_model || removed_.contains(id) || member.p_value > level_) continue;
     if (!is_possible(without.fit.candidates[member.index], member.score.theta)) continue;
+    const double floor = std::max(options_.floor, without.fit.candidates[member.index].floor);
+    if (member.score.rms < floor) continue;
     // What it says beyond the effect, the forward search would have found.
     if (refines(without.fit.candidates[member.index], effect.id)) continue;
     if (member.score.gain < least_gain) continue;

@@ -230,7 +230,8 @@ void Tracer::list_not_found() {
             ? member.score
             : score_test(now_->system,
                          candidate.columns(candidate.scan[candidate.scan.size() / 2]));
-    NotFoundEffect missing{candidate.id, score.hidden(), 0.0, candidate.size_unit, ""};
+    const bool hidden = score.hidden() || std::isinf(candidate.floor);
+    NotFoundEffect missing{candidate.id, hidden, 0.0, candidate.size_unit, ""};
     if (missing.hidden) {
       missing.record = candidate.record;
     } else {
