@@ -33,14 +33,6 @@ double scale_of(const ChainFit& fit, const Readings& readings) {
   return term.scale / readings.rms[static_cast<std::size_t>(term.channel)];
 }
 
-double distance_of(const Body& body) {
-  std::vector<double> distances;
-  for (const Sighting& s : body.at) {
-    if (s.seen) distances.push_back(s.pose.translation.norm());
-  }
-  return median_of(std::move(distances));
-}
-
 // The body by a joint of the other type and the same channel, where that is natural and fits.
 std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
                                         const LinkPath& parent, const Readings& readings) {
@@ -54,8 +46,8 @@ std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
     const JointType other = candidate.start.joints.front().type;
     if (other == type) continue;
     ChainFit fit = fit_chain(relative.motion, readings.value, candidate.start);
-    const bool fits =
-        fit.rotation_rms < kRotation && fit.translation_rms < kTranslation * distance_of(body);
+    const bool fits = fit.rotation_rms < kRotation &&
+                      fit.translation_rms < kTranslation * distance_of({&body, 1});
     if (!fits || !is_natural(other, scale_of(fit, readings))) continue;
     return attachment_from(std::move(fit), now.parent, relative, body, readings);
   }

@@ -65,6 +65,16 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
+double distance_of(std::span<const Body> bodies) {
+  std::vector<double> distances;
+  for (const Body& body : bodies) {
+    for (const Sighting& s : body.at) {
+      if (s.seen) distances.push_back(s.pose.translation.norm());
+    }
+  }
+  return median_of(std::move(distances));
+}
+
 Matrix6d whitening_of(const Matrix6d& covariance) {
   // covariance = U U' with U upper triangular, from the last row up; W = U^-1.
   Matrix6d U = Matrix6d::Zero();

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -54,6 +55,9 @@ void count_seen(Series& series);
 
 /// At most about `max_instants` instants of a clean series.
 [[nodiscard]] Series thinned(const Series& full, int max_instants);
+
+/// From the camera, the median over all sightings of the bodies, m.
+[[nodiscard]] double distance_of(std::span<const Body> bodies);
 
 /// W upper triangular with W' W = covariance^-1.
 [[nodiscard]] Matrix6d whitening_of(const Matrix6d& covariance);

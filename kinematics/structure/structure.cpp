@@ -52,21 +52,10 @@ struct Answer {
   double allowance = 0.0;
 };
 
-// The median over all sightings, m.
-double distance_of(const Series& series) {
-  std::vector<double> distances;
-  for (const Body& body : series.bodies) {
-    for (const Sighting& s : body.at) {
-      if (s.seen) distances.push_back(s.pose.translation.norm());
-    }
-  }
-  return median_of(std::move(distances));
-}
-
 Series with_allowance(Series series, double share) {
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(share * share),
-      Eigen::Vector3d::Constant(std::pow(share * distance_of(series), 2));
+      Eigen::Vector3d::Constant(std::pow(share * distance_of(series.bodies), 2));
   for (Body& body : series.bodies) {
     for (Sighting& s : body.at) {
       if (!s.seen) continue;

@@ -78,12 +78,8 @@ truth::EffectWorldOptions exact_world(RobotKind kind, int seed, const Request& r
 
 std::optional<InjectedEffect> pick(const std::string& effect, double strength,
                                    const truth::EffectWorldOptions& options) {
-  const auto places = truth::weakest_effects(effect, truth::robot_of(options));
-  if (places.empty()) return std::nullopt;
-  Rng rng = Rng::from_name("place of " + effect, options.seed);
-  InjectedEffect out = places[static_cast<std::size_t>(rng.index(static_cast<int>(places.size())))];
-  out.size *= strength;
-  return out;
+  return one_of(truth::weakest_effects(effect, truth::robot_of(options)), strength,
+                Rng::from_name("place of " + effect, options.seed));
 }
 
 acceptance::TruthRobot truth_of(const truth::World& world) {

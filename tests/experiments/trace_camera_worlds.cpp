@@ -38,9 +38,14 @@ World world_with(const TraceCase& of, const std::vector<InjectedEffect>& effects
 std::optional<InjectedEffect> pick_effect(std::string_view effect, double strength,
                                           const TraceCase& of) {
   const auto places = truth::weakest_effects(effect, truth::robot_of(world_options(of)));
+  return one_of(places, strength,
+                Rng::from_name(fmt::format("place of {} {}", effect, to_string(of.kind)),
+                               static_cast<std::uint64_t>(of.seed)));
+}
+
+std::optional<InjectedEffect> one_of(const std::vector<InjectedEffect>& places, double strength,
+                                     Rng rng) {
   if (places.empty()) return std::nullopt;
-  Rng rng = Rng::from_name(fmt::format("place of {} {}", effect, to_string(of.kind)),
-                           static_cast<std::uint64_t>(of.seed));
   InjectedEffect out = places[static_cast<std::size_t>(rng.index(static_cast<int>(places.size())))];
   out.size *= strength;
   return out;

@@ -32,6 +32,10 @@ struct TraceCase {
                                                                double strength,
                                                                const TraceCase& of);
 
+/// One of the places, at `strength` times its size; nothing where there is none.
+[[nodiscard]] std::optional<truth::InjectedEffect> one_of(
+    const std::vector<truth::InjectedEffect>& places, double strength, Rng rng);
+
 [[nodiscard]] std::string describe(const truth::InjectedEffect& effect);
 
 /// Length of the whitened shift of the corners that a calibration without the effect cannot take
