@@ -65,7 +65,7 @@ struct DynamicsOptions {
   std::filesystem::path output;                  ///< folder
   TorqueDataOptions data;
   TorqueModelOptions models_options;
-  std::vector<std::string> models;              ///< names; empty: all
+  std::vector<std::string> models;              ///< names; empty: all but the network
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   bool learning_curve = false;
   bool robust = true;  ///< the robust regressions beside the models
