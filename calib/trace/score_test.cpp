@@ -18,6 +18,8 @@ constexpr double kHidden = 1e-7;
 // Effective stretches beyond the effect's own parameters below which their scatter alone is no
 // judge.
 constexpr double kFewStretches = 8.0;
+// What a single stretch shows may be anything that happened then.
+constexpr double kFewestStretches = 2.0;
 
 // The effect's columns combined so that they are of unit length and all shown: E -> E T.
 Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& S) {
@@ -86,52 +88,69 @@ StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
   return out;
 }
 
-// Of the gain, by the noise of the rows that the effect touches, widened for its correlation in
-// time as if the effect changed slowly.
-double pooled_p_value(const NormalSystem& system, const NormalSystem::Touched& touched, double gain,
-                      double k) {
+// The noise of the rows that the effect touches, widened for its correlation in time as if the
+// effect changed slowly.
+struct PooledNoise {
+  double variance = 0.0;
+  double freedom = 0.0;
+};
+
+PooledNoise pooled_noise(const NormalSystem& system, const NormalSystem::Touched& touched,
+                         double gain, double k) {
   const Linearisation& linear = system.linear();
   // Of the model's own parameters, these rows pay their part.
   const double own = static_cast<double>(system.parameters()) * touched.rows /
                      static_cast<double>(linear.residual.size());
   const double freedom = touched.rows - own - k;
-  if (freedom < 1.0) return 1.0;
+  if (freedom < 1.0) return {};
   double memory = 1.0;
   if (!linear.independent_instants && linear.instants() > 1) {
     const double step = (linear.time_s[linear.instants() - 1] - linear.time_s[0]) /
                         static_cast<double>(linear.instants() - 1);
     memory = std::max(1.0, 2.0 * linear.correlation_time_s / step);
   }
-  const double variance = (touched.squares - gain) / freedom;
-  if (!(variance > 0.0)) return 0.0;
-  return f_survival(gain / (k * variance * memory), k, std::max(1.0, freedom / memory));
+  return {std::max(0.0, touched.squares - gain) / freedom * memory,
+          std::max(1.0, freedom / memory)};
+}
+
+double effective_stretches(const Eigen::VectorXd& energy) {
+  const double squares = energy.squaredNorm();
+  return squares > 0.0 ? std::floor(energy.sum() * energy.sum() / squares) : 0.0;
 }
 
 void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
            const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
            Score& out) {
   const auto k = static_cast<double>(p.theta.size());
-  const double effective =
-      stretches.energy.squaredNorm() > 0.0
-          ? stretches.energy.sum() * stretches.energy.sum() / stretches.energy.squaredNorm()
-          : 0.0;
+  const double effective = effective_stretches(stretches.energy);
   out.rank = static_cast<int>(p.theta.size());
   out.theta = p.T * p.theta;
   out.covariance = p.T * covariance * p.T.transpose();
   out.gain = p.gain;
   out.rms = system.shift_of(p.theta.dot(p.S * p.theta), columns);
-  out.freedom = std::floor(effective) - k;
+  out.freedom = effective - k;
+  if (effective < kFewestStretches) return;
   const bool few = out.freedom < kFewStretches;
+  const PooledNoise noise =
+      few ? pooled_noise(system, system.touched(columns), p.gain, k) : PooledNoise{};
+  if (few && !(noise.freedom > 0.0)) return;
+  const double pooled_statistic = p.gain / (k * noise.variance);
+  if (effective < k + 2.0) {
+    // Fewer than its parameters: their scatter does not even span the effect.
+    out.freedom = noise.freedom;
+    out.statistic = pooled_statistic;
+    out.covariance = p.T * p.S_inverse * p.T.transpose() * noise.variance;
+    out.p_value = f_survival(out.statistic, k, out.freedom);
+    return;
+  }
   if (few) out.freedom = system.partition().stretches - k;
-  if (std::floor(effective) < k + 2.0) return;
   // Of the covariance, directions that no stretch disagrees about are not certain but unknown.
   const Eigen::MatrixXd inverse = scaled_pseudo_inverse(covariance, 1e-12);
   out.statistic = p.theta.dot(inverse * p.theta) / k;
   out.p_value = f_survival(out.statistic, k, out.freedom);
   // The scatter of few stretches says little by itself, however clear the effect: then noise at its
   // usual level and memory must not explain it either.
-  if (few)
-    out.p_value = std::max(out.p_value, pooled_p_value(system, system.touched(columns), p.gain, k));
+  if (few) out.p_value = std::max(out.p_value, f_survival(pooled_statistic, k, noise.freedom));
 }
 
 // Scatter of the last `count` parameters when each stretch is left out in turn.

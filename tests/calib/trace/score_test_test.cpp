@@ -207,5 +207,49 @@ TEST(ScoreTest, OfNoiseOneTestInTwentyIsSignificant) {
   EXPECT_LE(significant, 36);
 }
 
+// Six parameters that act from one instant to another only, as a slip of a marker that is seldom
+// seen.
+std::vector<EffectColumn> seldom(Eigen::Index first, Eigen::Index count) {
+  std::vector<EffectColumn> out;
+  for (const int carrier : {0, 1, 2}) {
+    for (const double slope : {0.0, 1.0}) {
+      Eigen::VectorXd share = Eigen::VectorXd::Zero(kInstants);
+      for (Eigen::Index i = 0; i < count; ++i)
+        share[first + i] = 1.0 + slope * static_cast<double>(i);
+      out.push_back({carrier, share});
+    }
+  }
+  return out;
+}
+
+// Stretches are of six instants here: these columns have fewer of them than parameters.
+TEST(ScoreTest, FewStretchesAreJudgedByTheNoiseOfTheirRows) {
+  Linearisation linear = linear_model(0.0);
+  const std::vector<EffectColumn> columns = seldom(96, 24);
+  const Eigen::MatrixXd E = explicit_columns(linear, columns);
+  constexpr int kRuns = 400;
+  Rng rng = Rng::from_name("noise of few stretches");
+  int significant = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    for (double& r : linear.residual) r = rng.normal();
+    const NormalSystem system(linear, make_partition(linear));
+    const Score score = score_test(system, columns);
+    ASSERT_EQ(score.rank, 6);
+    if (score.p_value < 0.05) ++significant;
+  }
+  EXPECT_LE(significant, 36);
+
+  constexpr double kClear = 4.0;
+  linear.residual += kClear * E.col(0);
+  const NormalSystem system(linear, make_partition(linear));
+  EXPECT_LT(score_test(system, columns).p_value, 1e-6);
+  EXPECT_LT(jackknife_test(system, columns).p_value, 1e-6);
+  const Score score = score_test(system, columns);
+  EXPECT_NEAR(score.theta[0], kClear, 4.0 * std::sqrt(score.covariance(0, 0)));
+  // Rows that one stretch alone holds may tell of anything that happened then.
+  const std::vector<EffectColumn> once = seldom(96, 6);
+  EXPECT_EQ(score_test(system, once).p_value, 1.0);
+}
+
 }  // namespace
 }  // namespace kinescope::trace
