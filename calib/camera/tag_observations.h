@@ -21,6 +21,7 @@ struct TagObservation {
   double sigma_px = 0.1;         ///< standard deviation of one coordinate of one corner
   int hamming = 0;               ///< bits corrected
   double decision_margin = 0.0;  ///< contrast of the decoding; 0 where unknown
+  bool partly_hidden = false;    ///< its code does not lie where its corners put it
 };
 
 /// A detection that was seen and not believed.

@@ -21,6 +21,25 @@ constexpr double kMaxStepCost = 30.0;
 // The sightings with the largest images used to find a focal length.
 constexpr std::size_t kFocalViews = 120;
 
+// Eight numbers less the pose's six are left to check a sighting; one in a thousand misfits more
+// than this by noise.
+constexpr double kFreedom = 2.0;
+constexpr double kWorstMisfit = 13.8;
+
+// Corners that no pose explains have errors that are no noise (half hidden, blurred): as wrong as
+// they show themselves to be (Birge 1932).
+PlanarPose with_own_misfit(PlanarPose pose) {
+  if (pose.best.chi_square <= kWorstMisfit) return pose;
+  const double variance = pose.best.chi_square / kFreedom;
+  const auto widen = [variance](PlanarBranch& branch) {
+    branch.chi_square /= variance;
+    branch.covariance *= variance;
+  };
+  widen(pose.best);
+  if (pose.other) widen(*pose.other);
+  return pose;
+}
+
 struct Candidate {
   int frame = 0;
   PlanarPose pose;
@@ -121,7 +140,7 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
   for (const TagObservation& observation : observations.observations) {
     const auto pose = estimate_planar_pose(camera, markers.corners_m(observation.id),
                                            observation.corners_px, observation.sigma_px);
-    if (pose) candidates[observation.id].push_back({observation.frame, *pose});
+    if (pose) candidates[observation.id].push_back({observation.frame, with_own_misfit(*pose)});
   }
   PoseTracks tracks{observations.times_s, {}};
   for (auto& [id, list] : candidates) {

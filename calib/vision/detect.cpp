@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/vision/frame_workers.h"
+#include "calib/vision/pattern_shift.h"
 #include "calib/vision/refine_corners.h"
 #include "calib/vision/sightings.h"
 #include "calib/vision/video.h"
@@ -128,9 +129,11 @@ class Detecting {
       Corners start;
       std::ranges::copy(tag.corners_px, start.begin());
       const RefinedCorners refined = refine_corners(frame.image.view(), start, layout_);
-      if (refined.status != RefineStatus::kDone) continue;
-      std::ranges::copy(refined.corners_px, tag.corners_px.begin());
-      tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+      if (refined.status == RefineStatus::kDone) {
+        std::ranges::copy(refined.corners_px, tag.corners_px.begin());
+        tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+      }
+      tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_);
     }
     return tags;
   }

@@ -17,28 +17,6 @@ constexpr double kMaxHalfWidth = 3.0;  // px, at blurs below 1 px; beyond, in bl
 constexpr double kTaper = 0.7;  // px over which a strip's weight fades out, so that the result does
                                 // not jump when a pixel enters it
 
-// Homography from the square (-1,1), (1,1), (1,-1), (-1,-1) to the corners.
-std::optional<Eigen::Matrix3d> tag_to_image(const Corners& corners) {
-  constexpr std::array<std::array<double, 2>, 4> kSquare = {
-      {{-1.0, 1.0}, {1.0, 1.0}, {1.0, -1.0}, {-1.0, -1.0}}};
-  Eigen::Matrix<double, 8, 8> A;
-  Eigen::Matrix<double, 8, 1> b;
-  for (int i = 0; i < 4; ++i) {
-    const auto [x, y] = kSquare[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d& p = corners[static_cast<std::size_t>(i)];
-    A.row(2 * i) << x, y, 1.0, 0.0, 0.0, 0.0, -x * p.x(), -y * p.x();
-    A.row(2 * i + 1) << 0.0, 0.0, 0.0, x, y, 1.0, -x * p.y(), -y * p.y();
-    b(2 * i) = p.x();
-    b(2 * i + 1) = p.y();
-  }
-  const Eigen::FullPivLU<Eigen::Matrix<double, 8, 8>> lu(A);
-  if (!lu.isInvertible()) return std::nullopt;
-  const Eigen::Matrix<double, 8, 1> h = lu.solve(b);
-  Eigen::Matrix3d H;
-  H << h(0), h(1), h(2), h(3), h(4), h(5), h(6), h(7), 1.0;
-  return H;
-}
-
 Eigen::Vector2d mapped(const Eigen::Matrix3d& H, double x, double y) {
   return (H * Eigen::Vector3d(x, y, 1.0)).hnormalized();
 }
@@ -54,6 +32,26 @@ double faded(double width, double distance) {
 }
 
 }  // namespace
+
+std::optional<Eigen::Matrix3d> tag_to_image(const Corners& corners) {
+  Eigen::Matrix<double, 8, 8> A;
+  Eigen::Matrix<double, 8, 1> b;
+  for (int i = 0; i < 4; ++i) {
+    const double x = kSquare[static_cast<std::size_t>(i)].x();
+    const double y = kSquare[static_cast<std::size_t>(i)].y();
+    const Eigen::Vector2d& p = corners[static_cast<std::size_t>(i)];
+    A.row(2 * i) << x, y, 1.0, 0.0, 0.0, 0.0, -x * p.x(), -y * p.x();
+    A.row(2 * i + 1) << 0.0, 0.0, 0.0, x, y, 1.0, -x * p.y(), -y * p.y();
+    b(2 * i) = p.x();
+    b(2 * i + 1) = p.y();
+  }
+  const Eigen::FullPivLU<Eigen::Matrix<double, 8, 8>> lu(A);
+  if (!lu.isInvertible()) return std::nullopt;
+  const Eigen::Matrix<double, 8, 1> h = lu.solve(b);
+  Eigen::Matrix3d H;
+  H << h(0), h(1), h(2), h(3), h(4), h(5), h(6), h(7), 1.0;
+  return H;
+}
 
 std::optional<std::array<Edge, 4>> make_edges(const Corners& corners, const TagLayout& layout,
                                               const std::array<double, 2>& blur) {

@@ -13,6 +13,13 @@
 
 namespace kinescope::corner_fit {
 
+/// The square that corners are the image of, in their order.
+inline const std::array<Eigen::Vector2d, 4> kSquare = {
+    Eigen::Vector2d{-1.0, 1.0}, {1.0, 1.0}, {1.0, -1.0}, {-1.0, -1.0}};
+
+/// Homography from that square; nothing for corners that span no quadrangle.
+[[nodiscard]] std::optional<Eigen::Matrix3d> tag_to_image(const Corners& corners);
+
 /// One side of the quadrangle, from corner e to e + 1.
 struct Edge {
   Eigen::Vector2d middle;

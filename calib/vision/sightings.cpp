@@ -243,6 +243,10 @@ std::vector<std::string> sort_out_sightings(TagObservations& observations, const
   sort_detections(observations.observations);
   keep_if(observations, [&](const TagObservation& tag) { return undeclared(tag, markers); });
   keep_if(observations, [](const TagObservation& tag) { return impossible_shape(tag.corners_px); });
+  keep_if(observations, [](const TagObservation& tag) -> std::optional<std::string> {
+    if (!tag.partly_hidden) return std::nullopt;
+    return "something covers a part of it";
+  });
   const std::map<TagId, int> doubles = settle_doubles(observations);
   reject_jumps(observations);
   reject_rare(observations, min_sightings);

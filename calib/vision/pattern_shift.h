@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a grey image, a marker's corners and how its cells lie.
+// Gives   how far the steps between the cells of its code lie from where the corners put them.
+// Units   px.
+// Method  steps between neighbouring cells that differ, each placed by the grey between the two
+//         cells' middles; a bilinear warp of the square fitted to them. What covers a marker's rim
+//         (another marker's plate, a cable) makes it look narrower, as a tilt would: only its code
+//         can tell the two apart.
+#pragma once
+
+#include <optional>
+
+#include "calib/vision/refine_corners.h"
+
+namespace kinescope {
+
+/// The largest shift of an end of an edge, outward or inward, beyond what all ends have in common
+/// (bright cells that bloom). Nothing where the code has too few steps or too little contrast.
+[[nodiscard]] std::optional<double> pattern_shift(const ImageView& image, const Corners& corners,
+                                                  const TagLayout& layout);
+
+/// Is the code further from the border that was fitted than pixels, noise and lens allow? Not where
+/// the fit failed or the image is too blurred to say.
+[[nodiscard]] bool is_partly_hidden(const ImageView& image, const RefinedCorners& border,
+                                    const TagLayout& layout);
+
+}  // namespace kinescope
