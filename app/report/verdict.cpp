@@ -3,6 +3,7 @@
 // The verdict: sentences that say no more than the numbers do.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,6 +54,19 @@ std::size_t moving_joints(const KinematicTree& tree) {
       tree.joints, [](const Joint& joint) { return joint.type != JointType::kFixed; }));
 }
 
+/// "q3 drives 2 of them", by channel.
+std::vector<std::string> shared_channels(const KinematicTree& tree) {
+  std::map<std::string, int> count;
+  for (const Joint& joint : tree.joints) {
+    if (joint.type != JointType::kFixed) ++count[joint.channel];
+  }
+  std::vector<std::string> out;
+  for (const auto& [channel, joints] : count) {
+    if (joints > 1) out.push_back(fmt::format("{} drives {} of them", channel, joints));
+  }
+  return out;
+}
+
 /// "every one is driven by a logged channel" and its weaker forms.
 std::string driving_words(const RunSummary& run) {
   std::vector<std::string> undriven;
@@ -62,6 +76,8 @@ std::string driving_words(const RunSummary& run) {
   if (run.log.empty()) return "no joint log: the joint values are estimates from the markers";
   const std::size_t moving = moving_joints(run.calibration.tree);
   if (undriven.empty()) {
+    const std::vector<std::string> shared = shared_channels(run.calibration.tree);
+    if (!shared.empty()) return fmt::format("driven by logged channels, {}", joined(shared));
     return moving == 1 ? "driven by a logged channel" : "each driven by its own logged channel";
   }
   return fmt::format("no logged channel drives {}", joined(undriven));

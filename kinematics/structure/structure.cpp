@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -135,6 +137,22 @@ StructureDoubt allowance_doubt(double allowance) {
           {}};
 }
 
+// One motor may move several joints; a marker seen wrongly looks like a second joint, too.
+void doubt_shared_channels(const JointLog& log, Structure& out) {
+  std::map<int, int> joints;
+  for (const StructureJoint& joint : out.joints) {
+    if (joint.channel) ++joints[joint.channel->channel];
+  }
+  for (const auto& [channel, count] : joints) {
+    if (count < 2) continue;
+    const std::string& name = log.channels[static_cast<std::size_t>(channel)];
+    out.doubts.push_back({fmt::format("{} drives {} joints", name, count),
+                          "right where one motor moves them all; else check that their markers sit "
+                          "firmly and are wholly in view",
+                          {name}});
+  }
+}
+
 Structure nothing(StructureDoubt doubt) {
   Structure out;
   out.status = StructureStatus::kUndetermined;
@@ -181,6 +199,7 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   const Readings every = readings_like(s.readings, log, full, s.offset.value_s, options.max_gap_s);
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
+  doubt_shared_channels(log, out);
   if (answer.allowance > 0.0) out.doubts.push_back(allowance_doubt(answer.allowance));
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;

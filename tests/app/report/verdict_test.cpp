@@ -27,6 +27,15 @@ TEST(Verdict, OfAVideoWithALog) {
   EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;
 }
 
+TEST(Verdict, NamesAChannelThatDrivesTwoJoints) {
+  RunSummary run = synthetic_run();
+  KinematicTree& tree = run.calibration.tree;
+  tree.joints[1].channel = tree.joints[0].channel;
+  const Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.found, "driven by logged channels, q1 drives 2 of them"))
+      << verdict.found;
+}
+
 TEST(Verdict, ALateLogHasAMinus) {
   RunSummary run = synthetic_run();
   run.calibration.time_offset_s = -0.0123;

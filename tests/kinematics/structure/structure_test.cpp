@@ -55,6 +55,25 @@ TEST(FindStructure, WithoutAMarkerOnTheBase) {
   EXPECT_TRUE(s.links[0].markers.empty());
 }
 
+TEST(FindStructure, AChannelThatDrivesTwoJointsIsADoubt) {
+  RecordingOptions o = noisy();
+  o.together = {{0, 2}};
+  o.shuffle_channels = false;
+  Scene scene = make_scene("Linkage", {.joints = 3, .prismatic_share = 0.0}, o);
+  // The third joint has no channel of its own: one motor moves it and the first.
+  JointLog& log = scene.recording.log;
+  ASSERT_EQ(log.channels.size(), 3U);
+  const std::string motor = log.channels[0];
+  log.channels.pop_back();
+  log.values.conservativeResize(Eigen::NoChange, 2);
+  const Structure s = find_structure(scene.recording.tracks, log);
+  ASSERT_EQ(s.joints.size(), 3U);
+  const auto doubt = std::ranges::find_if(
+      s.doubts, [](const StructureDoubt& d) { return d.what.ends_with("drives 2 joints"); });
+  ASSERT_NE(doubt, s.doubts.end());
+  EXPECT_EQ(doubt->names, std::vector<std::string>{motor});
+}
+
 TEST(FindStructure, IdleChannelsAreNamed) {
   RecordingOptions o = noisy();
   o.idle_channels = 2;
