@@ -48,7 +48,9 @@ void add_failures(const RunSummary& run, std::vector<Finding>& findings) {
 void add_structure_doubts(const RunSummary& run, std::vector<Finding>& findings) {
   if (!run.structure) return;
   double weight = run.structure->status == StructureStatus::kDetermined ? kUnseen : kDoubt;
+  const bool traced = run.trace && !run.trace->accepted.empty();
   for (const StructureDoubt& doubt : run.structure->doubts) {
+    if (doubt.of_model && traced) continue;  // the section on effects names the cause
     findings.push_back({weight, sentence(doubt.what), sentence(doubt.remedy)});
     weight -= 0.1;
   }

@@ -134,7 +134,8 @@ StructureDoubt allowance_doubt(double allowance) {
                       100.0 * allowance),
           "check that no marker has slipped, that the camera stood still and that tags.yaml has "
           "every marker's size",
-          {}};
+          {},
+          true};
 }
 
 // One motor may move several joints; a marker seen wrongly looks like a second joint, too.

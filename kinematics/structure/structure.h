@@ -61,6 +61,7 @@ struct StructureDoubt {
   std::string what;
   std::string remedy;
   std::vector<std::string> names;  ///< channels or tags concerned
+  bool of_model = false;           ///< an effect that the model lacks may be its cause
 };
 
 struct Structure {

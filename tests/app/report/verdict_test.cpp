@@ -36,6 +36,17 @@ TEST(Verdict, NamesAChannelThatDrivesTwoJoints) {
       << verdict.found;
 }
 
+TEST(Verdict, ADoubtThatTracingSettlesIsNoLimit) {
+  RunSummary run = synthetic_run();
+  run.structure->doubts.push_back({"the markers move as the joints say only roughly", "check", {}});
+  run.structure->doubts.back().of_model = true;
+  EXPECT_TRUE(has(make_verdict(run).limits, "only roughly"));
+  run.trace = Trace{};
+  EXPECT_TRUE(has(make_verdict(run).limits, "only roughly"));
+  run.trace->accepted.emplace_back();
+  EXPECT_FALSE(has(make_verdict(run).limits, "only roughly"));
+}
+
 TEST(Verdict, ALateLogHasAMinus) {
   RunSummary run = synthetic_run();
   run.calibration.time_offset_s = -0.0123;
