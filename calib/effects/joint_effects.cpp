@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -16,6 +18,11 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 // encoder's eccentricity.
 constexpr double kFewestPeriods = 3.0;
 constexpr double kMostPeriods = 250.0;
+
+// By unit: an effect as large as that nobody overlooks. A fit that asks for it makes a wave or a
+// ratio of some other small thing, seen over a small range.
+const std::map<std::string, double> kLargest = {{"rad", 0.2}, {"m", 0.05}, {"", 0.25}};
+constexpr double kLargestCoupling = 1.5;
 
 // A joint under suspicion and what is needed to suspect it.
 struct Suspect {
@@ -59,6 +66,11 @@ CameraEffect effect(const Suspect& s, std::string name, std::string words,
   c.size_weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(parameters.size()));
   c.parameters = std::move(parameters);
   c.size_unit = std::move(size_unit);
+  if (const auto most = kLargest.find(c.size_unit); most != kLargest.end()) {
+    c.possible = [limit = most->second](const Eigen::VectorXd& theta) {
+      return theta.norm() < limit;
+    };
+  }
   return out;
 }
 
@@ -193,6 +205,9 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
 CameraEffect coupling(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "coupling", fmt::format("another joint moves {} too", s.name), {{"ratio", ""}}, "");
+  out.candidate.possible = [](const Eigen::VectorXd& ratio) {
+    return std::abs(ratio[0]) < kLargestCoupling;
+  };
   std::vector<std::string> names;
   for (const Joint& joint : world.tree.joints) names.push_back(joint.name);
   for (const int other : world.driven) {

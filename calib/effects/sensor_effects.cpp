@@ -172,6 +172,16 @@ void happens_at_a_time(const EffectWorld& world, CorrectedPart part, int index, 
   };
 }
 
+// Further than its own size, or half a radian, a marker does not slip: it is put elsewhere.
+std::function<bool(const Eigen::VectorXd&)> is_a_slip(const EffectWorld& world, int marker) {
+  constexpr double kMostTurn = 0.5;      // rad
+  constexpr double kUnknownSize = 0.05;  // m
+  const double size = world.tree.markers[static_cast<std::size_t>(marker)].size_m;
+  return [most = size > 0.0 ? size : kUnknownSize](const Eigen::VectorXd& twist) {
+    return twist.head<3>().norm() < kMostTurn && twist.tail<3>().norm() < most;
+  };
+}
+
 CameraEffect tag_slip(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
   CameraEffect out =
@@ -179,6 +189,7 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
   out.candidate.size_weights.head<3>().setZero();
   out.candidate.check = "glue or screws of the marker's plate";
   out.candidate.record = "more frames with this marker in view, before and after";
+  out.candidate.possible = is_a_slip(world, marker);
   if (rests(world, marker) && world.kind == MeasurementKind::kCorners)
     out.candidate.floor = kRestingBias;
   happens_at_a_time(world, CorrectedPart::kMarker, marker, out);
