@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Predictive bands that hold what they say. A model's sigma assumes that noise is white and normal
-// and that the model lacks nothing; on measured robots neither is so. Hence the width of a band is
-// a multiple of sigma that is read from residuals on motion that was left out of the fit: whole
-// trajectories, or blocks with a gap (cross-conformal prediction, Vovk 2015; Barber, Candes,
-// Ramdas, Tibshirani 2021). Everything must be estimated anew in every fold: Gaussian processes
-// that keep the hyperparameters of all samples cover less with such factors than without
-// (tests/experiments/torque_bands), so theirs are not calibrated.
+// Takes   a way to fit a model on some samples and predict others.
+// Gives   BandFactors: widths of 90 and 95 % bands in sigmas; SigmaParts: a sigma that holds.
+// Units   those of the samples; rows are samples, columns joints.
+// Method  a model's sigma assumes that noise is white and normal and that the model lacks nothing;
+//         on robots neither is so. Widths are quantiles of residuals on motion that was left out of
+//         the fit: whole trajectories, or blocks with a gap (cross-conformal prediction, Vovk 2015;
+//         Barber, Candes, Ramdas, Tibshirani 2021), studentised by a sigma whose parts are those of
+//         the largest predictive likelihood there. Everything is estimated anew in every fold:
+//         hyperparameters of all samples know the motion that is left out, and its residuals come
+//         out too small (tests/experiments/torque_bands).
+// Not here: the fits (torque_model.h), how motion is left out (dynamics/data/splits.h).
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "dynamics/data/torque_samples.h"
 #include "dynamics/identify/prediction.h"
@@ -31,12 +36,44 @@ struct BandFactors {
 using FoldPredictor =
     std::function<TorquePrediction(const TorqueSamples& train, const TorqueSamples& test)>;
 
-/// From residuals over at most `folds` folds (dynamics/data/splits.h). The normal distribution's
-/// where there are too few samples for two folds.
+/// What models said about motion that they had not seen.
+struct LeftOutTorques {
+  Eigen::MatrixXd residual;
+  Eigen::MatrixXd model_sigma;
+  Eigen::MatrixXd sigma;
+  Eigen::VectorXi fold;  ///< of each row
+  int folds = 0;
+};
+
+/// At most `folds` fits (dynamics/data/splits.h), and about `most_rows` predictions evenly spread
+/// over the samples; 0: all. Nothing where there are too few samples for two folds, or for a fit.
+[[nodiscard]] std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int folds,
+                                                            Eigen::Index most_rows,
+                                                            const FoldPredictor& predict);
+
+/// Quantiles of |residual| / sigma. Each is widened by what it is in doubt itself, as Student's t
+/// is by the doubt of a sigma: its logarithm's variance by the jackknife over folds (Shao and Wu
+/// 1989: groups, not single values, for quantiles) stands for 1 / (2 degrees of freedom).
+[[nodiscard]] BandFactors bands_of(const LeftOutTorques& left);
+
+/// bands_of(leave_folds_out()); the normal distribution's where that gives nothing.
 [[nodiscard]] BandFactors cross_validated_bands(const TorqueSamples& samples, int folds,
                                                 const FoldPredictor& predict);
 
-/// From residuals of samples that the prediction has not seen.
-[[nodiscard]] BandFactors bands_of(const Eigen::MatrixXd& residual, const Eigen::MatrixXd& sigma);
+/// sigma^2 = model_factor^2 model_sigma^2 + noise_sigma^2, one entry a joint. Where a model errs
+/// coherently (coloured noise, what it lacks), its own noise is too small a part and its doubt
+/// about the function grows otherwise than its error does.
+struct SigmaParts {
+  Eigen::VectorXd model_factor;
+  Eigen::VectorXd noise_sigma;
+};
+
+/// Those of the largest normal predictive likelihood of residuals on motion left out (Gneiting and
+/// Raftery 2007, the logarithmic score), the common scale profiled out.
+[[nodiscard]] SigmaParts sigma_parts_of(const LeftOutTorques& left);
+
+/// The same mean with a sigma of these parts.
+[[nodiscard]] TorquePrediction with_sigma_parts(TorquePrediction prediction,
+                                                const SigmaParts& parts);
 
 }  // namespace kinescope

@@ -4,7 +4,7 @@
 // Gives   FittedTorqueModel: predictive mean and sigma of every joint's torque, whatever the kind.
 // Units   those of the samples; rows are samples, columns joints, as in dynamics/data.
 // Method  parametric: dynamics/identify; Gaussian processes: dynamics/gp with the kernels of the
-//         field, hyperparameters by marginal likelihood.
+//         field, hyperparameters by marginal likelihood; bands: bands.h.
 // Not here: filtering (dynamics/data), what a model lacks (dynamics/effects).
 #pragma once
 
@@ -64,7 +64,9 @@ struct TorqueModelOptions {
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
   int band_folds = 8;  ///< of the parametric model's bands; below 2: the normal distribution's
-  int threads = 0;     ///< 0: all of the machine; never changes a result
+  /// The same for Gaussian processes, at most band_folds: each costs a search with one start.
+  int process_band_folds = 5;
+  int threads = 0;                     ///< 0: all of the machine; never changes a result
   std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
 };
 
@@ -75,7 +77,7 @@ struct FittedTorqueModel {
   std::function<TorquePrediction(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                                  const Eigen::MatrixXd& ddq)>
       predict;
-  BandFactors bands = {};  ///< calibrated for the parametric model only, see bands.h
+  BandFactors bands = {};  ///< calibrated for the parametric model and Gaussian processes
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what

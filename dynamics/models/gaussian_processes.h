@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Gaussian processes of torque with the kernels of the field (dynamics/gp), and their bands.
+#pragma once
+
+#include "dynamics/models/torque_model.h"
+
+namespace kinescope::models {
+
+/// How a Gaussian process of some kind holds its samples.
+struct ProcessShare {
+  int samples = 0;
+  bool sparse = false;
+};
+[[nodiscard]] ProcessShare share_of(TorqueModelKind kind, Eigen::Index samples,
+                                    const TorqueModelOptions& options);
+
+/// Hyperparameters by marginal likelihood. Sigma and bands are those of residuals on motion left
+/// out, with a search of its own in every fold (bands.h): what is claimed by itself covers far too
+/// little, as noise is taken for white and the hyperparameters for known.
+[[nodiscard]] FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind,
+                                                       const DynamicModel& model,
+                                                       const TorqueSamples& samples,
+                                                       const TorqueModelOptions& options);
+
+}  // namespace kinescope::models
