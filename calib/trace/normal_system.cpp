@@ -68,8 +68,6 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
   if (found != carriers_.end()) return found->second;
   CarrierSums sums{Eigen::VectorXd::Zero(linear_->instants()),
                    Eigen::MatrixXd::Zero(linear_->instants(), parameters()),
-                   Eigen::VectorXd::Zero(linear_->instants()),
-                   Eigen::VectorXd::Zero(linear_->instants()),
                    Eigen::VectorXd::Zero(linear_->instants())};
   RowMatrix with_jacobian = RowMatrix::Zero(linear_->instants(), parameters());
   for (Eigen::SparseMatrix<double>::InnerIterator entry(linear_->carriers, index); entry; ++entry) {
@@ -78,8 +76,6 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
     with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
     const double unit = linear_->unit[entry.row()];
     if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
-    sums.rows[i] += 1.0;
-    sums.squares[i] += linear_->residual[entry.row()] * linear_->residual[entry.row()];
   }
   sums.with_jacobian = with_jacobian;
   return carriers_.emplace(index, std::move(sums)).first->second;
@@ -178,19 +174,38 @@ double NormalSystem::shift_of(double gain, const std::vector<EffectColumn>& colu
   return sum > 0.0 ? std::sqrt(std::max(0.0, gain) / sum) : 0.0;
 }
 
-NormalSystem::Touched NormalSystem::touched(const std::vector<EffectColumn>& columns) const {
-  Eigen::VectorXd rows = Eigen::VectorXd::Zero(linear_->instants());
-  Eigen::VectorXd squares = rows;
-  for (const EffectColumn& column : columns) {
-    const Eigen::VectorXd share = share_of(column);
-    const CarrierSums& sums = carrier(column.carrier);
-    for (Eigen::Index i = 0; i < rows.size(); ++i) {
-      if (share[i] == 0.0) continue;
-      rows[i] = std::max(rows[i], sums.rows[i]);
-      squares[i] = std::max(squares[i], sums.squares[i]);
+Eigen::VectorXd NormalSystem::residual_after(const Eigen::VectorXd& delta,
+                                             const std::vector<EffectColumn>& columns,
+                                             const Eigen::VectorXd& theta) const {
+  Eigen::VectorXd out = linear_->residual - linear_->jacobian * delta;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const Eigen::VectorXd share = share_of(columns[k]);
+    const double size = theta[static_cast<Eigen::Index>(k)];
+    using Entries = Eigen::SparseMatrix<double>::InnerIterator;
+    for (Entries entry(linear_->carriers, columns[k].carrier); entry; ++entry) {
+      out[entry.row()] -=
+          size * share[instant_[static_cast<std::size_t>(entry.row())]] * entry.value();
     }
   }
-  return {rows.sum(), squares.sum()};
+  return out;
+}
+
+NormalSystem::Touched NormalSystem::touched(const std::vector<EffectColumn>& columns,
+                                            const Eigen::VectorXd& residual) const {
+  Touched out;
+  std::vector<bool> counted(static_cast<std::size_t>(residual.size()), false);
+  for (const EffectColumn& column : columns) {
+    const Eigen::VectorXd share = share_of(column);
+    using Entries = Eigen::SparseMatrix<double>::InnerIterator;
+    for (Entries entry(linear_->carriers, column.carrier); entry; ++entry) {
+      const auto row = static_cast<std::size_t>(entry.row());
+      if (counted[row] || share[instant_[row]] == 0.0) continue;
+      counted[row] = true;
+      out.rows += 1.0;
+      out.squares += residual[entry.row()] * residual[entry.row()];
+    }
+  }
+  return out;
 }
 
 }  // namespace kinescope::trace

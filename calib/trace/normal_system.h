@@ -51,23 +51,27 @@ class NormalSystem {
   /// squares: the same shift of every row they touch would take as much; in the residual's unit.
   [[nodiscard]] double shift_of(double gain, const std::vector<EffectColumn>& columns) const;
 
+  /// The residual where the model's parameters moved by `delta` and the columns have the size
+  /// `theta`.
+  [[nodiscard]] Eigen::VectorXd residual_after(const Eigen::VectorXd& delta,
+                                               const std::vector<EffectColumn>& columns,
+                                               const Eigen::VectorXd& theta) const;
   /// Rows that the carriers of these columns touch while their share is not zero, and the squares
-  /// of the residual there.
+  /// of `residual` there.
   struct Touched {
     double rows = 0.0;
     double squares = 0.0;
   };
-  [[nodiscard]] Touched touched(const std::vector<EffectColumn>& columns) const;
+  [[nodiscard]] Touched touched(const std::vector<EffectColumn>& columns,
+                                const Eigen::VectorXd& residual) const;
 
  private:
-  // Of one carrier at each instant: carrier'residual, carrier'J, of the rows it touches the weight
-  // (in the inverse square of the residual's unit), their number and the residual's squares.
+  // Of one carrier at each instant: carrier'residual, carrier'J, and of the rows it touches the
+  // weight (in the inverse square of the residual's unit).
   struct CarrierSums {
     Eigen::VectorXd with_residual;
     Eigen::MatrixXd with_jacobian;  // instants x parameters
     Eigen::VectorXd weight;
-    Eigen::VectorXd rows;
-    Eigen::VectorXd squares;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;

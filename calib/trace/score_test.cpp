@@ -95,9 +95,12 @@ struct PooledNoise {
   double freedom = 0.0;
 };
 
-PooledNoise pooled_noise(const NormalSystem& system, const NormalSystem::Touched& touched,
-                         double gain, double k) {
+PooledNoise pooled_noise(const NormalSystem& system, const Projected& p,
+                         const std::vector<EffectColumn>& columns) {
   const Linearisation& linear = system.linear();
+  const auto k = static_cast<double>(p.theta.size());
+  const NormalSystem::Touched touched =
+      system.touched(columns, system.residual_after(p.delta, columns, p.T * p.theta));
   // Of the model's own parameters, these rows pay their part.
   const double own = static_cast<double>(system.parameters()) * touched.rows /
                      static_cast<double>(linear.residual.size());
@@ -109,8 +112,7 @@ PooledNoise pooled_noise(const NormalSystem& system, const NormalSystem::Touched
                         static_cast<double>(linear.instants() - 1);
     memory = std::max(1.0, 2.0 * linear.correlation_time_s / step);
   }
-  return {std::max(0.0, touched.squares - gain) / freedom * memory,
-          std::max(1.0, freedom / memory)};
+  return {touched.squares / freedom * memory, std::max(1.0, freedom / memory)};
 }
 
 double effective_stretches(const Eigen::VectorXd& energy) {
@@ -131,8 +133,7 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.freedom = effective - k;
   if (effective < kFewestStretches) return;
   const bool few = out.freedom < kFewStretches;
-  const PooledNoise noise =
-      few ? pooled_noise(system, system.touched(columns), p.gain, k) : PooledNoise{};
+  const PooledNoise noise = few ? pooled_noise(system, p, columns) : PooledNoise{};
   if (few && !(noise.freedom > 0.0)) return;
   const double pooled_statistic = p.gain / (k * noise.variance);
   if (effective < k + 2.0) {
