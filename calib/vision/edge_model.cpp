@@ -21,6 +21,51 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+// The normal distribution and its density from a table, cubic between its entries: to 1e-9, and
+// several times as fast as erfc and exp, which were half of the time of a fit.
+class BlurredStep {
+ public:
+  BlurredStep() {
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      const double z = kLow + static_cast<double>(i) / kPerUnit;
+      const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+      entries_[i] = {0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0), density};
+    }
+  }
+
+  struct Value {
+    double step = 0.0;
+    double density = 0.0;
+  };
+
+  [[nodiscard]] Value at(double z) const {
+    const double place = (std::clamp(z, kLow, -kLow) - kLow) * kPerUnit;
+    const auto i = std::min(static_cast<std::size_t>(place), entries_.size() - 2);
+    const double t = place - static_cast<double>(i);
+    const double low = kLow + static_cast<double>(i) / kPerUnit;
+    const Value& a = entries_[i];
+    const Value& b = entries_[i + 1];
+    // Hermite: the density is the step's slope, -z times the density is the density's.
+    const double left = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t);
+    const double slope_left = t * (1.0 - t) * (1.0 - t) / kPerUnit;
+    const double slope_right = t * t * (t - 1.0) / kPerUnit;
+    return {
+        left * a.step + (1.0 - left) * b.step + slope_left * a.density + slope_right * b.density,
+        left * a.density + (1.0 - left) * b.density - slope_left * low * a.density -
+            slope_right * (low + 1.0 / kPerUnit) * b.density};
+  }
+
+ private:
+  static constexpr double kLow = -7.0;
+  static constexpr double kPerUnit = 64.0;
+  std::array<Value, 897> entries_;  // 14 units
+};
+
+const BlurredStep& blurred_step() {
+  static const BlurredStep kTable;
+  return kTable;
+}
+
 }  // namespace
 
 Layout::Layout(const Corners& corners) {
@@ -34,55 +79,79 @@ Layout::Layout(const Corners& corners) {
   }
 }
 
-Prediction predict(const Layout& layout, const Eigen::VectorXd& unknowns, const Sample& s) {
-  Prediction out;
-  const auto e = static_cast<std::size_t>(s.edge);
-  const int line = 3 * s.edge;
-  const int blur_index = kBlurIndex + s.edge % 2;
-  const double blur = unknowns(blur_index);
-  const double sag = s.u * s.u - 1.0;
-  const double d =
-      s.distance - (unknowns(line) + unknowns(line + 1) * s.u + unknowns(line + 2) * sag);
-  const double z = d / blur;
-  const double step = 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2.0);
-  const double bell = std::exp(-0.5 * z * z) / (blur * std::sqrt(2.0 * std::numbers::pi));
-  const double place = std::clamp(0.5 * (s.u + 1.0), 0.0, 1.0) * (layout.knots[e] - 1);
-  const int knot = std::min(static_cast<int>(place), layout.knots[e] - 2);
-  const double part = place - knot;
-  const int in = layout.inside[e] + knot;
-  const int on = layout.outside[e] + knot;
-  const double inside = (1.0 - part) * unknowns(in) + part * unknowns(in + 1);
-  const double outside = (1.0 - part) * unknowns(on) + part * unknowns(on + 1);
-  const double contrast = outside - inside;
-  out.grey = inside + contrast * step;
-  const double slope = contrast * bell;  // per px of distance
-  out.index = {line, line + 1, line + 2, blur_index, in, in + 1, on, on + 1};
-  out.slope = {-slope,
-               -slope * s.u,
-               -slope * sag,
-               -slope * z,
-               (1.0 - step) * (1.0 - part),
-               (1.0 - step) * part,
-               step * (1.0 - part),
-               step * part};
+std::vector<Prediction> predict(const Layout& layout, const Eigen::VectorXd& unknowns,
+                                const std::vector<Sample>& samples) {
+  const BlurredStep& table = blurred_step();
+  std::array<int, 4> first_piece{};
+  for (std::size_t e = 1; e < 4; ++e) first_piece[e] = first_piece[e - 1] + layout.knots[e - 1] - 1;
+  std::vector<Prediction> out(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Sample& s = samples[i];
+    Prediction& p = out[i];
+    const auto e = static_cast<std::size_t>(s.edge);
+    const int line = 3 * s.edge;
+    const double per_blur = 1.0 / unknowns(kBlurIndex + s.edge % 2);
+    const double sag = s.u * s.u - 1.0;
+    const double d =
+        s.distance - (unknowns(line) + unknowns(line + 1) * s.u + unknowns(line + 2) * sag);
+    const double z = d * per_blur;
+    const auto [step, bell] = table.at(z);
+    const double place = std::clamp(0.5 * (s.u + 1.0), 0.0, 1.0) * (layout.knots[e] - 1);
+    const int knot = std::min(static_cast<int>(place), layout.knots[e] - 2);
+    const double part = place - knot;
+    const int in = layout.inside[e] + knot;
+    const int on = layout.outside[e] + knot;
+    const double inside = (1.0 - part) * unknowns(in) + part * unknowns(in + 1);
+    const double outside = (1.0 - part) * unknowns(on) + part * unknowns(on + 1);
+    const double contrast = outside - inside;
+    p.grey = inside + contrast * step;
+    p.piece = first_piece[e] + knot;
+    const double slope = contrast * bell * per_blur;  // per px of distance
+    p.slope << -slope, -slope * s.u, -slope * sag, -slope * z, (1.0 - step) * (1.0 - part),
+        (1.0 - step) * part, step * (1.0 - part), step * part;
+  }
   return out;
 }
 
-System make_system(const std::vector<Sample>& samples, const Layout& layout,
-                   const Eigen::VectorXd& unknowns, double noise) {
+System make_system(const std::vector<Sample>& samples, const std::vector<Prediction>& predictions,
+                   const Layout& layout, double noise) {
+  struct Piece {
+    Eigen::Matrix<double, 8, 8> H = Eigen::Matrix<double, 8, 8>::Zero();
+    Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
+  };
+  const auto edge_pieces = [&](std::size_t e) {
+    return static_cast<std::size_t>(layout.knots[e] - 1);
+  };
+  std::vector<Piece> pieces(edge_pieces(0) + edge_pieces(1) + edge_pieces(2) + edge_pieces(3));
   System system{Eigen::MatrixXd::Zero(layout.size, layout.size),
                 Eigen::VectorXd::Zero(layout.size)};
-  for (const Sample& s : samples) {
-    const Prediction p = predict(layout, unknowns, s);
-    const double r = s.grey - p.grey;
-    const double limit = kRobust * noise;
-    const double w = s.weight * (std::abs(r) > limit ? limit / std::abs(r) : 1.0);
+  const double limit = kRobust * noise;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Prediction& p = predictions[i];
+    const double r = samples[i].grey - p.grey;
+    const double w = samples[i].weight * (std::abs(r) > limit ? limit / std::abs(r) : 1.0);
     system.cost += w * r * r;
     system.weight += w;
-    for (std::size_t i = 0; i < 8; ++i) {
-      const double wj = w * p.slope[i];
-      system.g(p.index[i]) += wj * r;
-      for (std::size_t j = 0; j <= i; ++j) system.H(p.index[i], p.index[j]) += wj * p.slope[j];
+    Piece& piece = pieces[static_cast<std::size_t>(p.piece)];
+    const Eigen::Matrix<double, 8, 1> weighted = w * p.slope;
+    piece.H.noalias() += weighted * p.slope.transpose();
+    piece.g.noalias() += r * weighted;
+  }
+  auto piece = pieces.begin();
+  for (int e = 0; e < 4; ++e) {
+    const auto edge = static_cast<std::size_t>(e);
+    for (int knot = 0; knot + 1 < layout.knots[edge]; ++knot, ++piece) {
+      const int in = layout.inside[edge] + knot;
+      const int on = layout.outside[edge] + knot;
+      // Ascending, so that the lower triangle goes to the lower triangle.
+      const std::array<int, 8> index = {3 * e, 3 * e + 1, 3 * e + 2, kBlurIndex + e % 2,
+                                        in,    in + 1,    on,        on + 1};
+      for (int a = 0; a < 8; ++a) {
+        const int row = index[static_cast<std::size_t>(a)];
+        system.g(row) += piece->g(a);
+        for (int b = 0; b <= a; ++b)
+          system.H(row, index[static_cast<std::size_t>(b)]) += piece->H(a, b);
+      }
     }
   }
   return system;
@@ -98,12 +167,12 @@ void add_belief(System& system, const Eigen::VectorXd& unknowns, int a, double r
   system.H(std::max(a, b), std::min(a, b)) += weight * row_a * row_b;
 }
 
-double robust_noise(const std::vector<Sample>& samples, const Layout& layout,
-                    const Eigen::VectorXd& unknowns) {
+double robust_noise(const std::vector<Sample>& samples,
+                    const std::vector<Prediction>& predictions) {
   std::vector<double> size;
   size.reserve(samples.size());
-  for (const Sample& s : samples) {
-    if (s.weight > 0.5) size.push_back(std::abs(s.grey - predict(layout, unknowns, s).grey));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].weight > 0.5) size.push_back(std::abs(samples[i].grey - predictions[i].grey));
   }
   if (size.empty()) return 0.0;
   return std::max(kMinNoise, 1.4826 * median(std::move(size)));

@@ -36,16 +36,16 @@ struct Layout {
   explicit Layout(const Corners& corners);
 };
 
-/// The model's grey value and its derivatives, stored as (index, value) of the eight that are not
-/// zero.
+/// The model's grey value and its derivatives by eight unknowns: the edge's line (3), its blur, the
+/// levels at the knots before and behind the sample, inside (2) and outside (2).
 struct Prediction {
   double grey = 0.0;
-  std::array<int, 8> index{};
-  std::array<double, 8> slope{};
+  int piece = 0;  ///< of an edge between two knots, counted over all edges
+  Eigen::Matrix<double, 8, 1> slope;
 };
 
-[[nodiscard]] Prediction predict(const Layout& layout, const Eigen::VectorXd& unknowns,
-                                 const Sample& s);
+[[nodiscard]] std::vector<Prediction> predict(const Layout& layout, const Eigen::VectorXd& unknowns,
+                                              const std::vector<Sample>& samples);
 
 /// Normal equations of the weighted, robust least squares.
 struct System {
@@ -55,9 +55,10 @@ struct System {
   double weight = 0.0;  // sum of weights
 };
 
-/// `noise`: standard deviation of a grey value.
-[[nodiscard]] System make_system(const std::vector<Sample>& samples, const Layout& layout,
-                                 const Eigen::VectorXd& unknowns, double noise);
+/// `predictions` of the samples; `noise`: standard deviation of a grey value.
+[[nodiscard]] System make_system(const std::vector<Sample>& samples,
+                                 const std::vector<Prediction>& predictions, const Layout& layout,
+                                 double noise);
 
 /// Adds the belief that row_a * unknowns(a) + row_b * unknowns(b) is zero; `weight` is the noise's
 /// variance over the belief's.
@@ -65,8 +66,8 @@ void add_belief(System& system, const Eigen::VectorXd& unknowns, int a, double r
                 double row_b, double weight);
 
 /// Standard deviation of the grey values around the model, from their median.
-[[nodiscard]] double robust_noise(const std::vector<Sample>& samples, const Layout& layout,
-                                  const Eigen::VectorXd& unknowns);
+[[nodiscard]] double robust_noise(const std::vector<Sample>& samples,
+                                  const std::vector<Prediction>& predictions);
 
 /// A first guess of the grey values inside and outside: medians of the pixels well away from the
 /// edge; nothing where there are too few.

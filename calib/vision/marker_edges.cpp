@@ -102,24 +102,26 @@ std::vector<Sample> collect_samples(const ImageView& image, const std::array<Edg
   std::vector<Sample> samples;
   for (int y = y0; y <= y1; ++y) {
     const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * y;
+    std::array<double, 4> out{};  // distance outward of every edge
+    for (std::size_t e = 0; e < 4; ++e)
+      out[e] = edges[e].outward.dot(Eigen::Vector2d(x0, y) - edges[e].middle);
     for (int x = x0; x <= x1; ++x) {
-      const Eigen::Vector2d p(x, y);
-      std::array<double, 4> out{};  // distance outward of every edge
-      for (std::size_t e = 0; e < 4; ++e) out[e] = edges[e].outward.dot(p - edges[e].middle);
+      const std::array<double, 4> here = out;
+      for (std::size_t e = 0; e < 4; ++e) out[e] += edges[e].outward.x();
       for (std::size_t e = 0; e < 4; ++e) {
         const Edge& edge = edges[e];
-        const double width = out[e] > 0.0 ? edge.outer_width : edge.inner_width;
-        if (std::abs(out[e]) >= width) continue;
+        const double width = here[e] > 0.0 ? edge.outer_width : edge.inner_width;
+        if (std::abs(here[e]) >= width) continue;
         // Away from both neighbouring edges by the reach of their blur.
         const double clear = kCornerReach * blur[(e + 1) % 2];
-        const double nearest = -std::max(out[(e + 1) % 4], out[(e + 3) % 4]);
-        if (nearest <= clear || nearest < std::abs(out[e]) * 0.5) continue;
+        const double nearest = -std::max(here[(e + 1) % 4], here[(e + 3) % 4]);
+        if (nearest <= clear || nearest < std::abs(here[e]) * 0.5) continue;
         Sample s;
         s.edge = static_cast<int>(e);
-        s.u = edge.along.dot(p - edge.middle) / edge.half;
-        s.distance = out[e];
+        s.u = edge.along.dot(Eigen::Vector2d(x, y) - edge.middle) / edge.half;
+        s.distance = here[e];
         s.grey = static_cast<double>(row[x]);
-        s.weight = faded(width, std::abs(out[e])) * std::min(1.0, (nearest - clear) / kTaper);
+        s.weight = faded(width, std::abs(here[e])) * std::min(1.0, (nearest - clear) / kTaper);
         samples.push_back(s);
       }
     }

@@ -29,7 +29,7 @@ constexpr double kMinStep =
     0.004;  // of the contrast: how levels differ from knot to knot, at least ..
 constexpr double kMaxStep = 0.3;    // .. and at most
 constexpr double kBlurSigma = 0.6;  // px: what blurs are like, for tags too small to show their own
-constexpr double kConverged = 5e-4;  // px
+constexpr double kConverged = 2e-3;  // px; the next step would be far smaller
 constexpr int kMaxRounds = 24;
 constexpr int kFullSteps = 6;          // rounds before steps are halved
 constexpr double kMinContrast = 12.0;  // grey levels
@@ -77,7 +77,8 @@ class Fit {
       }
       // The edges were laid anew through the corners: lines start at zero, all else is kept.
       for (int e = 0; e < 4; ++e) unknowns_(3 * e) = unknowns_(3 * e + 1) = 0.0;
-      noise_ = robust_noise(samples_, layout_, unknowns_);
+      predictions_ = predict(layout_, unknowns_, samples_);
+      noise_ = robust_noise(samples_, predictions_);
       if (!step(*edges, round < kFullSteps ? 1.0 : 0.5)) return RefineStatus::kBadFit;
       if (round < kFullSteps) learn_steps();
       const double moved = take_corners(*edges);
@@ -156,7 +157,7 @@ class Fit {
   }
 
   bool step(const std::array<Edge, 4>& edges, double damping) {
-    System system = make_system(samples_, layout_, unknowns_, noise_);
+    System system = make_system(samples_, predictions_, layout_, noise_);
     add_beliefs(system, edges);
     const double freedom = system.weight - layout_.size;
     if (!(freedom > 0.25 * kMinPixels)) return false;
@@ -225,8 +226,9 @@ class Fit {
   double correlation() const {
     constexpr double kPiece = 8.0;  // px, a block of the usual video codecs
     std::map<std::pair<int, int>, std::array<double, 2>> pieces;
-    for (const Sample& s : samples_) {
-      const Prediction p = predict(layout_, unknowns_, s);
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const Sample& s = samples_[i];
+      const Prediction& p = predictions_[i];
       const double r = std::clamp(s.grey - p.grey, -kRobust * noise_, kRobust * noise_);
       const auto e = static_cast<std::size_t>(s.edge);
       const double length = (corners_[(e + 1) % 4] - corners_[e]).norm();
@@ -260,6 +262,7 @@ class Fit {
   std::array<double, 2> blur_ = {kBlurStart, kBlurStart};
   std::array<Meeting, 4> meetings_;
   std::vector<Sample> samples_;
+  std::vector<Prediction> predictions_;  // before the last step
   Eigen::VectorXd unknowns_;
   Eigen::LLT<Eigen::MatrixXd> solver_;
   double noise_ = 0.0;
