@@ -2,7 +2,6 @@
 #include "calib/vision/detect.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "calib/vision/pattern_shift.h"
 #include "calib/vision/refine_corners.h"
 #include "calib/vision/sightings.h"
+#include "calib/vision/tag_windows.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/error.h"
 
@@ -28,18 +28,9 @@ constexpr double kArucoSigma = 0.8;
 constexpr double kCompressionSigma = 0.025;
 // A gap in a track is searched where sightings on both sides, or one of them, are this near.
 constexpr double kGapBothSides_s = 2.5;
-constexpr double kGapOneSide_s = 0.2;
-// A glint beside a marker hides it from a detector that thresholds by the brightest pixel nearby;
-// so windows are searched again with brightness cut off at these grey levels.
-constexpr std::array<int, 5> kCeilings = {255, 200, 150, 110, 80};
+constexpr double kGapOneSide_s = 0.35;
 constexpr double kLargeEdge = 150.0;  // px; larger markers are not lost for want of resolution
-
-using FrameTags = std::vector<std::vector<TagObservation>>;  // by frame
-
-struct Window {
-  TagId id;
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // inclusive
-};
+constexpr double kSamePlace = 0.25;   // of an edge: two detections of one and the same marker
 
 // What one worker has of its own.
 struct Searcher {
@@ -67,14 +58,20 @@ class Detecting {
     Detection out;
     out.observations.width = reader->info().width;
     out.observations.height = reader->info().height;
+    // Pictures that were taken one by one need not follow from one another.
+    const bool follows = reader->info().codec != "images";
     const int every = std::max(1, options_.full_search_every);
-    out.observations.times_s = for_each_frame(
-        *reader, searchers_.size(),
-        [&](std::size_t worker, const VideoFrame& frame) {
-          Searcher& searcher = searchers_[worker];
-          const bool full = searcher.fine && frame.index % every == 0;
-          return finish((full ? searcher.fine : searcher.coarse)->detect(frame.image.view()),
-                        frame);
+    out.observations.times_s = for_each_run(
+        *reader, searchers_.size(), follows ? static_cast<std::size_t>(every) : 1,
+        [&](std::size_t worker, const std::vector<VideoFrame>& run) {
+          FrameTags found;
+          for (const VideoFrame& frame : run) {
+            const bool full = frame.index % every == 0;
+            found.push_back(finish(
+                found.empty() ? search_whole(worker, frame, full) : follow(worker, frame, found),
+                frame));
+          }
+          return found;
         },
         tags_, progress, "finding markers");
     out.warnings = reader->warnings();
@@ -84,16 +81,18 @@ class Detecting {
   // Once more through the video, only where a marker was lost.
   void search_gaps(const std::filesystem::path& video, const Detection& so_far,
                    const Progress& progress) {
-    const std::map<int, std::vector<Window>> windows = find_gaps(so_far.observations);
+    const std::map<int, std::vector<TagWindow>> windows = find_gaps(so_far.observations);
     if (windows.empty()) return;
     const std::unique_ptr<VideoReader> reader = open_video(video);
     FrameTags more;
-    for_each_frame(
-        *reader, searchers_.size(),
-        [&](std::size_t worker, const VideoFrame& frame) {
+    for_each_run(
+        *reader, searchers_.size(), 1,
+        [&](std::size_t worker, const std::vector<VideoFrame>& run) {
+          const VideoFrame& frame = run.front();
           const auto found = windows.find(frame.index);
-          if (found == windows.end()) return std::vector<TagObservation>();
-          return finish(search_windows(*fine(worker), frame.image.view(), found->second), frame);
+          if (found == windows.end()) return FrameTags(1);
+          return FrameTags{finish(
+              search_windows(*fine(worker), frame.image.view(), found->second, true), frame)};
         },
         more, progress, "searching gaps");
     for (std::size_t f = 0; f < std::min(more.size(), tags_.size()); ++f) {
@@ -119,6 +118,33 @@ class Detecting {
     return (searcher.fine ? searcher.fine : searcher.coarse).get();
   }
 
+  std::vector<TagObservation> search_whole(std::size_t worker, const VideoFrame& frame,
+                                           bool full) const {
+    return (full ? fine(worker) : searchers_[worker].coarse.get())->detect(frame.image.view());
+  }
+
+  // The markers of the frame before, looked for where they should be; the whole frame where one of
+  // them is not there any more.
+  std::vector<TagObservation> follow(std::size_t worker, const VideoFrame& frame,
+                                     const FrameTags& before) const {
+    const std::vector<TagObservation> none;
+    const std::vector<TagWindow> windows =
+        windows_after(before.back(), before.size() > 1 ? before[before.size() - 2] : none,
+                      frame.image.width, frame.image.height);
+    std::vector<TagObservation> found =
+        search_windows(*fine(worker), frame.image.view(), windows, false);
+    if (!found.empty() && found.size() >= before.back().size()) return found;
+    for (TagObservation& tag : search_whole(worker, frame, false)) {
+      const bool known = std::ranges::any_of(found, [&](const TagObservation& other) {
+        return other.id == tag.id && corner_distance_px(other.corners_px, tag.corners_px) <
+                                         kSamePlace * mean_edge_px(tag.corners_px);
+      });
+      if (!known) found.push_back(std::move(tag));
+    }
+    sort_detections(found);
+    return found;
+  }
+
   // Refined corners, sigma and frame number.
   std::vector<TagObservation> finish(std::vector<TagObservation> tags,
                                      const VideoFrame& frame) const {
@@ -138,44 +164,11 @@ class Detecting {
     return tags;
   }
 
-  static std::vector<TagObservation> search_windows(TagDetector& detector, const ImageView& image,
-                                                    const std::vector<Window>& windows) {
-    std::vector<TagObservation> out;
-    for (const Window& window : windows) {
-      for (const int ceiling : kCeilings) {
-        const GreyImage part = cut(image, window, ceiling);
-        std::vector<TagObservation> found = detector.detect(part.view());
-        std::erase_if(found, [&](const TagObservation& tag) { return tag.id != window.id; });
-        for (TagObservation& tag : found) {
-          for (Eigen::Vector2d& corner : tag.corners_px) {
-            corner += Eigen::Vector2d(window.x0, window.y0);
-          }
-          out.push_back(std::move(tag));
-        }
-        if (!found.empty()) break;
-      }
-    }
-    return out;
-  }
-
-  static GreyImage cut(const ImageView& image, const Window& window, int ceiling) {
-    GreyImage part{window.x1 - window.x0 + 1, window.y1 - window.y0 + 1, {}};
-    part.pixels.reserve(static_cast<std::size_t>(part.width) *
-                        static_cast<std::size_t>(part.height));
-    for (int y = window.y0; y <= window.y1; ++y) {
-      const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * y;
-      for (int x = window.x0; x <= window.x1; ++x) {
-        part.pixels.push_back(static_cast<std::uint8_t>(std::min<int>(row[x], ceiling)));
-      }
-    }
-    return part;
-  }
-
   // Where to look again: markers that are there before or after a frame, and not in it.
-  std::map<int, std::vector<Window>> find_gaps(const TagObservations& so_far) const {
+  std::map<int, std::vector<TagWindow>> find_gaps(const TagObservations& so_far) const {
     std::map<TagId, std::vector<const TagObservation*>> tracks;
     for (const TagObservation& tag : so_far.observations) tracks[tag.id].push_back(&tag);
-    std::map<int, std::vector<Window>> out;
+    std::map<int, std::vector<TagWindow>> out;
     const auto& times = so_far.times_s;
     for (const auto& [id, track] : tracks) {
       std::size_t next = 0;
@@ -184,18 +177,17 @@ class Detecting {
         if (next < track.size() && track[next]->frame == f) continue;
         const TagObservation* before = next > 0 ? track[next - 1] : nullptr;
         const TagObservation* after = next < track.size() ? track[next] : nullptr;
-        if (auto window = expect(before, after, times, f, so_far.width, so_far.height)) {
-          window->id = id;
+        if (const auto window = expect(id, before, after, times, f, so_far.width, so_far.height))
           out[f].push_back(*window);
-        }
       }
     }
     return out;
   }
 
-  static std::optional<Window> expect(const TagObservation* before, const TagObservation* after,
-                                      const std::vector<double>& times, int frame, int width,
-                                      int height) {
+  static std::optional<TagWindow> expect(TagId id, const TagObservation* before,
+                                         const TagObservation* after,
+                                         const std::vector<double>& times, int frame, int width,
+                                         int height) {
     const auto time = [&](int f) { return times[static_cast<std::size_t>(f)]; };
     const double now = time(frame);
     std::vector<Eigen::Vector2d> corners;
@@ -211,23 +203,8 @@ class Detecting {
       corners = (follow ? before : after)->corners_px;
       reach = mean_edge_px(corners);
     }
-    const double edge = mean_edge_px(corners);
-    if (edge > kLargeEdge) return std::nullopt;
-    reach += 0.6 * edge + 8.0;
-    Eigen::Vector2d low = corners[0];
-    Eigen::Vector2d high = corners[0];
-    for (const Eigen::Vector2d& corner : corners) {
-      low = low.cwiseMin(corner);
-      high = high.cwiseMax(corner);
-    }
-    Window window;
-    window.x0 = std::max(0, static_cast<int>(low.x() - reach));
-    window.y0 = std::max(0, static_cast<int>(low.y() - reach));
-    window.x1 = std::min(width - 1, static_cast<int>(high.x() + reach));
-    window.y1 = std::min(height - 1, static_cast<int>(high.y() + reach));
-    constexpr int kSmallest = 16;
-    if (window.x1 - window.x0 < kSmallest || window.y1 - window.y0 < kSmallest) return std::nullopt;
-    return window;
+    if (mean_edge_px(corners) > kLargeEdge) return std::nullopt;
+    return window_around(id, corners, reach, width, height);
   }
 
   DetectOptions options_;

@@ -11,29 +11,31 @@
 namespace kinescope {
 namespace {
 
-// Frames on their way from the reader to the workers; holds a few, so that memory stays small.
-class FrameQueue {
+using Run = std::vector<VideoFrame>;
+
+// Runs on their way from the reader to the workers; holds a few, so that memory stays small.
+class RunQueue {
  public:
-  explicit FrameQueue(std::size_t capacity) : capacity_(capacity) {}
+  explicit RunQueue(std::size_t capacity) : capacity_(capacity) {}
 
   // False when nobody will take it any more.
-  bool push(VideoFrame frame) {
+  bool push(Run run) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || frames_.size() < capacity_; });
+    changed_.wait(lock, [&] { return closed_ || runs_.size() < capacity_; });
     if (closed_) return false;
-    frames_.push_back(std::move(frame));
+    runs_.push_back(std::move(run));
     changed_.notify_all();
     return true;
   }
 
-  std::optional<VideoFrame> pop() {
+  std::optional<Run> pop() {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || !frames_.empty(); });
-    if (frames_.empty()) return std::nullopt;
-    VideoFrame frame = std::move(frames_.front());
-    frames_.pop_front();
+    changed_.wait(lock, [&] { return closed_ || !runs_.empty(); });
+    if (runs_.empty()) return std::nullopt;
+    Run run = std::move(runs_.front());
+    runs_.pop_front();
     changed_.notify_all();
-    return frame;
+    return run;
   }
 
   void close() {
@@ -45,35 +47,37 @@ class FrameQueue {
   void close_and_drop() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
-    frames_.clear();
+    runs_.clear();
     changed_.notify_all();
   }
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<VideoFrame> frames_;
+  std::deque<Run> runs_;
   std::size_t capacity_;
   bool closed_ = false;
 };
 
 }  // namespace
 
-std::vector<double> for_each_frame(VideoReader& reader, std::size_t workers, const FrameWork& work,
-                                   std::vector<std::vector<TagObservation>>& results,
-                                   const Progress& progress, std::string_view stage) {
+std::vector<double> for_each_run(VideoReader& reader, std::size_t workers, std::size_t run_length,
+                                 const FrameWork& work, FrameTags& results,
+                                 const Progress& progress, std::string_view stage) {
   results.clear();
-  FrameQueue queue(2 * workers);
+  RunQueue queue(workers);
   std::mutex mutex;
   std::exception_ptr failure;
-  const auto run = [&](std::size_t worker) {
+  const auto work_off = [&](std::size_t worker) {
     try {
-      while (const std::optional<VideoFrame> frame = queue.pop()) {
-        std::vector<TagObservation> found = work(worker, *frame);
+      while (const std::optional<Run> run = queue.pop()) {
+        FrameTags found = work(worker, *run);
         const std::lock_guard lock(mutex);
-        const auto index = static_cast<std::size_t>(frame->index);
-        if (results.size() <= index) results.resize(index + 1);
-        results[index] = std::move(found);
+        for (std::size_t i = 0; i < run->size(); ++i) {
+          const auto index = static_cast<std::size_t>((*run)[i].index);
+          if (results.size() <= index) results.resize(index + 1);
+          results[index] = std::move(found[i]);
+        }
       }
     } catch (...) {
       const std::lock_guard lock(mutex);
@@ -84,13 +88,17 @@ std::vector<double> for_each_frame(VideoReader& reader, std::size_t workers, con
   std::vector<double> times;
   {
     std::vector<std::jthread> threads;
-    for (std::size_t i = 0; i < workers; ++i) threads.emplace_back(run, i);
+    for (std::size_t i = 0; i < workers; ++i) threads.emplace_back(work_off, i);
     try {
+      Run run;
       while (std::optional<VideoFrame> frame = reader.next()) {
         times.push_back(frame->time_s);
-        if (!queue.push(std::move(*frame))) break;
+        run.push_back(std::move(*frame));
         report_progress(progress, stage, static_cast<int>(times.size()), reader.info().frame_count);
+        if (run.size() < run_length) continue;
+        if (!queue.push(std::exchange(run, {}))) break;
       }
+      if (!run.empty()) (void)queue.push(std::move(run));
     } catch (...) {
       const std::lock_guard lock(mutex);
       if (!failure) failure = std::current_exception();

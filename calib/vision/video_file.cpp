@@ -76,7 +76,7 @@ GreyImage copy_plane(const std::uint8_t* data, int stride, int width, int height
 }
 
 // Turns by quarter turns, counterclockwise as the display matrix counts.
-GreyImage turned(const GreyImage& in, int quarters) {
+GreyImage turned(GreyImage in, int quarters) {
   if (quarters == 0) return in;
   const bool swap = quarters % 2 == 1;
   GreyImage out{swap ? in.height : in.width, swap ? in.width : in.height, {}};
@@ -289,9 +289,8 @@ class VideoFileReader final : public VideoReader {
   GreyImage grey() {
     const auto format = static_cast<AVPixelFormat>(frame_->format);
     if (has_luma_plane(format)) {
-      const GreyImage plane =
-          copy_plane(frame_->data[0], frame_->linesize[0], frame_->width, frame_->height);
-      return turned(plane, quarters_);
+      return turned(copy_plane(frame_->data[0], frame_->linesize[0], frame_->width, frame_->height),
+                    quarters_);
     }
     scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height, format,
                                        frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT,

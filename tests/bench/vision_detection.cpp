@@ -141,7 +141,7 @@ BENCHMARK(BM_Decode)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_PackagedDetector)->Arg(2)->Arg(1)->ArgName("decimate")->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_OpenCv)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_Refine)->Arg(0)->Arg(1)->ArgName("covers")->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_DetectTags)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_DetectTags)->MeasureProcessCPUTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace kinescope

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/detect.h"
 
+#include <map>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -92,8 +94,43 @@ TEST_F(Detect, FromAVideoToo) {
   expect_truth(found, kMpeg4);
 }
 
+// Between whole searches markers are followed; one that enters or leaves then is noticed all the
+// same.
+TEST_F(Detect, MarkersThatEnterAndLeaveAreNoticed) {
+  constexpr int kEnters = 14;
+  constexpr int kLeaves = 17;
+  Rng rng = Rng::from_name("detect, entering");
+  VideoSpec spec{frames_, {}, 0};
+  for (int f = 0; f < kFrames; ++f) {
+    spec.stamps_ms.push_back(33 * f);
+    std::vector<PlacedMarker> all;
+    const std::map<int, Eigen::Vector2d> places = {
+        {4, {70.0, 70.0}}, {9, {160.0, 150.0}}, {12, {250.0, 80.0}}};
+    for (const auto& [id, place] : places) {
+      PlacedMarker marker;
+      marker.art = apriltag_art("tag36h11", id);
+      marker.T_camera_tag = pose_showing(camera_, place, 45.0, marker.size_m, 0.3, 0.2, 0.1);
+      if (id == 12 && f < kEnters) continue;
+      if (id == 9 && f >= kLeaves) continue;
+      all.push_back(marker);
+    }
+    spec.frames[static_cast<std::size_t>(f)] =
+        render_markers(camera_, all, {.supersample = 3}, rng);
+  }
+  write_video(folder_ / "v.mp4", spec);
+  const Detection found = detect_tags(folder_ / "v.mp4", markers_);
+  std::map<int, int> count;
+  for (const TagObservation& tag : found.observations.observations) ++count[tag.id.value];
+  EXPECT_EQ(count[4], kFrames);
+  EXPECT_EQ(count[9], kLeaves);
+  EXPECT_EQ(count[12], kFrames - kEnters);
+}
+
 TEST_F(Detect, TheNumberOfThreadsChangesNothing) {
-  const auto folder = image_folder();
+  VideoSpec spec{frames_, {}, 2};
+  for (int f = 0; f < kFrames; ++f) spec.stamps_ms.push_back(33 * f);
+  const auto folder = folder_ / "v.mp4";
+  write_video(folder, spec);
   DetectOptions one;
   one.threads = 1;
   DetectOptions three;

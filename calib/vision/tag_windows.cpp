@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/vision/tag_windows.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "calib/vision/sightings.h"
+
+namespace kinescope {
+namespace {
+
+// What a detector needs around a marker: its white margin, and what turns of it may reach.
+constexpr double kMarginOfEdge = 0.6;
+constexpr double kMargin = 8.0;  // px
+constexpr int kSmallest = 16;    // px
+// Grey levels at which brightness is cut off.
+constexpr std::array<int, 5> kCeilings = {255, 200, 150, 110, 80};
+// Of the motion from frame to frame, what it may change by until the next one.
+constexpr double kChangeOfMotion = 0.5;
+
+GreyImage cut(const ImageView& image, const TagWindow& window, int ceiling) {
+  GreyImage part{window.x1 - window.x0 + 1, window.y1 - window.y0 + 1, {}};
+  part.pixels.reserve(static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height));
+  for (int y = window.y0; y <= window.y1; ++y) {
+    const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * y;
+    for (int x = window.x0; x <= window.x1; ++x) {
+      part.pixels.push_back(static_cast<std::uint8_t>(std::min<int>(row[x], ceiling)));
+    }
+  }
+  return part;
+}
+
+}  // namespace
+
+std::optional<TagWindow> window_around(TagId id, const std::vector<Eigen::Vector2d>& corners_px,
+                                       double reach, int width, int height) {
+  reach += kMarginOfEdge * mean_edge_px(corners_px) + kMargin;
+  Eigen::Vector2d low = corners_px[0];
+  Eigen::Vector2d high = corners_px[0];
+  for (const Eigen::Vector2d& corner : corners_px) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
+  const auto pixel = [](double value, int most) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most)));
+  };
+  const TagWindow window{id, pixel(low.x() - reach, width - 1), pixel(low.y() - reach, height - 1),
+                         pixel(high.x() + reach, width - 1), pixel(high.y() + reach, height - 1)};
+  if (window.x1 - window.x0 < kSmallest || window.y1 - window.y0 < kSmallest) return std::nullopt;
+  return window;
+}
+
+std::vector<TagWindow> windows_after(const std::vector<TagObservation>& last,
+                                     const std::vector<TagObservation>& before_last, int width,
+                                     int height) {
+  std::vector<TagWindow> out;
+  for (const TagObservation& tag : last) {
+    std::vector<Eigen::Vector2d> expected = tag.corners_px;
+    double reach = 0.0;
+    const auto before = std::ranges::find(before_last, tag.id, &TagObservation::id);
+    if (before != before_last.end()) {
+      for (std::size_t c = 0; c < expected.size(); ++c)
+        expected[c] += tag.corners_px[c] - before->corners_px[c];
+      reach = kChangeOfMotion * corner_distance_px(tag.corners_px, before->corners_px);
+    }
+    if (const auto window = window_around(tag.id, expected, reach, width, height))
+      out.push_back(*window);
+  }
+  return out;
+}
+
+std::vector<TagObservation> search_windows(TagDetector& detector, const ImageView& image,
+                                           const std::vector<TagWindow>& windows, bool dimmed) {
+  std::vector<TagObservation> out;
+  for (const TagWindow& window : windows) {
+    for (const int ceiling : kCeilings) {
+      const GreyImage part = cut(image, window, ceiling);
+      std::vector<TagObservation> found = detector.detect(part.view());
+      std::erase_if(found, [&](const TagObservation& tag) { return tag.id != window.id; });
+      for (TagObservation& tag : found) {
+        for (Eigen::Vector2d& corner : tag.corners_px) {
+          corner += Eigen::Vector2d(window.x0, window.y0);
+        }
+        out.push_back(std::move(tag));
+      }
+      if (!found.empty() || !dimmed) break;
+    }
+  }
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   an image and where markers should be in it.
+// Gives   those that are there: only a part of the image is searched, at full resolution.
+// Units   px.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calib/vision/tag_detector.h"
+
+namespace kinescope {
+
+/// Where a marker is looked for; borders inclusive.
+struct TagWindow {
+  TagId id;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// Around corners, `reach` px further, plus the margin that a detector needs; nothing where less
+/// than a marker's worth of it lies in the image.
+[[nodiscard]] std::optional<TagWindow> window_around(TagId id,
+                                                     const std::vector<Eigen::Vector2d>& corners_px,
+                                                     double reach, int width, int height);
+
+/// Windows for the markers of a frame from those of the frame before it and, for their motion, of
+/// the one before that (empty: unknown).
+[[nodiscard]] std::vector<TagWindow> windows_after(const std::vector<TagObservation>& last,
+                                                   const std::vector<TagObservation>& before_last,
+                                                   int width, int height);
+
+/// In each window the marker that it was made for. `dimmed`: where it is not seen, brightness is
+/// cut off, step by step: a glint beside a marker hides it from a detector that thresholds by the
+/// brightest pixel nearby.
+[[nodiscard]] std::vector<TagObservation> search_windows(TagDetector& detector,
+                                                         const ImageView& image,
+                                                         const std::vector<TagWindow>& windows,
+                                                         bool dimmed);
+
+}  // namespace kinescope
