@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -29,8 +30,9 @@ constexpr double kCompressionSigma = 0.025;
 // A gap in a track is searched where sightings on both sides, or one of them, are this near.
 constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
-constexpr double kLargeEdge = 150.0;  // px; larger markers are not lost for want of resolution
-constexpr double kSamePlace = 0.25;   // of an edge: two detections of one and the same marker
+constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
+constexpr double kSeenReduced = 50.0;  // px; markers as large are followed at reduced resolution
+constexpr double kSamePlace = 0.25;    // of an edge: two detections of one and the same marker
 
 // What one worker has of its own.
 struct Searcher {
@@ -128,11 +130,18 @@ class Detecting {
   std::vector<TagObservation> follow(std::size_t worker, const VideoFrame& frame,
                                      const FrameTags& before) const {
     const std::vector<TagObservation> none;
-    const std::vector<TagWindow> windows =
+    std::vector<TagWindow> windows =
         windows_after(before.back(), before.size() > 1 ? before[before.size() - 2] : none,
                       frame.image.width, frame.image.height);
+    const auto large = std::ranges::partition(
+        windows, [](const TagWindow& window) { return window.edge < kSeenReduced; });
+    const std::vector<TagWindow> reduced(large.begin(), large.end());
+    windows.erase(large.begin(), large.end());
     std::vector<TagObservation> found =
         search_windows(*fine(worker), frame.image.view(), windows, false);
+    std::ranges::move(
+        search_windows(*searchers_[worker].coarse, frame.image.view(), reduced, false),
+        std::back_inserter(found));
     if (!found.empty() && found.size() >= before.back().size()) return found;
     for (TagObservation& tag : search_whole(worker, frame, false)) {
       const bool known = std::ranges::any_of(found, [&](const TagObservation& other) {

@@ -4,10 +4,12 @@
 // Gives   TagObservations: corners with their sigma in every frame; wrong ids and ghosts put aside
 // with a
 //         reason.
-// Method  whole frames at reduced resolution and now and then at full; markers lost on the way are
-// looked for
-//         again in a window around where their neighbours in time say they are; refine_corners()
-//         gives corners and sigma; sightings.h decides what is believed.
+// Method  whole frames at full resolution now and then, so that markers that enter are noticed;
+//         between them markers are followed in windows, and the whole frame is searched at reduced
+//         resolution where one of them is lost. Markers lost on the way are looked for again where
+//         their neighbours in time say they are; refine_corners() gives corners and sigma,
+//         pattern_shift.h finds what is covered, sightings.h decides what is believed. Pictures
+//         taken one by one are searched whole.
 #pragma once
 
 #include <filesystem>
@@ -27,8 +29,8 @@ struct DetectOptions {
   int min_sightings =
       5;  ///< markers seen in fewer frames (or a tenth of a short recording) are ghosts
   int full_search_every =
-      10;  ///< every so many frames are searched at full resolution, for small markers
-  bool fill_gaps = true;       ///< look again, at full resolution, where a marker should be
+      10;                 ///< every so many frames the whole of one is searched at full resolution
+  bool fill_gaps = true;  ///< look again, at full resolution, where a marker should be
   bool refine_corners = true;  ///< false keeps the detector's corners
 };
 

@@ -35,7 +35,8 @@ GreyImage cut(const ImageView& image, const TagWindow& window, int ceiling) {
 
 std::optional<TagWindow> window_around(TagId id, const std::vector<Eigen::Vector2d>& corners_px,
                                        double reach, int width, int height) {
-  reach += kMarginOfEdge * mean_edge_px(corners_px) + kMargin;
+  const double edge = mean_edge_px(corners_px);
+  reach += kMarginOfEdge * edge + kMargin;
   Eigen::Vector2d low = corners_px[0];
   Eigen::Vector2d high = corners_px[0];
   for (const Eigen::Vector2d& corner : corners_px) {
@@ -45,8 +46,12 @@ std::optional<TagWindow> window_around(TagId id, const std::vector<Eigen::Vector
   const auto pixel = [](double value, int most) {
     return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most)));
   };
-  const TagWindow window{id, pixel(low.x() - reach, width - 1), pixel(low.y() - reach, height - 1),
-                         pixel(high.x() + reach, width - 1), pixel(high.y() + reach, height - 1)};
+  const TagWindow window{id,
+                         pixel(low.x() - reach, width - 1),
+                         pixel(low.y() - reach, height - 1),
+                         pixel(high.x() + reach, width - 1),
+                         pixel(high.y() + reach, height - 1),
+                         edge};
   if (window.x1 - window.x0 < kSmallest || window.y1 - window.y0 < kSmallest) return std::nullopt;
   return window;
 }

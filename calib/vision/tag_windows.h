@@ -16,6 +16,7 @@ namespace kinescope {
 struct TagWindow {
   TagId id;
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  double edge = 0.0;  ///< of the marker that is expected
 };
 
 /// Around corners, `reach` px further, plus the margin that a detector needs; nothing where less
