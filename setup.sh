@@ -12,7 +12,8 @@ packages=(
   esbuild libjs-three
 )
 if [[ "${1:-}" == tests ]]; then
-  packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev)
+  packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev
+             python3-jsonschema)
   # Not in every release; the tests that want them say so and skip.
   optional=(libmujoco-dev clang-format-19 chromium)
 else

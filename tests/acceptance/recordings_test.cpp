@@ -14,6 +14,7 @@
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
 #include "tests/acceptance/truth_robot.h"
+#include "tests/app/io/check_products.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope::acceptance {
@@ -108,6 +109,9 @@ TEST_P(Recordings, AgreesWithTheTruth) {
   EXPECT_LT(
       calibration.at("held_out_rms").get<double>() / calibration.at("training_rms").get<double>(),
       kHeldOutRatio);
+
+  const ProductCheck check = check_products(output_);
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
 }
 
 INSTANTIATE_TEST_SUITE_P(Rendered, Recordings,

@@ -10,6 +10,7 @@
 #include "calib/camera/camera_file.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "tests/app/commands/program.h"
+#include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/truth/camera_world.h"
 #include "tests/truth/random_dynamics.h"
@@ -88,6 +89,22 @@ TEST(RunTorque, FromCornersToTorqueModelAndContacts) {
   }
   EXPECT_NE(read_text_file(folder.path() / "out/report.html").find("Torques and contacts"),
             std::string::npos);
+
+  const ProductCheck check = check_products(folder.path() / "out");
+  if (!check.done) GTEST_SKIP() << "the files' schemas were not checked: " << check.words;
+  EXPECT_TRUE(check.passed) << check.words;
+  for (const char* product :
+       {"structure.json", "calibration.json", "trace.json", "result.json", "run.json",
+        "dynamics.json", "dynamics_trace.json", "contacts.json"}) {
+    EXPECT_NE(check.words.find(std::string(product) + ": valid"), std::string::npos) << product;
+  }
+  auto misspelt = nlohmann::json::parse(read_text_file(folder.path() / "out/trace.json"));
+  misspelt["verdikt"] = misspelt.at("verdict");
+  misspelt.erase("verdict");
+  folder.write("out/trace.json", misspelt.dump());
+  const ProductCheck again = check_products(folder.path() / "out");
+  EXPECT_FALSE(again.passed);
+  EXPECT_NE(again.words.find("verdikt"), std::string::npos) << again.words;
 }
 
 }  // namespace
