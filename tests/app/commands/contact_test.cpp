@@ -7,6 +7,7 @@
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
+#include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/truth/contact_world.h"
 
@@ -51,6 +52,8 @@ TEST_F(ContactCommand, FindsEveryContactAndInventsNone) {
   EXPECT_TRUE(read_text_file(folder_.path() / "out/contacts.csv").starts_with("onset_s,end_s"));
   EXPECT_NE(read_text_file(folder_.path() / "out/contact.html").find("Contact time line"),
             std::string::npos);
+  const ProductCheck check = check_products(folder_.path() / "out");
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
 }
 
 TEST_F(ContactCommand, LearnsFromTheLogItself) {

@@ -7,6 +7,7 @@
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
+#include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/truth/torque_world.h"
 
@@ -141,6 +142,8 @@ TEST_F(DynamicsCommand, SaysWhatTheRobotCarries) {
     EXPECT_NE(read_text_file(folder_.path() / "out/dynamics.html").find("payload-table"),
               std::string::npos);
   }
+  const ProductCheck check = check_products(folder_.path() / "out");
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
 }
 
 TEST_F(DynamicsCommand, GravityThatNobodyDeclaredIsSaid) {
