@@ -252,7 +252,11 @@ std::array<Eigen::Vector3d, 2> across(const Eigen::Vector3d& axis) {
 
 CameraEffect curved_slider(const Suspect& s) {
   CameraEffect out = effect(s, "curved_slider", fmt::format("{} runs on a curve", s.name),
-                            {{"curvature across x", "1/m"}, {"curvature across y", "1/m"}}, "1/m");
+                            {{"curvature across x", "1/m"},
+                             {"curvature across y", "1/m"},
+                             {"stretch by the guide's place", ""}},
+                            "1/m");
+  out.candidate.size_weights[2] = 0.0;
   out.candidate.check = "straightness of the guide, supports of the rail";
   out.candidate.record = fmt::format("move {} over its whole length", s.name);
   out.corrections = [s](double) {
@@ -270,6 +274,9 @@ CameraEffect curved_slider(const Suspect& s) {
       }
       corrections.push_back(std::move(bend));
     }
+    // Where a straight slide's axis is nobody can see. Beside a curved guide the way is longer or
+    // shorter, by the distance from it over its radius.
+    corrections.push_back(turn(s, "stretch", "", s.value));
     return corrections;
   };
   return out;
