@@ -32,7 +32,6 @@ constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
 constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
 constexpr double kSeenReduced = 50.0;  // px; markers as large are followed at reduced resolution
-constexpr double kSamePlace = 0.25;    // of an edge: two detections of one and the same marker
 
 // What one worker has of its own.
 struct Searcher {
@@ -145,8 +144,7 @@ class Detecting {
     if (!found.empty() && found.size() >= before.back().size()) return found;
     for (TagObservation& tag : search_whole(worker, frame, false)) {
       const bool known = std::ranges::any_of(found, [&](const TagObservation& other) {
-        return other.id == tag.id && corner_distance_px(other.corners_px, tag.corners_px) <
-                                         kSamePlace * mean_edge_px(tag.corners_px);
+        return other.id == tag.id && is_same_place(other.corners_px, tag.corners_px);
       });
       if (!known) found.push_back(std::move(tag));
     }

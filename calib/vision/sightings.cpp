@@ -22,7 +22,6 @@ constexpr double kJumpOfMotion = 0.75;  // .. and of its motion between the neig
 constexpr double kJumpLeast = 5.0;      // .. and than this many px
 constexpr double kMarginRatio =
     1.5;  // decision margins that differ by this tell two detections apart
-constexpr double kSamePlace = 0.25;  // of an edge: two detections of one and the same marker
 
 using Sightings = std::vector<TagObservation>;
 
@@ -100,9 +99,7 @@ std::optional<std::size_t> choose(const std::vector<TagObservation>& group,
   }
   for (std::size_t i = 0; i < group.size(); ++i) {
     if (i == best) continue;
-    const double edge = mean_edge_px(group[best].corners_px);
-    const bool same_place =
-        corner_distance_px(group[i].corners_px, group[best].corners_px) < kSamePlace * edge;
+    const bool same_place = is_same_place(group[i].corners_px, group[best].corners_px);
     const bool weaker = group[best].decision_margin > kMarginRatio * group[i].decision_margin;
     if (!same_place && !weaker) return std::nullopt;
   }
@@ -204,6 +201,11 @@ double corner_distance_px(const std::vector<Eigen::Vector2d>& a,
   double sum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]).norm();
   return sum / static_cast<double>(a.size());
+}
+
+bool is_same_place(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b) {
+  constexpr double kOfEdge = 0.25;
+  return corner_distance_px(a, b) < kOfEdge * mean_edge_px(b);
 }
 
 std::vector<Eigen::Vector2d> corners_between(const TagObservation& a, double time_a_s,

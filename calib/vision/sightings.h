@@ -32,6 +32,10 @@ namespace kinescope {
 [[nodiscard]] double corner_distance_px(const std::vector<Eigen::Vector2d>& a,
                                         const std::vector<Eigen::Vector2d>& b);
 
+/// Are these two detections of one and the same marker, by where they are?
+[[nodiscard]] bool is_same_place(const std::vector<Eigen::Vector2d>& a,
+                                 const std::vector<Eigen::Vector2d>& b);
+
 /// Corners between two sightings (or beyond them), linear in time.
 [[nodiscard]] std::vector<Eigen::Vector2d> corners_between(const TagObservation& a, double time_a_s,
                                                            const TagObservation& b, double time_b_s,

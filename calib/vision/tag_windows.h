@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   an image and where markers should be in it.
-// Gives   those that are there: only a part of the image is searched, at full resolution.
+// Gives   those that are there: only a part of the image is searched.
 // Units   px.
 #pragma once
 

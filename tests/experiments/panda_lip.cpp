@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "app/report/plot.h"
@@ -19,6 +18,7 @@
 #include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/models/torque_model.h"
+#include "tests/experiments/command_line.h"
 #include "tests/experiments/figure.h"
 #include "tests/truth/reference_arms.h"
 
@@ -194,12 +194,5 @@ int main(int argc, char** argv) {
   app.add_option("--first", options.first, "number of the first pair");
   app.add_option("--lip-search", options.lip_search_samples, "samples of LIP's search");
   app.add_option("--figure", options.figure, "SVG file");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    kinescope::run(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return kinescope::run_experiment(app, argc, argv, [&] { kinescope::run(options); });
 }

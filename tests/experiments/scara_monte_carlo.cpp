@@ -16,12 +16,12 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "app/report/plot.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/models/comparison.h"
+#include "tests/experiments/command_line.h"
 #include "tests/experiments/figure.h"
 #include "tests/truth/reference_arms.h"
 
@@ -240,12 +240,7 @@ int main(int argc, char** argv) {
   app.add_option("--starts", options.starts, "of every hyperparameter search");
   app.add_option("--models", options.models, "which ones, in this order");
   app.add_option("--figure", options.figure, "SVG file");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return kinescope::run_experiment(app, argc, argv, [&] {
     options.efficiency ? kinescope::efficiency(options) : kinescope::monte_carlo(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "dynamics/data/splits.h"
 #include "dynamics/models/comparison.h"
+#include "tests/experiments/command_line.h"
 #include "tests/experiments/torque_sets.h"
 #include "tests/truth/shared_data.h"
 #include "tests/truth/torque_world.h"
@@ -151,12 +151,5 @@ int main(int argc, char** argv) {
   app.add_option("--rotate", options.rotate, "hold out so many folds of the training part in turn");
   app.add_option("--folds", options.folds, "that a Gaussian process's bands are made from");
   app.add_option("--robots", options.robots, "simulated robots a set");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    kinescope::run(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return kinescope::run_experiment(app, argc, argv, [&] { kinescope::run(options); });
 }
