@@ -166,7 +166,7 @@ class Detecting {
         std::ranges::copy(refined.corners_px, tag.corners_px.begin());
         tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
       }
-      tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_);
+      tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
     }
     return tags;
   }

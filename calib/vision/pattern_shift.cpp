@@ -27,6 +27,8 @@ constexpr double kNoisePixels = 2.0;  // px
 constexpr double kNoiseOfCell = 0.6;
 constexpr double kBending = 4e-4;
 constexpr double kClear = 5.0;  // standard deviations of the corners
+// Of corners without a fit: few whole markers are left without one, so that little is lost.
+constexpr double kClearOfStart = 3.0;
 // Where the blur is more than this share of a cell, steps cannot be told from one another.
 constexpr double kSharp = 0.2;
 
@@ -183,20 +185,25 @@ std::optional<double> pattern_shift(const ImageView& image, const Corners& corne
   return largest;
 }
 
-bool is_partly_hidden(const ImageView& image, const RefinedCorners& border,
-                      const TagLayout& layout) {
-  if (border.status != RefineStatus::kDone) return false;
+bool is_partly_hidden(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,
+                      double start_sigma_px) {
+  if (border.status == RefineStatus::kNotRun || border.status == RefineStatus::kTooFewPixels)
+    return false;
   double longest = 0.0;
   double shortest = edge_px(border.corners_px, 0);
   for (std::size_t e = 0; e < 4; ++e) {
     longest = std::max(longest, edge_px(border.corners_px, e));
     shortest = std::min(shortest, edge_px(border.corners_px, e));
   }
-  if (border.blur_px > kSharp * shortest / layout.cells) return false;
   const double cell = longest / layout.cells;
-  const double elsewhere = kPixels + kShareOfCell * cell + kBending * longest * longest / 8.0 +
-                           border.noise / border.contrast * (kNoisePixels + kNoiseOfCell * cell) +
-                           kClear * border.sigma_px;
+  double elsewhere = kPixels + kShareOfCell * cell + kBending * longest * longest / 8.0;
+  if (border.status == RefineStatus::kDone) {
+    if (border.blur_px > kSharp * shortest / layout.cells) return false;
+    elsewhere += border.noise / border.contrast * (kNoisePixels + kNoiseOfCell * cell) +
+                 kClear * border.sigma_px;
+  } else {
+    elsewhere += kClearOfStart * start_sigma_px;
+  }
   const std::optional<double> shift = pattern_shift(image, border.corners_px, layout);
   return shift && *shift > elsewhere;
 }

@@ -20,9 +20,10 @@ namespace kinescope {
 [[nodiscard]] std::optional<double> pattern_shift(const ImageView& image, const Corners& corners,
                                                   const TagLayout& layout);
 
-/// Is the code further from the border that was fitted than pixels, noise and lens allow? Not where
-/// the fit failed or the image is too blurred to say.
+/// Is the code further from the border than pixels, noise and lens allow? Where no border could be
+/// fitted, from the corners that the fit began with, known to `start_sigma_px`. Not where the
+/// marker is too small or too blurred to say.
 [[nodiscard]] bool is_partly_hidden(const ImageView& image, const RefinedCorners& border,
-                                    const TagLayout& layout);
+                                    const TagLayout& layout, double start_sigma_px);
 
 }  // namespace kinescope

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::array<double, 3> kSides = {24.0, 40.0, 110.0};  // px
 constexpr int kTrials = 6;
+constexpr double kStartSigma = 0.3;  // px, of the detector
 
 struct Scene {
   GreyImage image;
@@ -58,9 +59,16 @@ void cover(Scene& scene, std::size_t edge, double depth, const ImageOptions& opt
   }
 }
 
-// As the fit of the border gives it.
-RefinedCorners border_of(const Scene& scene, const ImageOptions& options) {
-  return {.status = RefineStatus::kDone,
+// As the fit of the border gives it, or as the detector gives it where no fit was possible.
+RefinedCorners border_of(const Scene& scene, const ImageOptions& options, RefineStatus status,
+                         Rng& rng) {
+  if (status != RefineStatus::kDone) {
+    RefinedCorners out{.status = status, .corners_px = scene.corners};
+    for (Eigen::Vector2d& corner : out.corners_px)
+      corner += kStartSigma * Eigen::Vector2d(rng.normal(), rng.normal());
+    return out;
+  }
+  return {.status = status,
           .corners_px = scene.corners,
           .sigma_px = 0.03,
           .contrast = options.white - options.black,
@@ -69,8 +77,9 @@ RefinedCorners border_of(const Scene& scene, const ImageOptions& options) {
 }
 
 int count_hidden(const std::string& family, double side, double covered_cells,
-                 const ImageOptions& options) {
+                 const ImageOptions& options, RefineStatus status = RefineStatus::kDone) {
   const TagLayout layout = tag_layout(family);
+  Rng rng = Rng::from_name("border " + family, static_cast<std::uint64_t>(side));
   int hidden = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
     Scene scene = make_scene(family, side, trial, options);
@@ -80,7 +89,10 @@ int count_hidden(const std::string& family, double side, double covered_cells,
           (scene.corners[(edge + 2) % 4] - scene.corners[(edge + 1) % 4]).norm() / layout.cells;
       cover(scene, edge, covered_cells * cell, options);
     }
-    hidden += is_partly_hidden(scene.image.view(), border_of(scene, options), layout) ? 1 : 0;
+    hidden += is_partly_hidden(scene.image.view(), border_of(scene, options, status, rng), layout,
+                               kStartSigma)
+                  ? 1
+                  : 0;
   }
   return hidden;
 }
@@ -110,6 +122,26 @@ TEST(PatternShift, SeesThatAnEdgeIsCovered) {
           << family << " " << side << " px";
     }
   }
+}
+
+TEST(PatternShift, LooksAtTheDetectorsCornersWhereNoBorderCouldBeFitted) {
+  int doubted = 0;
+  int covered = 0;
+  int all = 0;
+  for (const char* family : {"tag36h11", "DICT_4X4_50"}) {
+    for (const double side : {40.0, 60.0, 110.0}) {
+      for (const double blur : {0.7, 1.2}) {
+        const ImageOptions options{.blur_px = blur, .supersample = 3};
+        doubted += count_hidden(family, side, 0.0, options, RefineStatus::kMoved);
+        covered += count_hidden(family, side, 0.5, options, RefineStatus::kMoved);
+        all += kTrials;
+      }
+    }
+  }
+  EXPECT_LE(doubted, 0.1 * all) << "of " << all;
+  EXPECT_GE(covered, 0.6 * all) << "of " << all;
+  const ImageOptions options{.supersample = 3};
+  EXPECT_EQ(count_hidden("tag36h11", 60.0, 0.5, options, RefineStatus::kTooFewPixels), 0);
 }
 
 TEST(PatternShift, SaysNothingWithoutContrastOrQuadrangle) {
