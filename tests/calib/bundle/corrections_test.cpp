@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -172,9 +174,9 @@ Correction joint_correction(const World& world, int joint, const Eigen::VectorXd
   return out;
 }
 
-const Parameter& parameter_named(const Calibration& found, const std::string& name) {
+const Parameter& parameter_named(const Calibration& found, std::string_view name) {
   const auto at = std::ranges::find(found.parameters, name, &Parameter::name);
-  if (at == found.parameters.end()) throw std::logic_error("no parameter " + name);
+  if (at == found.parameters.end()) throw std::logic_error("no parameter " + std::string(name));
   return *at;
 }
 
