@@ -98,7 +98,45 @@ std::string effect_figure(const TracedEffect& effect) {
   return "<div class=\"figures pair\">" + drawing + "</div>\n";
 }
 
+// The vector at each node as an arrow over the image; the longest one is as long as two nodes are
+// apart.
+std::string field_figure(const Rest& rest) {
+  const FieldMap& field = rest.field;
+  const double longest = field.mean.rowwise().norm().maxCoeff();
+  const Eigen::RowVector2d low = field.at.colwise().minCoeff().array() - field.spacing;
+  const Eigen::RowVector2d high = field.at.colwise().maxCoeff().array() + field.spacing;
+  constexpr double kWidth = 470.0;
+  constexpr double kNarrowest = 0.2;
+  constexpr double kHighest = 2.0;
+  const double aspect =
+      std::clamp((high.y() - low.y()) / (high.x() - low.x()), kNarrowest, kHighest);
+  Plot plot(
+      "what is left over the image",
+      {.label = label_of("image column", rest.covariate_unit), .lower = low.x(), .upper = high.x()},
+      {.label = label_of("image row", rest.covariate_unit),
+       .lower = low.y(),
+       .upper = high.y(),
+       .down = true},
+      {.width = kWidth, .height = 48.0 + (kWidth - 62.0) * aspect});
+  const double scale = longest > 0.0 ? 2.0 * field.spacing / longest : 0.0;
+  for (Eigen::Index i = 0; i < field.at.rows(); ++i) {
+    const Eigen::Vector2d half = 0.5 * scale * field.mean.row(i).transpose();
+    const Eigen::Vector2d at = field.at.row(i).transpose();
+    const bool clear = field.mean.row(i).norm() > kCoverageFactor * field.sigma.row(i).norm();
+    plot.arrow(at - half, at + half, clear ? series_class(1) : "faint");
+  }
+  plot.legend(
+      fmt::format("longest arrow {}; stands out of its doubt", amount_text(longest, rest.unit)),
+      series_class(1));
+  plot.legend("does not", "faint");
+  return figure(plot.str(),
+                fmt::format("What is left at {} as a function of the {}: where corners are seen "
+                            "less where the model expects them (Gaussian process).",
+                            rest.place, rest.covariate));
+}
+
 std::string rest_figure(const Rest& rest) {
+  if (rest.is_field()) return field_figure(rest);
   const AmountUnit x = amount_unit(rest.covariate == "time" ? "" : rest.covariate_unit);
   const AmountUnit y = amount_unit(rest.unit);
   std::vector<double> at, lower, upper;

@@ -65,18 +65,32 @@ json ambiguity_json(const Ambiguity& ambiguity) {
   return {{"effects", effects}, {"record", text(ambiguity.record)}};
 }
 
+json field_json(const FieldMap& field) {
+  const auto vectors = [](const Eigen::MatrixX2d& rows) {
+    json out = json::array();
+    for (const auto& row : rows.rowwise()) out.push_back({number(row.x()), number(row.y())});
+    return out;
+  };
+  return {{"at", vectors(field.at)},
+          {"mean", vectors(field.mean)},
+          {"sigma", vectors(field.sigma)},
+          {"spacing", number(field.spacing)}};
+}
+
 json rest_json(const Rest& rest) {
-  return {{"place", text(rest.place)},
-          {"unit", text(rest.unit)},
-          {"depends_on", text(rest.covariate)},
-          {"depends_on_unit", text(rest.covariate_unit)},
-          {"p_value", number(rest.p_value)},
-          {"explained", number(rest.explained)},
-          {"at", curve_json(rest.at)},
-          {"mean", curve_json(rest.mean)},
-          {"sigma", curve_json(rest.sigma)},
-          {"held_out_before", error_json(rest.held_out_before)},
-          {"held_out_after", error_json(rest.held_out_after)}};
+  json out = {{"place", text(rest.place)},
+              {"unit", text(rest.unit)},
+              {"depends_on", text(rest.covariate)},
+              {"depends_on_unit", text(rest.covariate_unit)},
+              {"p_value", number(rest.p_value)},
+              {"explained", number(rest.explained)},
+              {"at", curve_json(rest.at)},
+              {"mean", curve_json(rest.mean)},
+              {"sigma", curve_json(rest.sigma)},
+              {"held_out_before", error_json(rest.held_out_before)},
+              {"held_out_after", error_json(rest.held_out_after)}};
+  if (rest.is_field()) out["field"] = field_json(rest.field);
+  return out;
 }
 
 json candidate_json(const TestedCandidate& tested) {

@@ -103,8 +103,8 @@ std::string ambiguity_words(const Ambiguity& ambiguity) {
 std::string rest_words(const Rest& rest) {
   return fmt::format(
       "At {} something is left that no known effect explains; it follows the {} and makes {:.1f} % "
-      "of the residual. Modelled as a curve: {} on unseen data.",
-      rest.place, rest.covariate, 100.0 * rest.explained,
+      "of the residual. Modelled as a {}: {} on unseen data.",
+      rest.place, rest.covariate, 100.0 * rest.explained, rest.is_field() ? "field" : "curve",
       error_change_words(rest.held_out_before, rest.held_out_after));
 }
 

@@ -155,6 +155,27 @@ Eigen::VectorXd units_of(const Sighting& sighting) {
   return units;
 }
 
+// Where in the image each row of a sighting was seen.
+Eigen::MatrixX2d places_of(const Spec& spec, const Sighting& sighting) {
+  Eigen::MatrixX2d places =
+      Eigen::MatrixX2d::Constant(sighting.dimension(), 2, std::numeric_limits<double>::quiet_NaN());
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  if (spec.path[marker.link.index()].empty()) return places;
+  for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(2 * i);
+    places.middleRows<2>(row).rowwise() = sighting.corners_px[i].transpose();
+  }
+  return places;
+}
+
+// What is eliminated from a frame mixes its rows: then none has a place of its own.
+bool rows_have_places(const Spec& spec, const std::vector<int>& used) {
+  if (std::ranges::find(spec.free_value, true) != spec.free_value.end()) return false;
+  return std::ranges::all_of(used, [&](int index) {
+    return spec.sightings[static_cast<std::size_t>(index)].kind == MeasurementKind::kCorners;
+  });
+}
+
 }  // namespace
 
 // The least squares fit; `spec` and `state` are left with the change in them.
@@ -217,6 +238,8 @@ BundleFit EffectBundle::fit(const BundleChange& change,
   for (const auto& [frame, block] : linear.frames) rows += frame < 0 ? 0 : block.r.size();
   out.residual.resize(rows);
   out.unit.resize(rows);
+  const bool with_places = rows_have_places(spec, impl_->used);
+  if (with_places) out.place_px.resize(rows, 2);
   out.jacobian.resize(rows, static_cast<Eigen::Index>(model.size()));
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::Index row = 0;
@@ -235,8 +258,10 @@ BundleFit EffectBundle::fit(const BundleChange& change,
     }
     Eigen::Index at = row;
     for (const int index : sightings.at(frame)) {
-      const Eigen::VectorXd units = units_of(spec.sightings[static_cast<std::size_t>(index)]);
+      const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+      const Eigen::VectorXd units = units_of(sighting);
       out.unit.segment(at, units.size()) = units;
+      if (with_places) out.place_px.middleRows(at, units.size()) = places_of(spec, sighting);
       at += units.size();
     }
     row += count;

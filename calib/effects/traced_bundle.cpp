@@ -163,6 +163,23 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
   return out;
 }
 
+// Corners may be off by where in the image they are.
+constexpr double kUsualShift = 0.02;  // px, what any detector's corners are off by
+
+// The carriers' places are filled in when the fit has told which rows have one.
+std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Carriers& carriers) {
+  if (world.kind != MeasurementKind::kCorners) return {};
+  RestField image{"camera", "px", "place in the image", "px", {}, {}, std::max(floor, kUsualShift)};
+  for (int axis = 0; axis < 2; ++axis) {
+    constexpr int kCentre = 2;  // cx, cy among the intrinsic parameters: all corners shift alike
+    Correction shift;
+    shift.part = CorrectedPart::kIntrinsic;
+    shift.index = kCentre + axis;
+    image.carriers[static_cast<std::size_t>(axis)] = carriers.still(shift);
+  }
+  return {image};
+}
+
 }  // namespace
 
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options)
@@ -212,7 +229,10 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   }
   TracedFit out;
   out.rest_places = rest_places_of(world, carriers);
+  out.rest_fields = rest_fields_of(world, options_.trace.floor, carriers);
   BundleFit fit = bundle_->fit(change, carriers.probes());
+  if (fit.place_px.size() == 0) out.rest_fields.clear();
+  for (RestField& field : out.rest_fields) field.at = fit.place_px;
   out.converged = fit.converged;
   out.reason = fit.reason;
   const auto places =

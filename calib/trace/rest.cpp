@@ -178,6 +178,24 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
 
 }  // namespace
 
+Linearisation extend(const Linearisation& linear, const FoundRest& found) {
+  return found.rest.is_field() ? extend(linear, found.rows, found.prior)
+                               : extend(linear, found.columns, found.prior);
+}
+
+bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain) {
+  const Linearisation with = extend(system.linear(), found);
+  const NormalSystem after(with, system.partition());
+  const Eigen::VectorXd step = after.inverse() * after.total().g;
+  gain = 2.0 * step.dot(after.total().g) - step.dot(after.total().H * step);
+  found.rest.explained = gain / system.total().rr;
+  if (found.rest.explained < kLeastShare) return false;
+  found.rest.held_out_before = held_out_error(system, held_out_instants(system));
+  found.rest.held_out_after = held_out_error(after, held_out_instants(after));
+  // What does not help to predict is no structure.
+  return found.rest.held_out_after.value < found.rest.held_out_before.value;
+}
+
 std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector<RestPlace>& places,
                                    const std::vector<Covariate>& covariates,
                                    const std::vector<FoundRest>& known, double level,
@@ -215,18 +233,9 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   out.prior = curve.prior_information;
   out.rest = describe(system, *best_place, *best_covariate, knots, curve);
   out.rest.p_value = std::min(1.0, best.p_value * tests);
-  const Linearisation with = extend(system.linear(), out.columns, out.prior);
-  const NormalSystem after(with, system.partition());
-  const Eigen::VectorXd step = after.inverse() * after.total().g;
-  const double left =
-      after.total().rr - 2.0 * step.dot(after.total().g) + step.dot(after.total().H * step);
-  out.rest.explained = 1.0 - left / system.total().rr;
-  if (out.rest.explained < kLeastShare) return std::nullopt;
-  if (system.shift_of(system.total().rr - left, out.columns) < floor) return std::nullopt;
-  out.rest.held_out_before = held_out_error(system, held_out_instants(system));
-  out.rest.held_out_after = held_out_error(after, held_out_instants(after));
-  // What does not help to predict is no structure.
-  if (out.rest.held_out_after.value >= out.rest.held_out_before.value) return std::nullopt;
+  double gain = 0.0;
+  if (!earns_its_place(system, out, gain)) return std::nullopt;
+  if (system.shift_of(gain, out.columns) < floor) return std::nullopt;
   return out;
 }
 

@@ -14,8 +14,18 @@ namespace kinescope::trace {
 struct FoundRest {
   Rest rest;
   std::vector<EffectColumn> columns;  ///< of the Gaussian process: hats on its knots
-  Eigen::MatrixXd prior;              ///< its information, whitened
+  Eigen::MatrixXd rows;   ///< of a field, in place of them: what the data show of it, row by row
+  Eigen::MatrixXd prior;  ///< information of either, whitened
 };
+
+/// The model with it.
+[[nodiscard]] Linearisation extend(const Linearisation& linear, const FoundRest& found);
+
+/// Adds what `found` explains of the residual of `system` (where it is at least a hundredth) and
+/// the errors held out before and after; by how much it moves the rows that it touches is left to
+/// the caller: `gain` is what it takes from the sum of squares. False where it explains less, or
+/// where it does not help to predict what is held out.
+[[nodiscard]] bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain);
 
 /// The place and covariate that explain most, where that is significant at `level` over all pairs
 /// of them, moves the prediction by more than `floor`, makes at least a hundredth of the residual's

@@ -34,33 +34,40 @@ std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t i
   return effects;
 }
 
-Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
+Linearisation extend(const Linearisation& linear, const Eigen::MatrixXd& columns,
                      const Eigen::MatrixXd& prior) {
   Linearisation out = linear;
   const Eigen::Index p = linear.jacobian.cols();
-  const auto k = static_cast<Eigen::Index>(columns.size());
+  const Eigen::Index k = columns.cols();
   out.jacobian.conservativeResize(Eigen::NoChange, p + k);
-  out.jacobian.rightCols(k).setZero();
+  out.jacobian.rightCols(k) = columns;
+  if (linear.prior.size() == 0 && prior.size() == 0) return out;
+  out.prior = Eigen::MatrixXd::Zero(p + k, p + k);
+  if (linear.prior.size() > 0) out.prior.topLeftCorner(p, p) = linear.prior;
+  if (prior.size() > 0) out.prior.bottomRightCorner(k, k) = prior;
+  return out;
+}
+
+Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
+                     const Eigen::MatrixXd& prior) {
+  Eigen::MatrixXd rows =
+      Eigen::MatrixXd::Zero(linear.residual.size(), static_cast<Eigen::Index>(columns.size()));
   std::vector<Eigen::Index> instant(static_cast<std::size_t>(linear.residual.size()));
   for (std::size_t i = 0; i + 1 < linear.first_row.size(); ++i) {
     std::fill(instant.begin() + linear.first_row[i], instant.begin() + linear.first_row[i + 1],
               static_cast<Eigen::Index>(i));
   }
-  for (Eigen::Index a = 0; a < k; ++a) {
+  for (Eigen::Index a = 0; a < rows.cols(); ++a) {
     const EffectColumn& column = columns[static_cast<std::size_t>(a)];
     for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, column.carrier); entry;
          ++entry) {
       const double share = column.share.size() == 0
                                ? 1.0
                                : column.share[instant[static_cast<std::size_t>(entry.row())]];
-      out.jacobian(entry.row(), p + a) = share * entry.value();
+      rows(entry.row(), a) = share * entry.value();
     }
   }
-  if (linear.prior.size() == 0 && prior.size() == 0) return out;
-  out.prior = Eigen::MatrixXd::Zero(p + k, p + k);
-  if (linear.prior.size() > 0) out.prior.topLeftCorner(p, p) = linear.prior;
-  if (prior.size() > 0) out.prior.bottomRightCorner(k, k) = prior;
-  return out;
+  return extend(linear, rows, prior);
 }
 
 }  // namespace kinescope::trace

@@ -40,5 +40,8 @@ using StagePtr = std::shared_ptr<const Stage>;
 [[nodiscard]] Linearisation extend(const Linearisation& linear,
                                    const std::vector<EffectColumn>& columns,
                                    const Eigen::MatrixXd& prior);
+/// The same with columns given row by row, whitened.
+[[nodiscard]] Linearisation extend(const Linearisation& linear, const Eigen::MatrixXd& columns,
+                                   const Eigen::MatrixXd& prior);
 
 }  // namespace kinescope::trace

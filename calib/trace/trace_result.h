@@ -118,6 +118,15 @@ struct NotFoundEffect {
   std::string record;  ///< hidden: what to record so that it shows
 };
 
+/// A vector that depends on a place of two coordinates: Gaussian process, posterior at the nodes of
+/// a grid.
+struct FieldMap {
+  Eigen::MatrixX2d at;
+  Eigen::MatrixX2d mean;
+  Eigen::MatrixX2d sigma;
+  double spacing = 0.0;  ///< of the nodes
+};
+
 /// Structure that no effect explains, as a function of what it depends on most.
 struct Rest {
   std::string place;
@@ -126,12 +135,14 @@ struct Rest {
   std::string covariate_unit;
   double p_value = 1.0;
   double explained = 0.0;  ///< share of the residual's sum of squares
-  Eigen::VectorXd at;      ///< of the covariate
+  Eigen::VectorXd at;      ///< of the covariate; empty where it is a place: see `field`
   Eigen::VectorXd mean;    ///< Gaussian process, posterior
   Eigen::VectorXd sigma;
   Eigen::VectorXd instants;  ///< its mean at every instant
+  FieldMap field;            ///< empty: a curve
   HeldOutError held_out_before;
   HeldOutError held_out_after;
+  [[nodiscard]] bool is_field() const { return field.at.rows() > 0; }
 };
 
 /// One round, for a reader who wants to follow.

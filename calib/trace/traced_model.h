@@ -5,6 +5,7 @@
 // Rows are whitened; an instant is a frame, a posture or a sample with all its rows.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -104,6 +105,18 @@ struct RestPlace {
   int carrier = 0;
 };
 
+/// Where an unexplained rest may move rows by a vector that depends on a place of two coordinates,
+/// which every row has of its own: an image.
+struct RestField {
+  std::string name;               ///< "camera"
+  std::string unit;               ///< of the vector
+  std::string covariate;          ///< "place in the image"
+  std::string covariate_unit;     ///< of the place
+  Eigen::MatrixX2d at;            ///< rows; NaN: this row has no place
+  std::array<int, 2> carriers{};  ///< how rows answer to the vector's two components
+  double floor = 0.0;             ///< in place of TraceOptions::floor
+};
+
 struct AddedEffect {
   EffectId id;
   double scan = 0.0;
@@ -121,6 +134,7 @@ struct TracedFit {
   std::vector<Candidate> candidates;
   std::vector<Covariate> covariates;
   std::vector<RestPlace> rest_places;
+  std::vector<RestField> rest_fields;
 };
 
 class TracedModel {

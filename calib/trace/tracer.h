@@ -46,9 +46,12 @@ class Tracer {
                                    const TestedMember& own);
   void replace_waves_by_a_curve();
   void look_for_rest();
+  void look_for_curves();
+  [[nodiscard]] bool look_for_field();
+  [[nodiscard]] double rest_level() const;
   /// True where a rest is large enough beside what an effect explains to put its name in doubt.
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
-  void drop_what_rests_explain();
+  [[nodiscard]] bool drop_what_rests_explain();
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);

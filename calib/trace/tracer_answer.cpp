@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "calib/trace/distribution.h"
+#include "calib/trace/field.h"
 #include "calib/trace/tracer.h"
 
 namespace kinescope::trace {
@@ -20,12 +21,12 @@ constexpr double kDoubtfulShare = 0.1;
 
 Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRest>& rests) {
   Linearisation out = linear;
-  for (const FoundRest& found : rests) out = extend(out, found.columns, found.prior);
+  for (const FoundRest& found : rests) out = extend(out, found);
   return out;
 }
 
 bool same_place(const std::string& rest, const std::string& effect) {
-  return rest == effect || rest.starts_with(effect + " ");
+  return rest == effect || rest.starts_with(effect + " ") || effect.starts_with(rest + " ");
 }
 
 }  // namespace
@@ -41,7 +42,7 @@ void Tracer::replace_waves_by_a_curve() {
     std::erase_if(others, [&](const AddedEffect& effect) { return effect.id == id; });
     StagePtr stage = stage_of(std::move(others));
     const auto curve = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
-                                 level_, options_.floor);
+                                 rest_level(), options_.floor);
     if (!curve || !same_place(curve->rest.place, id.place) ||
         curve->rest.held_out_after.value > now_->error.interval.high) {
       continue;
@@ -61,13 +62,20 @@ void Tracer::replace_waves_by_a_curve() {
 }
 
 void Tracer::look_for_rest() {
+  // What effects took of a rest goes back to it: from the start where one of them gives way.
+  do {
+    replace_waves_by_a_curve();
+    look_for_curves();
+  } while (look_for_field() || drop_what_rests_explain());
+}
+
+void Tracer::look_for_curves() {
   rests_.clear();
-  replace_waves_by_a_curve();
   while (rests_.size() < kMostRests) {
     const Linearisation linear = with_rests(now_->fit.linear, rests_);
     const NormalSystem system(linear, now_->system.partition());
     std::optional<FoundRest> found = find_rest(system, now_->fit.rest_places, now_->fit.covariates,
-                                               rests_, level_, options_.floor);
+                                               rests_, rest_level(), options_.floor);
     if (!found) break;
     if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
     add_step(
@@ -76,8 +84,35 @@ void Tracer::look_for_rest() {
         *now_);
     rests_.push_back(std::move(*found));
   }
-  if (!rests_.empty()) drop_what_rests_explain();
 }
+
+// Several curves stand in for what depends on a place that every row has of its own, where they
+// leave some of it and a field in their stead predicts better. True where an effect gave way to the
+// field.
+bool Tracer::look_for_field() {
+  if (!rests_.empty()) {
+    const Linearisation linear = with_rests(now_->fit.linear, rests_);
+    const NormalSystem beside(linear, now_->system.partition());
+    if (!shows_field(beside, now_->fit.rest_fields, rest_level())) return false;
+  }
+  const std::optional<FoundRest> field =
+      find_field(now_->system, now_->fit.rest_fields, rest_level());
+  if (!field) return false;
+  if (!rests_.empty() &&
+      field->rest.held_out_after.value >= rests_.back().rest.held_out_after.value) {
+    return false;
+  }
+  if (rest_replaces_an_effect(*field)) return true;
+  add_step(round_,
+           fmt::format("structure is left at {}, over {}{}", field->rest.place,
+                       field->rest.covariate, rests_.empty() ? "" : ", in place of the curves"),
+           *now_);
+  rests_ = {*field};
+  return false;
+}
+
+// Curves and fields share what is set aside for the rest.
+double Tracer::rest_level() const { return now_->fit.rest_fields.empty() ? level_ : 0.5 * level_; }
 
 bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
   return found.rest.explained * now_->system.total().rr >=
@@ -86,7 +121,8 @@ bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
 
 // Effects that explain nothing where what is left is in the model as curves: they stood in for it,
 // at whatever place.
-void Tracer::drop_what_rests_explain() {
+bool Tracer::drop_what_rests_explain() {
+  bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const AddedEffect effect = now_->added[i];
     // A curve at the effect's own place takes its shape, whatever that is; it puts the name in
@@ -112,7 +148,9 @@ void Tracer::drop_what_rests_explain() {
              fmt::format("{} at {} removed: what is left explains it too", effect.id.effect,
                          effect.id.place),
              *now_);
+    dropped = true;
   }
+  return dropped;
 }
 
 // An effect of the library can stand in for one that is not in it. Then the rest at its place is
@@ -123,8 +161,10 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     if (!same_place(found.rest.place, id.place)) continue;
     if (!is_doubtful(found, i)) continue;
     StagePtr stage = stage_of(without(now_->added, i));
-    const auto alone = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
-                                 level_, options_.floor);
+    const auto alone = found.rest.is_field()
+                           ? find_field(stage->system, stage->fit.rest_fields, rest_level())
+                           : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
+                                       {}, rest_level(), options_.floor);
     if (!alone || alone->rest.place != found.rest.place ||
         alone->rest.held_out_after.value > found.rest.held_out_after.interval.high) {
       continue;
@@ -132,10 +172,11 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     removed_.insert(id);
     mark(round_, id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);
-    add_step(round_,
-             fmt::format("{} at {} removed: a curve over {} explains as much without it", id.effect,
-                         id.place, alone->rest.covariate),
-             *now_);
+    add_step(
+        round_,
+        fmt::format("{} at {} removed: a {} over {} explains as much without it", id.effect,
+                    id.place, alone->rest.is_field() ? "field" : "curve", alone->rest.covariate),
+        *now_);
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
     return true;
   }

@@ -222,7 +222,8 @@ void print_unknown(const Request& request) {
       for (const Rest& rest : trace.rest)
         fmt::print("; {} over {} explains {:.0f} %", rest.place, rest.covariate,
                    100.0 * rest.explained);
-      fmt::print("\n");
+      fmt::print("; error {:.3f} to {:.3f} px\n", trace.held_out_before.value,
+                 trace.held_out_after.value);
       std::fflush(stdout);
     }
   }

@@ -122,6 +122,19 @@ TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
   EXPECT_EQ(trace.rest.front().place, "q2");
 }
 
+TEST(TraceCalibration, AShiftByPlaceIsUnknownOverThePlaceInTheImage) {
+  InjectedEffect chequer = strong("own_chequer", "camera");
+  chequer.detail = 90.0;  // px, a field
+  const Trace trace = trace_of(make_effect_world(filmed({chequer}))).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  ASSERT_EQ(trace.rest.size(), 1U);
+  EXPECT_EQ(trace.rest.front().place, "camera");
+  EXPECT_EQ(trace.rest.front().covariate, "place in the image");
+  EXPECT_TRUE(trace.rest.front().is_field());
+  EXPECT_LT(trace.held_out_after.value, 0.9 * trace.held_out_before.value);
+}
+
 TEST(TraceCalibration, ARecordingTooShortSaysSo) {
   const Trace trace = trace_of(make_effect_world(filmed({}, 8))).trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kNothingToSay) << answer(trace);

@@ -59,15 +59,26 @@ LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<In
   for (Eigen::Index j = 0; j < kJoints; ++j) q_.col(j) = smooth_motion(time_s_, rng);
   if (options.together) q_.col(1) = q_.col(0);
   // Each row answers to each joint in its own way, slowly changing with the posture.
-  gains_.resize(n * kRows, kJoints);
+  gains_ = Eigen::MatrixXd::Zero(n * kRows, kJoints + 2);
+  place_.resize(n * kRows, 2);
   for (Eigen::Index row = 0; row < gains_.rows(); ++row) {
     for (Eigen::Index j = 0; j < kJoints; ++j) {
       const double angle = static_cast<double>(row % kRows) + static_cast<double>(j);
       gains_(row, j) = std::cos(angle + 0.5 * q_(row / kRows, 1 - j)) + 0.2;
     }
+    // Two rows are a corner's coordinates.
+    const double corner = static_cast<double>(row % kRows / 2);
+    gains_(row, kJoints + row % 2) = 1.0;
+    place_.row(row) << q_(row / kRows, 0) + corner, 0.7 * q_(row / kRows, 1) - 0.5 * corner;
   }
   observed_ = Eigen::VectorXd::Zero(n * kRows);
   for (const Injected& effect : injected) {
+    if (effect.shape == "field") {
+      for (Eigen::Index row = 0; row < observed_.size(); ++row) {
+        observed_[row] += effect.size * shape_of_field(place_.row(row))[row % 2];
+      }
+      continue;
+    }
     const Eigen::VectorXd change = share(effect);
     for (Eigen::Index row = 0; row < observed_.size(); ++row) {
       observed_[row] += effect.size * change[row / kRows] * gains_(row, effect.joint);
@@ -80,6 +91,11 @@ LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<In
     m = row < kRows ? rng.normal() : options.noise_memory * m + fresh * rng.normal();
     observed_[row] += options.noise * m;
   }
+}
+
+Eigen::Vector2d LinearWorld::shape_of_field(const Eigen::Vector2d& place) {
+  return {std::sin(1.3 * place.x()) * std::cos(1.2 * place.y()),
+          std::cos(1.2 * place.x() + 0.8 * place.y())};
 }
 
 Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
@@ -186,6 +202,13 @@ TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
     out.covariates.push_back({"direction of " + name, "", direction_of(q_.col(j))});
   }
   out.covariates.push_back({"time", "s", time_s_});
+  out.rest_fields.push_back({"camera",
+                             "px",
+                             "place in the image",
+                             "px",
+                             place_,
+                             {static_cast<int>(kJoints), static_cast<int>(kJoints) + 1},
+                             0.0});
   return out;
 }
 

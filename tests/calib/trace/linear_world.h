@@ -25,7 +25,7 @@ struct LinearWorldOptions {
 /// What is in the data and not in the model: one term of `LinearWorld::share`.
 struct Injected {
   int joint = 0;
-  std::string shape;  ///< "scale", "sine", "gear", "direction", "step", "tanh_other"
+  std::string shape;  ///< "scale", "sine", "gear", "direction", "step", "tanh_other", "field"
   double size = 0.0;
   double detail = 0.0;  ///< periods of the gear, time of the step in s
 };
@@ -34,6 +34,8 @@ class LinearWorld final : public TracedModel {
  public:
   LinearWorld(const LinearWorldOptions& options, const std::vector<Injected>& injected);
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
+  /// Of the effect "field", size 1: the shift at a place.
+  [[nodiscard]] static Eigen::Vector2d shape_of_field(const Eigen::Vector2d& place);
 
  private:
   [[nodiscard]] Eigen::VectorXd share(const Injected& effect) const;
@@ -41,8 +43,9 @@ class LinearWorld final : public TracedModel {
 
   LinearWorldOptions options_;
   Eigen::VectorXd time_s_;
-  Eigen::MatrixXd q_;      // instants x joints
-  Eigen::MatrixXd gains_;  // rows x carriers
+  Eigen::MatrixXd q_;       // instants x joints
+  Eigen::MatrixXd gains_;   // rows x carriers: the joints, then a shift along either coordinate
+  Eigen::MatrixX2d place_;  // of rows
   Eigen::VectorXd observed_;
 };
 

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/own_space.h"
+
+#include <algorithm>
+
+#include <Eigen/Eigenvalues>
+
+namespace kinescope::trace {
+
+// The normal matrix gives a basis that is nearly orthonormal; its own products say what is missing
+// (Cholesky QR twice, Yamamoto et al. 2015).
+OwnSpace::OwnSpace(const NormalSystem& system) {
+  constexpr double kUnseen = 1e-13;  // as in the inverse of the normal matrix
+  const Linearisation& linear = system.linear();
+  Eigen::MatrixXd H = system.total().H;
+  if (linear.prior.size() > 0) H += linear.prior;
+  const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
+                                                             scale.asDiagonal());
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const Eigen::Index n = values.size();
+  const double least = n == 0 ? 0.0 : kUnseen * std::max(values[n - 1], 1e-300);
+  const auto shown = static_cast<Eigen::Index>((values.array() > least).count());
+  const Eigen::MatrixXd directions = scale.asDiagonal() * eigen.eigenvectors().rightCols(shown) *
+                                     values.tail(shown).cwiseSqrt().cwiseInverse().asDiagonal();
+  basis_ = linear.jacobian * directions;
+  Eigen::MatrixXd products = basis_.transpose() * basis_;
+  if (linear.prior.size() > 0) products += directions.transpose() * linear.prior * directions;
+  factor_.compute(products);
+}
+
+}  // namespace kinescope::trace

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/report/trace_section.h"
+
+#include <gtest/gtest.h>
+
+#include "app/report/trace_json.h"
+
+namespace kinescope::report {
+namespace {
+
+// Something is left over the image: two nodes that the data show, one that they do not.
+Trace trace_with_a_field() {
+  Rest rest;
+  rest.place = "camera";
+  rest.unit = "px";
+  rest.covariate = "place in the image";
+  rest.covariate_unit = "px";
+  rest.explained = 0.8;
+  rest.field.at.resize(3, 2);
+  rest.field.at << 100.0, 50.0, 120.0, 50.0, 100.0, 70.0;
+  rest.field.mean.resize(3, 2);
+  rest.field.mean << 0.3, 0.0, 0.0, -0.2, 0.1, 0.1;
+  rest.field.sigma = Eigen::MatrixX2d::Constant(3, 2, 0.02);
+  rest.field.sigma.row(2).setConstant(0.5);
+  rest.field.spacing = 20.0;
+  rest.held_out_before = {0.15, {0.14, 0.16}, "px"};
+  rest.held_out_after = {0.05, {0.04, 0.06}, "px"};
+  Trace trace;
+  trace.verdict = TraceVerdict::kUnknown;
+  trace.reason = "structure is left at camera, over place in the image";
+  trace.rest = {rest};
+  trace.held_out_before = rest.held_out_before;
+  trace.held_out_after = rest.held_out_after;
+  return trace;
+}
+
+std::size_t count(const std::string& text, const std::string& words) {
+  std::size_t times = 0;
+  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++times;
+  return times;
+}
+
+TEST(TraceSection, AFieldIsDrawnAsArrowsOverTheImage) {
+  const std::string html = trace_section(trace_with_a_field());
+  EXPECT_NE(html.find("Modelled as a field"), std::string::npos) << html;
+  EXPECT_NE(html.find("follows the place in the image"), std::string::npos);
+  EXPECT_NE(html.find("image row, px"), std::string::npos);
+  EXPECT_NE(html.find("longest arrow"), std::string::npos);
+  // One more arrow for every node.
+  Trace fewer = trace_with_a_field();
+  FieldMap& field = fewer.rest.front().field;
+  for (Eigen::MatrixX2d* rows : {&field.at, &field.mean, &field.sigma})
+    rows->conservativeResize(2, Eigen::NoChange);
+  EXPECT_EQ(count(html, "<path class=\"line ") - count(trace_section(fewer), "<path class=\"line "),
+            1U);
+}
+
+TEST(TraceSection, JsonNamesThePlaceAndHoldsTheField) {
+  const auto written = trace_json(trace_with_a_field());
+  const auto& rest = written.at("unexplained").at(0);
+  EXPECT_EQ(rest.at("depends_on"), "place in the image");
+  EXPECT_EQ(rest.at("field").at("at").size(), 3U);
+  EXPECT_EQ(rest.at("field").at("mean").at(1).at(1), -0.2);
+  EXPECT_EQ(rest.at("field").at("spacing"), 20.0);
+  Trace curve = trace_with_a_field();
+  curve.rest.front().field = {};
+  EXPECT_FALSE(trace_json(curve).at("unexplained").at(0).contains("field"));
+}
+
+}  // namespace
+}  // namespace kinescope::report
