@@ -104,8 +104,7 @@ bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
 void require_answer(const RunSummary& run) {
   if (run.calibration.status == CalibrationStatus::kUndetermined) {
     throw undetermined("calibration", run.calibration.status_reason,
-                       "record more travel of that joint, with its marker well in view; the report "
-                       "shows the details");
+                       run.calibration.status_remedy + "; the report shows the details");
   }
   if (run.structure && run.structure->status == StructureStatus::kAmbiguous) {
     const bool known = !run.structure->doubts.empty();

@@ -255,22 +255,26 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   return start;
 }
 
-CalibrationStart start_from_nominal(const Recording& recording, const Measurements& measurements,
-                                    const PoseTracks& tracks, const CameraModel& camera,
-                                    std::vector<std::string>& warnings) {
-  CalibrationStart start;
-  start.tree = value_of(recording.nominal);
-  start.nominal = true;
-  start.camera = camera;
-  match_channels(recording, start.tree, warnings);
-  const Eigen::MatrixXd values = nominal_values(recording, start.tree, measurements.times_s);
-  const Placement placement = recording.entry == RecordingEntry::kPoints
-                                  ? place_points(start.tree, values, measurements.points)
-                                  : place_markers(start.tree, values, tracks);
-  start.T_camera_base = placement.T_camera_base;
-  start.tree.markers = placement.markers;
-  for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
-  return start;
+CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,
+                                  const PoseTracks& tracks, const CameraModel& camera,
+                                  std::vector<std::string>& warnings) {
+  KinematicTree nominal = value_of(recording.nominal);
+  match_channels(recording, nominal, warnings);
+  const auto place = [&](const KinematicTree& tree) {
+    CalibrationStart start;
+    start.tree = tree;
+    start.nominal = true;
+    start.camera = camera;
+    const Eigen::MatrixXd values = nominal_values(recording, tree, measurements.times_s);
+    const Placement placement = recording.entry == RecordingEntry::kPoints
+                                    ? place_points(tree, values, measurements.points)
+                                    : place_markers(tree, values, tracks);
+    start.T_camera_base = placement.T_camera_base;
+    start.tree.markers = placement.markers;
+    for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
+    return start;
+  };
+  return check_nominal(nominal, place, measurements, recording.markers, recording.log);
 }
 
 void require_determined(const Structure& structure) {

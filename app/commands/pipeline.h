@@ -10,6 +10,7 @@
 #include "app/commands/commands.h"
 #include "app/report/run_summary.h"
 #include "calib/bundle/calibrate.h"
+#include "calib/bundle/check_nominal.h"
 #include "kinematics/structure/structure.h"
 
 namespace kinescope {
@@ -44,12 +45,11 @@ struct Observed {
                                                     const CameraModel& camera);
 
 /// A start from a nominal robot: channels matched by name (or by order, with a warning), markers
-/// placed. `warnings` receives what was assumed.
-[[nodiscard]] CalibrationStart start_from_nominal(const Recording& recording,
-                                                  const Measurements& measurements,
-                                                  const PoseTracks& tracks,
-                                                  const CameraModel& camera,
-                                                  std::vector<std::string>& warnings);
+/// placed, axes and channels that are grossly wrong mended. `warnings` receives what was assumed.
+[[nodiscard]] CheckedNominal start_from_nominal(const Recording& recording,
+                                                const Measurements& measurements,
+                                                const PoseTracks& tracks, const CameraModel& camera,
+                                                std::vector<std::string>& warnings);
 
 /// Throws undetermined with the first doubt's words and remedy when the structure is not
 /// determined.

@@ -93,10 +93,11 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   calibrate_options.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
   CalibrationStart begin;
   if (recording.nominal) {
-    const CalibrationStart start =
+    CheckedNominal checked =
         start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
+    run.nominal_faults = std::move(checked.faults);
+    begin = std::move(checked.start);
     clock.lap("structure", run.times);
-    begin = start;
   } else {
     run.structure = find_robot(recording, run.tracks, options.calibrate);
     // What was found is shown also where it is no answer, but never over an earlier answer.

@@ -2,12 +2,14 @@
 #include "app/report/findings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "app/report/facts.h"
 #include "app/report/numbers.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::report {
 namespace {
@@ -234,7 +236,48 @@ void add_noise_floor(const RunSummary& run, std::vector<Finding>& findings) {
        ""});
 }
 
+/// "x", "-z", or the three numbers of a direction that is no axis of the frame.
+std::string direction_words(const Eigen::Vector3d& direction) {
+  constexpr double kAligned = 1e-3;
+  constexpr std::array<std::string_view, 3> kNames = {"x", "y", "z"};
+  for (std::size_t k = 0; k < kNames.size(); ++k) {
+    const double along = direction(static_cast<Eigen::Index>(k));
+    if (std::abs(std::abs(along) - 1.0) > kAligned) continue;
+    return fmt::format("{}{}", along < 0.0 ? "-" : "", kNames[k]);
+  }
+  return fmt::format("({:.3f} {:.3f} {:.3f})", direction.x(), direction.y(), direction.z());
+}
+
+std::string error_words(const TypicalError& error) {
+  std::string text;
+  const auto add = [&](double value, Quantity quantity) {
+    if (value <= 0.0) return;
+    text += (text.empty() ? "" : ", ") + text_with_unit(value, quantity);
+  };
+  add(error.px, Quantity::kPixels);
+  add(error.m, Quantity::kLength);
+  add(error.rad, Quantity::kAngle);
+  return text;
+}
+
 }  // namespace
+
+std::string fault_words(const KinematicTree& nominal, const NominalFault& fault) {
+  const Joint& joint = nominal.joints[static_cast<std::size_t>(fault.joint)];
+  std::string what;
+  if (fault.axis) {
+    what = fmt::format("{} of the nominal robot moves {} {} of its joint frame, not {}", joint.name,
+                       joint.type == JointType::kRevolute ? "about" : "along",
+                       direction_words(*fault.axis), direction_words(joint.axis));
+  } else {
+    const auto other = static_cast<std::size_t>(value_of(fault.exchanged_with));
+    what = fmt::format("The channels of {} and {} are exchanged", joint.name,
+                       nominal.joints[other].name);
+  }
+  return sentence(fmt::format("{}; taken so (typical error of {} in a first fit {} → {})", what,
+                              marker_name(fault.marker), error_words(fault.before),
+                              error_words(fault.after)));
+}
 
 std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis) {
   std::vector<Finding> findings;

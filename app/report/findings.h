@@ -20,4 +20,7 @@ struct Finding {
 /// At least one: where nothing limits the model, the noise of the measurement does.
 [[nodiscard]] std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis);
 
+/// "j6 of the nominal robot turns about x of its frame, not z: .." in one sentence with errors.
+[[nodiscard]] std::string fault_words(const KinematicTree& nominal, const NominalFault& fault);
+
 }  // namespace kinescope::report

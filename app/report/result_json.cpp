@@ -201,6 +201,26 @@ json run_json(const RunSummary& run) {
           {"total_s", number(total)}};
 }
 
+json error_json(const TypicalError& error) {
+  return {{"px", number(error.px)}, {"m", number(error.m)}, {"rad", number(error.rad)}};
+}
+
+json nominal_faults_json(const RunSummary& run) {
+  json list = json::array();
+  for (const NominalFault& fault : run.nominal_faults) {
+    const auto& joints = run.calibration.tree.joints;
+    const auto name = [&](int joint) { return text(joints[static_cast<std::size_t>(joint)].name); };
+    list.push_back(
+        {{"joint", name(fault.joint)},
+         {"axis", fault.axis ? vector3(*fault.axis) : json(nullptr)},
+         {"exchanged_with", fault.exchanged_with ? name(*fault.exchanged_with) : json(nullptr)},
+         {"marker", fault.marker.value},
+         {"typical_error_with_it", error_json(fault.before)},
+         {"typical_error_without", error_json(fault.after)}});
+  }
+  return list;
+}
+
 }  // namespace
 
 json make_result(const RunSummary& run, const Analysis& analysis, const Verdict& verdict) {
@@ -215,6 +235,7 @@ json make_result(const RunSummary& run, const Analysis& analysis, const Verdict&
             {"next", text(verdict.next)}}},
           {"data", data_json(run, analysis)},
           {"structure", structure_json(run)},
+          {"nominal_faults", nominal_faults_json(run)},
           {"calibration", calibration_json(run)},
           {"errors", errors_json(run.errors)},
           {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/bundle/calibration.h"
+#include "calib/bundle/check_nominal.h"
 #include "calib/camera/marker_set.h"
 #include "calib/effects/trace_calibration.h"
 #include "calib/quality/error_summary.h"
@@ -60,6 +61,7 @@ struct RunSummary {
   PoseTracks tracks;                   ///< empty for points
   std::optional<Structure> structure;  ///< none when a nominal robot was given
   std::optional<KinematicTree> nominal;
+  std::vector<NominalFault> nominal_faults;  ///< mended before the fit
   Calibration calibration;
   std::optional<Trace> trace;                   ///< none where it was not asked for
   std::vector<FittedEffect> effects;            ///< that the calibration has in it

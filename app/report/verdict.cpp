@@ -13,6 +13,7 @@
 #include "app/report/facts.h"
 #include "app/report/findings.h"
 #include "app/report/numbers.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::report {
 namespace {
@@ -109,6 +110,8 @@ std::string found_words(const RunSummary& run) {
     if (moving > 0) text += fmt::format(" ({})", type_letters(tree));
     text +=
         fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), what), driving_words(run));
+    for (const NominalFault& fault : run.nominal_faults)
+      text += " " + fault_words(value_of(run.nominal), fault);
     return text;
   }
   if (moving == 0) {

@@ -216,7 +216,7 @@ State start_state(Spec& spec, const CalibrationStart& start, const CalibrateOpti
   for (auto& mask : placement.free_joint) mask.fill(false);
   placement.free_offset.assign(placement.free_offset.size(), false);
   placement.free_scale.assign(placement.free_scale.size(), false);
-  placement.has_prior = false;
+  placement.prior.reset();
   State placed = state;
   static_cast<void>(bundle::solve_robustly(placement, placed,
                                            bundle::usable_sightings(placement, placed),
@@ -240,7 +240,7 @@ void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) 
     const bool fixed = spec.tree.joints[j].type == JointType::kFixed;
     const bool free = std::ranges::any_of(spec.free_joint[j], [](bool f) { return f; });
     if (seen[j] || fixed || (!free && !spec.free_offset[j])) continue;
-    if (spec.has_prior) continue;
+    if (spec.prior) continue;
     missing += (missing.empty() ? "" : ", ") + spec.tree.joints[j].name;
   }
   if (missing.empty() && !usable.empty()) return;
@@ -250,6 +250,25 @@ void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) 
           ? std::string("no marker was seen while the joint log ran")
           : fmt::format("no marker behind {} was seen while the joint log ran", missing),
       "check that joints.csv and the video cover the same time");
+}
+
+// The markers of links none of whose markers is where the robot says, mostly.
+std::string links_not_described(const Calibration& calibration) {
+  constexpr int kFewest = 10;  // sightings
+  std::map<LinkId, std::pair<int, int>> used_and_rejected;
+  const auto& markers = calibration.tree.markers;
+  for (std::size_t m = 0; m < markers.size(); ++m) {
+    auto& [used, rejected] = used_and_rejected[markers[m].link];
+    used += calibration.markers[m].used;
+    rejected += calibration.markers[m].rejected;
+  }
+  std::string out;
+  for (const Marker& marker : markers) {
+    const auto& [used, rejected] = used_and_rejected.at(marker.link);
+    if (rejected <= used || used + rejected < kFewest) continue;
+    out += (out.empty() ? "" : ", ") + fmt::format("tag_{}", marker.id.value);
+  }
+  return out;
 }
 
 void set_status(Calibration& out, const RobustSolution& robust) {
@@ -267,9 +286,17 @@ void set_status(Calibration& out, const RobustSolution& robust) {
     if (!tilt_unknown && !place_unknown) continue;
     undetermined_joints += (undetermined_joints.empty() ? "" : ", ") + out.tree.joints[j].name;
   }
-  if (undetermined_joints.empty()) return;
+  if (!undetermined_joints.empty()) {
+    out.status = CalibrationStatus::kUndetermined;
+    out.status_reason = fmt::format("the axis of {} is not determined", undetermined_joints);
+    out.status_remedy = "record more travel of that joint, with its marker well in view";
+  }
+  const std::string contradicting = links_not_described(out);
+  if (contradicting.empty()) return;
   out.status = CalibrationStatus::kUndetermined;
-  out.status_reason = fmt::format("the axis of {} is not determined", undetermined_joints);
+  out.status_reason = "most sightings of " + contradicting + " contradict the robot";
+  out.status_remedy =
+      "check the axes, units and channels of the joints that move it, and that it sits firmly";
 }
 
 }  // namespace

@@ -47,13 +47,19 @@ struct CalibrationStart {
   std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
 };
 
+/// How far a robot is from its drawing: standard deviations of a prior on every joint's frame. A
+/// zero gives way to data that say otherwise.
+struct NominalSigmas {
+  double rad = 0.01;
+  double m = 5e-3;
+};
+
 struct CalibrateOptions {
   FreeGeometry free = FreeGeometry::kGeometry;
   bool estimate_intrinsics = false;
   bool estimate_time_offset = true;
-  bool estimate_scales = false;   ///< of channels that are declared in rad or m
-  double nominal_sigma_m = 5e-3;  ///< prior on the geometry of a nominal robot
-  double nominal_sigma_rad = 0.01;
+  bool estimate_scales = false;  ///< of channels that are declared in rad or m
+  NominalSigmas nominal = {};
   double reject_sigma = 4.5;  ///< sightings beyond this many standard deviations are left out
   int folds = 5;              ///< of the cross-validation; 0: none
   bool folds_by_lot = false;  ///< frames dealt out at random instead of by posture: an easier test,

@@ -92,6 +92,7 @@ enum class CalibrationStatus { kNotRun, kConverged, kNotConverged, kUndetermined
 struct Calibration {
   CalibrationStatus status = CalibrationStatus::kNotRun;
   std::string status_reason;
+  std::string status_remedy;  ///< what to check or record where nothing is determined
   MeasurementKind kind = MeasurementKind::kCorners;
 
   KinematicTree tree;  ///< base to links to markers

@@ -6,15 +6,6 @@
 namespace kinescope::bundle {
 namespace {
 
-// ad(d) of SE(3), tangent order rotation, translation. Barfoot 2017, eq. 7.16, reordered.
-Matrix6d small_adjoint(const Vector6d& d) {
-  Matrix6d ad = Matrix6d::Zero();
-  ad.topLeftCorner<3, 3>() = skew(d.head<3>());
-  ad.bottomRightCorner<3, 3>() = skew(d.head<3>());
-  ad.bottomLeftCorner<3, 3>() = skew(d.tail<3>());
-  return ad;
-}
-
 std::optional<SightingError> compare_corners(const Sighting& sighting, const Pose& T_camera_marker,
                                              const CameraModel& camera, double size) {
   const auto n = static_cast<Eigen::Index>(sighting.corners_px.size());
@@ -37,10 +28,8 @@ std::optional<SightingError> compare_corners(const Sighting& sighting, const Pos
 
 SightingError compare_pose(const Sighting& sighting, const Pose& T_camera_marker) {
   const Vector6d d = log_pose(T_camera_marker.inverse() * sighting.T_camera_marker);
-  // log(exp(-e) exp(d)) = d - Jl^-1(d) e with Jl^-1 = I - ad/2 + ad^2/12 to third order.
-  const Matrix6d ad = small_adjoint(d);
-  const Matrix6d inverse_jacobian = Matrix6d::Identity() - 0.5 * ad + ad * ad / 12.0;
-  return {sighting.whitening * d, -sighting.whitening * inverse_jacobian,
+  // log(exp(-e) exp(d)) = d - Jl^-1(d) e
+  return {sighting.whitening * d, -sighting.whitening * inverse_right_jacobian(-d),
           Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>::Zero(6, kMaxIntrinsics)};
 }
 

@@ -146,31 +146,44 @@ class SightingCost final : public ceres::CostFunction {
   std::vector<int> corrections_;  // that bear on this sighting
 };
 
-// A joint frame that should stay near the nominal one.
-class FramePrior final : public ceres::SizedCostFunction<6, 7> {
+// Parts of a joint frame that should stay near the nominal one: rows on the right perturbation.
+class FramePrior final : public ceres::CostFunction {
  public:
-  FramePrior(Pose nominal, double sigma_rad, double sigma_m) : nominal_(std::move(nominal)) {
-    weights_ << Eigen::Vector3d::Constant(1.0 / sigma_rad),
-        Eigen::Vector3d::Constant(1.0 / sigma_m);
+  FramePrior(Pose nominal, Eigen::Matrix<double, Eigen::Dynamic, 6> whitening)
+      : nominal_(std::move(nominal)), whitening_(std::move(whitening)) {
+    set_num_residuals(static_cast<int>(whitening_.rows()));
+    mutable_parameter_block_sizes()->push_back(7);
   }
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
     const Pose pose = from_block(parameters[0]);
     const Vector6d d = log_pose(nominal_.inverse() * pose);
-    Eigen::Map<Vector6d> out(residuals);
-    out = weights_.cwiseProduct(d);
+    Eigen::Map<Eigen::VectorXd>(residuals, whitening_.rows()) = whitening_ * d;
     if (jacobians != nullptr && jacobians[0] != nullptr) {
-      // The right Jacobian's inverse is the identity to first order in d, and d stays small.
-      Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>> slope(jacobians[0]);
-      slope = weights_.asDiagonal() * minus_jacobian(pose);
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 7, Eigen::RowMajor>> slope(
+          jacobians[0], whitening_.rows(), 7);
+      slope = whitening_ * inverse_right_jacobian(d) * minus_jacobian(pose);
     }
     return true;
   }
 
  private:
   Pose nominal_;
-  Vector6d weights_;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> whitening_;
 };
+
+// The direction in which a joint moves, as a right perturbation of its frame.
+Vector6d motion_of(const Joint& joint) {
+  Vector6d out = Vector6d::Zero();
+  (joint.type == JointType::kPrismatic ? out.tail<3>() : out.head<3>()) = joint.axis;
+  return out;
+}
+
+Matrix6d whitening_of(const NominalSigmas& sigmas) {
+  Vector6d weights;
+  weights << Eigen::Vector3d::Constant(1.0 / sigmas.rad), Eigen::Vector3d::Constant(1.0 / sigmas.m);
+  return weights.asDiagonal();
+}
 
 // A measured distance between two targets.
 class DistanceCost final : public ceres::SizedCostFunction<1, 3, 3> {
@@ -204,8 +217,15 @@ ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighti
   return new SightingCost(spec, sighting, readings);
 }
 
-ceres::CostFunction* make_frame_prior(const Spec& spec, const Pose& nominal) {
-  return new FramePrior(nominal, spec.prior_sigma_rad, spec.prior_sigma_m);
+ceres::CostFunction* make_frame_prior(const NominalSigmas& sigmas, const Joint& nominal) {
+  const Vector6d motion = motion_of(nominal);
+  const Matrix6d others = Matrix6d::Identity() - motion * motion.transpose();
+  return new FramePrior(nominal.T_parent_joint, whitening_of(sigmas) * others);
+}
+
+ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas, const Joint& nominal) {
+  return new FramePrior(nominal.T_parent_joint,
+                        motion_of(nominal).transpose() * whitening_of(sigmas));
 }
 
 ceres::CostFunction* make_distance_cost(const TargetPair& pair) {

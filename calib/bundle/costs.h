@@ -15,8 +15,13 @@ namespace kinescope::bundle {
 /// on the sighting all of them. `readings` must follow the time offset.
 [[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
                                                       const Readings& readings);
-/// A joint frame that should stay near the nominal one. Block: the frame (7).
-[[nodiscard]] ceres::CostFunction* make_frame_prior(const Spec& spec, const Pose& nominal);
+/// The frame of a joint that should stay near the nominal one, but for its zero. Block: the frame
+/// (7).
+[[nodiscard]] ceres::CostFunction* make_frame_prior(const NominalSigmas& sigmas,
+                                                    const Joint& nominal);
+/// Its zero: the frame's turn about (shift along) the axis.
+[[nodiscard]] ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas,
+                                                   const Joint& nominal);
 /// A measured distance. Blocks: both targets' places (3, 3).
 [[nodiscard]] ceres::CostFunction* make_distance_cost(const TargetPair& pair);
 

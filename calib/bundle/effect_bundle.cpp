@@ -269,7 +269,7 @@ BundleFit EffectBundle::fit(const BundleChange& change,
   out.first_row.push_back(row);
   out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
   out.probes.setFromTriplets(entries.begin(), entries.end());
-  if (spec.has_prior) out.prior_information = linear.prior_information(model, model);
+  if (spec.prior) out.prior_information = linear.prior_information(model, model);
   if (const auto distances = linear.frames.find(-1); distances != linear.frames.end()) {
     const Eigen::MatrixXd J = distances->second.J(Eigen::all, model);
     if (out.prior_information.size() == 0) {

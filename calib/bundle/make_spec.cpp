@@ -211,9 +211,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   free_joints(start, options, spec);
   free_frames(start, spec);
   spec.free_time_offset = options.estimate_time_offset && !spec.postures && !log.empty();
-  spec.has_prior = start.nominal && options.free == FreeGeometry::kGeometry;
-  spec.prior_sigma_m = options.nominal_sigma_m;
-  spec.prior_sigma_rad = options.nominal_sigma_rad;
+  if (start.nominal && options.free == FreeGeometry::kGeometry) spec.prior = options.nominal;
   if (options.estimate_intrinsics && spec.kind == MeasurementKind::kCorners) {
     // k3 bends only the far corners of the image, where markers seldom are: held unless the model
     // needs it.
@@ -259,7 +257,7 @@ std::string gauge_in_words(const Spec& spec) {
     words = "The base frame is held where it starts; ";
   }
   words +=
-      spec.has_prior
+      spec.prior
           ? "joint frames stay near the nominal ones by a weak prior where the data are silent."
           : "joint frames keep their z axis on the joint's axis and neither turn about nor slide "
             "along it: the markers' and next joints' places take that up, so nothing is lost.";

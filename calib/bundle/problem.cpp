@@ -190,13 +190,18 @@ void BuiltProblem::add_priors(const Spec& spec, State& state) {
     // A measurement, not a prior: it counts among the data.
     ids_.push_back(problem_->AddResidualBlock(make_distance_cost(pair), nullptr, from, to));
   }
-  if (!spec.has_prior) return;
+  if (!spec.prior) return;
   for (std::size_t j = 0; j < state.joint_frames.size(); ++j) {
     double* frame = state.joint_frames[j].data();
     const bool free = std::ranges::any_of(spec.free_joint[j], [](bool f) { return f; });
     if (!free || !problem_->HasParameterBlock(frame)) continue;
     prior_ids_.push_back(problem_->AddResidualBlock(
-        make_frame_prior(spec, spec.tree.joints[j].T_parent_joint), nullptr, frame));
+        make_frame_prior(*spec.prior, spec.tree.joints[j]), nullptr, frame));
+    // A zero may be far off, of how the robot was put together or homed: the prior gives way.
+    constexpr double kLossWidth = 2.0;
+    prior_ids_.push_back(
+        problem_->AddResidualBlock(make_zero_prior(*spec.prior, spec.tree.joints[j]),
+                                   new ceres::CauchyLoss(kLossWidth), frame));
   }
 }
 

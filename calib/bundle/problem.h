@@ -69,10 +69,7 @@ struct Spec {
   bool free_time_offset = false;
   std::array<bool, kMaxIntrinsics> free_intrinsics{};
   std::vector<Correction> corrections;  ///< all free
-  /// Prior on the joint frames (nominal robots): standard deviations of rotation and translation.
-  bool has_prior = false;
-  double prior_sigma_rad = 0.0;
-  double prior_sigma_m = 0.0;
+  std::optional<NominalSigmas> prior;   ///< on the joint frames (nominal robots)
 };
 
 /// The estimated numbers. Addresses must not change while a problem built on them lives.

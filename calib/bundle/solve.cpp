@@ -207,7 +207,12 @@ RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightin
   const double freedom =
       sightings.empty() ? 6.0 : spec.sightings[static_cast<std::size_t>(sightings[0])].dimension();
   BuildOptions robust{kLossWidth * std::sqrt(freedom), false};
+  // The start's misfit passes for noise here: beside that much of it a prior would hold all.
+  constexpr double kAtFirst = 30.0;
+  const std::optional<NominalSigmas> prior = spec.prior;
+  if (prior) spec.prior = NominalSigmas{kAtFirst * prior->rad, kAtFirst * prior->m};
   out.summary = solve(spec, state, sightings, robust, max_iterations);
+  spec.prior = prior;
   rescale(spec, misfits(spec, state, sightings), 1.0);
   SolveSummary second = solve(spec, state, sightings, robust, max_iterations);
   out.summary.iterations += second.iterations;

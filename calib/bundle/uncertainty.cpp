@@ -145,7 +145,7 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
   out.covariance = factor.asDiagonal() * white * factor.asDiagonal();
   for (int i = 0; i < n; ++i) {
     // With a prior the posterior is finite even where the data are silent, and says so by its size.
-    if (unseen[static_cast<std::size_t>(i)] && !spec.has_prior) continue;
+    if (unseen[static_cast<std::size_t>(i)] && !spec.prior) continue;
     Parameter& parameter = out.parameters[static_cast<std::size_t>(i)];
     parameter.sigma_white = std::sqrt(white(i, i));
     parameter.sigma = std::sqrt(out.covariance(i, i));

@@ -120,11 +120,21 @@ class AprilTagDetector final : public TagDetector {
   std::unique_ptr<apriltag_detector_t, FreeDetector> detector_;
 };
 
+// The frames are the threads' work. Once: OpenCV rebuilds its pool at every call, which is no safe
+// thing to do while another thread detects.
+void use_one_thread() {
+  [[maybe_unused]] static const bool done = [] {
+    cv::setNumThreads(1);
+    return true;
+  }();
+}
+
 class ArucoDetector final : public TagDetector {
  public:
   ArucoDetector(const ArucoDictionary& dictionary, const DetectorOptions& options)
       : dictionary_(cv::aruco::getPredefinedDictionary(dictionary.value)),
         parameters_(cv::aruco::DetectorParameters::create()) {
+    use_one_thread();
     // OpenCV's refinements are no better than its raw corners (about 0.8 px; SUBPIX jumps to the
     // outer rim of narrow white margins): refine_corners() does it.
     parameters_->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
@@ -139,7 +149,6 @@ class ArucoDetector final : public TagDetector {
   }
 
   std::vector<TagObservation> detect(const ImageView& image) override {
-    cv::setNumThreads(1);
     // OpenCV's detector reads only.
     const cv::Mat input(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
                         static_cast<std::size_t>(image.stride));

@@ -83,6 +83,14 @@ Vector6d log_pose(const Pose& pose) {
   return d;
 }
 
+Matrix6d inverse_right_jacobian(const Vector6d& d) {
+  Matrix6d ad = Matrix6d::Zero();
+  ad.topLeftCorner<3, 3>() = skew(d.head<3>());
+  ad.bottomRightCorner<3, 3>() = skew(d.head<3>());
+  ad.bottomLeftCorner<3, 3>() = skew(d.tail<3>());
+  return Matrix6d::Identity() + 0.5 * ad + ad * ad / 12.0;
+}
+
 Matrix6d adjoint(const Pose& pose) {
   const Eigen::Matrix3d R = pose.matrix3();
   Matrix6d ad = Matrix6d::Zero();

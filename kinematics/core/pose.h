@@ -48,6 +48,11 @@ struct Pose {
 /// Inverse of exp_pose for rotations below pi.
 [[nodiscard]] Vector6d log_pose(const Pose& pose);
 
+/// J with log(exp(d) exp(e)) = d + J e for small e: the inverse of the right Jacobian of SE(3), to
+/// second order in d (the next term is of the fourth); of the left one with -d. Barfoot 2017, eq.
+/// 7.84, tangent order rotation, translation.
+[[nodiscard]] Matrix6d inverse_right_jacobian(const Vector6d& d);
+
 /// 6x6 adjoint with exp(Ad(T) d) T = T exp(d), tangent order rotation, translation.
 [[nodiscard]] Matrix6d adjoint(const Pose& pose);
 

@@ -109,7 +109,8 @@ Verdict judge(const Case& c) {
   out.answer = std::string(to_string(trace.verdict));
   if (traced.base.kind == TorqueBaseKind::kIdentified) out.answer += " (on identified masses)";
   for (const TracedEffect& e : trace.accepted) {
-    out.answer += fmt::format(" {}@{}", e.id.effect, e.id.place);
+    out.answer += fmt::format(" {}@{} {:.3g} ({:.1e} of the squares, p {:.0e})", e.id.effect,
+                              e.id.place, e.size, e.explained, e.p_value);
   }
   for (const Ambiguity& a : trace.ambiguities) {
     out.answer += " (";

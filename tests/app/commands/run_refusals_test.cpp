@@ -8,30 +8,14 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/io/products.h"
+#include "tests/app/commands/poses_of_arm.h"
 #include "tests/app/commands/program.h"
-#include "tests/app/io/recording_folder.h"
-#include "tests/truth/random_robot.h"
 #include "tests/truth/render.h"
 
 namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string joints_csv(const JointLog& log) {
-  std::string text = "t";
-  for (const std::string& channel : log.channels) text += "," + channel;
-  text += "\n";
-  for (Eigen::Index i = 0; i < log.values.rows(); ++i) {
-    text += fmt::format("{}", log.times_s[static_cast<std::size_t>(i)]);
-    for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
-      text += fmt::format(",{}", log.values(i, c));
-    }
-    text += "\n";
-  }
-  return text;
-}
 
 std::map<std::string, std::string> contents(const fs::path& folder) {
   std::map<std::string, std::string> files;
@@ -69,27 +53,11 @@ class RunRefusals : public testing::Test {
   }
 
   void write_poses(const RobotRecording& recording) const {
-    folder_.write("poses.csv", tracks_csv(recording.tracks));
-    folder_.write("joints.csv", joints_csv(recording.log));
+    kinescope::write_poses(recording, folder_);
   }
 
   RecordingFolder folder_;
 };
-
-struct PosesOfArm {
-  RobotRecording recording;
-  std::vector<std::string> channel;  // of each joint
-};
-
-PosesOfArm arm(const std::string& name, const RecordingOptions& options, int joints = 3) {
-  Rng rng = Rng::from_name(name);
-  const RandomRobot robot = random_robot({.joints = joints, .prismatic_share = 0.0}, rng);
-  PosesOfArm out{record(robot, options, rng), {}};
-  for (const int c : out.recording.channel_of_joint) {
-    out.channel.push_back(out.recording.log.channels[static_cast<std::size_t>(c)]);
-  }
-  return out;
-}
 
 TEST_F(RunRefusals, AJointThatHardlyMoves) {
   RecordingOptions options;

@@ -80,6 +80,25 @@ TEST(Verdict, OfPointsWithANominalRobot) {
   EXPECT_FALSE(has(verdict.found, "probability")) << verdict.found;
 }
 
+TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
+  RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true});
+  KinematicTree& nominal = *run.nominal;
+  nominal.joints[0].axis = Eigen::Vector3d::UnitX();
+  run.nominal_faults = {{.joint = 0,
+                         .axis = -Eigen::Vector3d::UnitZ(),
+                         .marker = TagId{4},
+                         .before = {.m = 0.02},
+                         .after = {.m = 0.001}},
+                        {.joint = 1, .exchanged_with = 2, .marker = TagId{5}}};
+  const Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.found,
+                  "Q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
+                  "(typical error of tag_4 in a first fit 20.0 mm → 1.00 mm)."))
+      << verdict.found;
+  EXPECT_TRUE(has(verdict.found, "The channels of q2 and q3 are exchanged; taken so"))
+      << verdict.found;
+}
+
 TEST(Verdict, WithoutALogTheValuesAreEstimates) {
   const Verdict verdict = make_verdict(synthetic_run({.log = false}));
   EXPECT_TRUE(has(verdict.found, "the joint values are estimates from the markers"))

@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "calib/bundle/calibrate.h"
+#include "calib/bundle/check_nominal.h"
 #include "calib/bundle/place_markers.h"
+#include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 
 namespace kinescope {
@@ -138,6 +140,98 @@ TEST(Nominal, GeometryExplainsAWrongDrawing) {
   EXPECT_GT(offsets.held_out_rms, 5.0 * kSigmaM);
   EXPECT_LT(geometry.held_out_rms, 1.3 * kSigmaM);
   EXPECT_EQ(geometry.status, CalibrationStatus::kConverged);
+}
+
+TEST(Nominal, ZerosFarOffDoNotHoldTheGeometryBack) {
+  constexpr double kSigmaM = 1e-4;
+  const Lab lab = make_lab("far zeros", 0.3, 0.003);
+  const Measurements measurements = tracked_poses(lab, {}, 2e-4, kSigmaM);
+  const Placement placement = place_markers(lab.nominal, lab.values, measurements.poses);
+  const Calibration geometry = run(lab, measurements, placement, FreeGeometry::kGeometry);
+  EXPECT_LT(geometry.held_out_rms, 1.3 * kSigmaM);
+  EXPECT_EQ(geometry.status, CalibrationStatus::kConverged);
+  // What the data do not tell (the first zero against the base) the drawing still holds.
+  const auto zero = geometry.joints[0].direction_sigma_rad;
+  ASSERT_TRUE(zero);
+  EXPECT_LT(*zero, 0.05);
+}
+
+TEST(Nominal, AMarkerThatIsMostlyElsewhereIsNoAnswer) {
+  const Lab lab = make_lab("mostly elsewhere", 0.01, 0.002);
+  Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  PoseTrack strange = measurements.poses.tracks[0];
+  strange.id = TagId{4};
+  Rng rng = Rng::from_name("elsewhere");
+  for (PoseSample& sample : strange.samples) {
+    if (sample.frame % 5 < 3) sample.T_camera_marker = random_pose(rng, 0.5, 0.5);
+  }
+  measurements.poses.tracks.push_back(strange);
+  Placement placement = {lab.T_tracker_base, {{TagId{3}, LinkId{6}, {}}}};
+  placement.markers.push_back({TagId{4}, LinkId{5}, lab.nominal.joints[5].T_parent_joint});
+  for (const PoseSample& sample : measurements.poses.tracks[0].samples) {
+    PoseSample& other =
+        measurements.poses.tracks[1].samples[static_cast<std::size_t>(sample.frame)];
+    if (sample.frame % 5 < 3) continue;
+    other.T_camera_marker = lab.T_tracker_base *
+                            forward_kinematics(lab.real, lab.values.row(sample.frame))[5] *
+                            lab.nominal.joints[5].T_parent_joint;
+  }
+  const Calibration found = run(lab, measurements, placement, FreeGeometry::kGeometry);
+  EXPECT_EQ(found.status, CalibrationStatus::kUndetermined);
+  EXPECT_EQ(found.status_reason, "most sightings of tag_4 contradict the robot");
+  EXPECT_NE(found.status_remedy.find("axes, units and channels"), std::string::npos);
+}
+
+CheckedNominal check(const Lab& lab, const Measurements& measurements) {
+  const auto place = [&](const KinematicTree& tree) {
+    Eigen::MatrixXd values(lab.values.rows(), lab.values.cols());
+    for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+      values.col(static_cast<Eigen::Index>(j)) =
+          lab.values.col(value_of(lab.log.channel(tree.joints[j].channel)));
+    }
+    const Placement placement = place_markers(tree, values, measurements.poses);
+    CalibrationStart start;
+    start.tree = tree;
+    start.tree.markers = placement.markers;
+    start.T_camera_base = placement.T_camera_base;
+    start.nominal = true;
+    return start;
+  };
+  return check_nominal(lab.nominal, place, measurements, {}, lab.log);
+}
+
+TEST(CheckNominal, FindsAxesThatPointElsewhere) {
+  Lab lab = make_lab("wrong axes", 0.02, 0.003);
+  const Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  lab.nominal.joints[1].axis = -Eigen::Vector3d::UnitZ();
+  lab.nominal.joints[3].axis = Eigen::Vector3d::UnitX();
+  const CheckedNominal checked = check(lab, measurements);
+  ASSERT_EQ(checked.faults.size(), 2U);
+  for (const NominalFault& fault : checked.faults) {
+    EXPECT_TRUE(fault.joint == 1 || fault.joint == 3);
+    ASSERT_TRUE(fault.axis);
+    EXPECT_LT((*fault.axis - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+    EXPECT_LT(fault.after.m, fault.before.m);
+  }
+  for (const Joint& joint : checked.start.tree.joints)
+    EXPECT_LT((joint.axis - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+}
+
+TEST(CheckNominal, FindsExchangedChannels) {
+  Lab lab = make_lab("exchanged", 0.02, 0.003);
+  const Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  std::swap(lab.nominal.joints[1].channel, lab.nominal.joints[4].channel);
+  const CheckedNominal checked = check(lab, measurements);
+  ASSERT_EQ(checked.faults.size(), 1U);
+  EXPECT_EQ(checked.faults[0].joint, 1);
+  EXPECT_EQ(checked.faults[0].exchanged_with, 4);
+  EXPECT_EQ(checked.start.tree.joints[1].channel, "j2");
+}
+
+TEST(CheckNominal, LeavesARobotAloneThatIsOnlyInaccurate) {
+  const Lab lab = make_lab("only inaccurate", 0.1, 0.01);
+  const Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  EXPECT_TRUE(check(lab, measurements).faults.empty());
 }
 
 TEST(Nominal, PointsOfATracker) {

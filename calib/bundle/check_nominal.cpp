@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/check_nominal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+constexpr std::size_t kFrames = 40;  // of the recording, spread evenly
+constexpr std::size_t kMostFaults = 4;
+constexpr double kNoticeable = 1.05;
+constexpr double kBetter = 2.0;  // the typical error is divided by this, at least
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Frames of a measurement that has something in them, thinned out.
+template <typename Items, typename FrameOf>
+std::set<int> spread_frames(const Items& items, FrameOf frame_of) {
+  std::vector<int> frames;
+  for (const auto& item : items) frames.push_back(frame_of(item));
+  std::ranges::sort(frames);
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  std::set<int> out;
+  const std::size_t count = std::min(kFrames, frames.size());
+  for (std::size_t k = 0; k < count; ++k) out.insert(frames[k * frames.size() / count]);
+  return out;
+}
+
+Measurements few_of(Measurements all) {
+  const auto frame_of = [](const auto& item) { return item.frame; };
+  const std::set<int> corners = spread_frames(all.corners, frame_of);
+  std::erase_if(all.corners, [&](const TagObservation& o) { return !corners.contains(o.frame); });
+  const std::set<int> points = spread_frames(all.points.observations, frame_of);
+  std::erase_if(all.points.observations,
+                [&](const PointObservation& o) { return !points.contains(o.frame); });
+  std::vector<PoseSample> samples;
+  for (const PoseTrack& track : all.poses.tracks)
+    samples.insert(samples.end(), track.samples.begin(), track.samples.end());
+  const std::set<int> poses = spread_frames(samples, frame_of);
+  for (PoseTrack& track : all.poses.tracks)
+    std::erase_if(track.samples, [&](const PoseSample& s) { return !poses.contains(s.frame); });
+  return all;
+}
+
+using Errors = std::map<TagId, TypicalError>;  // of every marker
+
+Errors typical_errors(const Calibration& calibration) {
+  struct Lengths {
+    std::vector<double> px;
+    std::vector<double> m;
+    std::vector<double> rad;
+  };
+  std::map<TagId, Lengths> lengths;
+  for (const SightingResidual& residual : calibration.residuals) {
+    Lengths& of = lengths[residual.id];
+    if (calibration.kind == MeasurementKind::kCorners) {
+      double sum = 0.0;
+      for (const Eigen::Vector2d& r : residual.corners_px) sum += r.squaredNorm();
+      if (!residual.corners_px.empty())
+        of.px.push_back(std::sqrt(sum / static_cast<double>(residual.corners_px.size())));
+      continue;
+    }
+    of.m.push_back(residual.displacement.tail<3>().norm());
+    if (calibration.kind == MeasurementKind::kPose)
+      of.rad.push_back(residual.displacement.head<3>().norm());
+  }
+  Errors out;
+  for (auto& [id, of] : lengths)
+    out[id] = {median(std::move(of.px)), median(std::move(of.m)), median(std::move(of.rad))};
+  return out;
+}
+
+// How much smaller the errors are: geometric mean over the parts there are.
+double ratio(const TypicalError& from, const TypicalError& to) {
+  double sum = 0.0;
+  int parts = 0;
+  for (const auto& [a, b] : std::array<std::pair<double, double>, 3>{
+           {{from.px, to.px}, {from.m, to.m}, {from.rad, to.rad}}}) {
+    if (a <= 0.0) continue;
+    sum += std::log(a / std::max(b, std::numeric_limits<double>::min()));
+    ++parts;
+  }
+  return parts > 0 ? std::exp(sum / parts) : 1.0;
+}
+
+struct Gain {
+  double mean = 1.0;     // geometric, over the markers
+  double largest = 1.0;  // of one marker: a joint moves those beyond it only
+  TagId marker;          // that one
+};
+
+Gain gain(const Errors& from, const Errors& to) {
+  Gain out;
+  double sum = 0.0;
+  for (const auto& [id, error] : from) {
+    const auto at = to.find(id);
+    if (at == to.end()) continue;
+    const double smaller = ratio(error, at->second);
+    sum += std::log(smaller);
+    if (smaller <= out.largest) continue;
+    out.largest = smaller;
+    out.marker = id;
+  }
+  if (!from.empty()) out.mean = std::exp(sum / static_cast<double>(from.size()));
+  return out;
+}
+
+void mend(const NominalFault& fault, KinematicTree& tree) {
+  Joint& joint = tree.joints[static_cast<std::size_t>(fault.joint)];
+  if (fault.axis) joint.axis = *fault.axis;
+  if (fault.exchanged_with) {
+    Joint& other = tree.joints[static_cast<std::size_t>(*fault.exchanged_with)];
+    std::swap(joint.channel, other.channel);
+    std::swap(joint.scale, other.scale);
+    std::swap(joint.offset, other.offset);
+  }
+}
+
+// Against the axis, and along the four directions across it that are nearest to the frame's.
+std::vector<Eigen::Vector3d> other_directions(const Eigen::Vector3d& axis) {
+  std::vector<Eigen::Vector3d> out = {-axis};
+  Eigen::Index along = 0;
+  axis.cwiseAbs().maxCoeff(&along);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (k == along) continue;
+    const Eigen::Vector3d unit = Eigen::Vector3d::Unit(k);
+    const Eigen::Vector3d across = (unit - axis.dot(unit) * axis).normalized();
+    out.push_back(across);
+    out.push_back(-across);
+  }
+  return out;
+}
+
+std::vector<NominalFault> possible_faults(const KinematicTree& tree,
+                                          const std::vector<NominalFault>& known) {
+  std::vector<NominalFault> out;
+  const int joints = static_cast<int>(tree.joints.size());
+  const auto is_open = [&](int j) {
+    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+    return joint.type != JointType::kFixed && !joint.channel.empty() &&
+           std::ranges::none_of(known, [&](const NominalFault& fault) {
+             return fault.joint == j || fault.exchanged_with == j;
+           });
+  };
+  for (int j = 0; j < joints; ++j) {
+    if (!is_open(j)) continue;
+    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+    for (const Eigen::Vector3d& axis : other_directions(joint.axis))
+      out.push_back({.joint = j, .axis = axis});
+    for (int k = j + 1; k < joints; ++k) {
+      if (is_open(k) && tree.joints[static_cast<std::size_t>(k)].type == joint.type)
+        out.push_back({.joint = j, .exchanged_with = k});
+    }
+  }
+  return out;
+}
+
+CalibrateOptions quick_options() {
+  CalibrateOptions options;
+  options.free = FreeGeometry::kGeometry;  // whose prior bears a joint without a marker
+  options.estimate_time_offset = false;
+  options.folds = 0;
+  options.max_iterations = 30;
+  return options;
+}
+
+struct Trial {
+  CalibrationStart start;
+  Errors errors;
+};
+
+}  // namespace
+
+CheckedNominal check_nominal(const KinematicTree& nominal,
+                             const std::function<CalibrationStart(const KinematicTree&)>& place,
+                             const Measurements& measurements, const MarkerSet& markers,
+                             const JointLog& log) {
+  const Measurements few = few_of(measurements);
+  const CalibrateOptions options = quick_options();
+  const auto try_out = [&](const std::vector<NominalFault>& faults) -> std::optional<Trial> {
+    KinematicTree tree = nominal;
+    for (const NominalFault& fault : faults) mend(fault, tree);
+    try {
+      Trial trial{place(tree), {}};
+      trial.errors = typical_errors(calibrate(few, markers, log, trial.start, options));
+      return trial;
+    } catch (const Error&) {  // cannot be placed: no answer
+      return std::nullopt;
+    }
+  };
+  std::vector<NominalFault> faults;
+  std::optional<Trial> now = try_out(faults);
+  if (!now) return {place(nominal), {}};
+  // Beside another fault the first one found may help little.
+  while (faults.size() < kMostFaults) {
+    std::optional<NominalFault> best;
+    std::optional<Trial> best_trial;
+    for (const NominalFault& fault : possible_faults(nominal, faults)) {
+      std::vector<NominalFault> more = faults;
+      more.push_back(fault);
+      std::optional<Trial> trial = try_out(more);
+      if (!trial || gain((best_trial ? *best_trial : *now).errors, trial->errors).mean <= 1.0)
+        continue;
+      best = fault;
+      best_trial = std::move(trial);
+    }
+    if (!best) break;
+    const Gain won = gain(now->errors, best_trial->errors);
+    if (won.mean < kNoticeable && won.largest < kBetter) break;
+    faults.push_back(*best);
+    now = std::move(best_trial);
+  }
+  // With all in, each must be worth it.
+  for (std::size_t i = faults.size(); i-- > 0;) {
+    std::vector<NominalFault> others = faults;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    std::optional<Trial> without = try_out(others);
+    if (!without) continue;
+    const Gain won = gain(without->errors, now->errors);
+    if (won.largest >= kBetter) {
+      faults[i].marker = won.marker;
+      faults[i].before = without->errors.at(won.marker);
+      faults[i].after = now->errors.at(won.marker);
+      continue;
+    }
+    faults = std::move(others);
+    now = std::move(without);
+  }
+  return {std::move(now->start), std::move(faults)};
+}
+
+}  // namespace kinescope

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope run --nominal` with a drawing that is grossly wrong.
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "kinematics/core/file.h"
+#include "kinematics/urdf/urdf.h"
+#include "tests/app/commands/poses_of_arm.h"
+#include "tests/app/commands/program.h"
+#include "tests/app/io/check_products.h"
+
+namespace kinescope {
+namespace {
+
+TEST(RunNominal, AnAxisDrawnTheWrongWayRoundIsNamedAndMended) {
+  const RecordingFolder folder;
+  write_poses(arm("nominal the wrong way round", {}).recording, folder);
+  const std::filesystem::path found = folder.path() / "found";
+  ASSERT_EQ(run({"run", folder.path().string(), "--output", found.string(), "--quiet"}).code, 0);
+  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  drawing.markers.clear();
+  std::size_t turned = 0;
+  while (drawing.joints.at(turned).type == JointType::kFixed) ++turned;
+  const Eigen::Vector3d axis = drawing.joints[turned].axis;
+  drawing.joints[turned].axis = -axis;
+  folder.write("drawing.urdf", write_urdf(drawing));
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", out.string(), "--quiet", "--nominal",
+           (folder.path() / "drawing.urdf").string(), "--free", "geometry"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("of the nominal robot moves about"), std::string::npos) << outcome.out;
+  const nlohmann::json result = nlohmann::json::parse(read_text_file(out / "result.json"));
+  ASSERT_EQ(result.at("nominal_faults").size(), 1U);
+  EXPECT_EQ(result["nominal_faults"][0]["joint"], drawing.joints[turned].name);
+  const KinematicTree mended = read_urdf(out / "robot.urdf");
+  const auto joint = mended.joint(drawing.joints[turned].name);
+  ASSERT_TRUE(joint);
+  EXPECT_GT(mended.joints[joint->index()].axis.dot(axis), 0.99);
+  const ProductCheck check = check_products(out);
+  if (!check.done) GTEST_SKIP() << "the files' schemas were not checked: " << check.words;
+  EXPECT_TRUE(check.passed) << check.words;
+}
+
+}  // namespace
+}  // namespace kinescope
