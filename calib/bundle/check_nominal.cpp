@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kFrames = 40;  // of the recording, spread evenly
 constexpr std::size_t kMostFaults = 4;
-constexpr double kNoticeable = 1.05;
-constexpr double kBetter = 2.0;  // the typical error is divided by this, at least
+constexpr double kNoticeable = 1.05;  // enough to look for the next one beside it
+constexpr double kBetter = 2.0;       // the typical error is divided by this, at least
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;

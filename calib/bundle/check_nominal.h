@@ -4,7 +4,7 @@
 // Gives   what of the drawing is grossly wrong: axes that point elsewhere, channels exchanged; and
 //         the drawing without that.
 // Method  every joint is tried with each of the other five directions of its frame, and every two
-//         channels are exchanged; the markers are placed anew and the zeros fitted on few frames.
+//         channels are exchanged; the markers are placed anew and the robot fitted on few frames.
 //         The best is taken, then the best beside it, until nothing helps; what does not cut the
 //         typical error of any marker by half, with all the others in, is left out again.
 // Why     a fit with a prior cannot leave a wrong axis, a robust loss hides it, and tracing names

@@ -257,6 +257,7 @@ CameraEffect curved_slider(const Suspect& s) {
                              {"stretch by the guide's place", ""}},
                             "1/m");
   out.candidate.size_weights[2] = 0.0;
+  out.candidate.contains = {{"encoder_scale", s.name}};
   out.candidate.check = "straightness of the guide, supports of the rail";
   out.candidate.record = fmt::format("move {} over its whole length", s.name);
   out.corrections = [s](double) {

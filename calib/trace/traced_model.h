@@ -68,6 +68,9 @@ struct Candidate {
   /// Effects that this one refines: it waits while one of them helps, and gives way to one that
   /// says as much (friction before a friction curve; Chipman 1996, heredity).
   std::vector<EffectId> refines;
+  /// Effects that are special cases of this one, which therefore is no rival of theirs: what it
+  /// says beyond them the search would have found.
+  std::vector<EffectId> contains;
   std::vector<EffectParameter> parameters;
   /// The size that is reported is the parameter itself where there is one, else
   /// sqrt(sum of weight x parameter^2), in `size_unit`.

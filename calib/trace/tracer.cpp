@@ -29,6 +29,10 @@ bool refines(const Candidate& candidate, const EffectId& id) {
   return std::ranges::find(candidate.refines, id) != candidate.refines.end();
 }
 
+bool contains(const Candidate& candidate, const EffectId& id) {
+  return std::ranges::find(candidate.contains, id) != candidate.contains.end();
+}
+
 std::string name_of(const EffectId& id) { return fmt::format("{} at {}", id.effect, id.place); }
 
 }  // namespace
@@ -313,15 +317,14 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
   std::vector<TestedMember> rivals;
   const double least_gain = kRivalShare * own.score.gain;
   for (TestedMember& member : test_family(without.system, without.fit.candidates, least_gain)) {
-    const EffectId& id = without.fit.candidates[member.index].id;
-    const bool in_model =
-        std::ranges::any_of(now_->added, [&](const AddedEffect& added) { return added.id == id; });
-    if (in_model || removed_.contains(id) || member.p_value > level_) continue;
-    if (!is_possible(without.fit.candidates[member.index], member.score.theta)) continue;
-    const double floor = std::max(options_.floor, without.fit.candidates[member.index].floor);
-    if (member.score.rms < floor) continue;
+    const Candidate& candidate = without.fit.candidates[member.index];
+    const bool in_model = std::ranges::any_of(
+        now_->added, [&](const AddedEffect& added) { return added.id == candidate.id; });
+    if (in_model || removed_.contains(candidate.id) || member.p_value > level_) continue;
+    if (!is_possible(candidate, member.score.theta)) continue;
+    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
     // What it says beyond the effect, the forward search would have found.
-    if (refines(without.fit.candidates[member.index], effect.id)) continue;
+    if (refines(candidate, effect.id) || contains(candidate, effect.id)) continue;
     if (member.score.gain < least_gain) continue;
     rivals.push_back(std::move(member));
   }

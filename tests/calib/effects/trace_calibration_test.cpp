@@ -107,6 +107,19 @@ INSTANTIATE_TEST_SUITE_P(TraceCalibration, Named,
                                            std::pair{"clock_drift", "clock"}),
                          [](const auto& tested) { return tested.param.first; });
 
+// A curve beside a joint's frame stretches the way, too: it contains the scale and is no rival.
+TEST(TraceCalibration, ASlidesScaleStandsAlone) {
+  EffectWorldOptions options = filmed();
+  options.kind = truth::RobotKind::kGantry;
+  InjectedEffect scale = truth::weakest_effects("encoder_scale", truth::robot_of(options)).at(0);
+  scale.size *= 10.0;
+  options.effects = {scale};
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"encoder_scale", scale.place})) << answer(trace);
+}
+
 TEST(TraceCalibration, ACleanWorldIsClean) {
   const Trace& trace = clean_trace().trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
