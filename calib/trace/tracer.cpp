@@ -18,6 +18,10 @@ namespace {
 // A rival is looked at if it explains at least this share of what the chosen effect explains.
 constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
+// What is less than this share of the squares that were there at first may be the imperfection of
+// the other effects: with all of them in it must be beyond doubt.
+constexpr double kImperfection = 1e-5;
+constexpr double kBeyondDoubt = 1e-4;  // of the level
 // Held-out losses further apart than this (Student's t of the stretches) need no refit to compare.
 constexpr double kClearlyWorse = 3.0;
 
@@ -276,9 +280,11 @@ bool Tracer::check(std::size_t index) {
   // What clearly helps to predict stays, however few stretches judge its parameters.
   const bool needed = paired_t(now_->system.partition(), stage->held_out.whitened,
                                now_->held_out.whitened) > kClearlyWorse;
+  const bool slight = now_->added.size() > 1 && detail.explained < kImperfection;
+  const bool shown =
+      slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
   const bool possible = is_possible(*candidate, now_->fit.values[index]);
-  if (!possible || (own.p_value > level_ && !needed) ||
-      stage->held_out_sum() < now_->held_out_sum()) {
+  if (!possible || !shown || stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = stage_of(kinescope::trace::without(now_->added, index));

@@ -291,6 +291,11 @@ class World {
   Eigen::VectorXd measured(double t_s) {
     const Eigen::VectorXd now = physical(t_s);
     Eigen::VectorXd out = now;
+    // What is late is what the sensor's gain and cross-talk then bear on.
+    for (const TrueEffect& effect : effects_) {
+      if (effect.effect == "torque_delay")
+        out[effect.joint] = physical(t_s - effect.strength)[effect.joint];
+    }
     for (const TrueEffect& effect : effects_) {
       const Eigen::Index j = effect.joint;
       if (effect.effect == "torque_gain") out[j] *= 1.0 + effect.strength;
@@ -298,7 +303,6 @@ class World {
         out[j] +=
             effect.strength * scales_.torque[j] / scales_.torque[effect.other] * now[effect.other];
       }
-      if (effect.effect == "torque_delay") out[j] = physical(t_s - effect.strength)[j];
     }
     return out;
   }
