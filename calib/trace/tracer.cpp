@@ -22,6 +22,9 @@ constexpr std::size_t kMostRivals = 6;
 // the other effects: with all of them in it must be beyond doubt.
 constexpr double kImperfection = 1e-5;
 constexpr double kBeyondDoubt = 1e-4;  // of the level
+// Effects that may be hidden by another one: p-values up to this, so many of them.
+constexpr double kHint = 0.2;
+constexpr std::size_t kMostHints = 3;
 // Held-out losses further apart than this (Student's t of the stretches) need no refit to compare.
 constexpr double kClearlyWorse = 3.0;
 
@@ -100,13 +103,52 @@ void Tracer::forward() {
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
     StagePtr next = refit_best(contenders(*now_, family), round_);
+    if (!next) next = look_ahead(family);
     if (!next) return;
+    const std::size_t before = now_->added.size();
     now_ = std::move(next);
-    const EffectId& id = now_->added.back().id;
-    mark(round_, id, CandidateState::kAccepted, now_->error.value);
-    add_step(round_, fmt::format("{} added", name_of(id)), *now_);
-    search_again(id.place);
+    for (std::size_t i = before; i < now_->added.size(); ++i) {
+      const EffectId& id = now_->added[i].id;
+      mark(round_, id, CandidateState::kAccepted, now_->error.value);
+      add_step(round_, fmt::format("{} added", name_of(id)), *now_);
+    }
+    search_again(now_->added.back().id.place);
   }
+}
+
+// Two effects may hide each other: what the other does is noise to each, and it lasts. The
+// likeliest are tried as if they were shown; both must be, once both are in.
+StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
+  const StagePtr now = now_;
+  std::vector<const TestedMember*> hints;
+  for (const TestedMember& member : family) {
+    const Candidate& candidate = now->fit.candidates[member.index];
+    if (member.score.hidden() || member.p_value > kHint || removed_.contains(candidate.id))
+      continue;
+    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
+    if (is_possible(candidate, member.score.theta)) hints.push_back(&member);
+  }
+  std::ranges::stable_sort(hints, std::greater{},
+                           [](const TestedMember* hint) { return hint->score.gain; });
+  if (hints.size() > kMostHints) hints.resize(kMostHints);
+  StagePtr best;
+  for (const TestedMember* hint : hints) {
+    std::vector<AddedEffect> effects = now->added;
+    effects.push_back({now->fit.candidates[hint->index].id, hint->scan});
+    now_ = stage_of(effects);
+    StagePtr both;
+    if (now_->fit.converged)
+      both = refit_best(contenders(*now_, test_family(now_->system, now_->fit.candidates)), round_);
+    now_ = now;
+    if (!both || (best && both->held_out_sum() >= best->held_out_sum())) continue;
+    const StagePtr second = stage_of(kinescope::trace::without(both->added, now->added.size()));
+    const Candidate* first = find_candidate(second->fit, effects.back().id);
+    if (first == nullptr || !is_possible(*first, both->fit.values[now->added.size()])) continue;
+    const Score shown = jackknife_test(second->system, first->columns(hint->scan));
+    if (shown.p_value * number_of_tests(second->fit.candidates, *first) > level_) continue;
+    if (second->held_out_sum() > both->held_out_sum()) best = std::move(both);
+  }
+  return best;
 }
 
 // The value of a scan was the best beside the effects that were known then. Everywhere, or at one

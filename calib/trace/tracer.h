@@ -36,6 +36,7 @@ class Tracer {
   [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
+  [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
   void search_again(const std::optional<std::string>& place);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
