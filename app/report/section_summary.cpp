@@ -24,6 +24,10 @@ std::string light(std::string_view subject, std::string_view css_class, std::str
 }
 
 std::string structure_light(const RunSummary& run) {
+  if (!run.nominal_faults.empty()) {
+    return light("Structure", "fair", "given and mended",
+                 "what the nominal robot declares did not fit; see below what was taken instead");
+  }
   if (!run.structure) {
     return light("Structure", "good", "given",
                  "the nominal robot declares it; nothing was decided");

@@ -163,7 +163,8 @@ std::string prediction_words(const RunSummary& run) {
     return "No error can be given: nothing was fitted.";
   }
   if (run.nominal && !before.empty()) {
-    text += fmt::format("; with the nominal robot it was {}", before);
+    text += fmt::format("; with the nominal robot{} it was {}",
+                        run.nominal_faults.empty() ? "" : ", so mended,", before);
   }
   return text + ".";
 }

@@ -95,6 +95,8 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
                   "Q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
                   "(typical error of tag_4 in a first fit 20.0 mm → 1.00 mm)."))
       << verdict.found;
+  EXPECT_TRUE(has(verdict.accurate, "with the nominal robot, so mended, it was"))
+      << verdict.accurate;
   EXPECT_TRUE(has(verdict.found, "The channels of q2 and q3 are exchanged; taken so"))
       << verdict.found;
 }
