@@ -123,10 +123,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   std::vector<const TestedMember*> hints;
   for (const TestedMember& member : family) {
     const Candidate& candidate = now->fit.candidates[member.index];
-    if (member.score.hidden() || member.p_value > kHint || removed_.contains(candidate.id))
-      continue;
-    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
-    if (is_possible(candidate, member.score.theta)) hints.push_back(&member);
+    if (member.p_value <= kHint && may_be_added(candidate, member.score)) hints.push_back(&member);
   }
   std::ranges::stable_sort(hints, std::greater{},
                            [](const TestedMember* hint) { return hint->score.gain; });
@@ -175,16 +172,18 @@ void Tracer::search_again(const std::optional<std::string>& place) {
   }
 }
 
+bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {
+  return !score.hidden() && score.rms >= std::max(options_.floor, candidate.floor) &&
+         !removed_.contains(candidate.id) && is_possible(candidate, score.theta);
+}
+
 std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
                                                   const std::vector<TestedMember>& family) const {
   std::vector<Contender> out;
   for (const TestedMember& member : family) {
     const Candidate& candidate = stage.fit.candidates[member.index];
-    if (member.score.hidden() || member.p_value > level_) continue;
-    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
+    if (member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
     const EffectId& id = candidate.id;
-    if (removed_.contains(id)) continue;
-    if (!is_possible(candidate, member.score.theta)) continue;
     const Score confirmed = jackknife_test(stage.system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;
     out.push_back({member, id, held_out_cells(stage.system, member.columns)});
@@ -368,9 +367,7 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const Candidate& candidate = without.fit.candidates[member.index];
     const bool in_model = std::ranges::any_of(
         now_->added, [&](const AddedEffect& added) { return added.id == candidate.id; });
-    if (in_model || removed_.contains(candidate.id) || member.p_value > level_) continue;
-    if (!is_possible(candidate, member.score.theta)) continue;
-    if (member.score.rms < std::max(options_.floor, candidate.floor)) continue;
+    if (in_model || member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
     // What it says beyond the effect, the forward search would have found.
     if (refines(candidate, effect.id) || contains(candidate, effect.id)) continue;
     if (member.score.gain < least_gain) continue;

@@ -33,6 +33,8 @@ class Tracer {
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_say(const Stage& stage);
   void forward();
+  /// Seen at all, large enough, possible, and not taken out before; significance apart.
+  [[nodiscard]] bool may_be_added(const Candidate& candidate, const Score& score) const;
   [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
