@@ -14,6 +14,7 @@
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/rotation_between.h"
 
 namespace kinescope {
 namespace {
@@ -100,8 +101,7 @@ Pose base_frame(const KinematicTree& tree, const std::optional<Eigen::Vector3d>&
   if (gravity) {
     const Eigen::Vector3d up = -gravity->normalized();
     const Eigen::Vector3d z = T_camera_base.rotation * Eigen::Vector3d::UnitZ();
-    T_camera_base.rotation =
-        (Eigen::Quaterniond::FromTwoVectors(z, up) * T_camera_base.rotation).normalized();
+    T_camera_base.rotation = (rotation_between(z, up) * T_camera_base.rotation).normalized();
   }
   return T_camera_base;
 }

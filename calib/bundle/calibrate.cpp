@@ -13,6 +13,7 @@
 #include "calib/bundle/read_back.h"
 #include "calib/bundle/solve.h"
 #include "calib/bundle/uncertainty.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -42,9 +43,9 @@ std::optional<Prediction> predict_residual(const Spec& spec, const State& state,
     out.displacement.tail<3>() = error->residual * sighting.sigma;
     return out;
   }
-  out.displacement = -(error->d_marker.transpose() * error->d_marker)
-                          .ldlt()
-                          .solve(error->d_marker.transpose() * error->residual);
+  const Matrix6d normal = error->d_marker.transpose() * error->d_marker;
+  const Vector6d right = error->d_marker.transpose() * error->residual;
+  out.displacement = -solve_symmetric(normal, right);
   if (sighting.kind == MeasurementKind::kCorners) {
     const Eigen::Matrix3d R = bundle::predict(spec, state, readings, sighting).matrix3();
     out.displacement.head<3>() = R * out.displacement.head<3>();

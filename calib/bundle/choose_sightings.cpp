@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Cholesky>
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -57,7 +57,9 @@ double lasting_bend(const std::vector<SightingError>& errors) {
   for (const SightingError& error : errors) {
     if (error.residual.size() != rows) continue;
     const Eigen::Matrix<double, Eigen::Dynamic, 6>& J = error.d_marker;
-    sum += error.residual - J * (J.transpose() * J).ldlt().solve(J.transpose() * error.residual);
+    const Matrix6d normal = J.transpose() * J;
+    const Vector6d right = J.transpose() * error.residual;
+    sum += error.residual - J * solve_symmetric(normal, right);
   }
   const double freedom = std::max(1.0, static_cast<double>(rows) - 6.0);
   return sum.norm() / static_cast<double>(errors.size()) / std::sqrt(freedom);

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include <Eigen/Cholesky>
 #include <ceres/crs_matrix.h>
 
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::bundle {
@@ -48,9 +48,9 @@ void eliminate(FrameRows& rows, const Eigen::MatrixXd& local) {
   if (local.cols() == 0) return;
   Eigen::MatrixXd normal = local.transpose() * local;
   normal.diagonal().array() += 1e-12 * (normal.diagonal().maxCoeff() + 1e-300);
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  rows.J -= local * factor.solve(local.transpose() * rows.J);
-  rows.r -= local * factor.solve(local.transpose() * rows.r);
+  const LdltFactor factor(normal);
+  rows.J -= local * factor.solve(Eigen::MatrixXd(local.transpose() * rows.J));
+  rows.r -= local * factor.solve(Eigen::VectorXd(local.transpose() * rows.r));
 }
 
 }  // namespace

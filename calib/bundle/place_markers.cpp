@@ -6,9 +6,10 @@
 #include <limits>
 #include <map>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -35,17 +36,18 @@ std::optional<std::vector<Pose>> links_at(const KinematicTree& tree,
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0.0) u.col(2) *= -1.0;
-  return u * svd.matrixV().transpose();
+  const SingularValues svd = singular_value_decomposition(m);
+  const Eigen::Matrix3d V = svd.V;
+  Eigen::Matrix3d U = svd.U;
+  if ((U * V.transpose()).determinant() < 0.0) U.col(2) *= -1.0;
+  return U * V.transpose();
 }
 
 // T_camera_marker = T_camera_base T_base_link T_link_marker for all pairs. Shah 2013, section 3:
 // the two rotations are the first singular vectors of sum R_link (x) R_camera_marker.
 std::optional<HandEye> hand_eye(const std::vector<PosePair>& pairs) {
   if (pairs.size() < 3) return std::nullopt;
-  Eigen::Matrix<double, 9, 9> K = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(9, 9);
   for (const PosePair& pair : pairs) {
     const Eigen::Matrix3d A = pair.T_base_link.matrix3();
     const Eigen::Matrix3d B = pair.T_camera_marker.matrix3();
@@ -53,16 +55,15 @@ std::optional<HandEye> hand_eye(const std::vector<PosePair>& pairs) {
       for (int j = 0; j < 3; ++j) K.block<3, 3>(3 * i, 3 * j) += A(i, j) * B;
     }
   }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 9, 9>> svd(
-      K, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const auto as_matrix = [](const Eigen::Matrix<double, 9, 1>& v) {
+  const SingularValues svd = singular_value_decomposition(K);
+  const auto as_matrix = [](const Eigen::VectorXd& v) {
     const Eigen::Matrix3d m = Eigen::Map<const Eigen::Matrix3d>(v.data());
     return nearest_rotation(m.determinant() < 0.0 ? Eigen::Matrix3d(-m) : m);
   };
   HandEye out;
-  const Eigen::Matrix3d R_camera_base = as_matrix(svd.matrixU().col(0));
+  const Eigen::Matrix3d R_camera_base = as_matrix(svd.U.col(0));
   // V holds R_marker_link.
-  const Eigen::Matrix3d R_link_marker = as_matrix(svd.matrixV().col(0)).transpose();
+  const Eigen::Matrix3d R_link_marker = as_matrix(svd.V.col(0)).transpose();
   Matrix6d normal = Matrix6d::Zero();
   Vector6d right = Vector6d::Zero();
   for (const PosePair& pair : pairs) {
@@ -73,7 +74,7 @@ std::optional<HandEye> hand_eye(const std::vector<PosePair>& pairs) {
              (pair.T_camera_marker.translation - R_camera_base * pair.T_base_link.translation);
   }
   normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
-  const Vector6d t = normal.ldlt().solve(right);
+  const Vector6d t = solve_symmetric(normal, right);
   out.T_camera_base = {Eigen::Quaterniond(R_camera_base).normalized(), t.head<3>()};
   out.T_link_marker = {Eigen::Quaterniond(R_link_marker).normalized(), t.tail<3>()};
   double sum_m = 0.0;
@@ -199,11 +200,12 @@ std::pair<Eigen::Vector3d, double> point_in_targets(const std::vector<PointPair>
     A.block<3, 3>(row, targets[pairs[i].observation->target]) = -Eigen::Matrix3d::Identity();
     b.segment<3>(row) = -pairs[i].T_base_link.translation;
   }
-  const Eigen::VectorXd solution = A.completeOrthogonalDecomposition().solve(b);
+  const Eigen::VectorXd solution = shortest_least_squares(A, b);
   return {solution.head<3>(),
           std::sqrt((A * solution - b).squaredNorm() / static_cast<double>(pairs.size()))};
 }
 
+// Umeyama 1991, eqs. 40 to 42, without scale.
 Pose absolute_orientation(const std::vector<PointPair>& pairs, const Eigen::Vector3d& point) {
   Eigen::Matrix3Xd from(3, static_cast<Eigen::Index>(pairs.size()));
   Eigen::Matrix3Xd to(3, from.cols());
@@ -211,7 +213,12 @@ Pose absolute_orientation(const std::vector<PointPair>& pairs, const Eigen::Vect
     from.col(static_cast<Eigen::Index>(i)) = pairs[i].T_base_link * point;
     to.col(static_cast<Eigen::Index>(i)) = *pairs[i].observation->position_m;
   }
-  return pose_from_matrix(Eigen::umeyama(from, to, false));
+  const Eigen::Vector3d from_mean = from.rowwise().mean();
+  const Eigen::Vector3d to_mean = to.rowwise().mean();
+  const Eigen::Matrix3d R =
+      nearest_rotation((to.colwise() - to_mean) * (from.colwise() - from_mean).transpose() /
+                       static_cast<double>(pairs.size()));
+  return {Eigen::Quaterniond(R).normalized(), to_mean - R * from_mean};
 }
 
 struct PointFit {
@@ -232,8 +239,8 @@ double point_rms(const PointFit& fit, const std::vector<PointPair>& pairs) {
 
 // One step of Levenberg and Marquardt on the base's pose and the point together.
 PointFit step(const PointFit& fit, const std::vector<PointPair>& pairs, double damping) {
-  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-  Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(9, 9);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(9);
   const Eigen::Matrix3d R = fit.T_camera_base.matrix3();
   for (const PointPair& pair : pairs) {
     const Eigen::Vector3d p_base = pair.T_base_link * fit.point;
@@ -244,7 +251,7 @@ PointFit step(const PointFit& fit, const std::vector<PointPair>& pairs, double d
     right += J.transpose() * missing;
   }
   normal.diagonal() *= 1.0 + damping;
-  const Eigen::Matrix<double, 9, 1> d = normal.ldlt().solve(right);
+  const Eigen::VectorXd d = solve_symmetric(normal, right);
   return {fit.T_camera_base * exp_pose(d.head<6>()), fit.point + d.tail<3>(), 0.0};
 }
 

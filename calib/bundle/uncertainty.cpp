@@ -5,10 +5,10 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "calib/bundle/linearise.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -81,19 +81,18 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
                         std::vector<bool>& unseen) {
   const Eigen::Index n = data.rows();
   const Eigen::VectorXd scale = data.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * data *
-                                                             scale.asDiagonal());
-  const double largest = std::sqrt(std::max(eigen.eigenvalues()[n - 1], 1e-300));
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * data * scale.asDiagonal());
+  const double largest = std::sqrt(std::max(eigen.values[n - 1], 1e-300));
   for (Eigen::Index k = n; k-- > 0;) {
-    out.singular_values.push_back(std::sqrt(std::max(eigen.eigenvalues()[k], 0.0)));
+    out.singular_values.push_back(std::sqrt(std::max(eigen.values[k], 0.0)));
   }
   out.condition_number = largest / std::max(out.singular_values.back(), 1e-300);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const double relative = std::sqrt(std::max(eigen.eigenvalues()[k], 0.0)) / largest;
+    const double relative = std::sqrt(std::max(eigen.values[k], 0.0)) / largest;
     if (relative > kWeak) break;
     WeakDirection weak{relative, {}, {}};
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double weight = eigen.eigenvectors()(i, k);
+      const double weight = eigen.vectors(i, k);
       if (std::abs(weight) > 0.2) weak.parameters.emplace_back(static_cast<int>(i), weight);
       if (relative < kUnseen && std::abs(weight) > 1e-3) unseen[static_cast<std::size_t>(i)] = true;
     }
@@ -104,15 +103,15 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
     out.weak.push_back(std::move(weak));
   }
   const Eigen::VectorXd total_scale = total.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> full(total_scale.asDiagonal() * total *
-                                                            total_scale.asDiagonal());
+  const SymmetricEigen full =
+      symmetric_eigen(total_scale.asDiagonal() * total * total_scale.asDiagonal());
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(n);
-  const double floor = kUnseen * kUnseen * full.eigenvalues()[n - 1];
+  const double floor = kUnseen * kUnseen * full.values[n - 1];
   for (Eigen::Index k = 0; k < n; ++k) {
-    if (full.eigenvalues()[k] > floor) inverse[k] = 1.0 / full.eigenvalues()[k];
+    if (full.values[k] > floor) inverse[k] = 1.0 / full.values[k];
   }
-  return total_scale.asDiagonal() * full.eigenvectors() * inverse.asDiagonal() *
-         full.eigenvectors().transpose() * total_scale.asDiagonal();
+  return total_scale.asDiagonal() * full.vectors * inverse.asDiagonal() * full.vectors.transpose() *
+         total_scale.asDiagonal();
 }
 
 }  // namespace

@@ -6,11 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "calib/trace/distribution.h"
 #include "calib/trace/own_space.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 namespace {
@@ -110,15 +108,15 @@ struct Smoothness {
 
 Smoothness diagonalise(const FieldGrid& grid, const Evidence& evidence, double length) {
   const Eigen::Index n = grid.nodes.rows();
-  const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(grid.correlation(length)).matrixL();
+  const Eigen::MatrixXd factor = CholeskyFactor(grid.correlation(length)).lower();
   Eigen::MatrixXd L = Eigen::MatrixXd::Zero(2 * n, 2 * n);
   L.topLeftCorner(n, n) = factor;
   L.bottomRightCorner(n, n) = factor;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(L.transpose() * evidence.S * L);
+  const SymmetricEigen eigen = symmetric_eigen(L.transpose() * evidence.S * L);
   Smoothness out;
   out.length = length;
-  out.directions = L * eigen.eigenvectors();
-  out.shown = eigen.eigenvalues().cwiseMax(0.0);
+  out.directions = L * eigen.vectors;
+  out.shown = eigen.values.cwiseMax(0.0);
   out.score = out.directions.transpose() * evidence.score;
   return out;
 }
@@ -263,8 +261,8 @@ double p_value_of(const NormalSystem& system, const FieldGrid& grid, const Evide
         agreement(s, t) = 0.0;
       }
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(agreement, Eigen::EigenvaluesOnly);
-    best = std::min(best, quadratic_form_survival(agreement.sum(), eigen.eigenvalues()));
+    best =
+        std::min(best, quadratic_form_survival(agreement.sum(), symmetric_eigenvalues(agreement)));
     tests += 1.0;
   }
   return std::min(1.0, best * tests);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/trace/normal_equations.h"
 
-#include <Eigen/Cholesky>
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 
@@ -49,7 +49,7 @@ Eigen::VectorXd solve_without(const NormalEquations& total, const NormalEquation
   Eigen::MatrixXd H = scale.asDiagonal() * (total.H - part.H) * scale.asDiagonal();
   H.diagonal().array() += kRidge;
   const Eigen::VectorXd g = scale.asDiagonal() * (total.g - part.g);
-  return scale.asDiagonal() * H.ldlt().solve(g);
+  return scale.asDiagonal() * solve_symmetric(H, g);
 }
 
 }  // namespace kinescope::trace

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::trace {
@@ -24,13 +23,12 @@ Eigen::MatrixXd scaled_pseudo_inverse(const Eigen::MatrixXd& matrix, double floo
   const Eigen::Index n = matrix.rows();
   if (n == 0) return matrix;
   const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * matrix *
-                                                             scale.asDiagonal());
-  const double least = floor * std::max(eigen.eigenvalues()[n - 1], 1e-300);
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
+  const double least = floor * std::max(eigen.values[n - 1], 1e-300);
   const Eigen::VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([&](double v) { return v > least ? 1.0 / v : 0.0; });
-  return scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
-         eigen.eigenvectors().transpose() * scale.asDiagonal();
+      eigen.values.unaryExpr([&](double v) { return v > least ? 1.0 / v : 0.0; });
+  return scale.asDiagonal() * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() *
+         scale.asDiagonal();
 }
 
 NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)

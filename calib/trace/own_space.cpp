@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include <Eigen/Eigenvalues>
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 
@@ -15,18 +15,17 @@ OwnSpace::OwnSpace(const NormalSystem& system) {
   Eigen::MatrixXd H = system.total().H;
   if (linear.prior.size() > 0) H += linear.prior;
   const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
-                                                             scale.asDiagonal());
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  const Eigen::VectorXd& values = eigen.values;
   const Eigen::Index n = values.size();
   const double least = n == 0 ? 0.0 : kUnseen * std::max(values[n - 1], 1e-300);
   const auto shown = static_cast<Eigen::Index>((values.array() > least).count());
-  const Eigen::MatrixXd directions = scale.asDiagonal() * eigen.eigenvectors().rightCols(shown) *
+  const Eigen::MatrixXd directions = scale.asDiagonal() * eigen.vectors.rightCols(shown) *
                                      values.tail(shown).cwiseSqrt().cwiseInverse().asDiagonal();
   basis_ = linear.jacobian * directions;
   Eigen::MatrixXd products = basis_.transpose() * basis_;
   if (linear.prior.size() > 0) products += directions.transpose() * linear.prior * directions;
-  factor_.compute(products);
+  factor_ = CholeskyFactor(products);
 }
 
 }  // namespace kinescope::trace

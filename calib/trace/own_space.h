@@ -5,9 +5,8 @@
 // show come out of it wrong by as much as they are large.
 #pragma once
 
-#include <Eigen/Cholesky>
-
 #include "calib/trace/normal_system.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 
@@ -24,7 +23,7 @@ class OwnSpace {
 
  private:
   Eigen::MatrixXd basis_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
+  CholeskyFactor factor_;
 };
 
 }  // namespace kinescope::trace

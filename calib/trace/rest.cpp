@@ -6,9 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
 #include "calib/trace/score_test.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 namespace {
@@ -104,23 +103,22 @@ struct Posterior {
 // Rasmussen and Williams 2006, eq. 2.30, in the space of the knots' values.
 Posterior posterior(const Evidence& evidence, const Eigen::MatrixXd& K) {
   const Eigen::Index n = K.rows();
-  const Eigen::LLT<Eigen::MatrixXd> factor(K);
+  const CholeskyFactor factor(K);
   Posterior out;
-  if (factor.info() != Eigen::Success) return out;
-  const Eigen::MatrixXd L = factor.matrixL();
+  if (!factor.positive_definite()) return out;
+  const Eigen::MatrixXd L = factor.lower();
   // In the space z with theta = L z the prior is white.
   const Eigen::MatrixXd A =
       Eigen::MatrixXd::Identity(n, n) + L.transpose() * evidence.S * L / evidence.noise;
-  const Eigen::LLT<Eigen::MatrixXd> inner(A);
-  if (inner.info() != Eigen::Success) return out;
+  const CholeskyFactor inner(A);
+  if (!inner.positive_definite()) return out;
   const Eigen::VectorXd b = L.transpose() * evidence.score / evidence.noise;
   const Eigen::VectorXd z = inner.solve(b);
-  const double log_determinant =
-      2.0 * Eigen::MatrixXd(inner.matrixL()).diagonal().array().log().sum();
+  const double log_determinant = 2.0 * inner.lower().diagonal().array().log().sum();
   out.log_evidence = 0.5 * b.dot(z) - 0.5 * log_determinant;
   out.mean = L * z;
   out.covariance = L * inner.solve(Eigen::MatrixXd(L.transpose()));
-  out.prior_information = factor.solve(Eigen::MatrixXd::Identity(n, n)) * evidence.noise;
+  out.prior_information = factor.inverse() * evidence.noise;
   return out;
 }
 

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "calib/trace/distribution.h"
 #include "calib/trace/normal_equations.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 namespace {
@@ -24,11 +23,10 @@ constexpr double kFewestStretches = 2.0;
 // The effect's columns combined so that they are of unit length and all shown: E -> E T.
 Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& S) {
   const Eigen::VectorXd scale = sums.EE.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * S *
-                                                             scale.asDiagonal());
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * S * scale.asDiagonal());
   Eigen::Index first = 0;
-  while (first < S.rows() && !(eigen.eigenvalues()[first] > kHidden)) ++first;
-  return scale.asDiagonal() * eigen.eigenvectors().rightCols(S.rows() - first);
+  while (first < S.rows() && !(eigen.values[first] > kHidden)) ++first;
+  return scale.asDiagonal() * eigen.vectors.rightCols(S.rows() - first);
 }
 
 EffectSums combine(const EffectSums& sums, const Eigen::MatrixXd& T) {

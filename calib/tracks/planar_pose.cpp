@@ -6,7 +6,9 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
+
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 namespace {
@@ -27,9 +29,9 @@ std::optional<Eigen::Matrix3d> homography(std::span<const Eigen::Vector2d> plane
     A.row(2 * i) << p.x(), p.y(), 1, 0, 0, 0, -x.x() * p.x(), -x.x() * p.y(), -x.x();
     A.row(2 * i + 1) << 0, 0, 0, p.x(), p.y(), 1, -x.y() * p.x(), -x.y() * p.y(), -x.y();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(A.transpose() * A);
-  if (eigen.eigenvalues()[1] < 1e-12 * eigen.eigenvalues()[8]) return std::nullopt;
-  const Eigen::Matrix<double, 9, 1> h = eigen.eigenvectors().col(0);
+  const SymmetricEigen eigen = symmetric_eigen(A.transpose() * A);
+  if (eigen.values[1] < 1e-12 * eigen.values[8]) return std::nullopt;
+  const Eigen::VectorXd h = eigen.vectors.col(0);
   Eigen::Matrix3d H;
   H << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8];
   if (std::abs(H(2, 2)) < 1e-12 * H.norm()) return std::nullopt;
@@ -48,7 +50,9 @@ std::optional<std::array<Eigen::Matrix3d, 2>> ippe_rotations(const Eigen::Matrix
   const Eigen::Matrix2d B = P * Rv.leftCols<2>();
   if (std::abs(B.determinant()) < 1e-12) return std::nullopt;
   const Eigen::Matrix2d A = B.inverse() * J;
-  const double gamma = A.jacobiSvd().singularValues()[0];
+  // The larger singular value.
+  const double gamma = 0.5 * (std::hypot(A(0, 0) + A(1, 1), A(1, 0) - A(0, 1)) +
+                              std::hypot(A(0, 0) - A(1, 1), A(1, 0) + A(0, 1)));
   if (!(gamma > 0.0)) return std::nullopt;
   const Eigen::Matrix2d R22 = A / gamma;
   const Eigen::Matrix2d rest = Eigen::Matrix2d::Identity() - R22.transpose() * R22;
@@ -76,7 +80,7 @@ Eigen::Vector3d translation_for(const Eigen::Matrix3d& R, std::span<const Eigen:
     normal += A.transpose() * A;
     right -= A.transpose() * A * p;
   }
-  return normal.ldlt().solve(right);
+  return solve_symmetric(normal, right);
 }
 
 struct Linearised {
@@ -114,7 +118,7 @@ std::optional<PlanarBranch> refine(const CameraModel& camera, Pose pose,
   for (int i = 0; i < kMaxIterations; ++i) {
     Matrix6d damped = state->normal;
     damped.diagonal() *= 1.0 + damping;
-    const Vector6d step = damped.ldlt().solve(state->gradient);
+    const Vector6d step = solve_symmetric(damped, state->gradient);
     const Pose candidate = pose * exp_pose(step);
     const auto next = linearise(camera, candidate, points, pixels, sigma_px);
     if (!next || next->chi_square > state->chi_square) {
@@ -128,11 +132,9 @@ std::optional<PlanarBranch> refine(const CameraModel& camera, Pose pose,
     damping = std::max(1e-12, damping * 0.1);
     if (gain < 1e-9 * (1.0 + state->chi_square)) break;
   }
-  const Eigen::LDLT<Matrix6d> factor(state->normal);
-  if (!factor.isPositive()) return std::nullopt;
-  PlanarBranch branch{pose, state->chi_square, factor.solve(Matrix6d::Identity())};
-  if (!branch.covariance.allFinite()) return std::nullopt;
-  return branch;
+  const std::optional<Matrix6d> covariance = inverse_of_positive(state->normal);
+  if (!covariance || !covariance->allFinite()) return std::nullopt;
+  return PlanarBranch{pose, state->chi_square, *covariance};
 }
 
 }  // namespace

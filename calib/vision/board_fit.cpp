@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <opencv2/calib3d.hpp>
+
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 namespace {
@@ -141,7 +141,7 @@ std::optional<ViewFit> fit_from(const CameraModel& camera, const BoardSight& vie
       H += J.transpose() * J;
       g += J.transpose() * (view.pixels[i] - p->pixel);
     }
-    const Vector6d step = H.ldlt().solve(g);
+    const Vector6d step = solve_symmetric(H, g);
     if (!step.allFinite()) return std::nullopt;
     fit.T_camera_board = fit.T_camera_board * exp_pose(step);
     constexpr double kConverged = 1e-12;
@@ -202,7 +202,7 @@ std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
       squared += fits[v].residuals_px[i].squaredNorm();
       measured += 2;
     }
-    S += A - B * C.ldlt().solve(B.transpose());
+    S += A - B * solve_symmetric(Eigen::MatrixXd(C), Eigen::MatrixXd(B.transpose()));
   }
   const Eigen::Index freedom = measured - n - 6 * static_cast<Eigen::Index>(views.size());
   if (freedom <= 0) return std::nullopt;
@@ -211,12 +211,11 @@ std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
   if (!(d.minCoeff() > 0.0)) return std::nullopt;
   const Eigen::VectorXd scale = d.cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const SymmetricEigen eigen = symmetric_eigen(scaled);
   constexpr double kSingular = 1e-11;
-  if (!(eigen.eigenvalues().minCoeff() > kSingular)) return std::nullopt;
-  const Eigen::MatrixXd inverse = eigen.eigenvectors() *
-                                  eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                                  eigen.eigenvectors().transpose();
+  if (!(eigen.values.minCoeff() > kSingular)) return std::nullopt;
+  const Eigen::MatrixXd inverse =
+      eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   return Eigen::MatrixXd(scale.asDiagonal() * inverse * scale.asDiagonal() * squared /
                          static_cast<double>(freedom));
 }

@@ -9,10 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include "calib/vision/edge_model.h"
 #include "calib/vision/marker_edges.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 namespace {
@@ -162,8 +161,8 @@ class Fit {
     const double freedom = system.weight - layout_.size;
     if (!(freedom > 0.25 * kMinPixels)) return false;
     variance_ = std::max(system.cost / freedom, kMinNoise * kMinNoise);
-    solver_.compute(system.H);  // reads the lower triangle
-    if (solver_.info() != Eigen::Success) return false;
+    solver_ = CholeskyFactor(system.H);  // reads the lower triangle
+    if (!solver_.positive_definite()) return false;
     Eigen::VectorXd delta = solver_.solve(system.g);
     if (!delta.allFinite()) return false;
     // No step longer than the model can carry.
@@ -264,7 +263,7 @@ class Fit {
   std::vector<Sample> samples_;
   std::vector<Prediction> predictions_;  // before the last step
   Eigen::VectorXd unknowns_;
-  Eigen::LLT<Eigen::MatrixXd> solver_;
+  CholeskyFactor solver_;
   double noise_ = 0.0;
   double variance_ = 0.0;
   double inside_step_ = 0.5 * kMaxStep;

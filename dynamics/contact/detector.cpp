@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dynamics/contact/hinge.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -103,7 +104,7 @@ void ContactDetector::raise_alarm(int age) {
   const auto back = std::min<std::size_t>(last, static_cast<std::size_t>(age));
   onset_ = record_[last - back];
   mean_torque(onset_, record_[last]);
-  const Eigen::VectorXd direction = covariance_.llt().solve(mean_);
+  const Eigen::VectorXd direction = CholeskyFactor(covariance_).solve(mean_);
   bend_t_.clear();
   bend_y_.clear();
   for (std::size_t k = last - std::min(last, 2 * back + 8); k <= last; ++k) {
@@ -198,7 +199,7 @@ double ContactDetector::end_of_contact() {
   const std::size_t first =
       std::max(last - std::min(last, 3 * window), record_.at_or_before(onset_.stamp_s));
   mean_torque(record_[first], record_[last]);
-  const Eigen::VectorXd direction = covariance_.llt().solve(mean_);
+  const Eigen::VectorXd direction = CholeskyFactor(covariance_).solve(mean_);
   bend_t_.clear();
   bend_y_.clear();
   const double now = record_[last].stamp_s;

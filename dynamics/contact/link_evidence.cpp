@@ -5,8 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -56,9 +55,9 @@ std::vector<char> path_to(Eigen::Index link, Eigen::Index joints, std::span<cons
 /// Whitened in the given order: each entry is cleared of those before.
 Eigen::VectorXd whitened(const Eigen::VectorXd& torque, const Eigen::MatrixXd& covariance,
                          const Eigen::VectorXi& order) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(covariance(order, order));
-  KINESCOPE_CHECK(factor.info() == Eigen::Success, "a positive definite covariance");
-  const Eigen::VectorXd white = factor.matrixL().solve(torque(order));
+  const CholeskyFactor factor(covariance(order, order));
+  KINESCOPE_CHECK(factor.positive_definite(), "a positive definite covariance");
+  const Eigen::VectorXd white = factor.whitened(torque(order));
   Eigen::VectorXd out(torque.size());
   out(order) = white;
   return out;

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -76,7 +75,7 @@ ObserverCalibration calibrate_observer(const std::vector<BalanceSample>& samples
   }
   covariance /= count;
   if (test == ObserverTest::kAllJoints) {
-    calibration.spread = covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+    calibration.spread = CholeskyFactor(covariance).inverse();
   } else {
     calibration.spread = Eigen::MatrixXd(covariance.diagonal().cwiseInverse().asDiagonal());
   }

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
-
 #include "dynamics/data/smoothing_spline.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 namespace {
@@ -67,9 +66,11 @@ double share_of_joint(const Rough& rough, Eigen::Index joint) {
   rest.col(2) = (rough.dq.col(joint).array() / slow).tanh();
   rest.middleCols(3, joints) = rough.q.array().sin();
   rest.rightCols(joints) = rough.q.array().cos();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(rest);
-  const Eigen::VectorXd ddq = rough.ddq.col(joint) - rest * qr.solve(rough.ddq.col(joint));
-  const Eigen::VectorXd torque = rough.torque.col(joint) - rest * qr.solve(rough.torque.col(joint));
+  Eigen::MatrixXd both(n, 2);
+  both << rough.ddq.col(joint), rough.torque.col(joint);
+  const Eigen::MatrixXd fitted = least_squares(rest, both);
+  const Eigen::VectorXd ddq = both.col(0) - rest * fitted.col(0);
+  const Eigen::VectorXd torque = both.col(1) - rest * fitted.col(1);
   const double whole = variance(rough.torque.col(joint));
   if (ddq.squaredNorm() <= 0.0 || whole <= 0.0) return kSmallest;
   const double inertia = ddq.dot(torque) / ddq.squaredNorm();

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -41,9 +41,11 @@ Fit fit_joint(const TorqueSamples& samples, const Eigen::MatrixXd& predicted, Ei
     model(k) = predicted(row - shift, joint);
     torque(k) = samples.torque(row, joint);
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(friction);
-  const Eigen::VectorXd model_rest = model - friction * qr.solve(model);
-  const Eigen::VectorXd torque_rest = torque - friction * qr.solve(torque);
+  Eigen::MatrixXd both(n, 2);
+  both << model, torque;
+  const Eigen::MatrixXd fitted = least_squares(friction, both);
+  const Eigen::VectorXd model_rest = model - friction * fitted.col(0);
+  const Eigen::VectorXd torque_rest = torque - friction * fitted.col(1);
   const double mm = model_rest.squaredNorm();
   const double tt = torque_rest.squaredNorm();
   const double mt = model_rest.dot(torque_rest);

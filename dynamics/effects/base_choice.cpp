@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::effects {
 namespace {
@@ -30,14 +29,13 @@ struct Normal {
     const Eigen::VectorXd diagonal = full.diagonal();
     const Eigen::VectorXd scale =
         (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * full *
-                                                               scale.asDiagonal());
-    const Eigen::VectorXd& values = eigen.eigenvalues();
+    const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * full * scale.asDiagonal());
+    const Eigen::VectorXd& values = eigen.values;
     const double least = kUnseen * std::max(values[values.size() - 1], 1e-300);
     const Eigen::VectorXd inverse =
         values.unaryExpr([least](double v) { return v > least ? 1.0 / v : 0.0; });
-    const Eigen::VectorXd turned = eigen.eigenvectors().transpose() * (scale.asDiagonal() * g);
-    return scale.asDiagonal() * (eigen.eigenvectors() * inverse.cwiseProduct(turned));
+    const Eigen::VectorXd turned = eigen.vectors.transpose() * (scale.asDiagonal() * g);
+    return scale.asDiagonal() * (eigen.vectors * inverse.cwiseProduct(turned));
   }
 };
 

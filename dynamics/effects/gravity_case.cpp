@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "dynamics/effects/torque_parts.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/regressor.h"
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::effects {
 namespace {
@@ -23,12 +22,11 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
   const Eigen::VectorXd diagonal = H.diagonal();
   const Eigen::VectorXd scale =
       (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
-                                                             scale.asDiagonal());
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  const Eigen::VectorXd& values = eigen.values;
   Eigen::Index first = 0;
   while (first < n && !(values[first] > kUnseen * values[n - 1])) ++first;
-  return scale.asDiagonal() * eigen.eigenvectors().rightCols(n - first) *
+  return scale.asDiagonal() * eigen.vectors.rightCols(n - first) *
          values.tail(n - first).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 

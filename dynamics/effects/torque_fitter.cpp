@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
 #include "dynamics/effects/torque_parts.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::effects {
@@ -34,7 +34,8 @@ Eigen::VectorXd scaled_solve(const Eigen::MatrixXd& H, const Eigen::VectorXd& g)
       (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
   Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   scaled.diagonal().array() += 1e-12;
-  return scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * g);
+  const Eigen::VectorXd right = scale.asDiagonal() * g;
+  return scale.asDiagonal() * solve_symmetric(scaled, right);
 }
 
 }  // namespace

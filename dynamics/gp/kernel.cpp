@@ -4,10 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "dynamics/gp/gram.h"
 #include "dynamics/gp/kernel_node.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::gp {
@@ -102,13 +101,13 @@ Kernel multiplicative_polynomial(const FeatureMap& map, int degree, Offset first
 Kernel feature_kernel(FeatureMap map, const Eigen::MatrixXd& sigma) {
   KINESCOPE_CHECK(sigma.rows() == map.size() && sigma.cols() == map.size(),
                   "a covariance for every pair of features");
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sigma);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(sigma);
+  const Eigen::VectorXd& values = eigen.values;
   if (values.size() > 0 && !(values[0] >= -1e-9 * values.cwiseAbs().maxCoeff())) {
     throw bad_request("sigma", "the covariance of the weights has a negative eigenvalue",
                       "give a symmetric positive semi-definite matrix");
   }
-  const Eigen::MatrixXd root = eigen.eigenvectors() * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd root = eigen.vectors * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   Kernel out = linear(mixed(std::move(map), root), Offset::kNone, Weights::kCommon);
   std::vector<Parameter> parameters = out.parameters();
   parameters[0].name = "model scale";

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/dynamic_autodiff_cost_function.h>
 #include <ceres/problem.h>
@@ -14,6 +13,7 @@
 
 #include "dynamics/identify/log_cholesky.h"
 #include "dynamics/rigid/mass_matrix.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -184,9 +184,8 @@ double colour_of(const Identification& fit) {
 
 /// Root of the information that the base parameters carry: R' R = information / colour.
 Eigen::MatrixXd information_root(const Identification& fit) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(fit.information / colour_of(fit));
-  return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-         eigen.eigenvectors().transpose();
+  const SymmetricEigen eigen = symmetric_eigen(fit.information / colour_of(fit));
+  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
 }
 
 /// The nonlinear least squares, its blocks and its answer.

@@ -5,13 +5,12 @@
 #include <limits>
 #include <numbers>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "dynamics/identify/block_jackknife.h"
 #include "dynamics/identify/gain_system.h"
 #include "dynamics/identify/prediction.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -96,12 +95,12 @@ void judge_directions(const Eigen::MatrixXd& H, double ridge, Identification& ou
   const Eigen::VectorXd inverse = length.cwiseInverse();
   const Eigen::MatrixXd scaled =
       inverse.asDiagonal() * H.topLeftCorner(p, p) * inverse.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(scaled);
+  const Eigen::VectorXd& values = eigen.values;
   out.condition = std::sqrt(values[p - 1] / std::max(values[0], 1e-300));
   const double size = length.cwiseProduct(out.parameters).norm();
   for (Eigen::Index k = 0; k < p && values[k] < 10.0 * ridge; ++k) {
-    const Eigen::VectorXd direction = size * inverse.cwiseProduct(eigen.eigenvectors().col(k));
+    const Eigen::VectorXd direction = size * inverse.cwiseProduct(eigen.vectors.col(k));
     out.covariance += direction * direction.transpose();
   }
   for (Eigen::Index k = 0; k < p; ++k) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::identify {
@@ -234,11 +235,11 @@ ScaledSolver::ScaledSolver(const Eigen::MatrixXd& H, double ridge) {
   inverse_length_ = (diagonal.array() > 0.0).select(diagonal.cwiseSqrt().cwiseInverse(), 1.0);
   Eigen::MatrixXd scaled = inverse_length_.asDiagonal() * H * inverse_length_.asDiagonal();
   scaled.diagonal().array() += ridge;
-  factor_.compute(scaled);
+  factor_ = LdltFactor(scaled);
 }
 
 Eigen::MatrixXd ScaledSolver::solve(const Eigen::MatrixXd& g) const {
-  const Eigen::MatrixXd x = factor_.solve(inverse_length_.asDiagonal() * g);
+  const Eigen::MatrixXd x = factor_.solve(Eigen::MatrixXd(inverse_length_.asDiagonal() * g));
   return inverse_length_.asDiagonal() * x;
 }
 

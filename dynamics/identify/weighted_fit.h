@@ -7,8 +7,9 @@
 
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 
@@ -59,7 +60,7 @@ class ScaledSolver {
 
  private:
   Eigen::VectorXd inverse_length_;
-  Eigen::LDLT<Eigen::MatrixXd> factor_;
+  LdltFactor factor_;
 };
 
 struct WeightedFitOptions {

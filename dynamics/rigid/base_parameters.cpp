@@ -7,10 +7,10 @@
 #include <numbers>
 
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <fmt/format.h>
 
 #include "dynamics/rigid/regressor.h"
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 
@@ -97,7 +97,7 @@ ColumnBasis independent_columns(const Eigen::MatrixXd& W, const std::vector<int>
   const Eigen::MatrixXd R = qr.matrixQR().topRows(rows).template triangularView<Eigen::Upper>();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(R);
   pivoted.setThreshold(tolerance);
-  out.singular_values = Eigen::JacobiSVD<Eigen::MatrixXd>(R).singularValues();
+  out.singular_values = singular_values(R);
   out.kept = keep_in_order(R, candidates, pivoted.rank(), tolerance);
   out.regroup = regroup_on(R * norms.asDiagonal(), out.kept);
   return out;

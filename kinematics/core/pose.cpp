@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "kinematics/core/rotation_between.h"
+
 namespace kinescope {
 namespace {
 
@@ -105,7 +107,7 @@ double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 }
 
 Eigen::Quaterniond rotation_to_axis(const Eigen::Vector3d& axis) {
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).normalized();
+  return rotation_between(Eigen::Vector3d::UnitZ(), axis);
 }
 
 }  // namespace kinescope

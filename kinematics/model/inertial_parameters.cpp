@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/model/inertial_parameters.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -95,9 +94,7 @@ InertialParameters from_pseudo_inertia(const Eigen::Matrix4d& pseudo) {
 }
 
 bool is_consistent(const InertialParameters& parameters, double tolerance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(pseudo_inertia(parameters),
-                                                             Eigen::EigenvaluesOnly);
-  const Eigen::Vector4d& values = eigen.eigenvalues();
+  const Eigen::Vector4d values = symmetric_eigenvalues(pseudo_inertia(parameters));
   return values.allFinite() && values[0] >= -tolerance * std::abs(values[3]);
 }
 

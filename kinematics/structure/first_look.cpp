@@ -5,8 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/linear_motion.h"
 #include "kinematics/structure/rest.h"
 #include "kinematics/structure/tangent.h"
@@ -96,7 +95,7 @@ double left_by_principal(const Eigen::MatrixXd& y) {
     const Vector6d mean = y * weight.matrix() / weight.sum();
     const Eigen::Matrix<double, 6, Eigen::Dynamic> r = y.colwise() - mean;
     const Matrix6d G = r * weight.matrix().asDiagonal() * r.transpose();
-    const Vector6d u = Eigen::SelfAdjointEigenSolver<Matrix6d>(G).eigenvectors().col(5);
+    const Vector6d u = symmetric_eigen(G).vectors.col(5);
     const Eigen::ArrayXd along = r.transpose() * u;
     const Eigen::ArrayXd across = r.colwise().squaredNorm().transpose().array() - along.square();
     left = median(across) / kMedian5;

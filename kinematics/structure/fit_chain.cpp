@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/chain_residuals.h"
 #include "kinematics/structure/series.h"
@@ -36,7 +35,7 @@ void update_coordinates(ChainModel& model, const ChainResiduals& e) {
 Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& H, double variance) {
   const Eigen::MatrixXd damped =
       H + 1e-9 * Eigen::MatrixXd(H.diagonal().cwiseMax(1e-12).asDiagonal());
-  return variance * damped.ldlt().solve(Eigen::MatrixXd::Identity(H.rows(), H.cols()));
+  return variance * LdltFactor(damped).inverse();
 }
 
 std::vector<double> scale_sigmas(const ChainModel& model, const Eigen::MatrixXd& covariance) {
@@ -93,7 +92,7 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
     ChainModel next = model;
     Eigen::MatrixXd damped = normal.H;
     damped.diagonal() += damping * normal.H.diagonal().cwiseMax(1e-6);
-    const Eigen::VectorXd step = damped.ldlt().solve(normal.g);
+    const Eigen::VectorXd step = solve_symmetric(damped, normal.g);
     if (!step.allFinite()) break;
     apply_step(next, step);
     if (free) update_coordinates(next, chain_residuals(motion, next, readings));

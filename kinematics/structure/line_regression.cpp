@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/residual_scale.h"
 
 namespace kinescope::structure_search {
@@ -79,7 +78,7 @@ LineFit solve_line(const LineProblem& problem, const Eigen::VectorXd& coordinate
   g << m.col(0).tail<6>(), m.col(1).tail<6>();
   Eigen::MatrixXd part = H(used, used);
   part.diagonal() *= 1.0 + 1e-9;
-  const Eigen::LDLT<Eigen::MatrixXd> factor(part);
+  const LdltFactor factor(part);
   Vector12d x = Vector12d::Zero();
   const Eigen::VectorXd right = g(used);
   const Eigen::VectorXd solved = factor.solve(right);
@@ -87,7 +86,7 @@ LineFit solve_line(const LineProblem& problem, const Eigen::VectorXd& coordinate
   LineFit fit{.mean = x.head<6>(), .slope = x.tail<6>()};
   if (used.size() == 12) {
     const Eigen::MatrixXd covariance =
-        factor.solve(Eigen::MatrixXd::Identity(12, 12).middleCols<3>(6));
+        factor.solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(12, 12).middleCols<3>(6)));
     const double variance = covariance.middleRows<3>(6).trace() / 3.0;
     fit.turn_evidence = fit.slope.head<3>().norm() / std::sqrt(std::max(1e-300, variance));
   }

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/attachment_path.h"
 #include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/chain_residuals.h"
@@ -98,7 +97,7 @@ Normal1d normal_of(const Attachment& attachment, const Body& body, const LinkPat
   Eigen::MatrixXd H = n.H.topLeftCorner(own, own);
   H.diagonal() *= 1.0 + 1e-9;
   const Eigen::VectorXd cross = n.H.col(own).head(own);
-  const Eigen::VectorXd solved = H.ldlt().solve(cross);
+  const Eigen::VectorXd solved = solve_symmetric(H, cross);
   return {n.H(own, own) - cross.dot(solved), n.g(own) - solved.dot(n.g.head(own))};
 }
 

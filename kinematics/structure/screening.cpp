@@ -5,10 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/line_regression.h"
 #include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"
@@ -47,10 +44,10 @@ Direction driven_direction(const Matrix6d& G, const Vector6d& b, double qq, int 
 }
 
 Direction principal_direction(const Matrix6d& G, int samples) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(G);
+  const SymmetricEigen eigen = symmetric_eigen(G);
   Direction d;
-  const double along = eigen.eigenvalues()(5);
-  d.slope = eigen.eigenvectors().col(5) * std::sqrt(along / samples);
+  const double along = eigen.values(5);
+  d.slope = eigen.vectors.col(5) * std::sqrt(along / samples);
   const double variance = along / samples;
   d.cost = split_cost(samples, std::max(0.0, G.trace() - along), samples) +
            samples * std::log(1.0 + variance);

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/screening.h"
 #include "kinematics/structure/tangent.h"
 
@@ -95,7 +94,7 @@ void regress_twists(Problem& p, const std::vector<int>& channels) {
   }
   Eigen::MatrixXd H = A.transpose() * A;
   H.diagonal().array() += 1e-4;
-  const Eigen::MatrixXd covariance = H.ldlt().solve(Eigen::MatrixXd::Identity(K + 1, K + 1));
+  const Eigen::MatrixXd covariance = LdltFactor(H).inverse();
   const Eigen::MatrixXd X = covariance * (A.transpose() * Y);
   const Eigen::MatrixXd residual = Y - A * X;
   const double dof = std::max(1.0, static_cast<double>(count) - static_cast<double>(K) - 1.0);

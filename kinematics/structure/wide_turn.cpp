@@ -6,8 +6,7 @@
 #include <numbers>
 #include <numeric>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::structure_search {
 namespace {
@@ -23,7 +22,7 @@ Eigen::Vector3d shared_axis(const Motion& motion, const std::vector<std::size_t>
                                            motion[order[i]].pose.rotation);
     sum += w * w.transpose();
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvectors().col(2);
+  return symmetric_eigen(sum).vectors.col(2);
 }
 
 // Angle about `axis` from the first sample of `order`, unwrapped from neighbour to neighbour. The
@@ -68,7 +67,7 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> axis_points(const Motion& motion) {
     H.noalias() += J.transpose() * J;
     g.noalias() += J.transpose() * sample.pose.translation;
   }
-  const Vector6d x = H.ldlt().solve(g);
+  const Vector6d x = solve_symmetric(H, g);
   return {x.head<3>(), x.tail<3>()};
 }
 
