@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kLegendRow = 15.0;
 constexpr double kCharacterWidth = 6.1;  ///< of an 11 px label
+constexpr double kAxisName = 24.0;       ///< left of the ticks' labels
 constexpr double kRowNameWidth = 96.0;
 constexpr double kArrowHead = 4.0;
 
@@ -99,6 +100,9 @@ Plot::Plot(std::string_view name, PlotAxis x, PlotAxis y, PlotSize size)
     : name_(name), x_(std::move(x)), y_(std::move(y)), size_(size) {
   if (!(x_.upper > x_.lower)) pad_range(x_.lower, x_.upper);
   if (!(y_.upper > y_.lower)) pad_range(y_.lower, y_.upper);
+  for (const auto& [tick, text] : ticks_of(y_)) {
+    left_ = std::max(left_, kAxisName + kCharacterWidth * static_cast<double>(text.size()));
+  }
 }
 
 Eigen::Vector2d Plot::place(const Eigen::Vector2d& point) const {
