@@ -127,6 +127,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.command = options.command_line;
   summary.inputs = hashed_inputs({options.logs, options.learn_logs, {options.robot}});
   summary.joints = robot.joints;
+  summary.types = robot.types;
   summary.links = robot.links;
   const TorqueLogReport log = read_log(options.logs, model, options.data);
   summary.findings = log.findings;

@@ -29,7 +29,7 @@ namespace {
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   run.robot = recording.settings.name;
-  run.recording = recording.folder.filename().string();
+  run.recording = recording_name(recording.folder);
   run.entry = to_string(recording.entry);
   run.version = program_version();
   run.command = options.command_line;

@@ -10,6 +10,7 @@
 #include "app/report/page.h"
 #include "app/report/plot.h"
 #include "app/report/sections.h"
+#include "app/report/torque_unit.h"
 
 namespace kinescope {
 namespace {
@@ -26,7 +27,9 @@ constexpr std::array<ContentsEntry, 4> kContents = {{
 
 std::string contact_table(const ContactSummary& summary, const nlohmann::json& document) {
   if (summary.events.empty()) return "";
-  Table table("contacts-table", fmt::format("Contacts; external torque in {}", summary.torque_unit),
+  Table table("contacts-table",
+              fmt::format("Contacts; external torque in {}",
+                          common_unit(summary.torque_unit, summary.types)),
               document);
   std::vector<std::string> head = {"Onset, s", "End, s", "Known after, ms", "Link",
                                    "Probability, %"};
@@ -73,11 +76,12 @@ std::string joint_plot(const ContactSummary& summary, Eigen::Index joint) {
   double end = summary.t_s[samples - 1];
   pad_range(begin, end, 0.01);
   const std::string& name = summary.joints[static_cast<std::size_t>(joint)];
-  Plot plot(
-      fmt::format("External torque of {}", name),
-      {.label = "time, s", .lower = begin, .upper = end},
-      {.label = fmt::format("{}, {}", name, summary.torque_unit), .lower = low, .upper = high},
-      {.width = 940.0, .height = 150.0});
+  const std::string unit =
+      joint_unit(summary.torque_unit, summary.types[static_cast<std::size_t>(joint)]);
+  Plot plot(fmt::format("External torque of {}", name),
+            {.label = "time, s", .lower = begin, .upper = end},
+            {.label = fmt::format("{}, {}", name, unit), .lower = low, .upper = high},
+            {.width = 940.0, .height = 150.0});
   for (const ContactEvent& event : summary.events) {
     plot.band({event.onset_s, event.end_s}, {low, low}, {high, high}, series_class(1));
   }
@@ -106,8 +110,9 @@ std::string calibration_section(const ContactSummary& summary, const nlohmann::j
       summary.model, summary.calibration.options.false_alarms_per_hour,
       check.extrapolated_per_hour));
   Table table("noise-table", "Noise without contact", document);
-  table.header({"Joint", "Velocity, per s", fmt::format("Torque, {}", summary.torque_unit),
-                fmt::format("Model, {}", summary.torque_unit), "Model, correlation time, s"});
+  const std::string unit = common_unit(summary.torque_unit, summary.types);
+  table.header({"Joint", "Velocity, per s", fmt::format("Torque, {}", unit),
+                fmt::format("Model, {}", unit), "Model, correlation time, s"});
   for (std::size_t j = 0; j < summary.joints.size(); ++j) {
     table.begin_row();
     table.text(summary.joints[j]);

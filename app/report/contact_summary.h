@@ -25,6 +25,7 @@ struct ContactSummary {
   std::vector<LogFinding> findings;
 
   std::vector<std::string> joints;
+  std::vector<JointType> types;    ///< beside joints
   std::vector<std::string> links;  ///< the link that each joint moves
   std::string torque_unit = "Nm";
   ContactCalibration calibration;

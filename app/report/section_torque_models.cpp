@@ -8,6 +8,7 @@
 #include "app/report/plot.h"
 #include "app/report/sections.h"
 #include "app/report/torque_sections.h"
+#include "app/report/torque_unit.h"
 
 namespace kinescope::report {
 namespace {
@@ -98,11 +99,12 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   double end = *std::ranges::max_element(time);
   pad_range(begin, end, 0.01);
   const std::string& name = summary.joints[static_cast<std::size_t>(joint)];
-  Plot plot(
-      fmt::format("Measured and predicted torque of {}", name),
-      {.label = "time, s", .lower = begin, .upper = end},
-      {.label = fmt::format("{}, {}", name, summary.test.torque_unit), .lower = low, .upper = high},
-      {.width = 940.0, .height = 200.0});
+  const std::string unit =
+      joint_unit(summary.test.torque_unit, summary.types[static_cast<std::size_t>(joint)]);
+  Plot plot(fmt::format("Measured and predicted torque of {}", name),
+            {.label = "time, s", .lower = begin, .upper = end},
+            {.label = fmt::format("{}, {}", name, unit), .lower = low, .upper = high},
+            {.width = 940.0, .height = 200.0});
   plot.band(time, lower, upper, series_class(0));
   plot.line(measured, series_class(7));
   plot.line(predicted, series_class(0));
@@ -112,11 +114,10 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const double error = score.rms[joint];
   // A line on a line is no riddle to leave to the reader.
   const bool alike = error < 0.005 * (high - low);
-  return figure(
-      plot.str(),
-      fmt::format("{}: samples that the model has not seen; rms error {:.2g} {}{}.", name, error,
-                  summary.test.torque_unit, alike ? ", less than the lines are wide" : ""),
-      "wide");
+  return figure(plot.str(),
+                fmt::format("{}: samples that the model has not seen; rms error {:.2g} {}{}.", name,
+                            error, unit, alike ? ", less than the lines are wide" : ""),
+                "wide");
 }
 
 }  // namespace
@@ -127,9 +128,10 @@ std::string torque_models_section(const TorqueFacts& facts) {
       "nMSE: mean squared error over the variance of the measured torque, on the held-out part. "
       "Coverage: share of the held-out samples within the model's own 90 % and 95 % bands.");
   out += score_table(facts, "nmse-table", "nMSE, %", "nmse_percent", Quantity::kPlain);
-  out +=
-      score_table(facts, "rms-table", fmt::format("Rms error, {}", facts.summary.train.torque_unit),
-                  "rms", Quantity::kPlain);
+  out += score_table(facts, "rms-table",
+                     fmt::format("Rms error, {}",
+                                 common_unit(facts.summary.train.torque_unit, facts.summary.types)),
+                     "rms", Quantity::kPlain);
   out += score_table(facts, "coverage90-table", "Coverage of the 90 % band, %", "coverage_90",
                      Quantity::kPercent);
   out += score_table(facts, "coverage95-table", "Coverage of the 95 % band, %", "coverage_95",

@@ -8,6 +8,7 @@
 #include "app/report/plot.h"
 #include "app/report/sections.h"
 #include "app/report/torque_sections.h"
+#include "app/report/torque_unit.h"
 
 namespace kinescope::report {
 namespace {
@@ -67,12 +68,13 @@ std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
     high = std::max(high, means.back().y());
   }
   pad_range(low, high, 0.1);
-  const bool turns = summary.types[static_cast<std::size_t>(joint)] != JointType::kPrismatic;
+  const JointType type = summary.types[static_cast<std::size_t>(joint)];
+  const bool turns = type != JointType::kPrismatic;
   Plot plot(fmt::format("Friction of {}", name),
             {.label = turns ? "velocity, rad/s" : "velocity, m/s",
              .lower = -1.05 * fastest,
              .upper = 1.05 * fastest},
-            {.label = fmt::format("{}, {}", name, summary.train.torque_unit),
+            {.label = fmt::format("{}, {}", name, joint_unit(summary.train.torque_unit, type)),
              .lower = low,
              .upper = high});
   plot.line(model, series_class(0));
@@ -85,7 +87,7 @@ std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
 std::string drive_table(const TorqueFacts& facts) {
   Table table("drives-table",
               fmt::format("Drives, in {} per SI (expanded uncertainty, k = 2)",
-                          facts.summary.train.torque_unit),
+                          common_unit(facts.summary.train.torque_unit, facts.summary.types)),
               facts.result);
   table.header({"Joint", "Term", "Value", "U"});
   for (std::size_t k = 0; k < facts.summary.drives.size(); ++k) {

@@ -8,6 +8,7 @@
 #include "app/report/plot.h"
 #include "app/report/sections.h"
 #include "app/report/torque_sections.h"
+#include "app/report/torque_unit.h"
 
 namespace kinescope::report {
 namespace {
@@ -70,7 +71,8 @@ std::string friction_caption(const TorqueSummary& summary, std::size_t joint) {
   const auto column = summary.train.torque.col(static_cast<Eigen::Index>(joint));
   const double torque = column.norm() / std::sqrt(static_cast<double>(column.size()));
   return fmt::format("{}: {:.2g} {} rms, {:.2g} % of its torque{}.", summary.joints[joint],
-                     friction, summary.train.torque_unit, 100.0 * friction / torque,
+                     friction, joint_unit(summary.train.torque_unit, summary.types[joint]),
+                     100.0 * friction / torque,
                      friction < summary.robust->joints[joint].noise ? ": below its noise" : "");
 }
 
@@ -93,11 +95,12 @@ std::string profile_plot(const TorqueSummary& summary, std::size_t joint) {
   double left = velocity.front();
   double right = velocity.back();
   pad_range(left, right);
-  const bool turns = summary.types[joint] != JointType::kPrismatic;
+  const JointType type = summary.types[joint];
+  const bool turns = type != JointType::kPrismatic;
   const std::string& name = summary.joints[joint];
   Plot plot(fmt::format("Learned friction of {}", name),
             {.label = turns ? "velocity, rad/s" : "velocity, m/s", .lower = left, .upper = right},
-            {.label = fmt::format("{}, {}", name, summary.train.torque_unit),
+            {.label = fmt::format("{}, {}", name, joint_unit(summary.train.torque_unit, type)),
              .lower = low,
              .upper = high});
   plot.band(velocity, lower, upper, series_class(2));

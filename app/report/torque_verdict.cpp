@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/report/torque_summary.h"
+#include "app/report/torque_unit.h"
 
 namespace kinescope {
 namespace {
@@ -129,11 +130,12 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
         fmt::format(" The parametric model leaves {}.", percent(parametric->nmse_percent.mean()));
   }
   if (best.nmse_percent[worst] > kPoor) {
+    const auto at = static_cast<std::size_t>(worst);
+    const std::string unit = report::joint_unit(summary.train.torque_unit, summary.types[at]);
     out.limits = fmt::format(
         "The torque of {} is explained worst: its noise is {:.3g} {}, its "
         "error {:.3g} {}. ",
-        summary.joints[static_cast<std::size_t>(worst)], found.sigma[worst],
-        summary.train.torque_unit, best.rms[worst], summary.train.torque_unit);
+        summary.joints[at], found.sigma[worst], unit, best.rms[worst], unit);
   }
   Eigen::Index narrow = 0;
   if (best.coverage_95.minCoeff(&narrow) < kLeastCoverage) {
