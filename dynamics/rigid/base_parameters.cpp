@@ -81,11 +81,10 @@ ColumnBasis independent_columns(const Eigen::MatrixXd& W, const std::vector<int>
   const double largest = norms.size() > 0 ? norms.maxCoeff() : 0.0;
   std::vector<int> candidates;
   for (const int column : preference) {
-    // Zero columns hold the rounding of others.
-    if (norms[column] > 1e-12 * largest) candidates.push_back(column);
+    if (norms[column] > tolerance * largest) candidates.push_back(column);
   }
   for (int c = 0; c < W.cols(); ++c) {
-    if (!(norms[c] > 1e-12 * largest)) out.without_effect.push_back(c);
+    if (!(norms[c] > tolerance * largest)) out.without_effect.push_back(c);
   }
   out.regroup = Eigen::MatrixXd::Zero(0, W.cols());
   if (candidates.empty()) return out;

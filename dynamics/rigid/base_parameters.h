@@ -17,14 +17,14 @@ namespace kinescope {
 struct ColumnBasis {
   std::vector<int> kept;            ///< independent columns, increasing
   Eigen::MatrixXd regroup;          ///< kept x columns; the identity on the kept ones
-  std::vector<int> without_effect;  ///< columns that are zero
+  std::vector<int> without_effect;  ///< columns that are zero, or rounding beside the largest
   Eigen::VectorXd
       singular_values;  ///< of W with unit columns, decreasing; the gap shows how sure the rank is
 };
 
 /// Columns in the order of `preference` (all of them) are kept when they are independent of those
 /// kept before; the rank is that of a column-pivoted QR of W with unit columns, relative
-/// `tolerance`.
+/// `tolerance`. Columns below `tolerance` of the largest have no effect.
 [[nodiscard]] ColumnBasis independent_columns(const Eigen::MatrixXd& W,
                                               const std::vector<int>& preference, double tolerance);
 

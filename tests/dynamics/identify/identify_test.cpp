@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/identify/identify.h"
 
+#include <numbers>
+
 #include <gtest/gtest.h>
 
 #include "dynamics/identify/prediction.h"
@@ -65,6 +67,39 @@ TEST(Identify, WithoutNoiseItIsTheRobot) {
     // With gravity pointing elsewhere it is not.
     EXPECT_GT(fit.fit_error_percent.maxCoeff(), 1e-3);
   }
+}
+
+/// Three upright parallel axes; the second one is turned by two right angles as they are written.
+DynamicModel upright_arm(double right_angle_rad) {
+  KinematicTree tree;
+  tree.links.push_back({"base"});
+  for (int k = 0; k < 3; ++k) {
+    Joint joint;
+    joint.name = "joint" + std::to_string(k + 1);
+    joint.type = JointType::kRevolute;
+    joint.parent = LinkId{k};
+    joint.child = LinkId{k + 1};
+    joint.T_parent_joint.translation = {0.3 * k, 0.0, 0.1};
+    tree.joints.push_back(joint);
+    tree.links.push_back({"link" + std::to_string(k + 1)});
+  }
+  const Eigen::Quaterniond turn = exp_rotation(Eigen::Vector3d::UnitX() * right_angle_rad);
+  tree.joints[1].T_parent_joint.rotation = turn * turn;
+  return without_masses(tree);
+}
+
+TEST(Identify, ARightAngleOfFiveDigitsHasNoParametersOfItsOwn) {
+  const auto parameters = [](double right_angle_rad) {
+    const RigidModel rigid = make_rigid_model(upright_arm(right_angle_rad));
+    return independent_terms(rigid, {}, torque_terms(rigid, {}));
+  };
+  const ColumnBasis exact = parameters(0.5 * std::numbers::pi);
+  for (const double written : {1.5708, 1.570796, 1.570796327}) {
+    const ColumnBasis rounded = parameters(written);
+    EXPECT_EQ(rounded.kept, exact.kept) << written;
+    EXPECT_EQ(rounded.without_effect, exact.without_effect) << written;
+  }
+  EXPECT_GT(parameters(1.56).kept.size(), exact.kept.size());
 }
 
 TEST(Identify, NoiseOfEachJointIsFound) {
