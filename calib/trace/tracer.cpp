@@ -18,6 +18,8 @@ namespace {
 // A rival is looked at if it explains at least this share of what the chosen effect explains.
 constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
+// A richer rival that explains less by this (squares, whitened: odds of e^-2) is none.
+constexpr double kClearlyLess = 4.0;
 // What is less than this share of the squares that were there at first may be the imperfection of
 // the other effects: with all of them in it must be beyond doubt.
 constexpr double kImperfection = 1e-5;
@@ -325,7 +327,8 @@ bool Tracer::check(std::size_t index) {
   const bool shown =
       slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
   const bool possible = is_possible(*candidate, now_->fit.values[index]);
-  if (!possible || !shown || stage->held_out_sum() < now_->held_out_sum()) {
+  const bool large = own.score.rms >= std::max(options_.floor, candidate->floor);
+  if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = stage_of(kinescope::trace::without(now_->added, index));
@@ -381,10 +384,9 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const Candidate& candidate = without.fit.candidates[rival.index];
     const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
     if (comparison == Comparison::kFirst) continue;
-    // A richer one that says less is no rival.
     const bool richer = rival.columns.size() > own.columns.size();
     if (comparison == Comparison::kInterchangeable && richer &&
-        rival.score.gain <= own.score.gain) {
+        rival.score.gain <= own.score.gain - kClearlyLess) {
       continue;
     }
     // Of two that say the same the plainer one comes first.
