@@ -57,6 +57,7 @@ struct Request {
 struct Outcome {
   bool structure = false;
   bool named = false;  ///< exactly what was injected, at its place; clean where that is nothing
+  bool among = false;  ///< one of those that the answer says cannot be told apart
   bool visible = true;
 };
 
@@ -109,6 +110,18 @@ bool is_exact(const json& trace, const std::optional<InjectedEffect>& injected) 
   return accepted[0].at("effect") == injected->effect && place.starts_with(injected->place);
 }
 
+bool is_among(const json& trace, const std::optional<InjectedEffect>& injected) {
+  if (!injected || trace.at("verdict") != "ambiguous") return false;
+  for (const json& ambiguity : trace.at("ambiguous")) {
+    for (const json& effect : ambiguity.at("effects")) {
+      const std::string place = effect.at("place");
+      if (effect.at("effect") == injected->effect && place.starts_with(injected->place))
+        return true;
+    }
+  }
+  return false;
+}
+
 Floor floor_of(const json& trace) {
   Floor out;
   for (const json& missing : trace.at("not_found")) {
@@ -154,6 +167,7 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
   const json trace = json::parse(read_text_file(folder / "run" / "trace.json"));
   out.structure = difference.empty();
   out.named = is_exact(trace, injected);
+  out.among = is_among(trace, injected);
   if (!injected) floor = floor_of(trace);
   out.visible = !injected || is_visible(floor, *injected);
   if (!out.structure) {
@@ -166,6 +180,7 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
              trace.at("held_out_before").at("value").get<double>(),
              trace.at("held_out_after").at("value").get<double>(),
              out.named     ? ""
+             : out.among   ? "among "
              : out.visible ? "NOT "
                            : "too small, ",
              answer_of(trace), time.count());
@@ -200,6 +215,7 @@ void run(const Request& request) {
   int right = 0;
   int visible = 0;
   int named = 0;
+  int among = 0;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed) {
     for (const RobotKind kind : request.kinds) {
       Floor floor;
@@ -210,11 +226,14 @@ void run(const Request& request) {
         right += outcome.structure ? 1 : 0;
         visible += outcome.visible ? 1 : 0;
         named += outcome.visible && outcome.named ? 1 : 0;
+        among += outcome.visible && outcome.among ? 1 : 0;
       }
     }
   }
-  fmt::print("{} recordings: structure right in {}; answer exactly right in {} of {} visible\n",
-             count, right, named, visible);
+  fmt::print(
+      "{} recordings: structure right in {}; answer exactly right in {} of {} visible, the effect "
+      "among those that cannot be told apart in {} more\n",
+      count, right, named, visible, among);
 }
 
 bool parse(int argc, char** argv, Request& request) {
