@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace kinescope::trace {
 
 Stage::Stage(std::vector<AddedEffect> effects, TracedFit fitted)
@@ -27,6 +29,20 @@ StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) 
 const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {
   const auto found = std::ranges::find(fit.candidates, id, &Candidate::id);
   return found == fit.candidates.end() ? nullptr : &*found;
+}
+
+std::string name_of(const EffectId& id) { return fmt::format("{} at {}", id.effect, id.place); }
+
+bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta) {
+  return !candidate.possible || candidate.possible(theta);
+}
+
+bool refines(const Candidate& candidate, const EffectId& id) {
+  return std::ranges::find(candidate.refines, id) != candidate.refines.end();
+}
+
+bool contains(const Candidate& candidate, const EffectId& id) {
+  return std::ranges::find(candidate.contains, id) != candidate.contains.end();
 }
 
 std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index) {

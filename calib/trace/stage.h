@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "calib/trace/held_out.h"
@@ -33,6 +34,13 @@ using StagePtr = std::shared_ptr<const Stage>;
 
 /// Nothing where the fit does not name it.
 [[nodiscard]] const Candidate* find_candidate(const TracedFit& fit, const EffectId& id);
+
+/// "backlash at joint2".
+[[nodiscard]] std::string name_of(const EffectId& id);
+/// False for parameters that cannot be.
+[[nodiscard]] bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta);
+[[nodiscard]] bool refines(const Candidate& candidate, const EffectId& id);
+[[nodiscard]] bool contains(const Candidate& candidate, const EffectId& id);
 
 [[nodiscard]] std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index);
 

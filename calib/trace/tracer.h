@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The search: forward selection, backward check, what cannot be told apart, what is left.
+// The search: forward selection (tracer.cpp), backward check and what cannot be told apart
+// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp).
 #pragma once
 
 #include <deque>

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The search backwards: does every effect still earn its place, what says the same, what cannot be
+// told apart.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "calib/trace/distribution.h"
+#include "calib/trace/encompassing.h"
+#include "calib/trace/picture.h"
+#include "calib/trace/tracer.h"
+
+namespace kinescope::trace {
+namespace {
+
+// A rival is looked at if it explains at least this share of what the chosen effect explains.
+constexpr double kRivalShare = 0.5;
+constexpr std::size_t kMostRivals = 6;
+// A richer rival that explains less by this (squares, whitened: odds of e^-2) is none.
+constexpr double kClearlyLess = 4.0;
+// What is less than this share of the squares that were there at first may be the imperfection of
+// the other effects: with all of them in it must be beyond doubt.
+constexpr double kImperfection = 1e-5;
+constexpr double kBeyondDoubt = 1e-4;  // of the level
+
+}  // namespace
+
+// Several effects at one place may stand for a single one that the search passed by.
+bool Tracer::simplify() {
+  std::map<std::string, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    places[now_->added[i].id.place].push_back(i);
+  }
+  for (const auto& [place, members] : places) {
+    if (members.size() < 2) continue;
+    std::vector<AddedEffect> others;
+    for (const AddedEffect& effect : now_->added) {
+      if (effect.id.place != place) others.push_back(effect);
+    }
+    const StagePtr stage = stage_of(others);
+    std::optional<AddedEffect> best;
+    double least = 0.0;
+    for (const Contender& contender :
+         contenders(*stage, test_family(stage->system, stage->fit.candidates))) {
+      const bool known = std::ranges::any_of(
+          members, [&](std::size_t i) { return now_->added[i].id == contender.id; });
+      const double loss = contender.held_out.sum();
+      if (contender.id.place != place || known || (best && loss >= least)) continue;
+      best = AddedEffect{contender.id, contender.member.scan};
+      least = loss;
+    }
+    if (!best) continue;
+    others.push_back(*best);
+    StagePtr single = stage_of(std::move(others));
+    if (!single->fit.converged || single->held_out_sum() > now_->held_out_sum()) continue;
+    for (const std::size_t i : members) removed_.insert(now_->added[i].id);
+    mark(round_, best->id, CandidateState::kAccepted, single->error.value);
+    now_ = std::move(single);
+    add_step(round_,
+             fmt::format("{} takes the place of {} effects at {}", best->id.effect, members.size(),
+                         place),
+             *now_);
+    return true;
+  }
+  return false;
+}
+
+bool Tracer::backward() {
+  if (simplify()) return true;
+  search_again(std::nullopt);
+  details_.assign(now_->added.size(), {});
+  trace_.ambiguities.clear();
+  if (drop_without_size()) return true;
+  // The latest first: an early one may have stood for several that came after it.
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    if (check(i)) return true;
+  }
+  return false;
+}
+
+// An effect that bends the model can be significant where it is absent and of no certain size where
+// it is fitted: a gain of 7 that may be -5.
+bool Tracer::drop_without_size() {
+  Eigen::Index count = 0;
+  for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
+  if (count == 0) return false;
+  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
+  std::optional<std::size_t> weakest;
+  double least = t;
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    const Eigen::VectorXd& values = now_->fit.values[i];
+    const double variance = covariance(at, at);
+    at += values.size();
+    if (values.size() > 1 || !(variance > 0.0)) continue;
+    const double ratio = std::abs(values[0]) / std::sqrt(variance);
+    if (ratio >= least) continue;
+    least = ratio;
+    weakest = i;
+  }
+  if (!weakest) return false;
+  const EffectId id = now_->added[*weakest].id;
+  removed_.insert(id);
+  now_ = stage_of(kinescope::trace::without(now_->added, *weakest));
+  mark(round_, id, CandidateState::kRemoved, now_->error.value);
+  add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
+  return true;
+}
+
+bool Tracer::check(std::size_t index) {
+  const AddedEffect effect = now_->added[index];
+  const StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
+  const Candidate* candidate = find_candidate(stage->fit, effect.id);
+  if (candidate == nullptr) return false;
+  TestedMember own;
+  own.scan = effect.scan;
+  own.columns = candidate->columns(effect.scan);
+  own.score = jackknife_test(stage->system, own.columns);
+  own.tests = number_of_tests(stage->fit.candidates, *candidate);
+  own.p_value = std::min(1.0, own.score.p_value * own.tests);
+  TracedEffect& detail = details_[index];
+  detail.p_value = own.p_value;
+  detail.held_out_before = stage->error;
+  detail.held_out_after = now_->error;
+  detail.explained =
+      (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
+  // What clearly helps to predict stays, however few stretches judge its parameters.
+  const bool needed = paired_t(now_->system.partition(), stage->held_out.whitened,
+                               now_->held_out.whitened) > kClearlyWorse;
+  const bool slight = now_->added.size() > 1 && detail.explained < kImperfection;
+  const bool shown =
+      slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
+  const bool possible = is_possible(*candidate, now_->fit.values[index]);
+  const bool large = own.score.rms >= std::max(options_.floor, candidate->floor);
+  if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
+    removed_.insert(effect.id);
+    mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
+    now_ = stage_of(kinescope::trace::without(now_->added, index));
+    add_step(round_,
+             fmt::format("{} removed: with the others in, it earns nothing", name_of(effect.id)),
+             *now_);
+    return true;
+  }
+  detail.picture = picture_of(*stage, *now_, *candidate, own);
+  return settle_rivals(index, *stage, own);
+}
+
+// Puts another effect in the place of one; for good where the other makes it superfluous.
+bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous) {
+  const EffectId id = now_->added[index].id;
+  std::vector<AddedEffect> effects = now_->added;
+  effects[index] = other;
+  StagePtr swapped = stage_of(std::move(effects));
+  if (!swapped->fit.converged) return false;
+  // What says the same predicts as well, within its own doubt.
+  const double bar = superfluous ? now_->error.value : now_->error.interval.high;
+  if (swapped->error.value >= bar) return false;
+  if (superfluous) removed_.insert(id);
+  mark(round_, id, CandidateState::kRemoved, now_->error.value);
+  mark(round_, other.id, CandidateState::kAccepted, swapped->error.value);
+  now_ = std::move(swapped);
+  add_step(round_,
+           fmt::format("{} takes the place of {}{}", name_of(other.id), name_of(id),
+                       superfluous ? ", which it makes superfluous" : ": plainer, and as good"),
+           *now_);
+  return true;
+}
+
+bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
+  const AddedEffect effect = now_->added[index];
+  std::vector<TestedMember> rivals;
+  const double least_gain = kRivalShare * own.score.gain;
+  for (TestedMember& member : test_family(without.system, without.fit.candidates, least_gain)) {
+    const Candidate& candidate = without.fit.candidates[member.index];
+    const bool in_model = std::ranges::any_of(
+        now_->added, [&](const AddedEffect& added) { return added.id == candidate.id; });
+    if (in_model || member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
+    // What it says beyond the effect, the forward search would have found.
+    if (refines(candidate, effect.id) || contains(candidate, effect.id)) continue;
+    if (member.score.gain < least_gain) continue;
+    rivals.push_back(std::move(member));
+  }
+  std::ranges::stable_sort(rivals, std::greater{},
+                           [](const TestedMember& rival) { return rival.score.gain; });
+  if (rivals.size() > kMostRivals) rivals.resize(kMostRivals);
+  Ambiguity ambiguity;
+  for (const TestedMember& rival : rivals) {
+    const Candidate& candidate = without.fit.candidates[rival.index];
+    const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
+    if (comparison == Comparison::kFirst) continue;
+    const bool richer = rival.columns.size() > own.columns.size();
+    if (comparison == Comparison::kInterchangeable && richer &&
+        rival.score.gain <= own.score.gain - kClearlyLess) {
+      continue;
+    }
+    // Of two that say the same the plainer one comes first.
+    const bool plainer = rival.columns.size() < own.columns.size();
+    if (comparison == Comparison::kSecond || plainer) {
+      if (swap(index, {candidate.id, rival.scan}, comparison == Comparison::kSecond)) return true;
+    }
+    if (comparison == Comparison::kSecond) continue;
+    ambiguity.effects.push_back(candidate.id);
+    ambiguity.words.push_back(candidate.words);
+    if (ambiguity.record.empty()) ambiguity.record = candidate.record;
+  }
+  if (ambiguity.effects.empty()) return false;
+  const Candidate* chosen = find_candidate(without.fit, effect.id);
+  ambiguity.effects.insert(ambiguity.effects.begin(), effect.id);
+  ambiguity.words.insert(ambiguity.words.begin(), chosen->words);
+  if (ambiguity.record.empty()) ambiguity.record = chosen->record;
+  trace_.ambiguities.push_back(std::move(ambiguity));
+  return false;
+}
+
+}  // namespace kinescope::trace
