@@ -1,16 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/core/error.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 namespace kinescope {
 namespace {
+
+// Names from a file may hold line ends and what a terminal takes for commands.
+bool is_control(char c) {
+  const auto code = static_cast<unsigned char>(c);
+  return code < 0x20 || code == 0x7f;
+}
 
 std::string compose(std::string_view where, std::string_view what, std::string_view remedy) {
   std::string text;
   if (!where.empty()) text = fmt::format("{}: ", where);
   text += what;
   if (!remedy.empty()) text += fmt::format(" ({})", remedy);
+  std::ranges::replace_if(text, is_control, ' ');
   return text;
 }
 

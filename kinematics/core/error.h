@@ -23,7 +23,7 @@ enum class ExitCode : int {
   kOutsideLimits = 5  ///< done, but outside limits set with --fail-on
 };
 
-/// What the user is told, in one line: "where: what (remedy)".
+/// What the user is told, in one line: "where: what (remedy)"; control characters become spaces.
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, std::string_view where, std::string_view what, std::string_view remedy);

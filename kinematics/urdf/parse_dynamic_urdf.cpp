@@ -56,12 +56,13 @@ InertialParameters read_inertial(const XMLElement& inertial, const XmlOwner& own
   const auto moment = [&](const char* name) {
     return required_number(inertial, "inertia", name, owner);
   };
+  const double xx = moment("ixx");
+  const double yy = moment("iyy");
+  const double zz = moment("izz");
   const double xy = moment("ixy");
   const double xz = moment("ixz");
   const double yz = moment("iyz");
-  central.inertia_kgm2 << moment("ixx"), xy, xz,  //
-      xy, moment("iyy"), yz,                      //
-      xz, yz, moment("izz");
+  central.inertia_kgm2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   return in_frame(read_origin(inertial, owner), from_central(central));
 }
 

@@ -71,8 +71,14 @@ class Checker {
     if (const XMLElement* axis = joint.FirstChildElement("axis")) {
       const std::vector<double> v = numbers(*axis, "xyz", 3, owner);
       const bool turns = std::string(joint.Attribute("type")) != "fixed";
-      if (turns && !v.empty() && std::hypot(v[0], v[1], v[2]) < 1e-6) {
+      const double length = v.empty() ? 0.0 : std::hypot(v[0], v[1], v[2]);
+      if (turns && length < 1e-6) {
         throw bad_input(place(*axis), owner + ": the axis has no length", "give it a direction");
+      }
+      if (turns && length > 1e6) {
+        throw bad_input(place(*axis),
+                        fmt::format("{}: the axis has a length of {:g}", owner, length),
+                        "give it the length 1");
       }
     }
     const XMLElement* limit = joint.FirstChildElement("limit");

@@ -114,7 +114,10 @@ TEST(UrdfRefuses, NumbersThatAreNone) {
             std::string::npos);
   EXPECT_NE(refusal(with_limit(R"(<origin xyz="0 ${d} 0"/>)")).find("run xacro on the file first"),
             std::string::npos);
-  EXPECT_NE(refusal(with_limit(R"(<axis xyz="0 0 0"/>)")).find("the axis has no length"),
+  for (const char* axis : {R"(<axis xyz="0 0 0"/>)", R"(<axis/>)", R"(<axis xyr="0 0 1"/>)"}) {
+    EXPECT_NE(refusal(with_limit(axis)).find("the axis has no length"), std::string::npos) << axis;
+  }
+  EXPECT_NE(refusal(with_limit(R"(<axis xyz="0 0 1e200"/>)")).find("a length of 1e+200"),
             std::string::npos);
   EXPECT_NE(refusal(joint(R"(<limit lower="1" upper="-1" effort="1" velocity="1"/>)"))
                 .find("the lower limit 1 is above the upper limit -1"),
