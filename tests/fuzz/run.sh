@@ -20,4 +20,4 @@ run() {
   fi
 }
 export -f run
-printf '%s\n' tables sightings yaml urdf effects torque_log | xargs -P 2 -I{} bash -c "run {} $seconds"
+ls tests/fuzz/seeds | xargs -P 2 -I{} bash -c "run {} $seconds"
