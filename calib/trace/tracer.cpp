@@ -144,9 +144,13 @@ void Tracer::search_again(const std::optional<std::string>& place) {
   }
 }
 
+bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
+  return score.rms >= std::max(options_.floor, candidate.floor);
+}
+
 bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {
-  return !score.hidden() && score.rms >= std::max(options_.floor, candidate.floor) &&
-         !removed_.contains(candidate.id) && is_possible(candidate, score.theta);
+  return !score.hidden() && is_large(candidate, score) && !removed_.contains(candidate.id) &&
+         is_possible(candidate, score.theta);
 }
 
 std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,

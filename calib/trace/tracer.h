@@ -34,6 +34,8 @@ class Tracer {
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_say(const Stage& stage);
   void forward();
+  /// Beyond what the sensor's own errors do.
+  [[nodiscard]] bool is_large(const Candidate& candidate, const Score& score) const;
   /// Seen at all, large enough, possible, and not taken out before; significance apart.
   [[nodiscard]] bool may_be_added(const Candidate& candidate, const Score& score) const;
   [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,

@@ -136,8 +136,8 @@ bool Tracer::check(std::size_t index) {
   const bool shown =
       slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
   const bool possible = is_possible(*candidate, now_->fit.values[index]);
-  const bool large = own.score.rms >= std::max(options_.floor, candidate->floor);
-  if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
+  if (!possible || !is_large(*candidate, own.score) || !shown ||
+      stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = stage_of(kinescope::trace::without(now_->added, index));
