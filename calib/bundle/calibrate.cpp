@@ -57,7 +57,8 @@ std::optional<Prediction> predict_residual(const Spec& spec, const State& state,
   return out;
 }
 
-// Root mean square of one coordinate over sightings, and of one angle (poses).
+// Root mean square distance over sightings: corner to corner, point to point; and of the angle
+// between poses.
 struct Rms {
   double sum = 0.0;
   double sum_rotation = 0.0;
@@ -66,14 +67,14 @@ struct Rms {
   void add(MeasurementKind kind, const Prediction& prediction) {
     if (kind == MeasurementKind::kCorners) {
       for (const auto& r : prediction.corners_px) sum += r.squaredNorm();
-      count += 2 * static_cast<int>(prediction.corners_px.size());
+      count += static_cast<int>(prediction.corners_px.size());
       return;
     }
     sum += prediction.displacement.tail<3>().squaredNorm();
-    count += 3;
+    ++count;
     if (kind == MeasurementKind::kPose) {
       sum_rotation += prediction.displacement.head<3>().squaredNorm();
-      count_rotation += 3;
+      ++count_rotation;
     }
   }
   [[nodiscard]] double value() const { return count > 0 ? std::sqrt(sum / count) : 0.0; }

@@ -114,8 +114,9 @@ struct Calibration {
 
   std::vector<SightingResidual> residuals;
   double sigma_scale = 1.0;  ///< the noise found over the noise declared
-  double training_rms =
-      0.0;  ///< px (corners) or m (poses, points), per coordinate, of the folds' training parts
+  /// Distances, rms: px between corners, m between points (poses: between origins); of the folds'
+  /// training parts.
+  double training_rms = 0.0;
   double held_out_rms = 0.0;               ///< the same on the frames each fold left out
   double before_rms = 0.0;                 ///< the same with the start
   double final_rms = 0.0;                  ///< the same with all frames used

@@ -256,6 +256,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.first_row = std::move(fit.first_row);
   linear.unit = std::move(fit.unit);
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";
+  linear.coordinates = world.kind == MeasurementKind::kCorners ? 2 : 3;
   linear.independent_instants = world.postures;
   linear.correlation_time_s = fit.correlation_time_s;
   linear.time_s.resize(static_cast<Eigen::Index>(fit.frames.size()));

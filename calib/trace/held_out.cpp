@@ -61,7 +61,7 @@ HeldOutInstants held_out_instants(const NormalSystem& system) {
   const Linearisation& linear = system.linear();
   const Partition& partition = system.partition();
   HeldOutInstants out;
-  for (Eigen::VectorXd* v : {&out.whitened, &out.squared, &out.rows}) {
+  for (Eigen::VectorXd* v : {&out.whitened, &out.squared, &out.points}) {
     v->setZero(linear.instants());
   }
   for (Eigen::Index i = 0; i < linear.instants(); ++i) {
@@ -74,24 +74,24 @@ HeldOutInstants held_out_instants(const NormalSystem& system) {
         linear.jacobian.middleRows(first, rows) * steps[static_cast<std::size_t>(fold)];
     out.whitened[i] = error.squaredNorm();
     out.squared[i] = error.cwiseProduct(linear.unit.segment(first, rows)).squaredNorm();
-    out.rows[i] = static_cast<double>((linear.unit.segment(first, rows).array() > 0.0).count());
+    out.points[i] = linear.points(first, rows);
   }
   return out;
 }
 
 HeldOutError held_out_error(const NormalSystem& system, const HeldOutInstants& errors) {
   const Eigen::VectorXd squared = over_stretches(system.partition(), errors.squared);
-  const Eigen::VectorXd rows = over_stretches(system.partition(), errors.rows);
+  const Eigen::VectorXd points = over_stretches(system.partition(), errors.points);
   const auto n = static_cast<double>(squared.size());
   HeldOutError out;
   out.unit = system.linear().unit_name;
-  const double mean = squared.sum() / std::max(1.0, rows.sum());
+  const double mean = squared.sum() / std::max(1.0, points.sum());
   out.value = std::sqrt(mean);
   out.interval = {out.value, out.value};
   if (n < 3.0 || !(mean > 0.0)) return out;
   // A ratio of sums (Cochran 1977, 6.4); the root by the rule for small changes.
-  const Eigen::VectorXd rest = squared - mean * rows;
-  const double sigma = std::sqrt(rest.squaredNorm() * n / (n - 1.0)) / rows.sum();
+  const Eigen::VectorXd rest = squared - mean * points;
+  const double sigma = std::sqrt(rest.squaredNorm() * n / (n - 1.0)) / points.sum();
   const double half = t_quantile(0.025, n - 1.0) * sigma / (2.0 * out.value);
   out.interval = {std::max(0.0, out.value - half), out.value + half};
   return out;

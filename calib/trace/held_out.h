@@ -18,11 +18,11 @@ namespace kinescope::trace {
 struct HeldOutInstants {
   Eigen::VectorXd whitened;
   Eigen::VectorXd squared;  ///< in the square of the residual's unit
-  Eigen::VectorXd rows;
+  Eigen::VectorXd points;
 };
 [[nodiscard]] HeldOutInstants held_out_instants(const NormalSystem& system);
 
-/// Root mean square with a 95 % interval from the scatter of the stretches.
+/// Root mean square distance with a 95 % interval from the scatter of the stretches.
 [[nodiscard]] HeldOutError held_out_error(const NormalSystem& system,
                                           const HeldOutInstants& errors);
 

@@ -18,7 +18,7 @@ Stage::Stage(std::vector<AddedEffect> effects, TracedFit fitted)
 double Stage::rms() const {
   const Linearisation& linear = fit.linear;
   return std::sqrt(linear.residual.cwiseProduct(linear.unit).squaredNorm() /
-                   std::max(1.0, static_cast<double>((linear.unit.array() > 0.0).count())));
+                   std::max(1.0, linear.points(0, linear.unit.size())));
 }
 
 StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) {

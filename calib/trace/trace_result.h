@@ -31,7 +31,7 @@ struct Interval {
   double high = 0.0;
 };
 
-/// Root mean square error of a row on instants held out, with its 95 % interval.
+/// Root mean square error (a distance for points) on instants held out, with its 95 % interval.
 struct HeldOutError {
   double value = 0.0;
   Interval interval;
@@ -104,10 +104,10 @@ struct TestedCandidate {
   double p_value = 1.0;  ///< with the scan and the family counted in
   double scan = 0.0;
   double size = 0.0;   ///< as the score test sees it
-  double moves = 0.0;  ///< the prediction by, rms, beyond what other parameters could do, in the
-                       ///< residual's unit
+  double moves = 0.0;  ///< a coordinate of the prediction by, rms, beyond what other parameters
+                       ///< could do, in the residual's unit
   std::string unit;
-  std::optional<double> held_out;  ///< error after a refit, in the residual's unit
+  std::optional<double> held_out;  ///< error after a refit, rms distance
 };
 
 struct NotFoundEffect {
@@ -149,7 +149,7 @@ struct Rest {
 struct TraceStep {
   int round = 0;
   std::string words;
-  double rms = 0.0;  ///< training, in the residual's unit
+  double rms = 0.0;  ///< training, distance
   HeldOutError held_out;
 };
 
@@ -165,7 +165,7 @@ struct Trace {
   std::vector<TraceStep> steps;
   HeldOutError held_out_before;
   HeldOutError held_out_after;
-  double noise = 0.0;  ///< rms of what is left, in the residual's unit
+  double noise = 0.0;  ///< rms distance that is left, in the residual's unit
   int stretches = 0;   ///< of time, over which the noise was judged
   double false_alarm_rate = 0.0;
 };

@@ -33,11 +33,17 @@ struct Linearisation {
   /// and are not counted in errors.
   Eigen::VectorXd unit;
   std::string unit_name;  ///< "px", "m", "N m"
+  /// Counted rows that are the coordinates of one point: errors are given as distances.
+  int coordinates = 1;
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.
   bool independent_instants = false;
   double correlation_time_s = 0.0;  ///< integral time of the residual's autocorrelation
 
   [[nodiscard]] Eigen::Index instants() const { return time_s.size(); }
+  /// Counted among these rows.
+  [[nodiscard]] double points(Eigen::Index first, Eigen::Index rows) const {
+    return static_cast<double>((unit.segment(first, rows).array() > 0.0).count()) / coordinates;
+  }
 };
 
 /// One parameter of an effect: prediction changes by parameter x share(instant) x carrier(row).

@@ -2,6 +2,7 @@
 #include "calib/bundle/calibrate.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -77,7 +78,7 @@ TEST(Calibrate, NoiseComesBackAsNoise) {
   const World world = make_world(options);
   const Calibration found = calibrate(world.measurements, world.markers, world.log,
                                       perturbed_start(world, 0.02, 0.005, 3));
-  EXPECT_NEAR(found.final_rms, 0.1, 0.003);
+  EXPECT_NEAR(found.final_rms, std::numbers::sqrt2 * 0.1, 0.003);
   EXPECT_NEAR(found.sigma_scale, 1.0, 0.05);
   EXPECT_LT(found.held_out_rms / found.training_rms, 1.05);
   EXPECT_EQ(found.folds, 5);
@@ -95,7 +96,7 @@ TEST(Calibrate, OutliersAreListedAndDoNotMove) {
   for (const SightingResidual& residual : found.residuals) rejected += residual.used ? 0 : 1;
   EXPECT_GE(rejected, static_cast<int>(world.outliers.size()));
   EXPECT_LE(rejected, static_cast<int>(world.outliers.size()) + 4);
-  EXPECT_NEAR(found.final_rms, 0.1, 0.005);
+  EXPECT_NEAR(found.final_rms, std::numbers::sqrt2 * 0.1, 0.005);
 }
 
 TEST(Calibrate, ShuffledInputGivesTheSameBits) {
@@ -141,7 +142,7 @@ TEST(Calibrate, IntrinsicsOnRequest) {
   ASSERT_TRUE(found.intrinsics_sigma[0]);
   EXPECT_LT(std::abs(found.camera.fx - world.camera.fx), 4.0 * *found.intrinsics_sigma[0]);
   EXPECT_LT(std::abs(found.camera.cx - world.camera.cx), 4.0 * *found.intrinsics_sigma[2]);
-  EXPECT_NEAR(found.final_rms, 0.05, 0.003);
+  EXPECT_NEAR(found.final_rms, std::numbers::sqrt2 * 0.05, 0.003);
 }
 
 // Claimed uncertainty against scatter: z-scores of quantities that do not depend on the gauge (the

@@ -2,6 +2,7 @@
 //
 // Calibration against a nominal robot: from poses, from points, from a ball in sockets.
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -16,6 +17,7 @@ namespace kinescope {
 namespace {
 
 constexpr int kPostures = 80;
+constexpr double kDistance = std::numbers::sqrt3;  // rms, over the sigma of a coordinate
 
 struct Lab {
   KinematicTree real;     // what the robot is
@@ -123,8 +125,8 @@ TEST(Nominal, OffsetsAloneExplainWrongZeros) {
   const Calibration before = run(lab, measurements, placement, FreeGeometry::kPlacement);
   const Calibration after = run(lab, measurements, placement, FreeGeometry::kOffsets);
   EXPECT_GT(before.held_out_rms, 10.0 * kSigmaM);
-  EXPECT_NEAR(after.held_out_rms, kSigmaM, 0.15 * kSigmaM);
-  EXPECT_NEAR(after.held_out_rotation_rms_rad, kSigmaRad, 0.15 * kSigmaRad);
+  EXPECT_NEAR(after.held_out_rms, kDistance * kSigmaM, 0.15 * kDistance * kSigmaM);
+  EXPECT_NEAR(after.held_out_rotation_rms_rad, kDistance * kSigmaRad, 0.15 * kDistance * kSigmaRad);
   // The joint value stays the reading: the zero went into the frame.
   for (const Joint& joint : after.tree.joints) EXPECT_EQ(joint.offset, 0.0);
   EXPECT_TRUE(after.joints[2].offset_sigma);
@@ -138,7 +140,7 @@ TEST(Nominal, GeometryExplainsAWrongDrawing) {
   const Calibration offsets = run(lab, measurements, placement, FreeGeometry::kOffsets);
   const Calibration geometry = run(lab, measurements, placement, FreeGeometry::kGeometry);
   EXPECT_GT(offsets.held_out_rms, 5.0 * kSigmaM);
-  EXPECT_LT(geometry.held_out_rms, 1.3 * kSigmaM);
+  EXPECT_LT(geometry.held_out_rms, 1.3 * kDistance * kSigmaM);
   EXPECT_EQ(geometry.status, CalibrationStatus::kConverged);
 }
 
@@ -148,7 +150,7 @@ TEST(Nominal, ZerosFarOffDoNotHoldTheGeometryBack) {
   const Measurements measurements = tracked_poses(lab, {}, 2e-4, kSigmaM);
   const Placement placement = place_markers(lab.nominal, lab.values, measurements.poses);
   const Calibration geometry = run(lab, measurements, placement, FreeGeometry::kGeometry);
-  EXPECT_LT(geometry.held_out_rms, 1.3 * kSigmaM);
+  EXPECT_LT(geometry.held_out_rms, 1.3 * kDistance * kSigmaM);
   EXPECT_EQ(geometry.status, CalibrationStatus::kConverged);
   // What the data do not tell (the first zero against the base) the drawing still holds.
   const auto zero = geometry.joints[0].direction_sigma_rad;
@@ -251,7 +253,7 @@ TEST(Nominal, PointsOfATracker) {
   const Calibration before = run(lab, measurements, placement, FreeGeometry::kPlacement);
   const Calibration after = run(lab, measurements, placement, FreeGeometry::kGeometry);
   EXPECT_GT(before.held_out_rms, 10.0 * kSigma);
-  EXPECT_LT(after.held_out_rms, 1.5 * kSigma);
+  EXPECT_LT(after.held_out_rms, 1.5 * kDistance * kSigma);
 }
 
 TEST(Nominal, BallInSocketsWithTheirDistance) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -96,7 +97,7 @@ TEST_P(Named, SizedAndCorrected) {
   start.corrections = found.corrections;
   const Calibration corrected =
       calibrate(world.measurements, world.markers, world.log, start, {.folds = 0});
-  EXPECT_NEAR(corrected.final_rms, kSigma, kSigmaTolerance);
+  EXPECT_NEAR(corrected.final_rms, std::numbers::sqrt2 * kSigma, kSigmaTolerance);
 }
 
 INSTANTIATE_TEST_SUITE_P(TraceCalibration, Named,
@@ -124,8 +125,8 @@ TEST(TraceCalibration, ACleanWorldIsClean) {
   const Trace& trace = clean_trace().trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
   EXPECT_TRUE(clean_trace().corrections.empty());
-  EXPECT_NEAR(trace.noise, kSigma, kSigmaTolerance);
-  EXPECT_NEAR(trace.held_out_after.value, kSigma, 2.0 * kSigmaTolerance);
+  EXPECT_NEAR(trace.noise, std::numbers::sqrt2 * kSigma, kSigmaTolerance);
+  EXPECT_NEAR(trace.held_out_after.value, std::numbers::sqrt2 * kSigma, 2.0 * kSigmaTolerance);
 }
 
 TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
