@@ -20,6 +20,12 @@ constexpr double kOffsetMargin = 0.03;
 // Width of the Cauchy loss in units of the square root of a sighting's degrees of freedom.
 constexpr double kLossWidth = 3.0;
 
+// Starts are good enough for whole Gauss-Newton steps; what fails shrinks the radius.
+constexpr double kFirstRadius = 1e8;
+// A robust solution only tells the noise level and what stands out.
+constexpr double kRobustTolerance = 1e-6;
+constexpr double kPlainTolerance = 1e-10;
+
 // Quantile of chi-square with k degrees of freedom at z standard deviations. Wilson and Hilferty
 // 1931.
 double chi_square_at(double k, double z) {
@@ -166,7 +172,8 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
                                    ? ceres::SPARSE_NORMAL_CHOLESKY
                                    : ceres::DENSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
-  options.function_tolerance = 1e-10;
+  options.initial_trust_region_radius = kFirstRadius;
+  options.function_tolerance = build_options.robust_width ? kRobustTolerance : kPlainTolerance;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-14;
   options.num_threads = 1;

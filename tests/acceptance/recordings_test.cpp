@@ -16,6 +16,7 @@
 #include "tests/acceptance/truth_robot.h"
 #include "tests/app/io/check_products.h"
 #include "tests/truth/shared_data.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope::acceptance {
 namespace {
@@ -55,8 +56,7 @@ class Recordings : public testing::TestWithParam<Case> {
     } else {
       recording_ = fs::path(KINESCOPE_SOURCE_DIR) / GetParam().place;
     }
-    output_ = fs::temp_directory_path() /
-              ("kinescope_" + std::string(GetParam().name) + "_" + std::to_string(::getpid()));
+    output_ = truth::temporary_path(std::string(GetParam().name));
   }
   void TearDown() override {
     std::error_code ignored;

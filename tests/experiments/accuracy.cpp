@@ -17,6 +17,7 @@
 #include "kinematics/urdf/urdf.h"
 #include "tests/acceptance/truth_robot.h"
 #include "tests/truth/shared_data.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -41,7 +42,7 @@ double widening(const json& calibration) {
 }
 
 void judge(const fs::path& recording) {
-  const fs::path output = fs::temp_directory_path() / "kinescope_accuracy" / recording.filename();
+  const fs::path output = truth::temporary_path("accuracy") / recording.filename();
   RunOptions options;
   options.recording.folder = recording;
   options.output = output;

@@ -30,6 +30,7 @@
 #include "tests/acceptance/truth_robot.h"
 #include "tests/experiments/trace_camera_worlds.h"
 #include "tests/truth/film.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -195,8 +196,7 @@ Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect, cons
   if (injected) options.effects = {*injected};
   const std::string name = fmt::format("{}_{}_{}", to_string(kind), seed, effect);
   const bool keeps = !request.keep.empty();
-  const fs::path folder =
-      (keeps ? request.keep : fs::temp_directory_path() / "kinescope_filmed") / name;
+  const fs::path folder = (keeps ? request.keep : truth::temporary_path("filmed")) / name;
   fs::create_directories(folder);
   const truth::World world = truth::make_effect_world(options);
   truth::write_recording(folder, world, {.frame_rate_hz = kFrameRate, .seed = options.seed});

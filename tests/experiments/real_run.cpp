@@ -6,10 +6,10 @@
 #include <exception>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope::real {
 namespace fs = std::filesystem;
@@ -122,8 +122,7 @@ Outcome run_recording(const RecordingPaths& paths, const fs::path& output,
   return out;
 }
 
-ScratchFolder::ScratchFolder(const std::string& name)
-    : path_(fs::temp_directory_path() / fmt::format("kinescope_{}_{}", name, getpid())) {
+ScratchFolder::ScratchFolder(const std::string& name) : path_(truth::temporary_path(name)) {
   fs::create_directories(path_);
 }
 

@@ -4,18 +4,17 @@
 #include <filesystem>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "app/io/recording.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
 
 std::filesystem::path write_settings(const std::string& text) {
-  const auto folder = std::filesystem::path(testing::TempDir()) /
-                      ("kinescope_dynamics_settings_" + std::to_string(::getpid()));
+  const auto folder = truth::temporary_path("dynamics_settings");
   std::filesystem::create_directories(folder);
   write_file_atomically(folder / "recording.yaml", text);
   return folder / "recording.yaml";

@@ -12,6 +12,7 @@
 #include "app/io/recording.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 
@@ -21,8 +22,7 @@ class RecordingFolder {
  public:
   RecordingFolder() {
     const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::path(testing::TempDir()) /
-            (std::string("kinescope_") + test->test_suite_name() + "_" + test->name());
+    path_ = truth::temporary_path(std::string(test->test_suite_name()) + "_" + test->name());
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -10,10 +10,10 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "app/report/report.h"
 #include "tests/app/report/synthetic_run.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -39,8 +39,7 @@ std::string browser() {
 
 /// The DOM after the scripts ran; the console's messages go to `console`.
 std::string opened(const RunSummary& run, std::string& console) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("kinescope_report_" + std::to_string(getpid()));
+  const std::filesystem::path folder = truth::temporary_path("report");
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "report.html") << report_html(run, "");
   const std::string log = (folder / "console.txt").string();

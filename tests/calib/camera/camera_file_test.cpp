@@ -10,6 +10,7 @@
 #include "kinematics/core/file.h"
 #include "kinematics/core/rng.h"
 #include "tests/truth/shared_data.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -18,9 +19,8 @@ namespace {
 class CameraFile : public testing::Test {
  protected:
   std::filesystem::path write(const std::string& content, const std::string& name = "camera.yaml") {
-    const std::filesystem::path path =
-        std::filesystem::path(testing::TempDir()) /
-        (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" + name);
+    const std::filesystem::path path = truth::temporary_path(
+        std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" + name);
     write_file_atomically(path, content);
     files_.push_back(path);
     return path;

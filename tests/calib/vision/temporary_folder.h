@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/truth/temporary_path.h"
+
 namespace kinescope {
 
 /// A test with an empty folder of its own.
@@ -13,8 +15,7 @@ class TemporaryFolder : public testing::Test {
  protected:
   void SetUp() override {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(testing::TempDir()) /
-              (std::string("kinescope_") + info->test_suite_name() + "_" + info->name());
+    folder_ = truth::temporary_path(std::string(info->test_suite_name()) + "_" + info->name());
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 #include "kinematics/core/rng.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -90,8 +90,7 @@ std::string LogWorld::csv() const {
 }
 
 std::filesystem::path write_log(const std::string& name, const std::string& text) {
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("kinescope_logs_" + std::to_string(::getpid()));
+  const std::filesystem::path folder = truth::temporary_path("logs");
   std::filesystem::create_directories(folder);
   write_file_atomically(folder / name, text);
   return folder / name;

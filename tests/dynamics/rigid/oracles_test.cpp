@@ -6,7 +6,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/mass_matrix.h"
@@ -18,6 +17,7 @@
 #include <kdl/treeidsolver_recursive_newton_euler.hpp>
 
 #include "tests/truth/kdl_tree.h"
+#include "tests/truth/temporary_path.h"
 #endif
 #ifdef KINESCOPE_HAVE_MUJOCO
 #include <mujoco/mujoco.h>
@@ -124,8 +124,7 @@ void refine_inertia(const InertialParameters& ours, mjModel& model, int body) {
 }
 
 MujocoModel load(const DynamicModel& model) {
-  const auto path = std::filesystem::path(testing::TempDir()) /
-                    ("kinescope_rigid_oracle_" + std::to_string(::getpid()) + ".urdf");
+  const auto path = truth::temporary_path("rigid_oracle.urdf");
   std::ofstream(path) << write_urdf(model);
   char error[1000] = "";
   MujocoModel loaded(mj_loadXML(path.c_str(), nullptr, error, sizeof error));

@@ -4,9 +4,9 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "kinematics/core/error.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -16,8 +16,7 @@ class FileTest : public testing::Test {
  protected:
   FileTest() { fs::create_directories(folder_); }
   ~FileTest() override { fs::remove_all(folder_); }
-  fs::path folder_ =
-      fs::path(testing::TempDir()) / ("kinescope_file_test_" + std::to_string(::getpid()));
+  fs::path folder_ = truth::temporary_path("file_test");
 };
 
 ExitCode code_of(const std::function<void()>& call) {

@@ -7,11 +7,11 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
-#include <unistd.h>
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -54,8 +54,7 @@ TEST(Gzip, SaysWhatIsWrong) {
 TEST(Gzip, PacksTheSameBytesTwice) { EXPECT_EQ(gzip("t,q1\n0,1\n"), gzip("t,q1\n0,1\n")); }
 
 TEST(Gzip, TablesAreReadPackedOrPlain) {
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("kinescope_gzip_" + std::to_string(::getpid()));
+  const std::filesystem::path folder = truth::temporary_path("gzip");
   std::filesystem::create_directories(folder);
   const std::string text = "t,q1\n0,1\n1,2\n";
   write_file_atomically(folder / "log.csv", text);

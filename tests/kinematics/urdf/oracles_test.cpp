@@ -11,6 +11,7 @@
 
 #include "kinematics/urdf/urdf.h"
 #include "tests/kinematics/model/random_tree.h"
+#include "tests/truth/temporary_path.h"
 
 #ifdef KINESCOPE_HAVE_KDL
 #include <kdl/tree.hpp>
@@ -29,7 +30,7 @@ namespace {
 constexpr double kOthersAgree = 1e-9;
 
 std::filesystem::path write_temporary(const std::string& text, const std::string& name) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
+  const std::filesystem::path path = truth::temporary_path(name);
   std::ofstream(path) << text;
   return path;
 }
@@ -42,7 +43,7 @@ TEST(UrdfOracle, CheckUrdfTakesIt) {
   Rng rng = Rng::from_name("UrdfOracle.CheckUrdfTakesIt");
   for (int robot = 0; robot < 5; ++robot) {
     const std::string text = write_urdf(random_tree(rng, 8, 4));
-    const auto path = write_temporary(text, "kinescope_check_urdf.urdf");
+    const auto path = write_temporary(text, "check_urdf.urdf");
     const std::string command = "check_urdf '" + path.string() + "' > /dev/null 2>&1";
     EXPECT_EQ(std::system(command.c_str()), 0) << text;  // NOLINT(concurrency-mt-unsafe)
     std::filesystem::remove(path);
@@ -146,7 +147,7 @@ Pose body_pose(const mjModel& model, const mjData& data, const std::string& name
 }
 
 void compare_with_mujoco(const KinematicTree& tree, Rng& rng) {
-  const auto path = write_temporary(write_urdf(tree), "kinescope_mujoco.urdf");
+  const auto path = write_temporary(write_urdf(tree), "mujoco.urdf");
   char error[1000] = "";
   const std::unique_ptr<mjModel, MujocoDeleter> model(
       mj_loadXML(path.c_str(), nullptr, error, sizeof error));
