@@ -29,16 +29,6 @@ constexpr double kRarelySeen = 0.3;     ///< share of the frames
 constexpr double kSmallMarker = 25.0;   ///< px: below, tilt and depth are poorly seen
 constexpr double kOftenRejected = 0.1;  ///< share of the sightings of one marker
 
-/// A sentence of other rooms, closed with a full stop.
-std::string sentence(std::string text) {
-  if (text.empty()) return text;
-  const char first = text.front();
-  if (first >= 'a' && first <= 'z') text.front() = static_cast<char>(first - 'a' + 'A');
-  const char last = text.back();
-  if (last != '.' && last != '!' && last != '?') text += '.';
-  return text;
-}
-
 void add_failures(const RunSummary& run, std::vector<Finding>& findings) {
   const Calibration& calibration = run.calibration;
   if (calibration.status == CalibrationStatus::kConverged) return;
@@ -261,6 +251,15 @@ std::string error_words(const TypicalError& error) {
 }
 
 }  // namespace
+
+std::string sentence(std::string text) {
+  if (text.empty()) return text;
+  const char first = text.front();
+  if (first >= 'a' && first <= 'z') text.front() = static_cast<char>(first - 'a' + 'A');
+  const char last = text.back();
+  if (last != '.' && last != '!' && last != '?') text += '.';
+  return text;
+}
 
 std::string fault_words(const KinematicTree& nominal, const NominalFault& fault) {
   const Joint& joint = nominal.joints[static_cast<std::size_t>(fault.joint)];

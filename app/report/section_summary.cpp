@@ -9,6 +9,7 @@
 #include "app/report/findings.h"
 #include "app/report/html.h"
 #include "app/report/sections.h"
+#include "app/report/trace_words.h"
 
 namespace kinescope::report {
 namespace {
@@ -66,6 +67,31 @@ std::string geometry_light(const Facts& facts) {
                rule);
 }
 
+std::string_view trace_word(TraceVerdict verdict) {
+  switch (verdict) {
+    case TraceVerdict::kClean:
+      return "noise, nothing else";
+    case TraceVerdict::kEffects:
+      return "traced to what the model lacked, corrected";
+    case TraceVerdict::kAmbiguous:
+      return "traced, but to one of several causes";
+    case TraceVerdict::kUnknown:
+      return "structure left that no known effect explains";
+    case TraceVerdict::kNothingToSay:
+    case TraceVerdict::kNotRun:
+      break;
+  }
+  return "not traced: too little to tell";
+}
+
+std::string residual_light(const Trace& trace) {
+  return light("Residual", trace.verdict == TraceVerdict::kClean ? "good" : "fair",
+               trace_word(trace.verdict),
+               fmt::format("searched for known effects of camera, encoders and joints; noise alone "
+                           "names one in {:.0f} of 100 recordings",
+                           100.0 * trace.false_alarm_rate));
+}
+
 std::string verdict_line(std::string_view label, std::string_view words) {
   return fmt::format("<dt>{}</dt><dd>{}</dd>\n", label, escaped(words));
 }
@@ -78,10 +104,13 @@ std::string section_head(std::string_view id, std::string_view title) {
 
 std::string verdict_section(const Facts& facts) {
   std::string out = section_head("verdict", "Verdict");
+  const auto& trace = facts.run.trace;
+  const bool traced = trace && trace->verdict != TraceVerdict::kNotRun;
   out += "<ul class=\"lights\">\n" + structure_light(facts.run) + geometry_light(facts) +
-         "</ul>\n<dl class=\"verdict\">\n";
+         (traced ? residual_light(*trace) : "") + "</ul>\n<dl class=\"verdict\">\n";
   out += verdict_line("Found", facts.verdict.found);
   out += verdict_line("Accuracy", facts.verdict.accurate);
+  if (traced) out += verdict_line("What the model lacked", trace_paragraph(*trace));
   out += verdict_line("What limits it", facts.verdict.limits);
   out += verdict_line("What to record next", facts.verdict.next);
   return out + "</dl></section>\n";

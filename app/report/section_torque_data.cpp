@@ -4,6 +4,7 @@
 #include "app/report/html.h"
 #include "app/report/sections.h"
 #include "app/report/torque_sections.h"
+#include "app/report/trace_words.h"
 
 namespace kinescope::report {
 namespace {
@@ -30,8 +31,10 @@ std::string findings_table(const TorqueFacts& facts) {
 
 std::string torque_verdict_section(const TorqueFacts& facts) {
   const TorqueVerdict verdict = torque_verdict(facts.summary);
+  const std::string traced = facts.summary.trace ? trace_paragraph(*facts.summary.trace) : "";
   return section_head("verdict", "Verdict") + paragraph(verdict.found) +
          paragraph(verdict.accurate) + paragraph(verdict.limits) +
+         (traced.empty() ? "" : paragraph(traced)) +
          (verdict.payload.empty() ? "" : paragraph(verdict.payload)) +
          (verdict.gravity.empty() ? "" : paragraph(verdict.gravity)) + "</section>\n";
 }

@@ -242,9 +242,14 @@ std::string trace_section(const Trace& trace) {
       fmt::format(
           "Every candidate is tested against what the model's own parameters can do, with "
           "the noise judged over {} stretches of time; over all tests together something is "
-          "invented in {:.0f} of 100 recordings without effects. All tests stand in "
+          "invented in {:.0f} of 100 recordings without effects. {}All tests stand in "
           "trace.json.",
-          trace.stretches, 100.0 * trace.false_alarm_rate),
+          trace.stretches, 100.0 * trace.false_alarm_rate,
+          trace.held_out_after.unit == "px"
+              ? "Sightings that contradict those before and after them are left out here, more of "
+                "them than in the fit, so that this error is a little smaller than that of the "
+                "calibration. "
+              : ""),
       "note");
   out += not_found_table(trace) + steps_list(trace);
   return out + "</section>\n";

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "app/report/findings.h"
 #include "app/report/trace_lines.h"
 
 namespace kinescope {
@@ -108,37 +109,51 @@ std::string rest_words(const Rest& rest) {
       error_change_words(rest.held_out_before, rest.held_out_after));
 }
 
-}  // namespace report
+namespace {
 
-std::vector<std::string> trace_lines(const Trace& trace) {
-  using report::amount_text;
-  std::vector<std::string> out;
+// A sentence a finding, the verdict first.
+std::vector<std::string> findings_of(const Trace& trace) {
   switch (trace.verdict) {
     case TraceVerdict::kNotRun:
-      return out;
+      return {};
     case TraceVerdict::kNothingToSay:
-      out.push_back(fmt::format("Tracing: nothing can be said: {}.", trace.reason));
-      return out;
+      return {fmt::format("nothing can be said: {}.", trace.reason)};
     case TraceVerdict::kClean:
-      out.push_back(fmt::format("Tracing: nothing is left to explain; the residual is noise of {}.",
-                                amount_text(trace.noise, trace.held_out_after.unit)));
-      return out;
+      return {fmt::format("nothing is left to explain; the residual is noise of {}.",
+                          amount_text(trace.noise, trace.held_out_after.unit))};
     case TraceVerdict::kEffects:
     case TraceVerdict::kAmbiguous:
     case TraceVerdict::kUnknown:
       break;
   }
-  out.push_back(
-      fmt::format("Tracing: {}. Error on unseen data {}.", trace.reason,
-                  report::error_change_words(trace.held_out_before, trace.held_out_after)));
+  std::vector<std::string> out{
+      fmt::format("{}. Error on unseen data {}.", trace.reason,
+                  error_change_words(trace.held_out_before, trace.held_out_after))};
   for (const TracedEffect& effect : trace.accepted) {
-    out.push_back(fmt::format("  {}: {}; {}. Check: {}.", report::effect_name(effect),
-                              report::size_words(effect), effect.words, effect.check));
+    out.push_back(fmt::format("{}: {}; {}. Check: {}.", effect_name(effect), size_words(effect),
+                              effect.words, effect.check));
   }
-  for (const Ambiguity& ambiguity : trace.ambiguities) {
-    out.push_back("  " + report::ambiguity_words(ambiguity));
-  }
-  for (const Rest& rest : trace.rest) out.push_back("  " + report::rest_words(rest));
+  for (const Ambiguity& ambiguity : trace.ambiguities) out.push_back(ambiguity_words(ambiguity));
+  for (const Rest& rest : trace.rest) out.push_back(rest_words(rest));
+  return out;
+}
+
+}  // namespace
+
+std::string trace_paragraph(const Trace& trace) {
+  constexpr std::size_t kMost = 4;  // sentences; the others stand in their own section
+  std::vector<std::string> findings = findings_of(trace);
+  if (findings.size() > kMost) findings.resize(1);
+  std::string out;
+  for (const std::string& finding : findings) out += (out.empty() ? "" : " ") + sentence(finding);
+  return out;
+}
+
+}  // namespace report
+
+std::vector<std::string> trace_lines(const Trace& trace) {
+  std::vector<std::string> out = report::findings_of(trace);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i].insert(0, i == 0 ? "Tracing: " : "  ");
   return out;
 }
 

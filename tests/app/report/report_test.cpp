@@ -92,6 +92,22 @@ TEST(Report, PosesAndPointsHaveNoPixels) {
   }
 }
 
+TEST(Report, SaysFirstWhatTheModelLacked) {
+  RunSummary run = synthetic_run();
+  EXPECT_EQ(report_html(run, "").find("<b>Residual</b>"), std::string::npos);
+  run.trace = Trace{};
+  run.trace->verdict = TraceVerdict::kEffects;
+  run.trace->reason = "the model lacked backlash at arm3";
+  const std::string corrected = report_html(run, "");
+  EXPECT_NE(corrected.find("<dt>What the model lacked</dt><dd>The model lacked backlash at arm3."),
+            std::string::npos);
+  EXPECT_NE(corrected.find("<li class=\"light fair\"><span class=\"sign\">!</span><b>Residual</b>"),
+            std::string::npos);
+  run.trace->verdict = TraceVerdict::kClean;
+  EXPECT_NE(report_html(run, "").find("<span class=\"sign\">✓</span><b>Residual</b> noise"),
+            std::string::npos);
+}
+
 TEST(Report, ShowsNoNaN) {
   for (const SyntheticRunOptions& options : every_kind()) {
     RunSummary run = synthetic_run(options);
