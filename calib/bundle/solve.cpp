@@ -20,8 +20,9 @@ constexpr double kOffsetMargin = 0.03;
 // Width of the Cauchy loss in units of the square root of a sighting's degrees of freedom.
 constexpr double kLossWidth = 3.0;
 
-// Starts are good enough for whole Gauss-Newton steps; what fails shrinks the radius.
-constexpr double kFirstRadius = 1e8;
+// Starts are good enough for nearly whole Gauss-Newton steps. With 1e8 what cannot be told apart
+// wanders in its null space.
+constexpr double kFirstRadius = 1e6;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
 constexpr double kPlainTolerance = 1e-10;
