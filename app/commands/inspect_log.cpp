@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/inspection.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -14,12 +15,6 @@ namespace {
 constexpr double kLongGapS = 0.5;       ///< longer gaps are not bridged by the interpolation
 constexpr double kLittleMotion = 0.01;  ///< rad or m; an axis seen over less is hardly determined
 constexpr double kUnevenShare = 0.5;    ///< of the mean step
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Whole numbers over a wide range are encoder ticks; more than a turn in either direction are
 /// degrees.
@@ -71,7 +66,7 @@ void look_at_steps(const JointLog& log, LogFacts& facts, std::vector<Finding>& f
     facts.longest_gap_at_s = log.times_s[i - 1];
   }
   // Gaps are told apart from the steps, or one of them would be all the jitter.
-  const double longest_step_s = std::max(kLongGapS, 3.0 * median(steps));
+  const double longest_step_s = std::max(kLongGapS, 3.0 * median_of(steps));
   std::erase_if(steps, [&](double step) { return step > longest_step_s; });
   const auto count = static_cast<double>(steps.size());
   const double step = std::accumulate(steps.begin(), steps.end(), 0.0) / count;

@@ -13,6 +13,7 @@
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/torque_scale.h"
 #include "dynamics/rigid/inverse_dynamics.h"
+#include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
 
 namespace kinescope {

@@ -11,6 +11,7 @@
 #include "app/commands/inspection.h"
 #include "calib/camera/camera_file.h"
 #include "calib/vision/tag_detector.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -20,13 +21,6 @@ constexpr int kFramesDecoded = 900;      ///< 30 s at 30 Hz, a second or two of 
 constexpr double kSmallMarkerPx = 20.0;  ///< below this the pose of a marker flips and jitters
 constexpr double kBlurredPx = 2.0;
 constexpr double kLowContrast = 40.0;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Grey value between pixels; nothing outside the image.
 std::optional<double> sample(const ImageView& image, const Eigen::Vector2d& at) {
@@ -96,9 +90,9 @@ std::vector<MarkerFacts> summarise(const std::map<TagId, Sightings>& seen,
     out.push_back({.id = id,
                    .size_m = markers.size_m(id),
                    .frames = sightings.frames,
-                   .edge_px = median(sightings.edges_px),
-                   .contrast = median(sightings.contrasts),
-                   .blur_px = median(sightings.blurs_px)});
+                   .edge_px = median_of(sightings.edges_px),
+                   .contrast = median_of(sightings.contrasts),
+                   .blur_px = median_of(sightings.blurs_px)});
   }
   return out;
 }
@@ -176,7 +170,7 @@ void judge_times(const Recording& recording, VideoFacts& facts, std::vector<Find
     steps.push_back(facts.times_s[i] - facts.times_s[i - 1]);
   }
   if (steps.empty()) return;
-  const double step = median(steps);
+  const double step = median_of(steps);
   facts.frame_rate_hz = step > 0.0 ? 1.0 / step : 0.0;
   facts.longest_step_s = std::ranges::max(steps);
   if (step > 0.0 && facts.longest_step_s > 2.5 * step && facts.frame_rate_hz > 2.0) {

@@ -14,6 +14,7 @@
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 #include "kinematics/core/rotation_between.h"
 
 namespace kinescope {
@@ -169,13 +170,6 @@ double edge_px(const TagObservation& seen) {
   return sum / static_cast<double>(n);
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 }  // namespace
 
 Observed observe(const Recording& recording, const RunOptions& options,
@@ -302,8 +296,8 @@ std::vector<MarkerSummary> summarise_markers(const Observed& observed, const Mar
       edges.push_back(edge_px(*tag));
       sigmas.push_back(tag->sigma_px);
     }
-    out.push_back({id, markers.size_m(id), static_cast<int>(sightings.size()), median(edges),
-                   median(sigmas)});
+    out.push_back({id, markers.size_m(id), static_cast<int>(sightings.size()), median_of(edges),
+                   median_of(sigmas)});
   }
   for (const PoseTrack& track : observed.measurements.poses.tracks) {
     out.push_back({track.id, 0.0, static_cast<int>(track.samples.size()), 0.0, 0.0});

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -18,13 +19,6 @@ constexpr std::size_t kFrames = 40;  // of the recording, spread evenly
 constexpr std::size_t kMostFaults = 4;
 constexpr double kNoticeable = 1.05;  // enough to look for the next one beside it
 constexpr double kBetter = 2.0;       // the typical error is divided by this, at least
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 // Frames of a measurement that has something in them, thinned out.
 template <typename Items, typename FrameOf>
@@ -79,7 +73,8 @@ Errors typical_errors(const Calibration& calibration) {
   }
   Errors out;
   for (auto& [id, of] : lengths)
-    out[id] = {median(std::move(of.px)), median(std::move(of.m)), median(std::move(of.rad))};
+    out[id] = {median_of(std::move(of.px)), median_of(std::move(of.m)),
+               median_of(std::move(of.rad))};
   return out;
 }
 

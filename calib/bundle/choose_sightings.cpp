@@ -6,6 +6,7 @@
 #include <map>
 
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -19,12 +20,6 @@ constexpr double kDifferenceVariance = 1.26;
 std::size_t path_length(const Spec& spec, const Sighting& sighting) {
   const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
   return spec.path[marker.link.index()].size();
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 // Squared distance, per row, of a sighting's residual to the median of its neighbours'.

@@ -8,6 +8,8 @@
 #include <ceres/solver.h>
 #include <glog/logging.h>
 
+#include "kinematics/core/median.h"
+
 namespace kinescope::bundle {
 namespace {
 
@@ -32,12 +34,6 @@ constexpr double kPlainTolerance = 1e-10;
 double chi_square_at(double k, double z) {
   const double a = 2.0 / (9.0 * k);
   return k * std::pow(std::max(0.0, 1.0 - a + z * std::sqrt(a)), 3.0);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Ceres reports failed evaluations through glog to standard error; the summary says the same.
@@ -71,7 +67,7 @@ std::vector<Misfit> misfits(const Spec& spec, const State& state, const std::vec
 
 double robust_scale(const std::vector<double>& chi_squares, double freedom, double shrink) {
   if (chi_squares.empty()) return 1.0;
-  const double ratio = median(chi_squares) / chi_square_at(freedom, 0.0) * shrink;
+  const double ratio = median_of(chi_squares) / chi_square_at(freedom, 0.0) * shrink;
   return std::sqrt(std::max(ratio, 1e-12));
 }
 

@@ -9,6 +9,7 @@
 
 #include "calib/effects/camera_effects.h"
 #include "calib/effects/joint_shares.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::effects {
 namespace {
@@ -118,9 +119,7 @@ std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
   for (Eigen::Index i = 1; i < s.value.size(); ++i) {
     steps.push_back(std::abs(s.value[i] - s.value[i - 1]));
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  const double step = (s.turns ? *middle / kTurn : *middle);
+  const double step = median_of(std::move(steps)) / (s.turns ? kTurn : 1.0);
   const double fewest = s.turns ? std::max(kFewestPeriods, 1.0 / turns) : 1.0 / turns;
   double most = s.turns ? kMostPeriods : kMostPeriods / range;
   if (!world.postures && step > 0.0) most = std::min(most, 0.5 / step);

@@ -8,18 +8,14 @@
 
 #include <Eigen/LU>
 
+#include "kinematics/core/median.h"
+
 namespace kinescope::corner_fit {
 namespace {
 
 constexpr double kKnotSpacing =
     7.0;  // px, of the grey levels along an edge: shadows cross a marker
 constexpr int kMaxKnots = 10;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // The normal distribution and its density from a table, cubic between its entries: to 1e-9, and
 // several times as fast as erfc and exp, which were half of the time of a fit.
@@ -175,7 +171,7 @@ double robust_noise(const std::vector<Sample>& samples,
     if (samples[i].weight > 0.5) size.push_back(std::abs(samples[i].grey - predictions[i].grey));
   }
   if (size.empty()) return 0.0;
-  return std::max(kMinNoise, 1.4826 * median(std::move(size)));
+  return std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
 }
 
 std::optional<std::array<double, 2>> guess_levels(const std::vector<Sample>& samples) {
@@ -186,7 +182,7 @@ std::optional<std::array<double, 2>> guess_levels(const std::vector<Sample>& sam
     if (s.distance > 0.8) outside.push_back(s.grey);
   }
   if (inside.size() < 8 || outside.size() < 8) return std::nullopt;
-  return std::array<double, 2>{median(std::move(inside)), median(std::move(outside))};
+  return std::array<double, 2>{median_of(std::move(inside)), median_of(std::move(outside))};
 }
 
 Meeting meet(const std::array<Edge, 4>& edges, const Eigen::VectorXd& unknowns,

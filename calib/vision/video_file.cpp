@@ -18,6 +18,7 @@ extern "C" {
 #include <fmt/format.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -309,13 +310,7 @@ class VideoFileReader final : public VideoReader {
     return turned(copy_plane(out->data[0], out->linesize[0], out->width, out->height), quarters_);
   }
 
-  double median_step() const {
-    if (steps_.empty()) return 0.0;
-    std::vector<double> sorted = steps_;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, middle);
-    return *middle;
-  }
+  double median_step() const { return median_of(steps_); }
 
   void finish() {
     finished_ = true;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -125,13 +126,12 @@ double usual_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joint
   for (const BalanceSample& sample : samples) {
     if (std::isfinite(sample.sigma[joint])) sigmas.push_back(sample.sigma[joint]);
   }
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  if (*middle <= 0.0) {
+  const double middle = median_of(sigmas);
+  if (middle <= 0.0) {
     throw bad_request("contact", "a predictive sigma that is not positive",
                       "give the model's standard deviation");
   }
-  return *middle;
+  return middle;
 }
 
 std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& samples,
@@ -177,9 +177,7 @@ double median_step_s(const std::vector<BalanceSample>& samples) {
   if (steps.empty()) {
     throw undetermined("contact", "a log without two samples in time", "record a longer log");
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median_of(std::move(steps));
 }
 
 BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,

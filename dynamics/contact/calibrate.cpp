@@ -10,6 +10,7 @@
 #include "dynamics/contact/onset_bank.h"
 #include "dynamics/contact/statistic_log.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -20,12 +21,9 @@ constexpr double kSecondsPerHour = 3600.0;
 /// statistic.
 constexpr double kFirstMedians = 12.0;
 
-double median(std::vector<double> values) {
+double median_of_finite(std::vector<double> values) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  return median_of(std::move(values));
 }
 
 std::vector<double> octave_values(const contact::StatisticLog& log, Eigen::Index octave,
@@ -76,7 +74,8 @@ void set_first_thresholds(const std::vector<BalanceSample>& samples,
   const double least =
       3.0 * contact::chi_square_quantile(static_cast<int>(calibration.joints()), 5.2);
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
-    calibration.thresholds[o] = std::max(least, kFirstMedians * median(octave_values(log, o, all)));
+    calibration.thresholds[o] =
+        std::max(least, kFirstMedians * median_of_finite(octave_values(log, o, all)));
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "dynamics/data/log_checks.h"
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

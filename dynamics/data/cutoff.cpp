@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

@@ -12,6 +12,7 @@
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

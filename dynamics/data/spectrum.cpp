@@ -9,6 +9,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

@@ -14,8 +14,6 @@ double quantile(std::vector<double> values, double share) {
   return *nth;
 }
 
-double median_of(std::vector<double> values) { return quantile(std::move(values), 0.5); }
-
 std::vector<double> to_vector(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return {values.data(), values.data() + values.size()};
 }

@@ -11,7 +11,6 @@ namespace kinescope {
 
 /// The value below which `share` (0 to 1) of them lie; 0 of nothing.
 [[nodiscard]] double quantile(std::vector<double> values, double share);
-[[nodiscard]] double median_of(std::vector<double> values);
 [[nodiscard]] std::vector<double> to_vector(const Eigen::Ref<const Eigen::VectorXd>& values);
 
 /// y = slope x through the origin by least squares; `explained` = 1 - residual / sum of squares of

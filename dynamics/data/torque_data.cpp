@@ -8,6 +8,7 @@
 
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
 
 namespace kinescope {

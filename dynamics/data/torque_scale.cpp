@@ -9,6 +9,7 @@
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

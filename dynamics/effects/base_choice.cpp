@@ -6,6 +6,7 @@
 
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::effects {
 namespace {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dynamics/data/statistics.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

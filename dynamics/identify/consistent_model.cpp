@@ -15,6 +15,7 @@
 #include "dynamics/rigid/mass_matrix.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace identify {
@@ -176,10 +177,7 @@ double colour_of(const Identification& fit) {
     const double ratio = fit.covariance(k, k) / fit.white_covariance(k, k);
     if (std::isfinite(ratio)) ratios.push_back(ratio);
   }
-  if (ratios.empty()) return 1.0;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::ranges::nth_element(ratios, middle);
-  return std::max(1.0, *middle);
+  return std::max(1.0, median_of(std::move(ratios)));
 }
 
 /// Root of the information that the base parameters carry: R' R = information / colour.

@@ -10,6 +10,7 @@
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/gp/robust.h"
 #include "dynamics/identify/model_features.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::identify {
 namespace {
@@ -63,10 +64,7 @@ double median_sigma(const Eigen::VectorXd& whitened, const Eigen::VectorXd& weig
   for (Eigen::Index t = 0; t < whitened.size(); ++t) {
     if (weights[t] > 0.0) sizes.push_back(std::abs(whitened[t]));
   }
-  if (sizes.empty()) return 0.0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::ranges::nth_element(sizes, middle);
-  return kMadToSigma * *middle;
+  return kMadToSigma * median_of(std::move(sizes));
 }
 
 class Fitter {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/tangent.h"
 

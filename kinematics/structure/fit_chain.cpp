@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/median.h"
 #include "kinematics/structure/chain_kinematics.h"
 #include "kinematics/structure/chain_residuals.h"
 #include "kinematics/structure/series.h"

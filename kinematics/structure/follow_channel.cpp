@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "kinematics/core/median.h"
+
 namespace kinescope::structure_search {
 namespace {
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/core/median.h"
 #include "kinematics/structure/series.h"
 
 namespace kinescope::structure_search {

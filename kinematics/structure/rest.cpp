@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "kinematics/core/median.h"
 #include "kinematics/structure/attachment_cost.h"
 
 namespace kinescope::structure_search {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/median.h"
 #include "kinematics/structure/line_regression.h"
 #include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"

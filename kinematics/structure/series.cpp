@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/core/median.h"
 #include "kinematics/structure/tangent.h"
 
 namespace kinescope::structure_search {
@@ -56,13 +57,6 @@ void count_seen(Series& series) {
   for (Body& body : series.bodies) {
     body.seen = static_cast<int>(std::ranges::count_if(body.at, &Sighting::seen));
   }
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 double distance_of(std::span<const Body> bodies) {

@@ -62,7 +62,4 @@ void count_seen(Series& series);
 /// W upper triangular with W' W = covariance^-1.
 [[nodiscard]] Matrix6d whitening_of(const Matrix6d& covariance);
 
-/// Median of the values (copied); 0 when there are none.
-[[nodiscard]] double median_of(std::vector<double> values);
-
 }  // namespace kinescope::structure_search

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/core/median.h"
 #include "kinematics/structure/pair_tree.h"
 
 namespace kinescope::structure_search {

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "kinematics/core/median.h"
+
 namespace kinescope::structure_search {
 namespace {
 

@@ -10,6 +10,7 @@
 #include <tinyxml2.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "kinematics/urdf/urdf.h"
 #include "kinematics/urdf/urdf_inertia.h"
@@ -163,9 +164,7 @@ double rod_radius(const KinematicTree& tree) {
     lengths.push_back(marker.T_link_marker.translation.norm());
   std::erase_if(lengths, [](double length) { return length < 1e-4; });
   if (lengths.empty()) return 0.01;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::ranges::nth_element(lengths, middle);
-  return std::clamp(0.06 * *middle, kSmallest, kLargest);
+  return std::clamp(0.06 * median_of(std::move(lengths)), kSmallest, kLargest);
 }
 
 /// The body of the joint that moves the link, then rods from its origin to all that sits on the
