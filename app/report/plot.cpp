@@ -43,8 +43,9 @@ std::vector<std::pair<double, std::string>> ticks_of(const PlotAxis& axis) {
     return ticks;
   }
   const double decades = axis.upper - axis.lower;
-  const double stride = std::max(1.0, std::ceil(decades / 6.0));
-  for (double decade = std::floor(axis.lower); decade <= axis.upper; decade += stride) {
+  const int stride = std::max(1, static_cast<int>(std::ceil(decades / 6.0)));
+  const int last = static_cast<int>(std::floor(axis.upper));
+  for (int decade = static_cast<int>(std::floor(axis.lower)); decade <= last; decade += stride) {
     for (const double digit : {1.0, 2.0, 5.0}) {
       if (decades > 3.0 && digit > 1.0) continue;
       const double place = decade + std::log10(digit);

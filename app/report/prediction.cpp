@@ -77,7 +77,7 @@ Eigen::Vector3d Predictor::velocity(const std::vector<Pose>& links, std::size_t 
   const Joint& one = calibration_.tree.joints[joint];
   // The joint's motion leaves its own axis where it is, so the child's frame serves for both.
   const Pose& T_base_child = links[one.child.index()];
-  const Eigen::Vector3d axis = T_base_child.rotation * one.axis;
+  Eigen::Vector3d axis = T_base_child.rotation * one.axis;
   if (one.type == JointType::kPrismatic) return axis;
   return axis.cross(point_base - T_base_child.translation);
 }

@@ -107,6 +107,7 @@ void draw_camera(const Calibration& calibration, double depth, Drawing& drawing)
   const Pose T = calibration.T_camera_base.inverse();
   std::vector<Eigen::Vector3d> corners;
   const std::array<std::array<double, 2>, 4> image = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+  corners.reserve(image.size());
   for (const auto& [u, v] : image) {
     corners.push_back(T * Eigen::Vector3d(depth * (u * camera.width - camera.cx) / camera.fx,
                                           depth * (v * camera.height - camera.cy) / camera.fy,

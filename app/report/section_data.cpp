@@ -57,7 +57,7 @@ void draw_runs(Plot& plot, const std::set<int>& frames, const std::vector<double
   for (auto it = frames.begin(); it != frames.end();) {
     const int first = *it;
     int last = first;
-    while (++it != frames.end() && *it == last + 1) last = *it;
+    for (++it; it != frames.end() && *it == last + 1; ++it) last = *it;
     if (first < 0 || last >= count) continue;
     plot.bar(start(first), end(last), row - kBarHalf, row + kBarHalf, css_class);
   }

@@ -16,11 +16,10 @@ Quantity joint_quantity(JointType type) {
   return type == JointType::kPrismatic ? Quantity::kLength : Quantity::kAngle;
 }
 
-std::string evidence_table(const Facts& facts) {
+std::string evidence_table(const Facts& facts, const Structure& structure) {
   Table table("structure-table", "Joints and the evidence for each", facts.result);
   table.header({"Joint", "Type", "Parent", "Child", "Channel", "Scale, rad or m per unit", "Travel",
                 "Left over, °", "Left over, mm", "Runner-up", "Odds over it"});
-  const Structure& structure = *facts.run.structure;
   const KinematicTree& tree = facts.run.calibration.tree;
   for (std::size_t k = 0; k < structure.joints.size(); ++k) {
     const StructureJoint& joint = structure.joints[k];
@@ -103,7 +102,7 @@ std::string structure_section(const Facts& facts) {
   }
   out +=
       figure(tree_drawing(facts), "Links with their markers; joints with their evidence.", "wide");
-  out += facts.run.structure ? evidence_table(facts) : given_table(facts);
+  out += facts.run.structure ? evidence_table(facts, *facts.run.structure) : given_table(facts);
   if (facts.run.structure) {
     const Structure& structure = *facts.run.structure;
     if (!structure.free_markers.empty()) {

@@ -19,8 +19,7 @@ std::string_view method_name(std::size_t method) {
   return kNames[method];
 }
 
-std::string method_table(const TorqueFacts& facts) {
-  const RobustSummary& robust = *facts.summary.robust;
+std::string method_table(const TorqueFacts& facts, const RobustSummary& robust) {
   Table table("robust-table",
               "nMSE on the held-out part, %; and how much of it the 95 % band holds, %",
               facts.result);
@@ -66,18 +65,20 @@ std::string joint_table(const TorqueFacts& facts) {
   return table.str();
 }
 
-std::string friction_caption(const TorqueSummary& summary, std::size_t joint) {
-  const double friction = summary.robust->parts[joint].friction_rms;
+std::string friction_caption(const TorqueSummary& summary, const RobustSummary& robust,
+                             std::size_t joint) {
+  const double friction = robust.parts[joint].friction_rms;
   const auto column = summary.train.torque.col(static_cast<Eigen::Index>(joint));
   const double torque = column.norm() / std::sqrt(static_cast<double>(column.size()));
   return fmt::format("{}: {:.2g} {} rms, {:.2g} % of its torque{}.", summary.joints[joint],
                      friction, joint_unit(summary.train.torque_unit, summary.types[joint]),
                      100.0 * friction / torque,
-                     friction < summary.robust->joints[joint].noise ? ": below its noise" : "");
+                     friction < robust.joints[joint].noise ? ": below its noise" : "");
 }
 
-std::string profile_plot(const TorqueSummary& summary, std::size_t joint) {
-  const std::vector<FrictionBin>& bins = summary.robust->parts[joint].profile;
+std::string profile_plot(const TorqueSummary& summary, const RobustSummary& robust,
+                         std::size_t joint) {
+  const std::vector<FrictionBin>& bins = robust.parts[joint].profile;
   if (bins.size() < 2) return "";
   std::vector<double> velocity;
   std::vector<double> lower;
@@ -106,7 +107,7 @@ std::string profile_plot(const TorqueSummary& summary, std::size_t joint) {
   plot.band(velocity, lower, upper, series_class(2));
   plot.line(means, series_class(2));
   plot.legend("part that turns round with the velocity", series_class(2));
-  return figure(plot.str(), friction_caption(summary, joint));
+  return figure(plot.str(), friction_caption(summary, robust, joint));
 }
 
 std::string mass_text(const PayloadEstimate& found) {
@@ -140,7 +141,7 @@ std::string torque_robust_section(const TorqueFacts& facts) {
       "over {}. Where the three agree, no bad samples bend the result.",
       robust.scores.empty() ? 0 : robust.scores.front().training_samples, robust.folds,
       robust.by_trajectory ? "whole trajectories" : "stretches of the one trajectory"));
-  out += method_table(facts);
+  out += method_table(facts, robust);
   out += paragraph(
       "Parts of the learned torque F, by Student's t, at zero acceleration: friction is what turns "
       "round with the velocity, (F(q, dq) - F(q, -dq)) / 2; gravity what does not, with offsets "
@@ -150,7 +151,7 @@ std::string torque_robust_section(const TorqueFacts& facts) {
   out += joint_table(facts);
   out += "<div class=\"figures\">";
   for (std::size_t j = 0; j < facts.summary.joints.size(); ++j) {
-    out += profile_plot(facts.summary, j);
+    out += profile_plot(facts.summary, robust, j);
   }
   return out + "</div>\n</section>\n";
 }

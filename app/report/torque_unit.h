@@ -22,7 +22,11 @@ namespace kinescope::report {
   std::string unit(torque_unit);
   for (const JointType type : types) {
     const std::string own = joint_unit(torque_unit, type);
-    if (own != torque_unit) return unit + " (" + own + " where a joint slides)";
+    if (own == torque_unit) continue;
+    unit += " (";
+    unit += own;
+    unit += " where a joint slides)";
+    break;
   }
   return unit;
 }

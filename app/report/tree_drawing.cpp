@@ -63,7 +63,7 @@ std::string markers_of(const KinematicTree& tree, std::size_t link) {
 }
 
 std::string shortened(const std::string& text, std::size_t most) {
-  const std::string clean = clean_text(text);
+  std::string clean = clean_text(text);
   if (clean.size() <= most) return clean;
   std::size_t end = most;
   while (end > 0 && (static_cast<unsigned char>(clean[end]) & 0xC0U) == 0x80U) --end;

@@ -99,6 +99,28 @@ std::string certainty_words(const Structure& structure) {
   return "structure not examined";
 }
 
+/// " q3 is coupled: q2 moves it too, -1.000 times as far as q3 does."; smaller ones are effects,
+/// which tracing names.
+std::string coupling_words(const RunSummary& run, const Structure& structure) {
+  constexpr double kByDesign = 0.05;
+  const std::vector<Joint>& joints = run.calibration.tree.joints;
+  const std::vector<std::string>& channels = run.log.channels;
+  std::string text;
+  if (joints.size() != structure.joints.size()) return text;
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    const std::optional<ChannelTerm>& own = structure.joints[k].channel;
+    for (const ChannelTerm& term : structure.joints[k].couplings) {
+      const auto channel = static_cast<std::size_t>(term.channel);
+      if (!own || channel >= channels.size()) continue;
+      const double ratio = term.scale / own->scale;
+      if (std::abs(ratio) < kByDesign) continue;
+      text += fmt::format(" {} is coupled: {} moves it too, {:+.3f} times as far as {} does.",
+                          joints[k].name, channels[channel], ratio, joints[k].channel);
+    }
+  }
+  return text;
+}
+
 std::string found_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
   const std::size_t moving = moving_joints(tree);
@@ -121,7 +143,7 @@ std::string found_words(const RunSummary& run) {
                        is_chain(tree) ? "chain" : "tree", type_letters(tree),
                        counted(tree.markers.size(), what), driving_words(run));
   }
-  text += "; " + certainty_words(*run.structure) + ".";
+  text += "; " + certainty_words(*run.structure) + "." + coupling_words(run, *run.structure);
   if (!run.structure->free_markers.empty()) {
     std::vector<std::string> names;
     for (const TagId id : run.structure->free_markers) names.push_back(marker_name(id));
@@ -189,7 +211,8 @@ std::string axis_uncertainty(double direction, std::optional<double> position) {
 std::string axis_words(const Calibration& calibration) {
   std::vector<double> directions, positions;
   std::vector<std::string> unknown;
-  const JointEstimate* worst = nullptr;
+  double worst = -1.0;
+  std::optional<double> worst_position;
   std::string worst_name;
   for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
        ++j) {
@@ -199,25 +222,27 @@ std::string axis_words(const Calibration& calibration) {
       unknown.push_back(calibration.tree.joints[j].name);
       continue;
     }
-    directions.push_back(*estimate.direction_sigma_rad);
+    const double direction = *estimate.direction_sigma_rad;
+    directions.push_back(direction);
     if (estimate.position_sigma_m) positions.push_back(*estimate.position_sigma_m);
-    if (worst == nullptr || *estimate.direction_sigma_rad > *worst->direction_sigma_rad) {
-      worst = &estimate;
+    if (direction > worst) {
+      worst = direction;
+      worst_position = estimate.position_sigma_m;
       worst_name = calibration.tree.joints[j].name;
     }
   }
   std::string text;
   if (directions.size() == 1) {
     text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).", worst_name,
-                       axis_uncertainty(*worst->direction_sigma_rad, worst->position_sigma_m));
-  } else if (worst != nullptr) {
+                       axis_uncertainty(worst, worst_position));
+  } else if (!directions.empty()) {
     std::optional<double> position;
     if (!positions.empty()) position.emplace(median(positions));
     text = fmt::format(
         " Joint axes are known to {} (median, expanded uncertainty, k = 2); least certain is {} "
         "with {}.",
         axis_uncertainty(median(directions), position), worst_name,
-        axis_uncertainty(*worst->direction_sigma_rad, worst->position_sigma_m));
+        axis_uncertainty(worst, worst_position));
   }
   if (!unknown.empty()) {
     text += fmt::format(

@@ -125,7 +125,7 @@ std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
   if (!world.postures && step > 0.0) most = std::min(most, 0.5 / step);
   std::vector<double> out;
   const double spacing = std::max(0.35 / turns, (most - fewest) / 400.0);
-  for (double n = fewest; n <= most; n += spacing) out.push_back(n);
+  for (int k = 0; fewest + k * spacing <= most; ++k) out.push_back(fewest + k * spacing);
   return out;
 }
 
@@ -147,8 +147,10 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "backlash", fmt::format("{} has play", s.name), {{"width", s.unit}}, s.unit);
   const double range = s.value.maxCoeff() - s.value.minCoeff();
-  for (double width = range / 2000.0; width < 0.3 * range; width *= 1.8) {
-    out.candidate.scan.push_back(width);
+  double gap = range / 2000.0;
+  while (gap < 0.3 * range) {
+    out.candidate.scan.push_back(gap);
+    gap *= 1.8;
   }
   out.candidate.scan_name = "gap";
   out.candidate.scan_unit = s.unit;

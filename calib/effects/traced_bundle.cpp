@@ -252,7 +252,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.jacobian = fit.jacobian(Eigen::all, order);
   if (fit.prior_information.size() > 0) linear.prior = fit.prior_information(order, order);
   linear.residual = std::move(fit.residual);
-  linear.carriers = std::move(fit.probes);
+  linear.carriers.swap(fit.probes);
   linear.first_row = std::move(fit.first_row);
   linear.unit = std::move(fit.unit);
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";

@@ -39,7 +39,7 @@ std::vector<double> even_knots(const Eigen::VectorXd& values, std::size_t most) 
 }
 
 std::vector<double> equal_knots(const Eigen::VectorXd& values) {
-  const std::vector<double> few = even_knots(values, kTestKnots);
+  std::vector<double> few = even_knots(values, kTestKnots);
   if (few.size() < kTestKnots) return few;
   std::vector<double> knots;
   const double low = values.minCoeff();

@@ -52,9 +52,9 @@ class ChessboardFinder final : public BoardFinder {
     for (std::size_t i = 0; i < corners.size(); ++i) {
       sight.pixels.emplace_back(static_cast<double>(corners[i].x),
                                 static_cast<double>(corners[i].y));
-      const int index = static_cast<int>(i);
-      sight.places_m.emplace_back((index % board_.columns) * board_.square_m,
-                                  (index / board_.columns) * board_.square_m, 0.0);
+      const int column = static_cast<int>(i) % board_.columns;
+      const int row = static_cast<int>(i) / board_.columns;
+      sight.places_m.emplace_back(column * board_.square_m, row * board_.square_m, 0.0);
     }
     return sight;
   }

@@ -32,10 +32,10 @@ bool is_image_name(const std::filesystem::path& path) {
 }
 
 std::filesystem::path find_times(const std::filesystem::path& folder) {
-  const std::filesystem::path inside = folder / kTimesFile;
+  std::filesystem::path inside = folder / kTimesFile;
   if (std::filesystem::exists(inside)) return inside;
   const std::filesystem::path clean = (folder / "").parent_path();
-  const std::filesystem::path beside = clean.parent_path() / kTimesFile;
+  std::filesystem::path beside = clean.parent_path() / kTimesFile;
   if (std::filesystem::exists(beside)) return beside;
   throw bad_input(folder.string(),
                   "a folder of images needs their times, and there is no times.csv",

@@ -96,14 +96,25 @@ struct ModelError {
   double time_s = 0.0;
 };
 
+/// From `first` up to `end`, each the last one times `factor`.
+std::vector<double> scales_between(double first, double end, double factor) {
+  std::vector<double> out;
+  while (first < end) {
+    out.push_back(first);
+    first *= factor;
+  }
+  return out;
+}
+
 /// Least squares of the variances' logarithms over a grid; both are scales, a few per cent do not
 /// matter.
 ModelError fit_model_error(const std::vector<WindowVariance>& windows, double step_s,
                            double torque_sigma) {
   ModelError best;
   double best_cost = std::numeric_limits<double>::infinity();
-  for (double time = 2.0 * step_s; time < 2.0 * kLongestWindow_s; time *= 1.5) {
-    for (double sigma = 1e-3 * torque_sigma; sigma < 1e3 * torque_sigma; sigma *= 1.12) {
+  const std::vector<double> sigmas = scales_between(1e-3 * torque_sigma, 1e3 * torque_sigma, 1.12);
+  for (const double time : scales_between(2.0 * step_s, 2.0 * kLongestWindow_s, 1.5)) {
+    for (const double sigma : sigmas) {
       double cost = 0.0;
       for (const WindowVariance& window : windows) {
         const double expected =

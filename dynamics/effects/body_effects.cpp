@@ -2,6 +2,7 @@
 //
 // What is wrong with masses and gravity: these act on many joints at once.
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -52,7 +53,7 @@ Candidate gravity_direction(const SharedContext& c) {
   for (int k = 0; k < kGravityStarts; ++k) out.scan.push_back(k);
   out.scan_name = "direction looked from";
   out.columns = [carriers](double scan) {
-    const int start = std::clamp(static_cast<int>(scan + 0.5), 0, kGravityStarts - 1);
+    const int start = std::clamp(static_cast<int>(std::lround(scan)), 0, kGravityStarts - 1);
     if (start == 0)
       return std::vector<EffectColumn>{{carriers.gravity(0), {}}, {carriers.gravity(1), {}}};
     const bool first = gravity_starts()[static_cast<std::size_t>(start)].x() != 0.0;

@@ -32,8 +32,8 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
 
 }  // namespace
 
-void GravityCase::set_carriers(Eigen::SparseMatrix<double> all) {
-  carriers = std::move(all);
+void GravityCase::set_carriers(const Eigen::SparseMatrix<double>& all) {
+  carriers = all;
   const Eigen::Index joints = fixed.cols();
   carrier_torques.assign(static_cast<std::size_t>(carriers.cols()),
                          JointTorques(static_cast<std::size_t>(joints)));

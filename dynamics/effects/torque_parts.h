@@ -31,7 +31,7 @@ struct GravityCase {
   Eigen::MatrixXd bodies;                     ///< the bodies' parameters from the base parameters
 
   [[nodiscard]] Eigen::Index parameters() const { return base.front().cols(); }
-  void set_carriers(Eigen::SparseMatrix<double> all);
+  void set_carriers(const Eigen::SparseMatrix<double>& all);
 };
 
 [[nodiscard]] std::shared_ptr<const GravityCase> make_gravity_case(

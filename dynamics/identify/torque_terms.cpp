@@ -76,7 +76,7 @@ Eigen::ArrayXd drive_column(const RigidModel& model, const DriveTerms& drives,
                             const TorqueTerm& term, const MotionRows& motion) {
   const Eigen::VectorXd& weights = drives.coupled_drives[static_cast<std::size_t>(term.index)];
   if (term.kind == TermKind::kCoupledInertia) return (motion.ddq * weights).array();
-  const Eigen::ArrayXd rate = (motion.dq * weights).array();
+  Eigen::ArrayXd rate = (motion.dq * weights).array();
   if (term.kind == TermKind::kCoupledViscous) return rate;
   return friction_sign(rate, width_of(model, drives, weights));
 }

@@ -36,6 +36,18 @@ TEST(Verdict, NamesAChannelThatDrivesTwoJoints) {
       << verdict.found;
 }
 
+TEST(Verdict, NamesACouplingByDesign) {
+  RunSummary run = synthetic_run();
+  ASSERT_TRUE(run.structure && run.structure->joints.size() > 1);
+  StructureJoint& joint = run.structure->joints[1];
+  ASSERT_TRUE(joint.channel);
+  joint.couplings = {{.channel = 0, .scale = 0.01 * joint.channel->scale}};
+  EXPECT_FALSE(has(make_verdict(run).found, "coupled"));
+  joint.couplings[0].scale = -joint.channel->scale;
+  EXPECT_TRUE(has(make_verdict(run).found, "is coupled: q1 moves it too, -1.000 times"))
+      << make_verdict(run).found;
+}
+
 TEST(Verdict, ADoubtThatTracingSettlesIsNoLimit) {
   RunSummary run = synthetic_run();
   run.structure->doubts.push_back({"the markers move as the joints say only roughly", "check", {}});
