@@ -157,7 +157,7 @@ TEST_F(TorqueRefusals, FilesThatAreNoLogs) {
   no_log("", "empty");
   no_log("t,q1,q2,tau1,tau2\n", "no rows");
   no_log(std::string(4096, '\0'), "zeros");
-  no_log("\xff\xfe\x00garbage\n\x01\x02,\x03\n", "binary");
+  no_log(std::string("\xff\xfe\0garbage\n\x01\x02,\x03\n", 16), "binary");
   no_log("t,q1,q2,tau1,tau2\n0,0,0,0\n", "a short row");
   no_log("t,q1,q1,q2,tau1,tau2\n0,0,0,0,0,0\n1,0,0,0,0,0\n", "a column twice");
   no_log(std::string(1 << 20, 'x'), "one long word");

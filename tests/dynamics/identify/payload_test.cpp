@@ -40,7 +40,8 @@ DynamicModel with_load(DynamicModel model) {
   return model;
 }
 
-TorqueSamples log_of(const DynamicModel& model, const char* name, TorqueWorldOptions options) {
+TorqueSamples log_of(const DynamicModel& model, const char* name,
+                     const TorqueWorldOptions& options) {
   Rng rng = Rng::from_name(name);
   return torque_log_of(model, options, rng);
 }
