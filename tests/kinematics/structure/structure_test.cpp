@@ -34,15 +34,14 @@ TEST(FindStructure, TreeWithTwoMarkersALink) {
       make_scene("Tree", {.joints = 7, .tree = true, .markers_per_link = 2}, noisy());
   const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
   expect_right(s, scene);
-  for (std::size_t l = 0; l < s.links.size(); ++l) {
-    ASSERT_EQ(s.links[l].markers.size(), 2U);
-    EXPECT_LT(s.links[l].markers[0], s.links[l].markers[1]);
-    const Marker& a = *scene.robot.tree.marker(s.links[l].markers[0]);
-    const Marker& b = *scene.robot.tree.marker(s.links[l].markers[1]);
+  for (const StructureLink& link : s.links) {
+    ASSERT_EQ(link.markers.size(), 2U);
+    EXPECT_LT(link.markers[0], link.markers[1]);
+    const Marker& a = *scene.robot.tree.marker(link.markers[0]);
+    const Marker& b = *scene.robot.tree.marker(link.markers[1]);
     // Link 0's markers are placed in the camera's frame, the others' in the first marker's.
     const Pose truth = a.T_link_marker.inverse() * b.T_link_marker;
-    const Pose found =
-        s.links[l].T_reference_marker[0].inverse() * s.links[l].T_reference_marker[1];
+    const Pose found = link.T_reference_marker[0].inverse() * link.T_reference_marker[1];
     EXPECT_LT((truth.translation - found.translation).norm(), 2e-3);
     EXPECT_LT(angle_between(truth.rotation, found.rotation), 0.01);
   }

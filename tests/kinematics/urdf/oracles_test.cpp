@@ -84,7 +84,7 @@ void add_children(const urdf::Link& link, KDL::Tree& tree) {
 Pose from_kdl(const KDL::Frame& frame) {
   Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) T(r, c) = frame.M(static_cast<int>(r), static_cast<int>(c));
+    for (int c = 0; c < 3; ++c) T(r, c) = frame.M(r, c);
     T(r, 3) = frame.p(r);
   }
   return pose_from_matrix(T);
