@@ -144,9 +144,7 @@ bool Tracer::drop_what_rests_explain() {
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
-    add_step(round_,
-             fmt::format("{} at {} removed: what is left explains it too", effect.id.effect,
-                         effect.id.place),
+    add_step(round_, fmt::format("{} removed: what is left explains it too", name_of(effect.id)),
              *now_);
     dropped = true;
   }
@@ -172,11 +170,10 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     removed_.insert(id);
     mark(round_, id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);
-    add_step(
-        round_,
-        fmt::format("{} at {} removed: a {} over {} explains as much without it", id.effect,
-                    id.place, alone->rest.is_field() ? "field" : "curve", alone->rest.covariate),
-        *now_);
+    add_step(round_,
+             fmt::format("{} removed: a {} over {} explains as much without it", name_of(id),
+                         alone->rest.is_field() ? "field" : "curve", alone->rest.covariate),
+             *now_);
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
     return true;
   }
@@ -292,7 +289,7 @@ void Tracer::conclude() {
   const auto list = [&] {
     std::string out;
     for (const TracedEffect& effect : trace_.accepted) {
-      out += fmt::format("{}{} at {}", out.empty() ? "" : ", ", effect.id.effect, effect.id.place);
+      out += (out.empty() ? "" : ", ") + name_of(effect.id);
     }
     return out;
   };
@@ -305,7 +302,7 @@ void Tracer::conclude() {
     const Ambiguity& first = trace_.ambiguities.front();
     std::string names;
     for (const EffectId& id : first.effects) {
-      names += fmt::format("{}{} at {}", names.empty() ? "" : " or ", id.effect, id.place);
+      names += (names.empty() ? "" : " or ") + name_of(id);
     }
     trace_.reason = fmt::format("{}: this recording cannot tell them apart", names);
   } else if (!trace_.accepted.empty()) {
