@@ -43,9 +43,11 @@ KinematicTree tree_of_run(const std::filesystem::path& run_folder,
   for (const JointChannel& channel : channels) {
     const auto joint = tree.joint(channel.joint);
     if (!joint) continue;
-    tree.joints[joint->index()].channel = channel.channel;
-    tree.joints[joint->index()].scale = channel.scale;
-    tree.joints[joint->index()].offset = channel.offset;
+    Joint& driven = tree.joints[joint->index()];
+    driven.channel = channel.channel;
+    driven.scale = channel.scale;
+    driven.offset = channel.offset;
+    driven.couplings = channel.couplings;
   }
   return tree;
 }

@@ -66,18 +66,14 @@ double nearest_unit(JointType type, double scale) {
 
 // Couplings by design: a counter-commanded joint follows another one to one. What is smaller than
 // the tolerance of a unit is an effect of the robot and not part of the start.
-std::vector<std::vector<ChannelShare>> couplings_of(const Structure& structure,
-                                                    const JointLog& log) {
-  std::vector<std::vector<ChannelShare>> out;
-  for (const StructureJoint& joint : structure.joints) {
-    std::vector<ChannelShare>& shares = out.emplace_back();
-    if (!joint.channel) continue;
-    for (const ChannelTerm& term : joint.couplings) {
-      double ratio = term.scale / joint.channel->scale;
-      if (std::abs(ratio) < kUnitTolerance) continue;
-      if (std::abs(std::abs(ratio) - 1.0) < kUnitTolerance) ratio = std::copysign(1.0, ratio);
-      shares.push_back({log.channels[static_cast<std::size_t>(term.channel)], ratio});
-    }
+std::vector<ChannelShare> couplings_by_design(const StructureJoint& joint, const JointLog& log) {
+  std::vector<ChannelShare> out;
+  if (!joint.channel) return out;
+  for (const ChannelTerm& term : joint.couplings) {
+    double ratio = term.scale / joint.channel->scale;
+    if (std::abs(ratio) < kUnitTolerance) continue;
+    if (std::abs(std::abs(ratio) - 1.0) < kUnitTolerance) ratio = std::copysign(1.0, ratio);
+    out.push_back({log.channels[static_cast<std::size_t>(term.channel)], ratio});
   }
   return out;
 }
@@ -238,8 +234,11 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   CalibrationStart start;
   start.tree = structure_tree(structure, recording.log);
   start.tree.name = recording.settings.name;
-  for (Joint& joint : start.tree.joints) joint.scale = nearest_unit(joint.type, joint.scale);
-  start.couplings = couplings_of(structure, recording.log);
+  for (std::size_t j = 0; j < start.tree.joints.size(); ++j) {
+    Joint& joint = start.tree.joints[j];
+    joint.scale = nearest_unit(joint.type, joint.scale);
+    joint.couplings = couplings_by_design(structure.joints[j], recording.log);
+  }
   for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
   start.T_camera_base = base_frame(start.tree, recording.settings.gravity);
   move_base(start.tree, start.T_camera_base);

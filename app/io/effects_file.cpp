@@ -28,7 +28,7 @@ double finite(const json& value, const std::filesystem::path& path, const std::s
 
 std::string word(const json& entry, const char* key, const std::filesystem::path& path) {
   if (!entry.is_object() || !entry.contains(key) || !entry.at(key).is_string()) {
-    throw wrong(path, fmt::format("an effect without '{}'", key));
+    throw wrong(path, fmt::format("an entry without '{}'", key));
   }
   return entry.at(key).get<std::string>();
 }
@@ -53,6 +53,19 @@ FittedEffect effect_of(const json& entry, const std::filesystem::path& path) {
     out.references[next] = finite(parameter.value("reference", json()), path, name + ": reference");
     if (out.references[next] == 0.0) throw wrong(path, name + ": reference is 0");
     ++next;
+  }
+  return out;
+}
+
+std::vector<ChannelShare> couplings_of(const json& joint, const std::filesystem::path& path) {
+  std::vector<ChannelShare> out;
+  const auto list = joint.find("couplings");
+  if (list == joint.end()) return out;
+  if (!list->is_array()) throw wrong(path, "'couplings' is no list");
+  for (const json& share : *list) {
+    if (!share.is_object()) throw wrong(path, "a coupling is no object");
+    out.push_back(
+        {word(share, "channel", path), finite(share.value("ratio", json()), path, "ratio")});
   }
   return out;
 }
@@ -100,7 +113,8 @@ CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
     out.channels.push_back({word(joint, "name", calibration_json),
                             word(joint, "channel", calibration_json),
                             finite(joint.value("scale", json()), calibration_json, "scale"),
-                            finite(joint.value("offset", json()), calibration_json, "offset")});
+                            finite(joint.value("offset", json()), calibration_json, "offset"),
+                            couplings_of(joint, calibration_json)});
   }
   const auto effects = document.find("effects");
   if (effects == document.end()) return out;

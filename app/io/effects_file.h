@@ -18,12 +18,13 @@ namespace kinescope {
 /// A list: effect, place, at (the value of its scan), parameters (name, unit, value, reference).
 [[nodiscard]] nlohmann::json effects_json(const std::vector<FittedEffect>& effects);
 
-/// How a channel becomes a joint's value: value = scale * reading + offset.
+/// How channels become a joint's value (`Joint`).
 struct JointChannel {
   std::string joint;
   std::string channel;
   double scale = 1.0;
   double offset = 0.0;
+  std::vector<ChannelShare> couplings;
 };
 
 /// What undoing needs of calibration.json.

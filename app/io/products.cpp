@@ -79,6 +79,9 @@ json tree_json(const KinematicTree& tree) {
                {"channel", joint.channel},
                {"scale", number(joint.scale)},
                {"offset", number(joint.offset)}};
+    for (const ChannelShare& share : joint.couplings) {
+      entry["couplings"].push_back({{"channel", share.channel}, {"ratio", number(share.ratio)}});
+    }
     if (joint.limits) {
       entry["range"] = {number(joint.limits->lower), number(joint.limits->upper)};
     }

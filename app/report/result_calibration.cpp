@@ -74,6 +74,10 @@ json joint_json(const RunSummary& run, std::size_t index) {
                    {"scale", number(joint.scale)},
                    {"offset", number(joint.offset)},
                    {"origin", pose(joint.T_parent_joint)}};
+  for (const ChannelShare& share : joint.couplings) {
+    document["couplings"].push_back(
+        {{"channel", text(share.channel)}, {"ratio", number(share.ratio)}});
+  }
   if (index >= calibration.joints.size()) return document;
   const JointEstimate& estimate = calibration.joints[index];
   document["axis_base"] = vector3(estimate.axis_base);

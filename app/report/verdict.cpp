@@ -99,23 +99,13 @@ std::string certainty_words(const Structure& structure) {
   return "structure not examined";
 }
 
-/// " q3 is coupled: q2 moves it too, -1.000 times as far as q3 does."; smaller ones are effects,
-/// which tracing names.
-std::string coupling_words(const RunSummary& run, const Structure& structure) {
-  constexpr double kByDesign = 0.05;
-  const std::vector<Joint>& joints = run.calibration.tree.joints;
-  const std::vector<std::string>& channels = run.log.channels;
+/// " q3 is coupled: q2 moves it too, -1 times as far as q3 does."
+std::string coupling_words(const KinematicTree& tree) {
   std::string text;
-  if (joints.size() != structure.joints.size()) return text;
-  for (std::size_t k = 0; k < joints.size(); ++k) {
-    const std::optional<ChannelTerm>& own = structure.joints[k].channel;
-    for (const ChannelTerm& term : structure.joints[k].couplings) {
-      const auto channel = static_cast<std::size_t>(term.channel);
-      if (!own || channel >= channels.size()) continue;
-      const double ratio = term.scale / own->scale;
-      if (std::abs(ratio) < kByDesign) continue;
-      text += fmt::format(" {} is coupled: {} moves it too, {:+.3f} times as far as {} does.",
-                          joints[k].name, channels[channel], ratio, joints[k].channel);
+  for (const Joint& joint : tree.joints) {
+    for (const ChannelShare& share : joint.couplings) {
+      text += fmt::format(" {} is coupled: {} moves it too, {:+.4g} times as far as {} does.",
+                          joint.name, share.channel, share.ratio, joint.channel);
     }
   }
   return text;
@@ -143,7 +133,7 @@ std::string found_words(const RunSummary& run) {
                        is_chain(tree) ? "chain" : "tree", type_letters(tree),
                        counted(tree.markers.size(), what), driving_words(run));
   }
-  text += "; " + certainty_words(*run.structure) + "." + coupling_words(run, *run.structure);
+  text += "; " + certainty_words(*run.structure) + "." + coupling_words(tree);
   if (!run.structure->free_markers.empty()) {
     std::vector<std::string> names;
     for (const TagId id : run.structure->free_markers) names.push_back(marker_name(id));

@@ -27,13 +27,6 @@ enum class FreeGeometry {
   kGeometry    ///< + axes: direction and place
 };
 
-/// A further channel that moves a joint: value = scale * (reading + ratio * its reading + ..) +
-/// offset.
-struct ChannelShare {
-  std::string channel;
-  double ratio = 0.0;
-};
-
 /// Where the search starts, and what is held.
 struct CalibrationStart {
   KinematicTree tree;
@@ -43,7 +36,6 @@ struct CalibrationStart {
   Eigen::MatrixXd joint_values;  ///< frames x joints for joints no channel drives; else empty
   bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
   bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
-  std::vector<std::vector<ChannelShare>> couplings;  ///< of every joint; empty: none at all
   std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
 };
 

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
+
+#include <fmt/format.h>
 
 #include "calib/bundle/choose_sightings.h"
 #include "calib/bundle/folds.h"
@@ -48,6 +51,32 @@ std::vector<int> thin_frames(const Spec& spec, const std::vector<int>& usable) {
   return out;
 }
 
+// The first joint that a channel drives.
+std::optional<std::size_t> joint_of_channel(const Spec& spec, int channel) {
+  const auto found = std::ranges::find(spec.channel, channel);
+  if (found == spec.channel.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - spec.channel.begin());
+}
+
+std::vector<DesignCoupling> couplings_of(const Spec& spec) {
+  std::vector<DesignCoupling> out;
+  for (std::size_t j = 0; j < spec.couplings.size(); ++j) {
+    for (const auto& [channel, ratio] : spec.couplings[j]) {
+      const auto other = joint_of_channel(spec, channel);
+      if (!other) continue;
+      const double units = spec.tree.joints[j].scale / spec.tree.joints[*other].scale;
+      out.push_back({static_cast<int>(j), static_cast<int>(*other), units * ratio});
+    }
+  }
+  return out;
+}
+
+void remove_coupling(const DesignCoupling& coupling, Spec& spec) {
+  const int channel = spec.channel[static_cast<std::size_t>(coupling.other)];
+  std::erase_if(spec.couplings[static_cast<std::size_t>(coupling.joint)],
+                [&](const auto& share) { return share.first == channel; });
+}
+
 }  // namespace
 
 struct EffectBundle::Impl {
@@ -56,6 +85,7 @@ struct EffectBundle::Impl {
   double offset_start_s = 0.0;
   std::vector<int> used;
   std::vector<int> fold;
+  std::vector<DesignCoupling> couplings;
   double bias_px = 0.0;
   // Where the last fit of the same change ended: the next one begins there.
   mutable std::map<std::vector<std::string>, State> ends;
@@ -88,6 +118,7 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
   }
   impl_->offset_start_s = state.time_offset[0];
   impl_->start = state;
+  impl_->couplings = couplings_of(spec);
 
   std::set<int> frames;
   for (const int index : impl_->used) {
@@ -183,6 +214,9 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
   with = spec;
   state = start;
+  for (const std::size_t coupling : change.without_couplings) {
+    remove_coupling(couplings[coupling], with);
+  }
   with.free_time_offset = change.time_offset;
   state.time_offset[0] = change.time_offset ? offset_start_s : 0.0;
   with.corrections = change.corrections;
@@ -192,6 +226,9 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   }
   std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
   for (const Correction& correction : with.corrections) key.push_back(correction.name);
+  for (const std::size_t coupling : change.without_couplings) {
+    key.push_back(fmt::format("without coupling {}", coupling));
+  }
   if (const auto end = ends.find(key); end != ends.end()) state = end->second;
   constexpr int kIterations = 60;
   const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
@@ -333,6 +370,8 @@ std::vector<int> EffectBundle::driven_joints() const {
   }
   return out;
 }
+
+const std::vector<DesignCoupling>& EffectBundle::couplings() const { return impl_->couplings; }
 
 std::vector<int> EffectBundle::seen_markers() const {
   std::set<int> seen;

@@ -19,10 +19,18 @@
 
 namespace kinescope {
 
-/// What a fit has beyond the plain model.
+/// What a fit has beyond the plain model, or lacks of it.
 struct BundleChange {
   std::vector<Correction> corrections;
   bool time_offset = false;
+  std::vector<std::size_t> without_couplings;  ///< of EffectBundle::couplings()
+};
+
+/// A joint that another one's channel moves, too, in the plain model.
+struct DesignCoupling {
+  int joint = 0;
+  int other = 0;       ///< joint; the first that the channel drives
+  double ratio = 0.0;  ///< of the joints' values
 };
 
 struct BundleSolution {
@@ -86,6 +94,8 @@ class EffectBundle {
   [[nodiscard]] JointMotion motion_of_log(double time_offset_s) const;
   /// Joints that a channel drives.
   [[nodiscard]] std::vector<int> driven_joints() const;
+  /// Those of channels that drive a joint themselves.
+  [[nodiscard]] const std::vector<DesignCoupling>& couplings() const;
   /// Markers (index into the tree) that are seen.
   [[nodiscard]] std::vector<int> seen_markers() const;
 

@@ -153,10 +153,10 @@ void free_frames(const CalibrationStart& start, Spec& spec) {
   spec.free_camera = base_is_seen ? kAllFree : kHeld;
 }
 
-void add_couplings(const CalibrationStart& start, const JointLog& log, Spec& spec) {
+void add_couplings(const JointLog& log, Spec& spec) {
   spec.couplings.resize(spec.tree.joints.size());
-  for (std::size_t j = 0; j < start.couplings.size(); ++j) {
-    for (const ChannelShare& share : start.couplings[j]) {
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    for (const ChannelShare& share : spec.tree.joints[j].couplings) {
       const auto channel = log.channel(share.channel);
       KINESCOPE_CHECK(channel.has_value(), "a coupled channel is in the log");
       spec.couplings[j].emplace_back(*channel, share.ratio);
@@ -185,7 +185,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
         joint.type == JointType::kFixed ? std::nullopt : log.channel(joint.channel);
     spec.channel.push_back(channel.value_or(-1));
   }
-  add_couplings(start, log, spec);
+  add_couplings(log, spec);
   spec.corrections = start.corrections;
   for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
     std::vector<int> path;

@@ -24,7 +24,13 @@ JointMotion motion_of(const JointLog& log, const KinematicTree& tree) {
     const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
     const auto channel = log.channel(joint.channel);
     if (!channel) continue;
-    out.value.col(j) = (joint.scale * log.values.col(*channel).array() + joint.offset).matrix();
+    Eigen::ArrayXd reading = log.values.col(*channel).array();
+    for (const ChannelShare& share : joint.couplings) {
+      if (const auto other = log.channel(share.channel)) {
+        reading += share.ratio * log.values.col(*other).array();
+      }
+    }
+    out.value.col(j) = (joint.scale * reading + joint.offset).matrix();
     for (Eigen::Index i = 0; i < rows; ++i) {
       const Eigen::Index before = std::max<Eigen::Index>(0, i - 1);
       const Eigen::Index after = std::min(rows - 1, i + 1);

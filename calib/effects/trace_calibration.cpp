@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "calib/effects/coupling_by_design.h"
 #include "calib/effects/traced_bundle.h"
 
 namespace kinescope {
@@ -22,6 +23,7 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   }
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
+  effects::add_couplings_by_design(bundle, options, out.trace);
   effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added);
   out.effects = std::move(corrected.effects);
   out.corrections = std::move(corrected.corrections);

@@ -79,22 +79,6 @@ const CameraEffect& effect_of(const std::vector<CameraEffect>& library, const Ef
   return *found;
 }
 
-BundleChange change_of(const std::vector<CameraEffect>& library,
-                       const std::vector<AddedEffect>& effects) {
-  BundleChange out;
-  for (const AddedEffect& added : effects) {
-    const CameraEffect& effect = effect_of(library, added.id);
-    if (effect.is_time_offset) {
-      out.time_offset = true;
-      continue;
-    }
-    for (Correction& correction : effect.corrections(added.scan)) {
-      out.corrections.push_back(std::move(correction));
-    }
-  }
-  return out;
-}
-
 // Where each effect's parameters stand among those of the change.
 std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<CameraEffect>& library,
                                                         const std::vector<AddedEffect>& effects,
@@ -182,8 +166,26 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
 
 }  // namespace
 
-TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options)
-    : bundle_(&bundle), options_(options) {}
+TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
+                           std::vector<std::size_t> without_couplings)
+    : bundle_(&bundle), options_(options), without_couplings_(std::move(without_couplings)) {}
+
+BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
+                                     const std::vector<AddedEffect>& effects) const {
+  BundleChange out;
+  out.without_couplings = without_couplings_;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    if (effect.is_time_offset) {
+      out.time_offset = true;
+      continue;
+    }
+    for (Correction& correction : effect.corrections(added.scan)) {
+      out.corrections.push_back(std::move(correction));
+    }
+  }
+  return out;
+}
 
 EffectWorld TracedBundle::world_at(double time_offset_s) const {
   EffectWorld world;

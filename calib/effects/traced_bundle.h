@@ -10,7 +10,9 @@ namespace kinescope::effects {
 
 class TracedBundle final : public TracedModel {
  public:
-  TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options);
+  /// Keeps a reference to `bundle`, whose couplings by design it has, but for those named.
+  TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
+               std::vector<std::size_t> without_couplings = {});
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
 
   /// The same with its numbers: the corrections that stand for the effects, at their values.
@@ -22,9 +24,12 @@ class TracedBundle final : public TracedModel {
 
  private:
   [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
+  [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
+                                       const std::vector<AddedEffect>& effects) const;
 
   const EffectBundle* bundle_;
   CalibrationTraceOptions options_;
+  std::vector<std::size_t> without_couplings_;
 };
 
 }  // namespace kinescope::effects

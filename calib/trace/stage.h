@@ -37,6 +37,8 @@ using StagePtr = std::shared_ptr<const Stage>;
 
 /// "backlash at joint2".
 [[nodiscard]] std::string name_of(const EffectId& id);
+/// "the model lacked backlash at joint2, coupling at joint3".
+[[nodiscard]] std::string lacked_words(const std::vector<TracedEffect>& accepted);
 /// False for parameters that cannot be.
 [[nodiscard]] bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta);
 [[nodiscard]] bool refines(const Candidate& candidate, const EffectId& id);

@@ -286,13 +286,6 @@ void Tracer::list_not_found() {
 }
 
 void Tracer::conclude() {
-  const auto list = [&] {
-    std::string out;
-    for (const TracedEffect& effect : trace_.accepted) {
-      out += (out.empty() ? "" : ", ") + name_of(effect.id);
-    }
-    return out;
-  };
   if (!trace_.rest.empty()) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
@@ -307,7 +300,7 @@ void Tracer::conclude() {
     trace_.reason = fmt::format("{}: this recording cannot tell them apart", names);
   } else if (!trace_.accepted.empty()) {
     trace_.verdict = TraceVerdict::kEffects;
-    trace_.reason = fmt::format("the model lacked {}", list());
+    trace_.reason = lacked_words(trace_.accepted);
   } else {
     trace_.verdict = TraceVerdict::kClean;
     trace_.reason =

@@ -33,6 +33,13 @@ struct JointLimits {
   bool operator==(const JointLimits&) const = default;
 };
 
+/// A further channel that moves a joint by design, as in a counter-commanded wrist.
+struct ChannelShare {
+  std::string channel;
+  double ratio = 0.0;  ///< against the joint's own channel
+  bool operator==(const ChannelShare&) const = default;
+};
+
 struct Joint {
   std::string name;
   JointType type = JointType::kFixed;
@@ -42,7 +49,9 @@ struct Joint {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit, in the joint frame
   std::string channel;                              ///< log channel that drives it; may be empty
   double scale = 1.0;                               ///< rad (or m) per unit of the channel
-  double offset = 0.0;                              ///< value = scale * reading + offset
+  double offset = 0.0;                              ///< of the value, see below
+  /// value = scale * (reading + ratio * its reading + ..) + offset
+  std::vector<ChannelShare> couplings;
   std::optional<JointLimits> limits;
 };
 

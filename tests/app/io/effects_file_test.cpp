@@ -37,7 +37,11 @@ json document_of(const std::vector<FittedEffect>& effects) {
           {"robot",
            {{"joints",
              {{{"name", "joint1"}, {"channel", "a"}, {"scale", 1.0}, {"offset", 0.0}},
-              {{"name", "joint2"}, {"channel", "b"}, {"scale", 1e-3}, {"offset", 0.1}}}}}},
+              {{"name", "joint2"},
+               {"channel", "b"},
+               {"scale", 1e-3},
+               {"offset", 0.1},
+               {"couplings", {{{"channel", "a"}, {"ratio", -1.0}}}}}}}}},
           {"gravity_base", {0.0, 0.6, -0.8}},
           {"effects", effects_json(effects)}};
 }
@@ -80,6 +84,8 @@ TEST_F(EffectsFile, ComesBackToTheLastBit) {
   EXPECT_EQ(back.channels[1].channel, "b");
   EXPECT_EQ(back.channels[1].scale, 1e-3);
   EXPECT_EQ(back.channels[1].offset, 0.1);
+  EXPECT_TRUE(back.channels[0].couplings.empty());
+  EXPECT_EQ(back.channels[1].couplings, (std::vector<ChannelShare>{{"a", -1.0}}));
   ASSERT_TRUE(back.gravity_base);
   EXPECT_EQ(*back.gravity_base, Eigen::Vector3d(0.0, 0.6, -0.8));
 }
@@ -150,6 +156,11 @@ TEST_F(EffectsFile, WhatIsNoNumberIsRefused) {
   document = document_of({eccentricity()});
   document["effects"] = 7;
   refused(document, "effects");
+  for (const json& couplings : {json(7), json{3}, json{{{"channel", "a"}, {"ratio", "twice"}}}}) {
+    document = document_of({eccentricity()});
+    document["robot"]["joints"][1]["couplings"] = couplings;
+    refused(document, "");
+  }
   for (const json& gravity : {json{0.0, 1.0}, json{0.0, nullptr, 1.0}, json("down")}) {
     document = document_of({eccentricity()});
     document["gravity_base"] = gravity;

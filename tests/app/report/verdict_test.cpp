@@ -38,13 +38,9 @@ TEST(Verdict, NamesAChannelThatDrivesTwoJoints) {
 
 TEST(Verdict, NamesACouplingByDesign) {
   RunSummary run = synthetic_run();
-  ASSERT_TRUE(run.structure && run.structure->joints.size() > 1);
-  StructureJoint& joint = run.structure->joints[1];
-  ASSERT_TRUE(joint.channel);
-  joint.couplings = {{.channel = 0, .scale = 0.01 * joint.channel->scale}};
   EXPECT_FALSE(has(make_verdict(run).found, "coupled"));
-  joint.couplings[0].scale = -joint.channel->scale;
-  EXPECT_TRUE(has(make_verdict(run).found, "is coupled: q1 moves it too, -1.000 times"))
+  run.calibration.tree.joints[1].couplings = {{"q1", -1.0}};
+  EXPECT_TRUE(has(make_verdict(run).found, "is coupled: q1 moves it too, -1 times"))
       << make_verdict(run).found;
 }
 

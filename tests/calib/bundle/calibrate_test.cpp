@@ -71,6 +71,21 @@ TEST(Calibrate, WithoutABaseTagTheCameraIsTheBase) {
   EXPECT_LT(worst_marker_error(world, found), kExactPose);
 }
 
+// The last motor also carries what the one before it turns: its encoder shows the difference.
+TEST(Calibrate, AJointThatTwoChannelsMoveIsExact) {
+  WorldOptions options = mixed_chain();
+  options.sigma_px = 0.0;
+  const World world = make_world(options);
+  JointLog log = world.log;
+  log.values.col(3) -= 0.5 * log.values.col(2);
+  CalibrationStart start = perturbed_start(world, 0.03, 0.01, 1);
+  start.tree.joints[3].couplings = {{log.channels[2], 0.5}};
+  const Calibration found = calibrate(world.measurements, world.markers, log, start);
+  EXPECT_LT(found.final_rms, kExactRms);
+  EXPECT_LT(worst_marker_error(world, found), kExactPose);
+  EXPECT_EQ(found.tree.joints[3].couplings, start.tree.joints[3].couplings);
+}
+
 TEST(Calibrate, NoiseComesBackAsNoise) {
   WorldOptions options = mixed_chain();
   options.frames = 300;

@@ -104,6 +104,20 @@ TEST(CorrectedLog, AnEccentricityIsUndone) {
   expect_values(undo({fitted("eccentricity", "q1", {0.004, -0.003}, 2.0)}, log_of(logged)), truth);
 }
 
+// What an encoder's ring adds depends on where the joint is, not on its channel alone.
+TEST(CorrectedLog, AJointThatTwoChannelsMoveStandsWhereBothPutIt) {
+  constexpr double kRatio = -1.0;
+  KinematicTree coupled = robot();
+  coupled.joints[1].couplings = {{"axis1", kRatio}};
+  const Eigen::MatrixXd logged = values_as_logged();
+  const Eigen::ArrayXd q = logged.col(1).array() + kRatio * kTick * logged.col(0).array();
+  Eigen::MatrixXd truth = logged;
+  truth.col(1).array() += 0.004 * q.sin();
+  expect_values(corrected_log(log_of(logged), coupled,
+                              {fitted("eccentricity", "q2", {0.004, 0.0}, 1.0)}, std::nullopt),
+                truth);
+}
+
 // The link stands still while the gap is crossed, then follows half a gap behind.
 TEST(CorrectedLog, BacklashIsUndone) {
   constexpr double kGap = 0.02;

@@ -129,6 +129,47 @@ TEST(TraceCalibration, ACleanWorldIsClean) {
   EXPECT_NEAR(trace.held_out_after.value, std::numbers::sqrt2 * kSigma, 2.0 * kSigmaTolerance);
 }
 
+// q3's log shows its motor, which q2 turns, too; the model takes `ratio` for it.
+CalibrationTrace trace_of_coupled(double truth, double ratio) {
+  World world = make_effect_world(filmed());
+  const int motor = value_of(world.log.channel("q3"));
+  world.log.values.col(motor) -= truth * world.log.values.col(value_of(world.log.channel("q2")));
+  CalibrationStart start = start_of(world);
+  start.tree.joints[value_of(start.tree.joint("q3")).index()].couplings = {{"q2", ratio}};
+  return trace_calibration(world.measurements, world.markers, world.log, start, {});
+}
+
+void expect_coupling(const CalibrationTrace& found, double truth) {
+  const Trace& trace = found.trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  EXPECT_EQ(trace.reason, "the model lacked coupling at q3");
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& coupling = trace.accepted.front();
+  EXPECT_EQ(coupling.id, (EffectId{"coupling", "q3"}));
+  EXPECT_EQ(coupling.scan_words, "q2");
+  EXPECT_LT(coupling.interval.low, truth);
+  EXPECT_GT(coupling.interval.high, truth);
+  EXPECT_NEAR(coupling.size, truth, 1e-3);
+  EXPECT_GT(coupling.explained, 0.99);
+  EXPECT_LT(coupling.p_value, 1e-9);
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  EXPECT_GT(trace.held_out_before.value, 20.0 * trace.held_out_after.value);
+  EXPECT_GT(coupling.held_out_before.value, 20.0 * coupling.held_out_after.value);
+}
+
+TEST(TraceCalibration, ACouplingByDesignIsAnEffectWithItsErrorBefore) {
+  const CalibrationTrace found = trace_of_coupled(-1.0, -1.0);
+  expect_coupling(found, -1.0);
+  EXPECT_TRUE(found.corrections.empty());
+}
+
+TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {
+  const CalibrationTrace found = trace_of_coupled(0.31, 0.3);
+  expect_coupling(found, 0.31);
+  EXPECT_EQ(found.corrections.size(), 1U);
+}
+
 TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
   const Trace trace = trace_of(make_effect_world(filmed({strong("own_tanh", "q2")}))).trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);

@@ -67,7 +67,8 @@ LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<In
       gains_(row, j) = std::cos(angle + 0.5 * q_(row / kRows, 1 - j)) + 0.2;
     }
     // Two rows are a corner's coordinates.
-    const double corner = static_cast<double>(row % kRows / 2);
+    const Eigen::Index corner_index = row % kRows / 2;
+    const auto corner = static_cast<double>(corner_index);
     gains_(row, kJoints + row % 2) = 1.0;
     place_.row(row) << q_(row / kRows, 0) + corner, 0.7 * q_(row / kRows, 1) - 0.5 * corner;
   }
@@ -99,7 +100,7 @@ Eigen::Vector2d LinearWorld::shape_of_field(const Eigen::Vector2d& place) {
 }
 
 Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
-  const Eigen::VectorXd q = q_.col(effect.joint);
+  const auto q = q_.col(effect.joint);
   const Eigen::VectorXd other = q_.col(kJoints - 1 - effect.joint);
   if (effect.shape == "scale") return q;
   if (effect.shape == "sine") return q.array().sin();
@@ -115,7 +116,7 @@ std::vector<Candidate> LinearWorld::candidates() const {
     const int carrier = static_cast<int>(j);
     const Eigen::VectorXd q = q_.col(j);
     const auto add = [&](Candidate candidate, auto columns) {
-      candidate.columns = columns;
+      candidate.columns = std::move(columns);
       out.push_back(std::move(candidate));
     };
     Candidate scale = simple("scale", j, 1);
