@@ -85,7 +85,7 @@ struct Rms {
 
 std::vector<std::optional<Prediction>> predict_all(const Spec& spec, const State& state,
                                                    const std::vector<int>& indices) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::vector<std::optional<Prediction>> out;
   for (const int index : indices) {
     out.push_back(
@@ -182,7 +182,7 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
 // A fold for every frame: by posture, or by time where joint values are unknown; or by lot.
 std::vector<int> folds_of(const Spec& spec, const State& state, const std::vector<int>& usable,
                           int folds, bool by_lot) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::vector<int> frames;
   for (const int index : usable) {
     const int frame = spec.sightings[static_cast<std::size_t>(index)].frame;

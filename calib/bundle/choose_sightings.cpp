@@ -40,6 +40,34 @@ double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
   return sum / static_cast<double>(own.size()) / kDifferenceVariance;
 }
 
+// Marks runs that are far beyond whatever else their marker does, and end again: something covered
+// it, or it was taken for another one. Neighbours in such a run agree with each other. What lasts
+// to an end of the recording may be a slip.
+std::vector<bool> far_runs(const std::vector<Eigen::VectorXd>& series) {
+  constexpr double kUsual = 0.95;  // of the sightings are no such run
+  constexpr double kFar = 30.0;    // times as far as those
+  std::vector<double> rms;
+  for (const Eigen::VectorXd& residual : series) {
+    rms.push_back(residual.norm() / std::sqrt(static_cast<double>(residual.size())));
+  }
+  std::vector<double> sorted = rms;
+  const auto usual =
+      sorted.begin() + static_cast<std::ptrdiff_t>(kUsual * static_cast<double>(sorted.size() - 1));
+  std::ranges::nth_element(sorted, usual);
+  std::vector<bool> out(series.size(), false);
+  for (std::size_t first = 0; first < rms.size(); ++first) {
+    if (rms[first] <= kFar * *usual) continue;
+    std::size_t end = first;
+    while (end < rms.size() && rms[end] > kFar * *usual) ++end;
+    if (first > 0 && end < rms.size()) {
+      std::fill(out.begin() + static_cast<std::ptrdiff_t>(first),
+                out.begin() + static_cast<std::ptrdiff_t>(end), true);
+    }
+    first = end;
+  }
+  return out;
+}
+
 // Corners are off by this much in ways that repeat with the view.
 constexpr double kCornerBias = 0.02;  // px
 
@@ -70,7 +98,7 @@ void widen(Sighting& sighting, double factor) {
 
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
                                      double reject_sigma) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::map<int, std::vector<int>> of_marker;
   std::map<int, std::vector<Eigen::VectorXd>> residuals;
   std::map<int, std::vector<SightingError>> errors;
@@ -88,6 +116,7 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
     for (std::size_t i = 0; i < indices.size(); ++i) {
       distance.push_back(stands_out(residuals[marker], i));
     }
+    const std::vector<bool> far = far_runs(residuals[marker]);
     const double typical = std::max(median_of(distance), 1e-12);
     const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
     double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
@@ -104,7 +133,7 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
       // Median and scatter of a mean of `freedom` squares, to first order.
       const double noise = typical / (1.0 - 2.0 / (9.0 * freedom));
       widen(sighting, std::sqrt(noise + bias * bias));
-      if (distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
+      if (!far[i] && distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
         out.used.push_back(indices[i]);
       }
     }

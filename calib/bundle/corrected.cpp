@@ -94,8 +94,7 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         out.line_delay_s += amount;
         break;
       case CorrectedPart::kClock:
-        out.clock_s += amount;
-        break;
+        break;  // in the readings already
     }
   }
   return out;
@@ -106,7 +105,6 @@ std::optional<CorrectedError> corrected_error(
     const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,
     const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m) {
   for (std::size_t k = 0; k < joints.size(); ++k) {
-    joints[k].value += rates[k] * corrected.clock_s;
     joints[k].correction = corrected.joints[k];
   }
   CorrectedError out;

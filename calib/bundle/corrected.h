@@ -19,7 +19,6 @@ struct CorrectedSighting {
   double size = 1.0;
   std::array<double, kMaxIntrinsics> intrinsics{};  ///< changes
   double line_delay_s = 0.0;
-  double clock_s = 0.0;
 };
 
 /// `values`: one a correction of the spec.
@@ -34,8 +33,8 @@ struct CorrectedError {
   Eigen::VectorXd d_time;  ///< of the residual by the log's time, per s
 };
 
-/// `joints` as without corrections, `rates` the rate of each (rad/s, m/s). Nothing when a corner
-/// lies behind the camera.
+/// `joints` as without corrections but for those of the clock, `rates` the rate of each (rad/s,
+/// m/s). Nothing when a corner lies behind the camera.
 [[nodiscard]] std::optional<CorrectedError> corrected_error(
     const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
     const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,

@@ -125,7 +125,7 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
     frames.insert(spec.sightings[static_cast<std::size_t>(index)].frame);
   }
   const std::vector<int> driven = driven_joints();
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   Eigen::MatrixXd features(static_cast<Eigen::Index>(frames.size()),
                            static_cast<Eigen::Index>(driven.size()));
   Eigen::Index row = 0;

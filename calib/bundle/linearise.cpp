@@ -2,11 +2,15 @@
 #include "calib/bundle/linearise.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
 
 #include <ceres/crs_matrix.h>
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -106,7 +110,7 @@ LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& u
 }
 
 double correlation_time(const Spec& spec, const State& state, const std::vector<int>& used) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::map<int, std::map<int, Eigen::VectorXd>> by_marker;
   for (const int index : used) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
@@ -114,10 +118,20 @@ double correlation_time(const Spec& spec, const State& state, const std::vector<
       by_marker[sighting.marker][sighting.frame] = error->residual;
     }
   }
-  const std::size_t frames = spec.times_s.size();
+  // Long recordings are thinned: neighbours are the frames that were used.
+  std::set<int> used_frames;
+  for (const auto& [marker, series] : by_marker) {
+    for (const auto& [frame, r] : series) used_frames.insert(frame);
+  }
+  const std::size_t frames = used_frames.size();
   if (frames < 20) return 0.0;
-  const double step_s =
-      (spec.times_s.back() - spec.times_s.front()) / static_cast<double>(frames - 1);
+  std::vector<double> steps;
+  for (auto frame = used_frames.begin(); std::next(frame) != used_frames.end(); ++frame) {
+    steps.push_back(*std::next(frame) - *frame);
+  }
+  const int step = static_cast<int>(std::lround(median_of(std::move(steps))));
+  const double step_s = step * (spec.times_s.back() - spec.times_s.front()) /
+                        static_cast<double>(spec.times_s.size() - 1);
   double variance = 0.0;
   for (const auto& [marker, series] : by_marker) {
     for (const auto& [frame, r] : series)
@@ -134,7 +148,7 @@ double correlation_time(const Spec& spec, const State& state, const std::vector<
     int pairs = 0;
     for (const auto& [marker, series] : by_marker) {
       for (const auto& [frame, r] : series) {
-        const auto later = series.find(frame + lag);
+        const auto later = series.find(frame + lag * step);
         if (later == series.end()) continue;
         product += r.dot(later->second) / static_cast<double>(r.size());
         ++pairs;

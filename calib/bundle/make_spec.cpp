@@ -224,7 +224,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
 
 void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& state) {
   if (spec.targets.empty()) return;
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::vector<Eigen::Vector3d> sum(spec.targets.size(), Eigen::Vector3d::Zero());
   std::vector<int> count(spec.targets.size(), 0);
   for (const int index : sightings) {

@@ -17,19 +17,34 @@ namespace {
 const std::array<const char*, kMaxIntrinsics> kIntrinsicNames{"fx", "fy", "cx", "cy", "d1", "d2",
                                                               "d3", "d4", "d5", "d6", "d7", "d8"};
 
-// Keeps the readings at the time offset that the solver is looking at.
+// Keeps the readings at the clock that the solver is looking at.
 class ReadingsCallback final : public ceres::EvaluationCallback {
  public:
-  ReadingsCallback(Readings* readings, const double* time_offset)
-      : readings_(readings), time_offset_(time_offset) {}
+  ReadingsCallback(Readings* readings, const State* state) : readings_(readings), state_(state) {}
   void PrepareForEvaluation(bool /*jacobians*/, bool new_point) override {
-    if (new_point) readings_->update(*time_offset_);
+    if (new_point) readings_->update(*state_);
   }
 
  private:
   Readings* readings_;
-  const double* time_offset_;
+  const State* state_;
 };
+
+// Frames: joint-log time minus frame time.
+Eigen::VectorXd clock_of(const Spec& spec, const State& state) {
+  Eigen::VectorXd ahead_s = Eigen::VectorXd::Constant(
+      static_cast<Eigen::Index>(spec.times_s.size()), state.time_offset[0]);
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    const Correction& correction = spec.corrections[c];
+    if (correction.part != CorrectedPart::kClock) continue;
+    if (correction.share.size() == 0) {
+      ahead_s.array() += state.corrections[c];
+    } else {
+      ahead_s += state.corrections[c] * correction.share;
+    }
+  }
+  return ahead_s;
+}
 
 // What drives a joint at a time: its channel, and the others that move it too.
 std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
@@ -77,26 +92,40 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
   return state;
 }
 
-Readings::Readings(const Spec& spec, double time_offset_s) : spec_(&spec), time_offset_s_(0.0) {
-  const auto frames = static_cast<Eigen::Index>(spec.times_s.size());
-  const auto joints = static_cast<Eigen::Index>(spec.tree.joints.size());
-  value_ = Eigen::MatrixXd::Zero(frames, joints);
-  rate_ = Eigen::MatrixXd::Zero(frames, joints);
-  known_.setConstant(frames, joints, true);
-  time_offset_s_ = time_offset_s + 1.0;
-  update(time_offset_s);
+Readings::Readings(const Spec& spec, double time_offset_s)
+    : spec_(&spec),
+      ahead_s_(Eigen::VectorXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
+                                         time_offset_s)) {
+  read();
 }
 
-void Readings::update(double time_offset_s) {
-  if (time_offset_s == time_offset_s_) return;
-  time_offset_s_ = time_offset_s;
+Readings::Readings(const Spec& spec, const State& state)
+    : spec_(&spec), ahead_s_(clock_of(spec, state)) {
+  read();
+}
+
+void Readings::update(const State& state) {
+  Eigen::VectorXd ahead_s = clock_of(*spec_, state);
+  if (ahead_s == ahead_s_) return;
+  ahead_s_ = std::move(ahead_s);
+  read();
+}
+
+void Readings::read() {
+  const auto frames = static_cast<Eigen::Index>(spec_->times_s.size());
+  const auto joints = static_cast<Eigen::Index>(spec_->tree.joints.size());
+  if (value_.rows() != frames) {
+    value_ = Eigen::MatrixXd::Zero(frames, joints);
+    rate_ = Eigen::MatrixXd::Zero(frames, joints);
+    known_.setConstant(frames, joints, true);
+  }
   for (std::size_t j = 0; j < spec_->tree.joints.size(); ++j) {
     if (spec_->channel[j] < 0) continue;
     for (std::size_t f = 0; f < spec_->times_s.size(); ++f) {
       const auto row = static_cast<Eigen::Index>(f);
       const auto column = static_cast<Eigen::Index>(j);
-      const double time_s = spec_->times_s[f] + time_offset_s;
-      // Where the offset moves a frame past the log's end while solving, the end's value stays.
+      const double time_s = spec_->times_s[f] + ahead_s_[row];
+      // Where the clock moves a frame past the log's end while solving, the end's value stays.
       const double inside_s =
           std::clamp(time_s, spec_->log.times_s.front(), spec_->log.times_s.back());
       const auto sample = reading(*spec_, j, inside_s);
@@ -147,8 +176,8 @@ Pose predict(const Spec& spec, const State& state, const Readings& readings,
 
 BuiltProblem::BuiltProblem(const Spec& spec, State& state, const std::vector<int>& sightings,
                            const BuildOptions& options) {
-  readings_ = std::make_unique<Readings>(spec, state.time_offset[0]);
-  callback_ = std::make_unique<ReadingsCallback>(readings_.get(), state.time_offset.data());
+  readings_ = std::make_unique<Readings>(spec, state);
+  callback_ = std::make_unique<ReadingsCallback>(readings_.get(), &state);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = callback_.get();
   problem_options.enable_fast_removal = false;

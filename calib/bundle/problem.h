@@ -91,16 +91,20 @@ struct State {
 /// Channel readings and rates at every frame for the present time offset: frames x joints.
 class Readings {
  public:
+  /// Without corrections of the clock.
   Readings(const Spec& spec, double time_offset_s);
-  void update(double time_offset_s);
+  Readings(const Spec& spec, const State& state);
+  void update(const State& state);
   [[nodiscard]] double value(int frame, int joint) const { return value_(frame, joint); }
   [[nodiscard]] double rate(int frame, int joint) const { return rate_(frame, joint); }
   /// False where the log has nothing (outside, or in a gap).
   [[nodiscard]] bool known(int frame, int joint) const { return known_(frame, joint); }
 
  private:
+  void read();
+
   const Spec* spec_;
-  double time_offset_s_;
+  Eigen::VectorXd ahead_s_;  // frames: joint-log time minus frame time
   Eigen::MatrixXd value_;
   Eigen::MatrixXd rate_;
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> known_;

@@ -226,7 +226,7 @@ void fill_markers(const Spec& spec, const State& state, const RobustSolution& ro
 
 void read_back(const Spec& spec, const State& state, const RobustSolution& robust,
                const Uncertainty& uncertainty, Calibration& out) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   out.times_s = spec.times_s;
   out.camera = camera_of(spec, state);
   out.intrinsics_estimated = std::ranges::any_of(spec.free_intrinsics, [](bool f) { return f; });

@@ -47,7 +47,7 @@ struct Misfit {
 };
 
 std::vector<Misfit> misfits(const Spec& spec, const State& state, const std::vector<int>& indices) {
-  const Readings readings(spec, state.time_offset[0]);
+  const Readings readings(spec, state);
   std::vector<Misfit> out;
   for (const int index : indices) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];

@@ -9,6 +9,7 @@
 
 #include "calib/bundle/linearise.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/stretch_widening.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -21,18 +22,26 @@ constexpr double kUnseen = 1e-8;
 // Blocks of the sandwich: no fewer than this many, or its scatter says nothing.
 constexpr int kMinStretches = 12;
 
-// Which stretch of time each frame belongs to.
-std::map<int, int> stretches(const Spec& spec, const LinearBundle& linear, double correlation_s) {
-  std::map<int, int> out;
+// Which stretch of time each frame belongs to, and what the stretches' sums miss of the variance.
+struct Stretches {
+  std::map<int, int> of_frame;
+  double widening = 1.0;
+};
+
+Stretches stretches(const Spec& spec, const LinearBundle& linear, double correlation_s) {
+  Stretches out;
   const double begin = spec.times_s.front();
   const double duration = std::max(1e-9, spec.times_s.back() - begin);
   const double length = std::clamp(4.0 * correlation_s, duration / 200.0, duration / kMinStretches);
+  // Half a step is the integral time of white noise.
+  const double step = duration / std::max(1.0, static_cast<double>(spec.times_s.size()) - 1.0);
+  if (!spec.postures) out.widening = stretch_widening(length, correlation_s - 0.5 * step);
   int next = 1 << 20;
   for (const auto& [frame, rows] : linear.frames) {
     if (spec.postures || frame < 0) {
-      out[frame] = next++;
+      out.of_frame[frame] = next++;
     } else {
-      out[frame] =
+      out.of_frame[frame] =
           static_cast<int>((spec.times_s[static_cast<std::size_t>(frame)] - begin) / length);
     }
   }
@@ -40,19 +49,20 @@ std::map<int, int> stretches(const Spec& spec, const LinearBundle& linear, doubl
 }
 
 // Factors by which the variances grow because the residuals are not independent.
-Eigen::VectorXd inflation(const LinearBundle& linear, const std::map<int, int>& stretch,
+Eigen::VectorXd inflation(const LinearBundle& linear, const Stretches& stretch,
                           const Eigen::MatrixXd& covariance) {
   std::map<int, Eigen::VectorXd> scores;
   const Eigen::Index n = covariance.rows();
   for (const auto& [frame, rows] : linear.frames) {
-    auto [entry, fresh] = scores.try_emplace(stretch.at(frame), Eigen::VectorXd::Zero(n));
+    auto [entry, fresh] = scores.try_emplace(stretch.of_frame.at(frame), Eigen::VectorXd::Zero(n));
     entry->second += rows.J.transpose() * rows.r;
   }
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
   for (const auto& [key, g] : scores) meat += g * g.transpose();
   const auto count = static_cast<double>(scores.size());
   if (count < 3.0) return Eigen::VectorXd::Ones(n);
-  const Eigen::MatrixXd sandwich = covariance * meat * covariance * (count / (count - 1.0));
+  const Eigen::MatrixXd sandwich =
+      covariance * meat * covariance * (stretch.widening * count / (count - 1.0));
   Eigen::VectorXd ratio(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     ratio[i] = covariance(i, i) > 0.0 ? sandwich(i, i) / covariance(i, i) : 1.0;

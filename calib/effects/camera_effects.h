@@ -26,7 +26,7 @@ struct EffectWorld {
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   double first_s = 0.0;                         ///< of the frames
   double last_s = 0.0;
-  bool clock_free = false;  ///< the log's clock is declared to agree with the camera's
+  bool clock_free = false;  ///< false: the log's clock is declared to agree with the camera's
   /// Effects are known and to be undone: also at joints that rest here, over whatever range.
   bool known = false;
 };

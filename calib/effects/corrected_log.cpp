@@ -93,6 +93,24 @@ void check_place(const FittedEffect& effect, const KinematicTree& tree, const Jo
   }
 }
 
+// True where the joint's channel drives a second one, which has no part in the effect.
+bool drives_another(const KinematicTree& tree, const Joint& joint) {
+  return std::ranges::count(tree.joints, joint.channel, &Joint::channel) > 1;
+}
+
+// Joints that follow a channel by design followed the reading, not what it lacked: their own
+// channels take back what the change would do to them.
+void hold_followers(const KinematicTree& tree, const Joint& changed, const Eigen::VectorXd& change,
+                    JointLog& corrected) {
+  for (const Joint& joint : tree.joints) {
+    const auto own = corrected.channel(joint.channel);
+    if (!own) continue;
+    for (const ChannelShare& share : joint.couplings) {
+      if (share.channel == changed.channel) corrected.values.col(*own) -= share.ratio * change;
+    }
+  }
+}
+
 // Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
 bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
                 const std::vector<effects::CameraEffect>& library, const JointLog& log,
@@ -114,13 +132,16 @@ bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
         log, effect,
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
-  const auto channel = log.channel(joint.channel);
+  if (drives_another(tree, joint)) return false;
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(log.values.rows());  // in the channel's unit
   for (std::size_t k = 0; k < corrections.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const double amount =
         effect.values[at] * corrections[k].reference / effect.references[at] / joint.scale;
-    corrected.values.col(value_of(channel)) += amount * corrections[k].share;
+    change += amount * corrections[k].share;
   }
+  corrected.values.col(value_of(log.channel(joint.channel))) += change;
+  hold_followers(tree, joint, change, corrected);
   return true;
 }
 

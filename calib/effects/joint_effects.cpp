@@ -4,6 +4,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -124,7 +125,7 @@ std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
   double most = s.turns ? kMostPeriods : kMostPeriods / range;
   if (!world.postures && step > 0.0) most = std::min(most, 0.5 / step);
   std::vector<double> out;
-  const double spacing = std::max(0.35 / turns, (most - fewest) / 400.0);
+  const double spacing = 0.35 / turns;
   for (int k = 0; fewest + k * spacing <= most; ++k) out.push_back(fewest + k * spacing);
   return out;
 }
@@ -146,6 +147,10 @@ CameraEffect gear_error(const EffectWorld& world, const Suspect& s) {
 CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "backlash", fmt::format("{} has play", s.name), {{"width", s.unit}}, s.unit);
+  // A link ahead of its drive has no play: its reading is late.
+  out.candidate.possible = [limit = kLargest.at(s.unit)](const Eigen::VectorXd& width) {
+    return width[0] > 0.0 && width[0] < limit;
+  };
   const double range = s.value.maxCoeff() - s.value.minCoeff();
   double gap = range / 2000.0;
   while (gap < 0.3 * range) {
@@ -284,14 +289,20 @@ CameraEffect curved_slider(const Suspect& s) {
   return out;
 }
 
-// The axis tilts by a e^(i n q) + b e^(-i n q) (complex numbers for the two directions across it,
-// fixed in space); seen from the link, which turns on, by a e^(i (n-1) q) + b e^(-i (n+1) q). Of
-// n = 1 the first part stands still in the link and is no error but a crooked link; n = 0 likewise
-// is a crooked axis.
+// The axis tilts, about some place on it, by a e^(i n q) + b e^(-i n q) (complex numbers for the
+// two directions across it, fixed in space); seen from the link, which turns on, by a e^(i (n-1) q)
+// + b e^(-i (n+1) q). Of n = 1 the first part stands still in the link and is no error but a
+// crooked link; n = 0 likewise is a crooked axis.
 CameraEffect axis_wobble(const Suspect& s) {
   CameraEffect out =
       effect(s, "axis_wobble", fmt::format("the axis of {} tilts as it turns", s.name),
-             {{"tilt, real", "rad"}, {"tilt, imaginary", "rad"}}, "rad");
+             {{"tilt, real", "rad"},
+              {"tilt, imaginary", "rad"},
+              {"shift, real", "m"},
+              {"shift, imaginary", "m"}},
+             "rad");
+  // Where the bearing sits along the axis is not known: seen from elsewhere the tilt shifts, too.
+  out.candidate.size_weights.tail<2>().setZero();
   out.candidate.scan = {-2.0, 1.0, -3.0};
   out.candidate.scan_listed = true;
   out.candidate.scan_name = "turns of the tilt, seen from the link";
@@ -303,16 +314,22 @@ CameraEffect axis_wobble(const Suspect& s) {
   out.corrections = [s](double turns) {
     const auto sides = across(s.axis.head<3>());
     const Eigen::ArrayXd angle = turns * s.value.array();
-    Correction real = turn(s, "wobble real", "rad", {});
-    Correction imaginary = turn(s, "wobble imaginary", "rad", {});
-    for (Correction* tilt : {&real, &imaginary}) tilt->twists.setZero(s.value.size(), 6);
-    for (Eigen::Index i = 0; i < s.value.size(); ++i) {
-      const double c = std::cos(angle[i]);
-      const double d = std::sin(angle[i]);
-      real.twists.row(i).head<3>() = (c * sides[0] + d * sides[1]).transpose();
-      imaginary.twists.row(i).head<3>() = (c * sides[1] - d * sides[0]).transpose();
+    std::vector<Correction> corrections;
+    for (const auto& [what, unit, column] :
+         {std::tuple{"tilt", "rad", 0}, std::tuple{"shift", "m", 3}}) {
+      Correction real = turn(s, fmt::format("wobble, {}, real", what), unit, {});
+      Correction imaginary = turn(s, fmt::format("wobble, {}, imaginary", what), unit, {});
+      for (Correction* part : {&real, &imaginary}) part->twists.setZero(s.value.size(), 6);
+      for (Eigen::Index i = 0; i < s.value.size(); ++i) {
+        const double c = std::cos(angle[i]);
+        const double d = std::sin(angle[i]);
+        real.twists.row(i).segment<3>(column) = (c * sides[0] + d * sides[1]).transpose();
+        imaginary.twists.row(i).segment<3>(column) = (c * sides[1] - d * sides[0]).transpose();
+      }
+      corrections.push_back(std::move(real));
+      corrections.push_back(std::move(imaginary));
     }
-    return std::vector{real, imaginary};
+    return corrections;
   };
   return out;
 }

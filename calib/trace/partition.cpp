@@ -5,20 +5,14 @@
 #include <cmath>
 #include <map>
 
+#include "kinematics/core/stretch_widening.h"
+
 namespace kinescope::trace {
 namespace {
 
 constexpr double kCorrelationTimes = 6.0;  // in a stretch
 constexpr double kFewStretches = 24.0;
 constexpr double kManyStretches = 64.0;
-
-// Sums over a stretch of length L of noise that forgets exponentially with integral time tau have
-// 1 - tau / L (1 - exp(-L / tau)) of the variance that they have in the long run.
-double widening_of(double length, double integral_time) {
-  if (!(integral_time > 0.0)) return 1.0;
-  const double ratio = integral_time / length;
-  return 1.0 / (1.0 - ratio * (1.0 - std::exp(-1.0 / ratio)));
-}
 
 std::vector<int> stretch_of_instants(const Linearisation& linear, double& widening) {
   const Eigen::Index n = linear.instants();
@@ -38,7 +32,7 @@ std::vector<int> stretch_of_instants(const Linearisation& linear, double& wideni
                                    duration / kManyStretches, duration / kFewStretches);
   // Half a step is the integral time of white noise.
   const double step = duration / static_cast<double>(n - 1);
-  widening = widening_of(length, linear.correlation_time_s - 0.5 * step);
+  widening = stretch_widening(length, linear.correlation_time_s - 0.5 * step);
   const int last = std::max(0, static_cast<int>(std::ceil(duration / length - 1e-9)) - 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     out[static_cast<std::size_t>(i)] =

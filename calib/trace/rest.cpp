@@ -16,7 +16,7 @@ constexpr std::size_t kTestKnots = 8;       // of the test: few, for power
 constexpr std::size_t kStretchesAKnot = 5;  // fewer knots where few stretches judge them
 constexpr Eigen::Index kCurveKnots =
     24;  // of the Gaussian process: many, its prior keeps it smooth
-// The variance of the process is looked for from a millionth to a million times its natural scale.
+// The variance of the process is looked for from a thousandth to 1e9 times its natural scale.
 constexpr std::array<double, 5> kLengths{1.0, 0.5, 0.25, 0.125,
                                          0.0625};  // of the covariate's range
 constexpr int kVariances = 25;

@@ -138,7 +138,8 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
     // Fewer than its parameters: their scatter does not even span the effect.
     out.freedom = noise.freedom;
     out.statistic = pooled_statistic;
-    out.covariance = p.T * p.S_inverse * p.T.transpose() * noise.variance;
+    out.pooled = p.T * p.S_inverse * p.T.transpose() * noise.variance;
+    out.covariance = out.pooled;
     out.p_value = f_survival(out.statistic, k, out.freedom);
     return;
   }

@@ -13,11 +13,14 @@ namespace kinescope::trace {
 struct Score {
   Eigen::VectorXd theta;       ///< of the effect's parameters
   Eigen::MatrixXd covariance;  ///< by stretches of time
-  double statistic = 0.0;      ///< F
-  int rank = 0;                ///< directions of the effect that the data show
-  double freedom = 0.0;        ///< of the denominator
-  double p_value = 1.0;        ///< of this one test
-  double gain = 0.0;           ///< by how much the sum of squares falls
+  /// The same by noise at its usual level and memory, with `freedom`; empty where enough stretches
+  /// carry the effect for their scatter to judge it.
+  Eigen::MatrixXd pooled;
+  double statistic = 0.0;  ///< F
+  int rank = 0;            ///< directions of the effect that the data show
+  double freedom = 0.0;    ///< of the denominator
+  double p_value = 1.0;    ///< of this one test
+  double gain = 0.0;       ///< by how much the sum of squares falls
   double rms = 0.0;  ///< of what the effect does to the rows it touches, freed of the model's own
                      ///< parameters, in the residual's unit
   [[nodiscard]] bool hidden() const { return rank == 0; }

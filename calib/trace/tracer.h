@@ -23,6 +23,12 @@ class Tracer {
   [[nodiscard]] Trace run();
 
  private:
+  // What the backward check says of an added effect.
+  struct Detail {
+    TracedEffect effect;
+    Score score;  // without it, with all the others
+  };
+
   // A significant candidate with what the linear model says of it, held out.
   struct Contender {
     TestedMember member;
@@ -73,7 +79,7 @@ class Tracer {
   std::deque<StagePtr> last_;
   StagePtr base_;
   StagePtr now_;
-  std::vector<TracedEffect> details_;  // beside now_->added, filled by the backward check
+  std::vector<Detail> details_;  // beside now_->added, filled by the backward check
   std::set<EffectId> removed_;
   std::vector<FoundRest> rests_;
   int round_ = 0;

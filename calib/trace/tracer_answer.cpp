@@ -116,7 +116,7 @@ double Tracer::rest_level() const { return now_->fit.rest_fields.empty() ? level
 
 bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
   return found.rest.explained * now_->system.total().rr >=
-         kDoubtfulShare * details_[effect].explained * base_->system.total().rr;
+         kDoubtfulShare * details_[effect].effect.explained * base_->system.total().rr;
 }
 
 // Effects that explain nothing where what is left is in the model as curves: they stood in for it,
@@ -230,13 +230,19 @@ void Tracer::summarise() {
     const Candidate& candidate = *find_candidate(base_->fit, added.id);
     const Eigen::MatrixXd block = covariance.block(at, at, values.size(), values.size());
     at += values.size();
-    TracedEffect effect = details_[i];
+    TracedEffect effect = details_[i].effect;
     effect.id = added.id;
     effect.words = candidate.words;
     effect.check = candidate.check;
     effect.size = size_of(candidate, values);
     effect.unit = candidate.size_unit;
-    const double half = t * size_sigma(candidate, values, block);
+    // Where few stretches carry the effect their scatter may be small by chance.
+    const Score& score = details_[i].score;
+    double half = t * size_sigma(candidate, values, block);
+    if (score.pooled.size() > 0) {
+      half = std::max(half, t_quantile(0.025, std::max(2.0, score.freedom)) *
+                                size_sigma(candidate, values, score.pooled));
+    }
     effect.interval = {effect.size - half, effect.size + half};
     if (values.size() > 1) effect.interval.low = std::max(0.0, effect.interval.low);
     for (Eigen::Index k = 0; k < values.size(); ++k) {

@@ -123,7 +123,8 @@ bool Tracer::check(std::size_t index) {
   own.score = jackknife_test(stage->system, own.columns);
   own.tests = number_of_tests(stage->fit.candidates, *candidate);
   own.p_value = std::min(1.0, own.score.p_value * own.tests);
-  TracedEffect& detail = details_[index];
+  details_[index].score = own.score;
+  TracedEffect& detail = details_[index].effect;
   detail.p_value = own.p_value;
   detail.held_out_before = stage->error;
   detail.held_out_after = now_->error;

@@ -85,7 +85,6 @@ class Derivatives : public ::testing::Test {
     for (const Case& c : cases_) start.corrections.push_back(c.correction);
     spec_ = make_spec(world_.measurements, world_.markers, world_.log, start, {});
     state_ = initial_state(spec_, start);
-    readings_ = std::make_unique<Readings>(spec_, 0.0);
     const auto found = std::ranges::find_if(
         spec_.sightings, [](const Sighting& s) { return s.frame == kFrame && s.marker == 4; });
     ASSERT_NE(found, spec_.sightings.end());
@@ -93,16 +92,17 @@ class Derivatives : public ::testing::Test {
   }
 
   [[nodiscard]] Eigen::VectorXd residual() const {
-    return error_of(spec_, state_, *readings_, *sighting_).value().residual;
+    return error_of(spec_, state_, Readings(spec_, state_), *sighting_).value().residual;
   }
 
   [[nodiscard]] Eigen::VectorXd analytic(std::size_t c) const {
+    const Readings readings(spec_, state_);
     const CorrectedSighting corrected = sum_corrections(
         spec_, *sighting_, corrections_of(spec_, *sighting_), state_.corrections.data());
     const auto at =
         corrected_error(spec_, *sighting_, corrected, from_block(state_.camera_base.data()),
-                        chain_of(spec_, state_, *readings_, *sighting_),
-                        rates_of(spec_, state_, *readings_, *sighting_),
+                        chain_of(spec_, state_, readings, *sighting_),
+                        rates_of(spec_, state_, readings, *sighting_),
                         from_block(state_.mounts[4].data()), camera_of(spec_, state_), nullptr);
     return d_correction(spec_, *sighting_, spec_.corrections[c], at.value());
   }
@@ -129,7 +129,6 @@ class Derivatives : public ::testing::Test {
   std::vector<Case> cases_;
   Spec spec_;
   State state_;
-  std::unique_ptr<Readings> readings_;
   const Sighting* sighting_ = nullptr;
 };
 

@@ -118,6 +118,33 @@ TEST(CorrectedLog, AJointThatTwoChannelsMoveStandsWhereBothPutIt) {
                 truth);
 }
 
+// q2 is where q1's motor put it, whatever q1's encoder shows of that.
+TEST(CorrectedLog, WhatAJointsEncoderLackedDoesNotMoveItsFollower) {
+  constexpr double kRatio = -1.0;
+  KinematicTree coupled = robot();
+  coupled.joints[1].couplings = {{"axis1", kRatio}};
+  const Eigen::MatrixXd logged = values_as_logged();
+  const CorrectedLog corrected = corrected_log(
+      log_of(logged), coupled, {fitted("eccentricity", "q1", {0.004, 0.0}, 1.0)}, std::nullopt);
+  const auto follower = [&](const JointLog& log) -> Eigen::VectorXd {
+    return log.values.col(0) + kRatio * log.values.col(1);
+  };
+  EXPECT_LT((follower(corrected.log) - follower(log_of(logged))).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_EQ(corrected.undone.size(), 1U);
+}
+
+TEST(CorrectedLog, AChannelOfTwoJointsIsLeft) {
+  KinematicTree shared = robot();
+  shared.joints[1].channel = "axis1";
+  shared.joints[1].scale = 1.0;
+  const CorrectedLog corrected =
+      corrected_log(log_of(values_as_logged()), shared,
+                    {fitted("eccentricity", "q1", {0.004, 0.0}, 1.0)}, std::nullopt);
+  EXPECT_TRUE(corrected.undone.empty());
+  EXPECT_EQ(corrected.left.size(), 1U);
+  EXPECT_EQ(corrected.log.values, log_of(values_as_logged()).values);
+}
+
 // The link stands still while the gap is crossed, then follows half a gap behind.
 TEST(CorrectedLog, BacklashIsUndone) {
   constexpr double kGap = 0.02;

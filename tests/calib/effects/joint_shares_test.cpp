@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "calib/effects/camera_effects.h"
+
 namespace kinescope::effects {
 namespace {
 
@@ -77,6 +79,7 @@ KinematicTree pendulum(const Eigen::Quaterniond& R_base_joint) {
   Joint joint;
   joint.name = "q1";
   joint.type = JointType::kRevolute;
+  joint.parent = LinkId{0};
   joint.parent = LinkId{0};
   joint.child = LinkId{1};
   joint.T_parent_joint.rotation = R_base_joint;
@@ -170,6 +173,56 @@ TEST(GravityLoads, LinksBehindPullFromTheirOwnPlaces) {
     EXPECT_NEAR(loads[3].arm_m[i], std::sin(1.7 * kAngles[i]), kExact);
   }
   EXPECT_EQ(gravity_loads(tree, motion, 1, -Eigen::Vector3d::UnitX()).size(), 2U);
+}
+
+// A hinge that turns to and fro over `turns`, once in 30 s, filmed and logged at 30 Hz.
+EffectWorld hinge(double turns) {
+  EffectWorld world;
+  Joint joint;
+  joint.name = "q1";
+  joint.type = JointType::kRevolute;
+  joint.parent = LinkId{0};
+  joint.child = LinkId{1};
+  world.tree.links = {{"base"}, {"arm"}};
+  world.tree.joints = {joint};
+  world.driven = {0};
+  constexpr Eigen::Index kFrames = 900;
+  world.frames.value.resize(kFrames, 1);
+  world.frames.rate.setZero(kFrames, 1);
+  for (Eigen::Index i = 0; i < kFrames; ++i) {
+    const double t = static_cast<double>(i) / 30.0;
+    world.frames.times_s.push_back(t);
+    world.frames.value(i, 0) =
+        std::numbers::pi * turns * std::sin(2.0 * std::numbers::pi * t / 30.0);
+  }
+  world.log = world.frames;
+  return world;
+}
+
+Candidate candidate_of(const EffectWorld& world, const std::string& effect) {
+  for (const CameraEffect& known : joint_effects(world)) {
+    if (known.candidate.id.effect == effect) return known.candidate;
+  }
+  throw std::logic_error("no " + effect);
+}
+
+// A link ahead of its drive has no play: its reading is late.
+TEST(JointEffects, PlayIsPositive) {
+  const Candidate backlash = candidate_of(hinge(0.4), "backlash");
+  EXPECT_TRUE(backlash.possible(values({0.01})));
+  EXPECT_FALSE(backlash.possible(values({-0.01})));
+  EXPECT_FALSE(backlash.possible(values({1.0})));
+}
+
+// Waves further apart than half of what the range tells apart fall between the values.
+TEST(JointEffects, WavesAreLookedForWithoutGaps) {
+  for (const double turns : {0.5, 1.0, 2.0}) {
+    const std::vector<double> scan = candidate_of(hinge(turns), "gear_error").scan;
+    ASSERT_GT(scan.size(), 2U);
+    for (std::size_t i = 1; i < scan.size(); ++i) {
+      ASSERT_LT(scan[i] - scan[i - 1], 0.5 / turns) << turns << " turns";
+    }
+  }
 }
 
 }  // namespace

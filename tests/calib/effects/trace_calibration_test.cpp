@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 #include "tests/truth/camera_effects.h"
 
@@ -127,6 +128,46 @@ TEST(TraceCalibration, ACleanWorldIsClean) {
   EXPECT_TRUE(clean_trace().corrections.empty());
   EXPECT_NEAR(trace.noise, std::numbers::sqrt2 * kSigma, kSigmaTolerance);
   EXPECT_NEAR(trace.held_out_after.value, std::numbers::sqrt2 * kSigma, 2.0 * kSigmaTolerance);
+}
+
+// A camera that says 30 and takes 29.97 frames a second: the clocks part by 33 ms on the way.
+TEST(TraceCalibration, AStrongDriftIsFollowedToTheEnds) {
+  InjectedEffect drift = strong("clock_drift", "clock");
+  drift.size = 1e-3;
+  const Trace trace = trace_of(make_effect_world(filmed({drift}))).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), drift.size));
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+}
+
+// The place of a joint's frame along its axis is nobody's to see, and no bearing need sit there.
+CalibrationStart with_frame_moved(CalibrationStart start, const std::string& name, double along_m) {
+  Joint& joint = start.tree.joints[value_of(start.tree.joint(name)).index()];
+  Pose shift;
+  shift.translation = along_m * joint.axis;
+  joint.T_parent_joint = joint.T_parent_joint * shift;
+  for (Joint& next : start.tree.joints) {
+    if (next.parent == joint.child) next.T_parent_joint = shift.inverse() * next.T_parent_joint;
+  }
+  for (Marker& marker : start.tree.markers) {
+    if (marker.link == joint.child) marker.T_link_marker = shift.inverse() * marker.T_link_marker;
+  }
+  return start;
+}
+
+TEST(TraceCalibration, AWobblesBearingMayBeAnywhereOnTheAxis) {
+  const InjectedEffect wobble = strong("axis_wobble", "q2");
+  const World world = make_effect_world(filmed({wobble}));
+  const Trace trace = trace_calibration(world.measurements, world.markers, world.log,
+                                        with_frame_moved(start_of(world), "q2", 0.3), {})
+                          .trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"axis_wobble", "q2"}));
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
 // q3's log shows its motor, which q2 turns, too; the model takes `ratio` for it.
