@@ -6,27 +6,22 @@
 #include <limits>
 #include <map>
 
-#include <Eigen/LU>
-#include <fmt/format.h>
-
+#include "calib/bundle/hand_eye.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
+
+using bundle::best_base;
+using bundle::fit_mount;
+using bundle::hand_eye_cost;
+using bundle::HandEyeCost;
+using bundle::MountFit;
+using bundle::nearest_rotation;
+using bundle::PosePair;
+
 namespace {
-
-// A measured pose and where the nominal robot has the link at that instant.
-struct PosePair {
-  Pose T_camera_marker;
-  Pose T_base_link;
-};
-
-struct HandEye {
-  Pose T_camera_base;
-  Pose T_link_marker;
-  double rms_m = std::numeric_limits<double>::infinity();
-  double rms_rad = std::numeric_limits<double>::infinity();
-};
 
 std::optional<std::vector<Pose>> links_at(const KinematicTree& tree,
                                           const Eigen::MatrixXd& joint_values, int frame) {
@@ -35,143 +30,121 @@ std::optional<std::vector<Pose>> links_at(const KinematicTree& tree,
   return forward_kinematics(tree, q);
 }
 
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const SingularValues svd = singular_value_decomposition(m);
-  const Eigen::Matrix3d V = svd.V;
-  Eigen::Matrix3d U = svd.U;
-  if ((U * V.transpose()).determinant() < 0.0) U.col(2) *= -1.0;
-  return U * V.transpose();
-}
-
-// T_camera_marker = T_camera_base T_base_link T_link_marker for all pairs. Shah 2013, section 3:
-// the two rotations are the first singular vectors of sum R_link (x) R_camera_marker.
-std::optional<HandEye> hand_eye(const std::vector<PosePair>& pairs) {
-  if (pairs.size() < 3) return std::nullopt;
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(9, 9);
-  for (const PosePair& pair : pairs) {
-    const Eigen::Matrix3d A = pair.T_base_link.matrix3();
-    const Eigen::Matrix3d B = pair.T_camera_marker.matrix3();
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) K.block<3, 3>(3 * i, 3 * j) += A(i, j) * B;
-    }
-  }
-  const SingularValues svd = singular_value_decomposition(K);
-  const auto as_matrix = [](const Eigen::VectorXd& v) {
-    const Eigen::Matrix3d m = Eigen::Map<const Eigen::Matrix3d>(v.data());
-    return nearest_rotation(m.determinant() < 0.0 ? Eigen::Matrix3d(-m) : m);
-  };
-  HandEye out;
-  const Eigen::Matrix3d R_camera_base = as_matrix(svd.U.col(0));
-  // V holds R_marker_link.
-  const Eigen::Matrix3d R_link_marker = as_matrix(svd.V.col(0)).transpose();
-  Matrix6d normal = Matrix6d::Zero();
-  Vector6d right = Vector6d::Zero();
-  for (const PosePair& pair : pairs) {
-    Eigen::Matrix<double, 3, 6> A;
-    A << Eigen::Matrix3d::Identity(), R_camera_base * pair.T_base_link.matrix3();
-    normal += A.transpose() * A;
-    right += A.transpose() *
-             (pair.T_camera_marker.translation - R_camera_base * pair.T_base_link.translation);
-  }
-  normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
-  const Vector6d t = solve_symmetric(normal, right);
-  out.T_camera_base = {Eigen::Quaterniond(R_camera_base).normalized(), t.head<3>()};
-  out.T_link_marker = {Eigen::Quaterniond(R_link_marker).normalized(), t.tail<3>()};
-  double sum_m = 0.0;
-  double sum_rad = 0.0;
-  for (const PosePair& pair : pairs) {
-    const Pose predicted = out.T_camera_base * pair.T_base_link * out.T_link_marker;
-    sum_m += (predicted.translation - pair.T_camera_marker.translation).squaredNorm();
-    sum_rad += std::pow(angle_between(predicted.rotation, pair.T_camera_marker.rotation), 2);
-  }
-  out.rms_m = std::sqrt(sum_m / static_cast<double>(pairs.size()));
-  out.rms_rad = std::sqrt(sum_rad / static_cast<double>(pairs.size()));
-  return out;
-}
-
-std::vector<PosePair> pairs_for(const KinematicTree& nominal, const Eigen::MatrixXd& joint_values,
-                                const PoseTrack& track, LinkId link) {
-  std::vector<PosePair> pairs;
-  for (const PoseSample& sample : track.samples) {
-    if (const auto links = links_at(nominal, joint_values, sample.frame)) {
-      pairs.push_back({sample.T_camera_marker, (*links)[link.index()]});
-    }
-  }
-  return pairs;
-}
-
 // A marker on an inner link misses by the motion of the joints behind that link, which is large;
 // errors of the nominal robot alone can make an inner link fit a little better. So the outermost
 // link stays unless another one's misfit is below this share of its own.
 constexpr double kClearlyBetter = 0.8;
 
-// One length for a misfit in m and rad: at arm's length (1 m) a radian moves a point by a metre.
-double misfit(const HandEye& fit) { return std::hypot(fit.rms_m, fit.rms_rad); }
+// A marker and, for every link, its sightings with where the drawing has that link.
+struct Sightings {
+  TagId id;
+  std::vector<std::vector<PosePair>> on_link;
+};
 
-// Distance that the joint values move a link's frame over the recording, m and rad together.
-double excursion(const std::vector<PosePair>& pairs) {
-  double most = 0.0;
-  for (const PosePair& pair : pairs) {
-    const Pose move = pairs.front().T_base_link.inverse() * pair.T_base_link;
-    most = std::max(most, log_rotation(move.rotation).norm());
+std::vector<Sightings> sightings_of(const KinematicTree& nominal,
+                                    const Eigen::MatrixXd& joint_values, const PoseTracks& tracks) {
+  std::vector<Sightings> out;
+  for (const PoseTrack& track : tracks.tracks) {
+    Sightings of{track.id, std::vector<std::vector<PosePair>>(nominal.links.size())};
+    for (const PoseSample& sample : track.samples) {
+      const auto links = links_at(nominal, joint_values, sample.frame);
+      if (!links) continue;
+      for (std::size_t l = 0; l < links->size(); ++l)
+        of.on_link[l].push_back({sample.T_camera_marker, (*links)[l]});
+    }
+    if (!of.on_link.empty() && !of.on_link[0].empty()) out.push_back(std::move(of));
   }
-  return most;
+  return out;
 }
 
-// The mean mount of a marker for a known base.
-std::pair<Pose, double> mount_for(const std::vector<PosePair>& pairs, const Pose& T_camera_base) {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  std::vector<Pose> mounts;
+struct Choice {
+  std::size_t link = 0;
+  MountFit fit;
+};
+
+// The link of a marker among all; `base_for` gives the base to try it with.
+template <typename BaseFor>
+Choice choose_link(const Sightings& marker, BaseFor base_for) {
+  Choice out;
+  out.fit.misfit = std::numeric_limits<double>::infinity();
+  for (std::size_t l = marker.on_link.size(); l-- > 0;) {
+    const MountFit fit = fit_mount(marker.on_link[l], base_for(marker.on_link[l]));
+    if (fit.misfit < kClearlyBetter * out.fit.misfit) out = {l, fit};
+  }
+  return out;
+}
+
+// All markers place the base together, each on its link: what one cannot tell (the side on which a
+// hinge's marker has the next axis) another one can. Those that miss by more than the median count
+// for less; those that miss by less count alike, since few sightings may fit exactly.
+Pose base_of_all(const std::vector<Sightings>& markers, const std::vector<Choice>& choices) {
+  std::vector<double> misfits;
+  for (const Choice& choice : choices) misfits.push_back(choice.fit.misfit);
+  const double typical = std::max(median_of(misfits), std::numeric_limits<double>::epsilon());
+  HandEyeCost cost;
+  for (std::size_t m = 0; m < markers.size(); ++m) {
+    cost.add(hand_eye_cost(markers[m].on_link[choices[m].link]),
+             std::pow(typical / std::max(choices[m].fit.misfit, typical), 2));
+  }
+  return best_base(cost);
+}
+
+// Most that the joint values turn (rad) and shift (m) a link.
+std::pair<double, double> excursion(const std::vector<PosePair>& pairs) {
+  double turn = 0.0;
+  double shift = 0.0;
   for (const PosePair& pair : pairs) {
-    mounts.push_back((T_camera_base * pair.T_base_link).inverse() * pair.T_camera_marker);
-    rotation += mounts.back().matrix3();
-    translation += mounts.back().translation / static_cast<double>(pairs.size());
+    const Pose move = pairs.front().T_base_link.inverse() * pair.T_base_link;
+    turn = std::max(turn, log_rotation(move.rotation).norm());
+    shift = std::max(shift, move.translation.norm());
   }
-  const Pose mean{Eigen::Quaterniond(nearest_rotation(rotation)).normalized(), translation};
-  double sum = 0.0;
-  for (const Pose& mount : mounts) {
-    sum += (mount.translation - translation).squaredNorm() +
-           std::pow(angle_between(mount.rotation, mean.rotation), 2);
+  return {turn, shift};
+}
+
+void require_motion(const std::vector<Sightings>& markers, const std::vector<Choice>& choices) {
+  // Less motion does not place a base.
+  constexpr std::size_t kMinSightings = 3;
+  constexpr double kMinTurn = 0.2;    // rad
+  constexpr double kMinShift = 0.02;  // m
+  for (std::size_t m = 0; m < markers.size(); ++m) {
+    const auto& pairs = markers[m].on_link[choices[m].link];
+    const auto [turn, shift] = excursion(pairs);
+    if (pairs.size() >= kMinSightings && (turn >= kMinTurn || shift >= kMinShift)) return;
   }
-  return {mean, std::sqrt(sum / static_cast<double>(mounts.size()))};
+  throw undetermined("placing the nominal robot",
+                     "no marker is moved by the joints by more than 11 degrees or 20 mm",
+                     "record postures in which the joints before a marker move");
 }
 
 }  // namespace
 
 Placement place_markers(const KinematicTree& nominal, const Eigen::MatrixXd& joint_values,
                         const PoseTracks& tracks) {
-  // The marker and link that the robot turns most, and that fit, give the base.
-  constexpr double kMinTurn = 0.2;  // rad; less motion does not place a base
-  std::optional<HandEye> best;
-  for (const PoseTrack& track : tracks.tracks) {
-    for (std::size_t l = nominal.links.size(); l-- > 1;) {
-      const auto pairs = pairs_for(nominal, joint_values, track, LinkId{static_cast<int>(l)});
-      if (pairs.size() < 3 || excursion(pairs) < kMinTurn) continue;
-      const auto fit = hand_eye(pairs);
-      if (fit && (!best || misfit(*fit) < kClearlyBetter * misfit(*best))) best = fit;
-    }
+  constexpr int kMaxRounds = 5;
+  const std::vector<Sightings> markers = sightings_of(nominal, joint_values, tracks);
+  // With a base of its own a marker fits no worse than with the true one: a link that misses even
+  // so is none of its.
+  std::vector<Choice> choices;
+  for (const Sightings& marker : markers) {
+    choices.push_back(choose_link(marker, [](const std::vector<PosePair>& pairs) {
+      return best_base(hand_eye_cost(pairs));
+    }));
   }
-  if (!best) {
-    throw undetermined("placing the nominal robot",
-                       "no marker is turned by the joints by more than 11 degrees",
-                       "record postures in which at least two joints before a marker move");
-  }
-  Placement out{best->T_camera_base, {}};
-  for (const PoseTrack& track : tracks.tracks) {
-    Marker marker{track.id, LinkId{0}, {}, 0.0};
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t l = nominal.links.size(); l-- > 0;) {
-      const auto pairs = pairs_for(nominal, joint_values, track, LinkId{static_cast<int>(l)});
-      if (pairs.empty()) continue;
-      const auto [mount, spread] = mount_for(pairs, out.T_camera_base);
-      if (spread < kClearlyBetter * least) {
-        least = spread;
-        marker.link = LinkId{static_cast<int>(l)};
-        marker.T_link_marker = mount;
-      }
+  require_motion(markers, choices);
+  Placement out;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    out.T_camera_base = base_of_all(markers, choices);
+    bool same = true;
+    for (std::size_t m = 0; m < markers.size(); ++m) {
+      const Choice choice = choose_link(markers[m], [&](const auto&) { return out.T_camera_base; });
+      same = same && choice.link == choices[m].link;
+      choices[m] = choice;
     }
-    if (std::isfinite(least)) out.markers.push_back(marker);
+    if (same) break;
+  }
+  for (std::size_t m = 0; m < markers.size(); ++m) {
+    out.markers.push_back({markers[m].id, LinkId{static_cast<int>(choices[m].link)},
+                           choices[m].fit.T_link_marker, 0.0});
   }
   return out;
 }

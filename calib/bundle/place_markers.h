@@ -2,11 +2,9 @@
 //
 // Takes   a nominal robot, joint values and measured marker poses (or points).
 // Gives   where the base stands in the camera's frame, which link each marker sits on, and where on
-// it: the
-//         start of a calibration against a nominal robot.
-// Method  robot-world and hand-eye in closed form (Shah 2013); absolute orientation for points
-// (Umeyama
-//         1991), alternated with the points' places on their links.
+//         it: the start of a calibration against a nominal robot.
+// Method  robot-world and hand-eye of all markers together (hand_eye.h); absolute orientation for
+//         points (Umeyama 1991), alternated with the points' places on their links.
 #pragma once
 
 #include <optional>
