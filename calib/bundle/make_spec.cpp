@@ -164,6 +164,15 @@ void add_couplings(const JointLog& log, Spec& spec) {
   }
 }
 
+// The channels that drive a joint.
+std::vector<int> channels_of(const Spec& spec) {
+  std::set<int> channels(spec.channel.begin(), spec.channel.end());
+  for (const auto& couplings : spec.couplings)
+    for (const auto& [channel, ratio] : couplings) channels.insert(channel);
+  channels.erase(-1);
+  return {channels.begin(), channels.end()};
+}
+
 void check_something_seen(const Spec& spec) {
   if (!spec.sightings.empty()) return;
   throw undetermined("calibration", "none of the markers seen belongs to the robot's structure",
@@ -178,7 +187,6 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   spec.tree = start.tree;
   spec.times_s = measurements.times_s;
   spec.log = log;
-  spec.postures = !log.empty() && is_posture_log(log, spec.times_s);
   spec.camera = start.camera;
   for (const Joint& joint : spec.tree.joints) {
     const auto channel =
@@ -186,6 +194,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
     spec.channel.push_back(channel.value_or(-1));
   }
   add_couplings(log, spec);
+  spec.postures = !log.empty() && is_posture_log(log, spec.times_s, channels_of(spec));
   spec.corrections = start.corrections;
   for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
     std::vector<int> path;

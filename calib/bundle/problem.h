@@ -49,7 +49,7 @@ struct Spec {
   KinematicTree tree;  ///< joints and markers in the order of the State; the poses of the start
   std::vector<double> times_s;
   JointLog log;
-  bool postures = false;  ///< stamps of log and measurements agree: nothing to interpolate
+  bool postures = false;  ///< measured at rest (is_posture_log): nothing to interpolate
   double max_gap_s = 0.5;
   std::vector<int> channel;  ///< of every joint; -1: none (value unknown, or a fixed joint)
   std::vector<std::vector<std::pair<int, double>>>

@@ -82,6 +82,40 @@ ChannelValue hermite(const JointLog& log, int channel, std::size_t i, double tim
   return {value, rate};
 }
 
+// Second differences against first ones, where the stamps are close enough to interpolate. Of n
+// samples a period their squares' ratio is 4 sin(pi/n)^2, below 1 for n > 6; of noise and of
+// postures drawn by lot it is 3, of stops with several samples each 2, of steps to and fro up to 4.
+// Below 1 the line between a reading's neighbours predicts it to half a step: it was passed
+// through.
+bool moves_smoothly(const JointLog& log, int channel) {
+  constexpr int kMinTriples = 20;         // fewer may lie in line by chance
+  constexpr double kMinShareOfWay = 0.1;  // what only settles at its stops rests there
+  double first = 0.0;
+  double second = 0.0;
+  double way = 0.0;
+  double way_within = 0.0;
+  int triples = 0;
+  double before = 0.0;  // the last step, if it was within a stretch
+  bool within = false;
+  for (std::size_t i = 1; i < log.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double step = log.values(row, channel) - log.values(row - 1, channel);
+    const bool close = log.times_s[i] - log.times_s[i - 1] <= kMaxGap;
+    way += std::abs(step);
+    if (close) {
+      way_within += std::abs(step);
+      first += step * step;
+      if (within) {
+        second += (step - before) * (step - before);
+        ++triples;
+      }
+    }
+    within = close;
+    before = step;
+  }
+  return triples >= kMinTriples && way_within > kMinShareOfWay * way && second < first;
+}
+
 enum class Quantity { kValue, kRate };
 
 Eigen::MatrixXd resample_quantity(const JointLog& log, const std::vector<double>& times_s,
@@ -146,9 +180,11 @@ Eigen::MatrixXd resample_rates(const JointLog& log, const std::vector<double>& t
   return resample_quantity(log, times_s, time_offset_s, max_gap_s, Quantity::kRate);
 }
 
-bool is_posture_log(const JointLog& log, const std::vector<double>& times_s) {
-  return std::ranges::all_of(times_s,
-                             [&](double t) { return std::ranges::binary_search(log.times_s, t); });
+bool is_posture_log(const JointLog& log, const std::vector<double>& times_s,
+                    const std::vector<int>& channels) {
+  return std::ranges::all_of(
+             times_s, [&](double t) { return std::ranges::binary_search(log.times_s, t); }) &&
+         std::ranges::none_of(channels, [&](int c) { return moves_smoothly(log, c); });
 }
 
 }  // namespace kinescope

@@ -16,6 +16,9 @@
 
 namespace kinescope {
 
+/// The longest gap between samples that is interpolated, s.
+inline constexpr double kMaxGap = 0.5;
+
 /// Joint values over time. All channels share the stamps.
 struct JointLog {
   std::string source;                 ///< file name, for messages; empty when made by hand
@@ -45,19 +48,25 @@ struct ChannelValue {
 /// The channel at `time_s`, or nothing before the first, after the last sample, or inside a gap
 /// longer than `max_gap_s`. O(log samples).
 [[nodiscard]] std::optional<ChannelValue> interpolate(const JointLog& log, int channel,
-                                                      double time_s, double max_gap_s = 0.5);
+                                                      double time_s, double max_gap_s = kMaxGap);
 
 /// All channels at the given times: times x channels; rows that cannot be interpolated are NaN.
 [[nodiscard]] Eigen::MatrixXd resample(const JointLog& log, const std::vector<double>& times_s,
-                                       double time_offset_s = 0.0, double max_gap_s = 0.5);
+                                       double time_offset_s = 0.0, double max_gap_s = kMaxGap);
 
 /// Resampled rates (per s), as resample().
 [[nodiscard]] Eigen::MatrixXd resample_rates(const JointLog& log,
                                              const std::vector<double>& times_s,
-                                             double time_offset_s = 0.0, double max_gap_s = 0.5);
+                                             double time_offset_s = 0.0,
+                                             double max_gap_s = kMaxGap);
 
-/// True when every one of the times is exactly a stamp of the log: postures measured at rest, with
-/// nothing to interpolate and no clock to align.
-[[nodiscard]] bool is_posture_log(const JointLog& log, const std::vector<double>& times_s);
+/// True for postures measured at rest, with nothing to interpolate and no clock to align: every one
+/// of the times is exactly a stamp of the log, and none of these channels (those that drive a
+/// joint) moves smoothly from stamp to stamp. A script that writes a moving robot's readings once a
+/// frame has the frames' stamps, too, but the lag between camera and readings is to be found.
+/// Stamps alone cannot tell a sweep in equal steps from a motion: it is one when its stamps are no
+/// more than kMaxGap apart.
+[[nodiscard]] bool is_posture_log(const JointLog& log, const std::vector<double>& times_s,
+                                  const std::vector<int>& channels);
 
 }  // namespace kinescope

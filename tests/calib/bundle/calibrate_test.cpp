@@ -60,6 +60,20 @@ TEST(Calibrate, ExactCornersGiveTheExactRobot) {
   EXPECT_LT(worst_marker_error(world, found), kExactPose);
 }
 
+// Readings that a script writes once a frame, of a robot that moves.
+TEST(Calibrate, TheOffsetIsFoundThoughTheLogHasTheFramesStamps) {
+  WorldOptions options = mixed_chain();
+  options.time_offset_s = -0.03;
+  const World world = make_world(options);
+  JointLog log = world.log;
+  log.times_s = world.measurements.times_s;
+  log.values = resample(world.log, log.times_s);
+  const Calibration found =
+      calibrate(world.measurements, world.markers, log, perturbed_start(world, 0.03, 0.01, 1));
+  EXPECT_TRUE(found.time_offset_sigma_s);
+  EXPECT_NEAR(found.time_offset_s, -0.03, 1e-3);
+}
+
 TEST(Calibrate, WithoutABaseTagTheCameraIsTheBase) {
   WorldOptions options = mixed_chain();
   options.sigma_px = 0.0;

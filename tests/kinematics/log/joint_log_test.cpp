@@ -163,9 +163,98 @@ TEST(Resample, AddsTheOffsetToTheTimes) {
 TEST(PostureLog, WhenEveryTimeIsAStamp) {
   JointLog log;
   log.times_s = {0.0, 1.0, 2.0};
-  EXPECT_TRUE(is_posture_log(log, {2.0, 0.0}));
-  EXPECT_FALSE(is_posture_log(log, {0.0, 0.5}));
-  EXPECT_FALSE(is_posture_log(JointLog{}, {0.0}));
+  log.values.resize(3, 1);
+  log.values << 1, 2, 3;
+  EXPECT_TRUE(is_posture_log(log, {2.0, 0.0}, {0}));
+  EXPECT_FALSE(is_posture_log(log, {0.0, 0.5}, {0}));
+  EXPECT_FALSE(is_posture_log(JointLog{}, {0.0}, {}));
+}
+
+// A log whose stamps are the frames', of one channel.
+JointLog log_of(const std::vector<double>& values, double step_s) {
+  JointLog log;
+  log.channels = {"a"};
+  log.values.resize(static_cast<Eigen::Index>(values.size()), 1);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    log.times_s.push_back(static_cast<double>(i) * step_s);
+    log.values(static_cast<Eigen::Index>(i), 0) = values[i];
+  }
+  return log;
+}
+
+bool at_rest(const JointLog& log) {
+  std::vector<int> channels;
+  for (int c = 0; c < log.values.cols(); ++c) channels.push_back(c);
+  return is_posture_log(log, log.times_s, channels);
+}
+
+std::vector<double> waves(int count, double step_s) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i)
+    values.push_back(std::sin(1.1 * i * step_s) + 0.4 * std::sin(2.7 * i * step_s));
+  return values;
+}
+
+std::vector<double> by_lot(int count, int frames_each, double noise, std::string_view name) {
+  Rng rng = Rng::from_name(name);
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) {
+    const double value = rng.uniform(-1.0, 1.0);
+    for (int k = 0; k < frames_each; ++k) values.push_back(value + rng.normal(noise));
+  }
+  return values;
+}
+
+TEST(PostureLog, AMotionWrittenOnceAFrameIsNone) {
+  for (const double step_s : {1.0 / 30.0, 0.1, 0.3})
+    EXPECT_FALSE(at_rest(log_of(waves(100, step_s), step_s))) << step_s;
+  // Frames lost now and then, and a robot that stands for half of the time.
+  Rng rng = Rng::from_name("frames lost");
+  JointLog lossy = log_of(waves(200, 0.1), 0.1);
+  for (std::size_t i = 0; i < lossy.size(); ++i) {
+    lossy.times_s[i] =
+        (i == 0 ? 0.0 : lossy.times_s[i - 1]) + (rng.uniform(0, 1) < 0.3 ? 0.2 : 0.1);
+    const double t = std::min(lossy.times_s[i], 15.0);
+    lossy.values(static_cast<Eigen::Index>(i), 0) = std::sin(t) + rng.normal(1e-3);
+  }
+  EXPECT_FALSE(at_rest(lossy));
+}
+
+TEST(PostureLog, OneChannelThatMovesIsEnough) {
+  JointLog log = log_of(waves(100, 0.1), 0.1);
+  log.channels = {"a", "idle", "noise"};
+  log.values.conservativeResize(Eigen::NoChange, 3);
+  log.values.col(1).setConstant(0.7);
+  Rng rng = Rng::from_name("noise of an idle channel");
+  for (Eigen::Index i = 0; i < log.values.rows(); ++i) log.values(i, 2) = rng.normal(1e-3);
+  EXPECT_FALSE(at_rest(log));
+  // What drives no joint does not count.
+  EXPECT_TRUE(is_posture_log(log, log.times_s, {1, 2}));
+}
+
+TEST(PostureLog, PosturesByLotWhateverTheirStamps) {
+  for (const double step_s : {1.0 / 30.0, 0.1, 1.0})
+    EXPECT_TRUE(at_rest(log_of(by_lot(40, 1, 0.0, "postures"), step_s))) << step_s;
+  EXPECT_TRUE(at_rest(log_of(by_lot(1, 1, 0.0, "one frame"), 0.1)));
+}
+
+TEST(PostureLog, StopsWithSeveralFramesEach) {
+  EXPECT_TRUE(at_rest(log_of(by_lot(30, 5, 0.0, "stops"), 0.1)));
+  EXPECT_TRUE(at_rest(log_of(by_lot(30, 2, 1e-4, "short stops"), 0.1)));
+  // With the stamps of the stops, at which the robot still settles.
+  JointLog log = log_of(by_lot(30, 8, 0.0, "settling"), 0.1);
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    log.times_s[i] += 3.0 * static_cast<double>(i / 8);
+    log.values(static_cast<Eigen::Index>(i), 0) +=
+        2e-3 * std::exp(-0.5 * static_cast<double>(i % 8));
+  }
+  EXPECT_TRUE(at_rest(log));
+}
+
+TEST(PostureLog, ASweepInStepsOfWholeSeconds) {
+  std::vector<double> values;
+  for (int i = 0; i < 60; ++i) values.push_back(0.05 * i);
+  EXPECT_TRUE(at_rest(log_of(values, 1.0)));
 }
 
 }  // namespace
