@@ -9,6 +9,7 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/inspection.h"
+#include "app/commands/nominal_channels.h"
 
 namespace kinescope {
 namespace {
@@ -169,7 +170,7 @@ void note_what_is_missing(Inspection& inspection) {
         {false,
          "no camera.yaml: the intrinsics are estimated too; `kinescope camera` does it better"});
   }
-  if (recording.log.empty()) {
+  if (recording.log.empty() && !recording.nominal) {
     inspection.findings.push_back(
         {false, "no joints.csv: the structure is found from the markers alone"});
   }
@@ -177,6 +178,17 @@ void note_what_is_missing(Inspection& inspection) {
     inspection.findings.push_back(
         {true,
          "points alone do not show a structure: give a nominal robot with --nominal robot.urdf"});
+  }
+}
+
+// The nominal robot's joints and the log's columns, as `run` would match them.
+void look_at_nominal(const Recording& recording, std::vector<Finding>& findings) {
+  try {
+    for (const std::string& warning : match_channels(recording).warnings) {
+      findings.push_back({false, warning});
+    }
+  } catch (const Error& error) {
+    findings.push_back({true, error.what()});
   }
 }
 
@@ -206,7 +218,9 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
       findings.push_back({true, error.what()});
     }
   }
-  if (attempt.errors.empty()) note_what_is_missing(inspection);
+  if (!attempt.errors.empty()) return inspection;
+  if (recording.nominal) look_at_nominal(recording, findings);
+  note_what_is_missing(inspection);
   return inspection;
 }
 

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/commands/nominal_channels.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
@@ -113,37 +114,6 @@ void move_base(KinematicTree& tree, const Pose& T_camera_base) {
   }
 }
 
-void match_channels(const Recording& recording, KinematicTree& tree,
-                    std::vector<std::string>& warnings) {
-  std::vector<std::size_t> movable;
-  int named = 0;
-  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
-    if (tree.joints[j].type == JointType::kFixed) continue;
-    movable.push_back(j);
-    if (recording.log.channel(tree.joints[j].name)) ++named;
-  }
-  if (named > 0) {
-    for (const std::size_t j : movable) {
-      if (recording.log.channel(tree.joints[j].name)) tree.joints[j].channel = tree.joints[j].name;
-    }
-    return;
-  }
-  std::vector<std::string> names;
-  names.reserve(movable.size());
-  for (const std::size_t j : movable) names.push_back(tree.joints[j].name);
-  if (movable.size() != recording.log.channels.size()) {
-    throw bad_input(recording.log.source, "no column is named like a joint of the nominal robot",
-                    fmt::format("name the columns {}", fmt::join(names, ", ")));
-  }
-  for (std::size_t k = 0; k < movable.size(); ++k) {
-    tree.joints[movable[k]].channel = recording.log.channels[k];
-  }
-  warnings.push_back(
-      fmt::format("no column of {} is named like a joint of the nominal robot: taken in order ({} "
-                  "drives {}, ..)",
-                  recording.log.source, recording.log.channels.front(), names.front()));
-}
-
 Eigen::MatrixXd nominal_values(const Recording& recording, const KinematicTree& tree,
                                const std::vector<double>& times_s) {
   const Eigen::MatrixXd readings = resample(recording.log, times_s);
@@ -152,9 +122,28 @@ Eigen::MatrixXd nominal_values(const Recording& recording, const KinematicTree& 
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const auto channel = recording.log.channel(tree.joints[j].channel);
     if (!channel || tree.joints[j].type == JointType::kFixed) continue;
-    values.col(static_cast<Eigen::Index>(j)) = readings.col(*channel);
+    values.col(static_cast<Eigen::Index>(j)) =
+        (tree.joints[j].scale * readings.col(*channel)).array() + tree.joints[j].offset;
   }
   return values;
+}
+
+// A marker that would move with a joint without a column sits as well before that joint.
+void place_before_held_joints(KinematicTree& tree) {
+  for (Marker& marker : tree.markers) {
+    const std::vector<JointId> path = tree.path_to(marker.link);
+    const auto held = std::ranges::find_if(path, [&](JointId id) {
+      const Joint& joint = tree.joints[id.index()];
+      return joint.type != JointType::kFixed && joint.channel.empty();
+    });
+    if (held == path.end()) continue;
+    Pose T_parent_link;
+    for (auto id = held; id != path.end(); ++id) {
+      T_parent_link = T_parent_link * tree.joints[id->index()].T_parent_joint;
+    }
+    marker.link = tree.joints[held->index()].parent;
+    marker.T_link_marker = T_parent_link * marker.T_link_marker;
+  }
 }
 
 double edge_px(const TagObservation& seen) {
@@ -251,8 +240,9 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
 CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,
                                   const PoseTracks& tracks, const CameraModel& camera,
                                   std::vector<std::string>& warnings) {
-  KinematicTree nominal = value_of(recording.nominal);
-  match_channels(recording, nominal, warnings);
+  const NominalChannels matched = match_channels(recording);
+  const KinematicTree& nominal = matched.tree;
+  warnings.insert(warnings.end(), matched.warnings.begin(), matched.warnings.end());
   const auto place = [&](const KinematicTree& tree) {
     CalibrationStart start;
     start.tree = tree;
@@ -264,6 +254,7 @@ CheckedNominal start_from_nominal(const Recording& recording, const Measurements
                                     : place_markers(tree, values, tracks);
     start.T_camera_base = placement.T_camera_base;
     start.tree.markers = placement.markers;
+    place_before_held_joints(start.tree);
     for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
     return start;
   };

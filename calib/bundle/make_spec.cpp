@@ -135,7 +135,9 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
     spec.free_joint.push_back(mask);
     const bool movable = joint.type != JointType::kFixed;
     const bool driven = spec.channel[j] >= 0;
-    spec.free_value.push_back(movable && !driven);
+    // A nominal robot's joint without a channel is held at its offset, unless values are given.
+    const bool held = start.nominal && start.joint_values.size() == 0;
+    spec.free_value.push_back(movable && !driven && !held);
     spec.free_offset.push_back(start.nominal && movable && driven &&
                                options.free == FreeGeometry::kOffsets);
     spec.free_scale.push_back(driven && (options.estimate_scales || !is_unit_scale(joint.scale)));

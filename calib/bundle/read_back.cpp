@@ -108,6 +108,11 @@ void fill_joint_values(const Spec& spec, const State& state, const Readings& rea
   }
 }
 
+// At one value throughout: the data say nothing of its axis.
+bool is_held(const Spec& spec, std::size_t joint) {
+  return spec.channel[joint] < 0 && !spec.free_value[joint];
+}
+
 void fill_tree(const Spec& spec, const State& state, Calibration& out) {
   out.tree = spec.tree;
   for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
@@ -116,7 +121,7 @@ void fill_tree(const Spec& spec, const State& state, Calibration& out) {
                            joint_motion(joint.type, joint.axis, state.joint_maps[j][1]);
     joint.scale = state.joint_maps[j][0];
     joint.offset = 0.0;
-    if (joint.type == JointType::kFixed) continue;
+    if (joint.type == JointType::kFixed || is_held(spec, j)) continue;
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     for (const Sighting& sighting : spec.sightings) {
@@ -146,8 +151,8 @@ void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncert
     const Pose T_base_joint = T_base_link[joint.parent.index()] * joint.T_parent_joint;
     estimate.axis_base = T_base_joint.rotation * joint.axis;
     estimate.point_base = T_base_joint.translation;
-    if (joint.limits) estimate.range = *joint.limits;
-    if (joint.type != JointType::kFixed && parameters > 0) {
+    if (joint.limits && !is_held(spec, j)) estimate.range = *joint.limits;
+    if (joint.type != JointType::kFixed && !is_held(spec, j) && parameters > 0) {
       Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, parameters);
       bool seen = true;
       for (const int up : spec.path[joint.child.index()]) {

@@ -113,6 +113,11 @@ Joint to_joint(const urdf::Joint& from, LinkId parent, LinkId child) {
       from.limits->lower < from.limits->upper) {
     joint.limits = JointLimits{from.limits->lower, from.limits->upper};
   }
+  if (joint.type != JointType::kFixed && from.mimic) {
+    joint.channel = from.mimic->joint_name;
+    joint.scale = from.mimic->multiplier;
+    joint.offset = from.mimic->offset;
+  }
   return joint;
 }
 

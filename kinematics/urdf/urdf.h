@@ -15,10 +15,10 @@
 
 namespace kinescope {
 
-/// Parses URDF text. Fixed links named tag_<id> become markers of their parent. Continuous joints
-/// become revolute ones without limits. Throws bad_input with `source`, and the line or element
-/// where known, for text that is no URDF, a loop, two roots, joint types we do not know (planar,
-/// floating), NaN.
+/// Parses URDF text. Fixed links named tag_<id> become markers of their parent, continuous joints
+/// revolute ones without limits; <mimic> gives channel (the other joint), scale and offset. Throws
+/// bad_input with `source`, and the line or element where known, for text that is no URDF, a loop,
+/// two roots, joint types we do not know (planar, floating), NaN.
 [[nodiscard]] KinematicTree parse_urdf(std::string_view text, const std::string& source);
 [[nodiscard]] KinematicTree read_urdf(const std::filesystem::path& path);
 

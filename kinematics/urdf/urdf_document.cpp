@@ -98,6 +98,16 @@ class Checker {
     }
   }
 
+  void check_mimic(const XMLElement& joint, const std::string& owner) const {
+    const XMLElement* mimic = joint.FirstChildElement("mimic");
+    if (mimic == nullptr) return;
+    if (mimic->Attribute("joint") == nullptr) {
+      throw bad_input(place(*mimic), owner + " mimics no joint", "add joint=\"..\"");
+    }
+    static_cast<void>(numbers(*mimic, "multiplier", 1, owner));
+    static_cast<void>(numbers(*mimic, "offset", 1, owner));
+  }
+
   [[nodiscard]] std::string end_of(const XMLElement& joint, const char* end,
                                    const std::map<std::string, int>& links,
                                    const std::string& owner) const {
@@ -124,6 +134,7 @@ class Checker {
     out.child = end_of(joint, "child", links, owner);
     check_origin(joint, owner);
     check_axis_and_limit(joint, owner);
+    check_mimic(joint, owner);
     return out;
   }
 
@@ -243,7 +254,7 @@ std::string cut_down(XMLDocument& document) {
   }
   for (auto* joint = robot.FirstChildElement("joint"); joint != nullptr;
        joint = joint->NextSiblingElement("joint")) {
-    keep_children(*joint, {"parent", "child", "origin", "axis", "limit"});
+    keep_children(*joint, {"parent", "child", "origin", "axis", "limit", "mimic"});
   }
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);

@@ -44,5 +44,49 @@ TEST(RunNominal, AnAxisDrawnTheWrongWayRoundIsNamedAndMended) {
   EXPECT_TRUE(check.passed) << check.words;
 }
 
+TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
+  const RecordingFolder folder;
+  write_poses(arm("nominal with a gripper", {}, 2).recording, folder);
+  const std::filesystem::path found = folder.path() / "found";
+  ASSERT_EQ(
+      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
+          .code,
+      0);
+  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  const KinematicTree truth = drawing;
+  drawing.markers.clear();
+  const LinkId hand{static_cast<int>(drawing.links.size()) - 1};
+  drawing.links.push_back({"left"});
+  Joint finger;
+  finger.name = "finger";
+  finger.type = JointType::kPrismatic;
+  finger.parent = hand;
+  finger.child = LinkId{hand.value + 1};
+  finger.limits = JointLimits{0.0, 0.04};
+  drawing.joints.push_back(finger);
+  folder.write("drawing.urdf", write_urdf(drawing));
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", out.string(), "--quiet", "--no-trace",
+           "--nominal", (folder.path() / "drawing.urdf").string()});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("no logged channel drives finger"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("No uncertainty can be given for the axis of finger"),
+            std::string::npos)
+      << outcome.out;
+  const KinematicTree calibrated = read_urdf(out / "robot.urdf");
+  const auto kept = calibrated.joint("finger");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(calibrated.joints[kept->index()].limits, finger.limits);
+  // The hand's markers sit on the hand, not on a finger that might move.
+  EXPECT_EQ(calibrated.markers.size(), truth.markers.size());
+  for (const Marker& marker : truth.markers) {
+    ASSERT_NE(calibrated.marker(marker.id), nullptr);
+    EXPECT_EQ(calibrated.links[calibrated.marker(marker.id)->link.index()].name,
+              truth.links[marker.link.index()].name);
+  }
+}
+
 }  // namespace
 }  // namespace kinescope

@@ -41,6 +41,17 @@ std::string joint(std::string_view inside, std::string_view type = "revolute") {
       R"(<joint name="j" type="{}"><parent link="a"/><child link="b"/>{}</joint>)", type, inside));
 }
 
+TEST(Urdf, AMimickingJointNamesTheOtherAsItsChannel) {
+  const std::string follower = joint(
+      std::string(kLimit) + R"(<mimic joint="finger" multiplier="-2" offset="0.5"/>)", "prismatic");
+  const KinematicTree tree = parse_urdf(follower, "robot.urdf");
+  ASSERT_EQ(tree.joints.size(), 1U);
+  EXPECT_EQ(tree.joints[0].channel, "finger");
+  EXPECT_EQ(tree.joints[0].scale, -2.0);
+  EXPECT_EQ(tree.joints[0].offset, 0.5);
+  EXPECT_NE(refusal(joint(std::string(kLimit) + "<mimic multiplier=\"1\"/>")), "accepted");
+}
+
 TEST(UrdfRefuses, WhatIsNoXml) {
   EXPECT_EQ(refusal(""), "robot.urdf: is empty (name a URDF file)");
   EXPECT_EQ(refusal(" \n"), "robot.urdf: is empty (name a URDF file)");
