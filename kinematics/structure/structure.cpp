@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -15,6 +16,7 @@
 #include "kinematics/structure/readings.h"
 #include "kinematics/structure/search.h"
 #include "kinematics/structure/series.h"
+#include "kinematics/structure/time_offset.h"
 #include "kinematics/structure/verdict.h"
 
 namespace kinescope {
@@ -128,14 +130,71 @@ Answer search(Series full, const JointLog& log, const StructureOptions& options)
   return plain;
 }
 
+JointLog shifted(JointLog log, double by_s) {
+  for (double& t : log.times_s) t += by_s;
+  return log;
+}
+
+int moving_channels(const Readings& readings) {
+  int count = 0;
+  for (int c = 0; c < readings.channels(); ++c) count += readings.moves(c) ? 1 : 0;
+  return count;
+}
+
+// An offset beyond the scanned ones at which most channels that move drive a joint each: joint-log
+// time = frame time + offset.
+std::optional<double> offset_beyond(const Series& full, const JointLog& log,
+                                    const StructureOptions& options) {
+  const Series thin = thinned(full, kInstants);
+  const Readings now = readings_at(log, thin, 0.0, options.max_gap_s);
+  const auto [first, last] = std::ranges::minmax(full.times_s);
+  const double widest_s = 0.5 * std::min(last - first, log.times_s.back() - log.times_s.front());
+  if (!(widest_s > options.max_time_offset_s)) return std::nullopt;
+  for (const double start_s :
+       scan_time_offsets(full, log, offset_step(now), widest_s, options.max_gap_s)) {
+    if (std::abs(start_s) <= options.max_time_offset_s) continue;
+    const Answer other = search_with(full, 0.0, shifted(log, -start_s), options);
+    if (2 * static_cast<int>(used_channels(other.found.tree)) <= moving_channels(now)) continue;
+    return start_s + other.found.offset.value_s;
+  }
+  return std::nullopt;
+}
+
+// The markers move, the channels move, but not together.
+void doubt_clocks(const Series& full, const JointLog& log, const StructureOptions& options,
+                  Structure& out) {
+  const auto offset_s =
+      options.scan_time_offset && full.smooth ? offset_beyond(full, log, options) : std::nullopt;
+  if (!offset_s) {
+    out.doubts.insert(out.doubts.begin(),
+                      {"the markers move, but no channel of the log moves with them",
+                       "check that the log belongs to this recording and that its clock agrees "
+                       "with the frames' to a second (video_start in recording.yaml)",
+                       {}});
+    return;
+  }
+  out.status = StructureStatus::kUndetermined;
+  out.doubts.insert(
+      out.doubts.begin(),
+      {fmt::format(
+           "no channel drives a joint as the clocks are, which is {:.2f} s apart from where "
+           "they do",
+           std::abs(*offset_s)),
+       fmt::format("add {:+.3f} s to the frames' times (of a video: to video_start in "
+                   "recording.yaml), or {:+.3f} s to the log's",
+                   *offset_s, -*offset_s),
+       {}});
+}
+
 StructureDoubt allowance_doubt(double allowance) {
-  return {fmt::format("the markers move as the joints say to {:.1f} % of their distance from the "
-                      "camera only, which is more than their noise",
-                      100.0 * allowance),
-          "check that no marker has slipped, that the camera stood still and that tags.yaml has "
-          "every marker's size",
-          {},
-          true};
+  return {
+      fmt::format("the markers move as the joints say to {:.1f} % of their distance from the "
+                  "camera only, which is more than their noise",
+                  100.0 * allowance),
+      "check that camera.yaml is this camera's, that tags.yaml has every marker's size, that no "
+      "marker has slipped and that the camera stood still",
+      {},
+      true};
 }
 
 // One motor may move several joints; a marker seen wrongly looks like a second joint, too.
@@ -201,7 +260,12 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
   doubt_shared_channels(log, out);
-  if (answer.allowance > 0.0) out.doubts.push_back(allowance_doubt(answer.allowance));
+  // Whatever else is doubtful may come of it.
+  if (answer.allowance > 0.0)
+    out.doubts.insert(out.doubts.begin(), allowance_doubt(answer.allowance));
+  if (moving_channels(every) > 0 && used_channels(fitted) == 0 && out.links.size() > 1) {
+    doubt_clocks(full, log, options, out);
+  }
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;
   for (const PoseTrack& t : tracks.tracks) {

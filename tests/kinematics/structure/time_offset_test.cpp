@@ -61,5 +61,18 @@ TEST(LittleMotion, IsFoundWhereAChannelTellsIt) {
   EXPECT_EQ(described(s, scene.robot), described(scene));
 }
 
+// Clocks further apart than the scan looks: said with how far, instead of a robot without channels.
+TEST(ClockOffsetBeyondTheScan, IsNamedWithItsRemedy) {
+  RecordingOptions o = noisy();
+  o.frames = 360;
+  o.lag_s = -1.7;
+  const Scene scene = make_scene("OffsetBeyond", {.joints = 3}, o);
+  const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_EQ(s.status, StructureStatus::kUndetermined);
+  ASSERT_FALSE(s.doubts.empty());
+  EXPECT_NE(s.doubts.front().what.find("1.70 s apart"), std::string::npos) << s.doubts.front().what;
+  EXPECT_TRUE(s.doubts.front().remedy.starts_with("add -1.")) << s.doubts.front().remedy;
+}
+
 }  // namespace
 }  // namespace kinescope
