@@ -159,7 +159,8 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
                          const JointLog& log, const StructureOptions& options, Verdict& verdict) {
   std::vector<std::pair<int, int>> told;
   for (const Alternative& a : alternatives) {
-    if (a.first_channel < 0 || a.second_channel < 0 || a.loss > 2.0 * options.min_log_odds)
+    if (a.first_channel < 0 || a.second_channel < 0 || a.first_channel == a.second_channel ||
+        a.loss > 2.0 * options.min_log_odds)
       continue;
     const std::pair<int, int> pair = std::minmax(a.first_channel, a.second_channel);
     if (std::ranges::find(told, pair) != told.end()) continue;
