@@ -111,6 +111,33 @@ std::string coupling_words(const KinematicTree& tree) {
   return text;
 }
 
+bool is_about(double value, double of) {
+  constexpr double kTolerance = 0.05;
+  return std::abs(value / of - 1.0) < kTolerance;
+}
+
+/// " q3 counts in a unit of its own, 0.00153 rad each.": a scale that is no usual unit's. Where the
+/// joint slides and the log is in m, markers of another size than declared look like that.
+std::string scale_words(const KinematicTree& tree) {
+  std::string text;
+  for (const Joint& joint : tree.joints) {
+    if (joint.type == JointType::kFixed || joint.channel.empty()) continue;
+    const double scale = std::abs(joint.scale);
+    const bool slides = joint.type == JointType::kPrismatic;
+    if (is_about(scale, 1.0) || is_about(scale, slides ? kMetrePerMillimetre : kRadPerDegree))
+      continue;
+    text += fmt::format(" {} counts in a unit of its own, {:.3g} {} each", joint.channel, scale,
+                        slides ? "m" : "rad");
+    constexpr double kNotTicks = 0.5;
+    if (slides && scale > kNotTicks) {
+      text += fmt::format(
+          "; if it is logged in m, the tags are declared {:.3g} times as large as they are", scale);
+    }
+    text += ".";
+  }
+  return text;
+}
+
 std::string found_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
   const std::size_t moving = moving_joints(tree);
@@ -140,6 +167,7 @@ std::string found_words(const RunSummary& run) {
     text += fmt::format(" {} move{} with no joint of this robot.", joined(names),
                         names.size() == 1 ? "s" : "");
   }
+  text += scale_words(tree);
   return text;
 }
 

@@ -109,6 +109,19 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
       << verdict.found;
 }
 
+TEST(Verdict, AnOddScaleIsSaidWithTheTagSizeAsACause) {
+  RunSummary run = synthetic_run();
+  EXPECT_FALSE(has(make_verdict(run).found, "unit of its own")) << make_verdict(run).found;
+  run.calibration.tree.joints[0].scale = 0.00153;
+  run.calibration.tree.joints[2].scale = 1.2;
+  const std::string found = make_verdict(run).found;
+  EXPECT_TRUE(has(found, "q1 counts in a unit of its own, 0.00153 rad each.")) << found;
+  EXPECT_TRUE(has(found,
+                  "q3 counts in a unit of its own, 1.2 m each; if it is logged in m, the "
+                  "tags are declared 1.2 times as large as they are."))
+      << found;
+}
+
 TEST(Verdict, WithoutALogTheValuesAreEstimates) {
   const Verdict verdict = make_verdict(synthetic_run({.log = false}));
   EXPECT_TRUE(has(verdict.found, "the joint values are estimates from the markers"))
