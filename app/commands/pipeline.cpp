@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/commands/declared.h"
 #include "app/commands/nominal_channels.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
@@ -215,7 +216,10 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   }
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset;
-  return find_structure(tracks, recording.log, structure_options);
+  Structure structure = find_structure(tracks, recording.log, structure_options);
+  require_declared_units(recording, structure);
+  require_fixed_tags(recording, structure);
+  return structure;
 }
 
 CalibrationStart start_from_structure(const Structure& structure, const Recording& recording,
@@ -258,7 +262,10 @@ CheckedNominal start_from_nominal(const Recording& recording, const Measurements
     for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
     return start;
   };
-  return check_nominal(nominal, place, measurements, recording.markers, recording.log);
+  CheckedNominal checked =
+      check_nominal(nominal, place, measurements, recording.markers, recording.log);
+  require_fixed_tags(recording, checked.start.tree);
+  return checked;
 }
 
 void require_determined(const Structure& structure) {

@@ -33,7 +33,7 @@ struct Observed {
 [[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
 
 /// The structure, with the clocks' offset scanned for unless they are trusted to agree. Throws
-/// bad_request for points, which show no structure.
+/// bad_request for points, which show no structure, and what declared.h throws.
 [[nodiscard]] Structure find_robot(const Recording& recording, const PoseTracks& tracks,
                                    const CalibrateOptions& options);
 

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/declared.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kUnitTolerance = 0.05;
+constexpr double kClearSigmas = 4.0;
+
+bool has_answer(const Structure& structure) {
+  return structure.status == StructureStatus::kDetermined ||
+         structure.status == StructureStatus::kAmbiguous;
+}
+
+std::string settings_file(const Recording& recording) {
+  return (recording.folder / "recording.yaml").string();
+}
+
+// How many times as far as its declaration says a channel moves its joint; nothing where it says
+// nothing of this joint. The reader brings channels to rad and m.
+std::optional<double> times_as_far(JointType type, const std::string& unit, double scale) {
+  const bool angle = unit == "rad" || unit == "deg";
+  const bool length = unit == "m" || unit == "mm";
+  const bool alike = type == JointType::kRevolute ? angle : length;
+  return alike ? std::optional<double>(std::abs(scale)) : std::nullopt;
+}
+
+void check_scale(const Recording& recording, const StructureJoint& joint) {
+  const ChannelTerm& term = value_of(joint.channel);
+  const std::string& channel = recording.log.channels[static_cast<std::size_t>(term.channel)];
+  const auto declared = recording.settings.units.find(channel);
+  if (declared == recording.settings.units.end()) return;
+  const auto ratio = times_as_far(joint.type, declared->second, term.scale);
+  if (!ratio) return;
+  const double off = std::abs(*ratio - 1.0);
+  if (off < kUnitTolerance || off < kClearSigmas * term.scale_sigma) return;
+  const bool slides = joint.type == JointType::kPrismatic;
+  throw undetermined(
+      settings_file(recording),
+      fmt::format("the channel '{}', declared in {}, moves its joint {:.3g} times as far", channel,
+                  declared->second, *ratio),
+      fmt::format(
+          "{}; a channel in units of its own is declared as ticks",
+          slides ? "check the size of the tags in tags.yaml, and the unit" : "check the unit"));
+}
+
+const StructureJoint* joint_of(const Structure& structure, TagId id) {
+  for (const StructureJoint& joint : structure.joints) {
+    const auto& markers = structure.links[static_cast<std::size_t>(joint.child_link)].markers;
+    if (std::ranges::find(markers, id) != markers.end()) return &joint;
+  }
+  return nullptr;
+}
+
+Error moves(const Recording& recording, TagId id, const std::string& how) {
+  return undetermined(settings_file(recording),
+                      fmt::format("fixed_tags names {}, but that marker moves{}", id.value, how),
+                      "take it out of fixed_tags, or hold it still and record again");
+}
+
+Error not_seen(const Recording& recording, TagId id) {
+  return bad_input(settings_file(recording),
+                   fmt::format("fixed_tags names {}, which is not seen", id.value),
+                   "correct the id, or keep the marker in view");
+}
+
+}  // namespace
+
+void require_declared_units(const Recording& recording, const Structure& structure) {
+  if (!has_answer(structure)) return;
+  for (const StructureJoint& joint : structure.joints) {
+    if (joint.channel) check_scale(recording, joint);
+  }
+}
+
+void require_fixed_tags(const Recording& recording, const Structure& structure) {
+  if (!has_answer(structure)) return;
+  const std::vector<TagId>& at_rest = structure.links.front().markers;
+  for (const TagId id : recording.settings.fixed_tags) {
+    if (std::ranges::find(at_rest, id) != at_rest.end()) continue;
+    if (const StructureJoint* joint = joint_of(structure, id)) {
+      throw moves(
+          recording, id,
+          joint->channel
+              ? fmt::format(
+                    " with '{}'",
+                    recording.log.channels[static_cast<std::size_t>(joint->channel->channel)])
+              : std::string());
+    }
+    const auto& free = structure.free_markers;
+    if (std::ranges::find(free, id) != free.end()) throw moves(recording, id, "");
+    throw not_seen(recording, id);
+  }
+}
+
+void require_fixed_tags(const Recording& recording, const KinematicTree& tree) {
+  for (const TagId id : recording.settings.fixed_tags) {
+    const Marker* marker = tree.marker(id);
+    if (marker == nullptr) throw not_seen(recording, id);
+    const bool carried = std::ranges::any_of(tree.path_to(marker->link), [&](JointId joint) {
+      return tree.joints[joint.index()].type != JointType::kFixed;
+    });
+    if (!carried) continue;
+    throw moves(recording, id,
+                fmt::format(" with the link '{}'", tree.links[marker->link.index()].name));
+  }
+}
+
+}  // namespace kinescope

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What recording.yaml declares against what the markers show.
+#pragma once
+
+#include "app/io/recording.h"
+#include "kinematics/structure/structure.h"
+
+namespace kinescope {
+
+/// Throws undetermined when a channel that is declared in rad, deg, m or mm moves a joint of that
+/// kind clearly (5 % and four standard deviations) more or less far than it says. A turning
+/// channel that slides a joint, or the other way round, has a scale of its own.
+void require_declared_units(const Recording& recording, const Structure& structure);
+
+/// Throws undetermined when one of the `fixed_tags` moves, and bad_input when one is not seen
+/// (often enough).
+void require_fixed_tags(const Recording& recording, const Structure& structure);
+/// The same with the markers placed on a nominal robot.
+void require_fixed_tags(const Recording& recording, const KinematicTree& tree);
+
+}  // namespace kinescope
