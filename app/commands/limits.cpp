@@ -101,20 +101,27 @@ bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
   return within;
 }
 
-void require_answer(const RunSummary& run) {
+bool is_answer(const RunSummary& run) {
+  return run.calibration.status != CalibrationStatus::kUndetermined &&
+         !(run.structure && run.structure->status == StructureStatus::kAmbiguous);
+}
+
+void require_answer(const RunSummary& run, std::string_view see) {
+  if (is_answer(run)) return;
   if (run.calibration.status == CalibrationStatus::kUndetermined) {
     throw undetermined("calibration", run.calibration.status_reason,
-                       run.calibration.status_remedy + "; the report shows the details");
+                       fmt::format("{}; {}", run.calibration.status_remedy, see));
   }
-  if (run.structure && run.structure->status == StructureStatus::kAmbiguous) {
-    const bool known = !run.structure->doubts.empty();
-    throw undetermined(
-        "structure",
-        known ? run.structure->doubts.front().what
-              : "another structure explains the recording as well: " + run.structure->runner_up,
-        known ? run.structure->doubts.front().remedy
-              : std::string("record every joint moving at its own time"));
-  }
+  const Structure& structure = value_of(run.structure);
+  const bool known = !structure.doubts.empty();
+  throw undetermined(
+      "structure",
+      known ? structure.doubts.front().what
+            : "another structure explains the recording as well: " + structure.runner_up,
+      fmt::format(
+          "{}; {}",
+          known ? structure.doubts.front().remedy : "record every joint moving at its own time",
+          see));
 }
 
 }  // namespace kinescope

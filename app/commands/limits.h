@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/report/run_summary.h"
@@ -23,8 +24,12 @@ struct Limit {
 /// Prints one line to standard error for every limit that is passed.
 [[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits);
 
-/// Throws undetermined when the answer must not be trusted: an axis that is not determined, a
-/// structure with another one as probable. Called once everything is written.
-void require_answer(const RunSummary& run);
+/// False when the result must not be trusted: an axis that is not determined, a structure with
+/// another one as probable.
+[[nodiscard]] bool is_answer(const RunSummary& run);
+
+/// Throws undetermined when the result is no answer. `see` says where the details are. Called once
+/// everything is written.
+void require_answer(const RunSummary& run, std::string_view see);
 
 }  // namespace kinescope

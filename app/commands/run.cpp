@@ -26,6 +26,10 @@
 namespace kinescope {
 namespace {
 
+constexpr std::string_view kReport = "report.html";
+// Of a run without an answer, beside the products of an earlier one that has one.
+constexpr std::string_view kFailedReport = "failed_report.html";
+
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   run.robot = recording.settings.name;
@@ -51,7 +55,8 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.nominal = recording.nominal;
 }
 
-void print_result(const RunSummary& run, const RunFolder& folder, const Console& console) {
+void print_result(const RunSummary& run, const RunFolder& folder, std::string_view report,
+                  const Console& console) {
   if (console.json) {
     fmt::print("{}\n", result_json(run).dump(2));
     return;
@@ -62,8 +67,30 @@ void print_result(const RunSummary& run, const RunFolder& folder, const Console&
     for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
   }
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
-  fmt::print("urdf    {}\nreport  {}\n", folder.file("robot.urdf").string(),
-             folder.file("report.html").string());
+  if (report == kReport) fmt::print("urdf    {}\n", folder.file("robot.urdf").string());
+  fmt::print("report  {}\n", folder.file(report).string());
+}
+
+void write_tracks(const RunSummary& run, const RunFolder& folder) {
+  if (!run.tracks.tracks.empty()) folder.write("tracks.csv", tracks_csv(run.tracks));
+}
+
+void write_structure(const RunSummary& run, const RunFolder& folder) {
+  if (!run.structure) return;
+  folder.write("structure.json", structure_json(*run.structure, run.log).dump(2) + "\n");
+}
+
+void write_products(const RunSummary& run, const std::string& urdf, const RunFolder& folder) {
+  write_tracks(run, folder);
+  write_structure(run, folder);
+  folder.write("robot.urdf", urdf);
+  nlohmann::json calibration = calibration_json(run.calibration);
+  calibration["effects"] = effects_json(run.effects);
+  if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
+  folder.write("calibration.json", calibration.dump(1) + "\n");
+  folder.write("residuals.csv", residuals_csv(run.calibration));
+  if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");
+  folder.write("result.json", result_json(run).dump(2) + "\n");
 }
 
 }  // namespace
@@ -78,15 +105,17 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
 
   const Observed observed =
       observe(recording, options, folder.cached_observations(recording), console.progress);
-  folder.keep_observations(recording, observed.tags);
   describe_recording(recording, observed, options, run);
+  // What was found is kept also where it leads to no answer, but never over an earlier answer.
+  const bool answered = folder.holds_answer();
+  if (!answered) folder.keep_observations(recording, observed.tags);
   clock.lap("detect", run.times);
 
   const CameraModel camera = choose_camera(recording, observed.tags);
   run.tracks = observed.tags.observations.empty()
                    ? observed.measurements.poses
                    : pose_tracks_from_tags(observed.tags, camera, recording.markers);
-  if (!run.tracks.tracks.empty()) folder.write("tracks.csv", tracks_csv(run.tracks));
+  if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
   CalibrateOptions calibrate_options = options.calibrate;
@@ -100,10 +129,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     clock.lap("structure", run.times);
   } else {
     run.structure = find_robot(recording, run.tracks, options.calibrate);
-    // What was found is shown also where it is no answer, but never over an earlier answer.
-    if (!std::filesystem::exists(folder.file("robot.urdf"))) {
-      folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
-    }
+    if (!answered) write_structure(run, folder);
     require_determined(*run.structure);
     clock.lap("structure", run.times);
     begin = start_from_structure(*run.structure, recording, camera);
@@ -123,27 +149,24 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   run.errors = summarise_errors(run.calibration);
 
   const std::string urdf = write_urdf(run.calibration.tree);
-  if (run.structure) {
-    folder.write("structure.json", structure_json(*run.structure, recording.log).dump(2) + "\n");
+  if (answered && !is_answer(run)) {
+    folder.write(kFailedReport, report_html(run, urdf));
+    print_result(run, folder, kFailedReport, console);
+    require_answer(run, fmt::format("{} shows the details, the earlier answer stays",
+                                    folder.file(kFailedReport).string()));
   }
-  folder.write("robot.urdf", urdf);
-  nlohmann::json calibration = calibration_json(run.calibration);
-  calibration["effects"] = effects_json(run.effects);
-  if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
-  folder.write("calibration.json", calibration.dump(1) + "\n");
-  folder.write("residuals.csv", residuals_csv(run.calibration));
-  if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");
-  folder.write("result.json", result_json(run).dump(2) + "\n");
+  if (answered) folder.keep_observations(recording, observed.tags);
+  write_products(run, urdf, folder);
   clock.lap("write", run.times);
   run.torque =
       torque_stages(recording, options, run.calibration.tree, folder.file(""), console.progress);
   if (!run.torque.empty()) clock.lap("torque", run.times);
-  folder.write("report.html", report_html(run, urdf));
+  folder.write(kReport, report_html(run, urdf));
   clock.lap("report", run.times);
   folder.write("run.json", run_json(run).dump(2) + "\n");
 
-  print_result(run, folder, console);
-  require_answer(run);
+  print_result(run, folder, kReport, console);
+  require_answer(run, "the report shows the details");
   return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
 }
 

@@ -108,6 +108,19 @@ void RunFolder::keep_observations(const Recording& recording,
   write(kObservationsKey, kept.dump(1) + "\n");
 }
 
+bool RunFolder::holds_answer() const {
+  if (!fs::exists(file("robot.urdf"))) return false;
+  if (!fs::exists(file("result.json"))) return true;
+  const json result = json::parse(read_text_file(file("result.json")), nullptr, false);
+  const auto status = [&](const char* part) {
+    const bool there = result.is_object() && result.contains(part) && result[part].is_object();
+    const json value = there ? result[part].value("status", json()) : json();
+    return value.is_string() ? value.get<std::string>() : std::string();
+  };
+  return status("calibration") != to_string(CalibrationStatus::kUndetermined) &&
+         status("structure") != to_string(StructureStatus::kAmbiguous);
+}
+
 std::vector<InputFile> hash_inputs(const Recording& recording) {
   std::vector<InputFile> inputs;
   for (const fs::path& path : recording.files) {

@@ -23,6 +23,8 @@ class RunFolder : public OutputFolder {
   [[nodiscard]] std::optional<TagObservations> cached_observations(
       const Recording& recording) const;
   void keep_observations(const Recording& recording, const TagObservations& observations) const;
+  /// A robot of an earlier run, unless that run's result.json says that it is no answer.
+  [[nodiscard]] bool holds_answer() const;
 
  private:
   [[nodiscard]] std::string detection_key(const Recording& recording) const;

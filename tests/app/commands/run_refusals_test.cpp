@@ -35,7 +35,8 @@ class RunRefusals : public testing::Test {
   std::string refused(ExitCode code, const std::string& part,
                       const std::vector<std::string>& more = {}) const {
     const fs::path kept = output();
-    for (const char* name : {"robot.urdf", "structure.json", "report.html", "result.json"}) {
+    for (const char* name : {"robot.urdf", "structure.json", "report.html", "result.json",
+                             "tracks.csv", "observations.csv", "observations.json"}) {
       folder_.write(std::string("out/") + name, "of an earlier run");
     }
     const auto before = contents(kept);
@@ -95,6 +96,47 @@ TEST_F(RunRefusals, ANominalRobotThatCannotBeRead) {
                 "type='continuous'><parent link='a'/><child link='b'/></joint></robot>");
   refused(ExitCode::kBadInput, "name the columns elbow",
           {"--nominal", (folder_.path() / "other.urdf").string()});
+}
+
+// A calibration without an answer says so in a report of its own: where the folder holds an answer
+// the products stay, where it holds none they are written.
+TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
+  RecordingOptions few;
+  few.frames = 200;
+  const PosesOfArm good = arm("answer", few, 2);
+  write_poses(good.recording);
+  const fs::path kept = output();
+  std::vector<std::string> words{
+      "run",       folder_.path().string(), "--output", output(), "--quiet", "--free", "placement",
+      "--no-trace"};
+  ASSERT_EQ(run(words).code, 0);
+  folder_.write("nominal.urdf", read_text_file(kept / "robot.urdf"));
+  // The last body is mostly not where the robot says.
+  RobotRecording astray = good.recording;
+  Rng rng = Rng::from_name("astray");
+  for (PoseSample& sample : astray.tracks.tracks.back().samples) {
+    if (rng.uniform() < 0.35) continue;
+    for (double& x : sample.T_camera_marker.translation) x += rng.uniform(-0.3, 0.3);
+  }
+  write_poses(astray);
+  const auto before = contents(kept);
+  for (int time = 0; time < 2; ++time) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kUndetermined)) << outcome.err;
+    EXPECT_NE(outcome.err.find("the earlier answer stays"), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.out.find("robot.urdf"), std::string::npos) << outcome.out;
+    auto after = contents(kept);
+    EXPECT_EQ(after.erase("failed_report.html"), 1U);
+    EXPECT_EQ(after, before);
+  }
+  fs::remove_all(kept);
+  for (int time = 0; time < 2; ++time) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kUndetermined)) << outcome.err;
+    EXPECT_EQ(outcome.err.find("the earlier answer stays"), std::string::npos) << outcome.err;
+    EXPECT_TRUE(fs::exists(kept / "report.html"));
+    EXPECT_FALSE(fs::exists(kept / "failed_report.html"));
+  }
 }
 
 TEST_F(RunRefusals, AFolderThatCannotBeWritten) {
