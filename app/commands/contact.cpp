@@ -52,7 +52,7 @@ std::vector<TorqueSamples> unfiltered(const TorqueLog& log) {
     part.q = log.q.middleRows(from, count);
     part.dq = dq.middleRows(from, count);
     part.torque = log.torque.middleRows(from, count);
-    part.trajectory = Eigen::VectorXi::Zero(count);
+    part.trajectory = log.trajectory.segment(from, count);
     part.torque_unit = log.torque_unit;
     out.push_back(std::move(part));
   }
@@ -94,11 +94,39 @@ RigidBalance make_balance(const ContactCommandOptions& options, const DynamicMod
   return RigidBalance(make_rigid_model(consistent.model), friction);
 }
 
-std::vector<BalanceSample> balance_of(const RigidBalance& balance, const TorqueLog& log) {
-  std::vector<BalanceSample> out;
-  for (const TorqueSamples& part : unfiltered(log)) {
+// What contact detection looks at: the trajectories of a log on one clock.
+struct LogBalance {
+  std::vector<BalanceSample> samples;
+  LogClock clock;
+};
+
+// Far enough apart that detection begins anew in each, and what is left out around a contact stays
+// in its own.
+OneClock apart(const std::vector<TorqueSamples>& parts, double guard_s) {
+  Eigen::Index rows = 0;
+  for (const TorqueSamples& part : parts) rows += part.size();
+  Eigen::VectorXd t_s(rows);
+  Eigen::VectorXi trajectory(rows);
+  Eigen::Index at = 0;
+  for (const TorqueSamples& part : parts) {
+    t_s.segment(at, part.size()) = part.t_s;
+    trajectory.segment(at, part.size()) = part.trajectory;
+    at += part.size();
+  }
+  const double gap_s = 1.0 + guard_s;
+  return {t_s, trajectory, {.least_gap_s = gap_s, .gap_s = gap_s}};
+}
+
+LogBalance balance_of(const RigidBalance& balance, const TorqueLog& log, double guard_s) {
+  const std::vector<TorqueSamples> parts = unfiltered(log);
+  LogBalance out;
+  out.clock = {apart(parts, guard_s), log.trajectory_names};
+  for (const TorqueSamples& part : parts) {
     const std::vector<BalanceSample> samples = balance_samples(balance, part);
-    out.insert(out.end(), samples.begin(), samples.end());
+    out.samples.insert(out.samples.end(), samples.begin(), samples.end());
+  }
+  for (std::size_t i = 0; i < out.samples.size(); ++i) {
+    out.samples[i].stamp_s = out.clock.clock.time_s()[static_cast<Eigen::Index>(i)];
   }
   return out;
 }
@@ -134,16 +162,23 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.torque_unit = log.log.torque_unit;
 
   const RigidBalance balance = make_balance(options, model, summary);
-  const std::vector<BalanceSample> samples = balance_of(balance, log.log);
-  const bool apart = !options.learn_logs.empty();
-  summary.learned = apart ? file_list(options.learn_logs) : "the log itself";
+  const bool learn_apart = !options.learn_logs.empty();
+  summary.learned = learn_apart ? file_list(options.learn_logs) : "the log itself";
   ContactOptions contact = options.contact;
   for (const RigidBody& body : make_rigid_model(model).bodies) {
     contact.parents.push_back(body.parent);
   }
-  summary.calibration = calibrate_contacts(
-      apart ? balance_of(balance, read_log(options.learn_logs, model, options.data).log) : samples,
-      contact);
+  const LogBalance looked_at = balance_of(balance, log.log, contact.guard_s);
+  const std::vector<BalanceSample>& samples = looked_at.samples;
+  summary.clock = summary.learn_clock = looked_at.clock;
+  if (learn_apart) {
+    const TorqueLogReport learn = read_log(options.learn_logs, model, options.data);
+    const LogBalance learned = balance_of(balance, learn.log, contact.guard_s);
+    summary.learn_clock = learned.clock;
+    summary.calibration = calibrate_contacts(learned.samples, contact);
+  } else {
+    summary.calibration = calibrate_contacts(samples, contact);
+  }
 
   summary.events = detect_contacts(summary.calibration, samples);
   std::vector<TimeSpan> spans;
@@ -151,10 +186,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   for (const ContactEvent& event : summary.events) spans.push_back({event.onset_s, event.end_s});
   summary.check = check_false_alarms(summary.calibration, samples, spans);
   summary.external_torque = observe_momentum(samples, kObserverGain);
-  summary.t_s.resize(static_cast<Eigen::Index>(samples.size()));
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    summary.t_s[static_cast<Eigen::Index>(i)] = samples[i].stamp_s;
-  }
+  summary.t_s = summary.clock.clock.time_s();
 
   folder.write("contacts.csv", contacts_csv(summary));
   folder.write("contacts.json", contact_json(summary).dump(1) + "\n");

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 #include "dynamics/data/torque_data.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -48,10 +49,13 @@ nlohmann::json corrected_json(const CorrectedTorqueModel& corrected) {
   return list;
 }
 
-nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts) {
+nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts,
+                             const TorqueSamples& samples) {
   nlohmann::json list = nlohmann::json::array();
   for (const ContactSpan& span : contacts) {
-    list.push_back({{"from_s", span.from_s}, {"to_s", span.to_s}});
+    list.push_back({{"trajectory", report::text(samples.trajectory_name(span.from.trajectory))},
+                    {"from_s", span.from.t_s},
+                    {"to_s", span.to.t_s}});
   }
   return list;
 }
@@ -71,7 +75,7 @@ TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicMode
   nlohmann::json document = trace_json(out.trace);
   document["base"] = {{"masses", to_string(out.base.kind)}, {"reason", out.base.reason}};
   document["effects"] = corrected_json(out.corrected);
-  document["left_out"] = contacts_json(out.contacts);
+  document["left_out"] = contacts_json(out.contacts, traced.samples);
   folder.write(options.trace_file, document.dump(1) + "\n");
   if (out.trace.verdict == TraceVerdict::kNothingToSay) return out;
   folder.write("robot_traced.urdf", write_urdf(out.corrected.model));

@@ -26,9 +26,11 @@ double link_probability(const ContactEvent& event) {
 }
 
 json event_json(const ContactSummary& summary, const ContactEvent& event) {
-  return {{"onset_s", number(event.onset_s)},
-          {"end_s", number(event.end_s)},
-          {"alarm_s", number(event.alarm_s)},
+  const LogClock& clock = summary.clock;
+  return {{"trajectory", text(clock.trajectory(event.onset_s))},
+          {"onset_s", number(clock.time_s(event.onset_s))},
+          {"end_s", number(clock.time_s(event.end_s))},
+          {"alarm_s", number(clock.time_s(event.alarm_s))},
           {"link", text(link_name(summary, event.link))},
           {"probability", number(link_probability(event))},
           {"open", event.open},
@@ -37,10 +39,12 @@ json event_json(const ContactSummary& summary, const ContactEvent& event) {
           {"statistic", number(event.statistic)}};
 }
 
-json calibration_json(const ContactCalibration& calibration) {
+json calibration_json(const ContactCalibration& calibration, const LogClock& clock) {
   json excluded = json::array();
   for (const TimeSpan& span : calibration.excluded) {
-    excluded.push_back({{"begin_s", number(span.begin_s)}, {"end_s", number(span.end_s)}});
+    excluded.push_back({{"trajectory", text(clock.trajectory(span.begin_s))},
+                        {"begin_s", number(clock.time_s(span.begin_s))},
+                        {"end_s", number(clock.time_s(span.end_s))}});
   }
   return {{"declared_per_hour", number(calibration.options.false_alarms_per_hour)},
           {"thresholds", numbers(calibration.thresholds)},
@@ -53,17 +57,28 @@ json calibration_json(const ContactCalibration& calibration) {
             {"model_time_s", numbers(calibration.noise.model_time_s)}}}};
 }
 
+// A cell of a CSV file, in quotes where it needs them.
+std::string cell(const std::string& value) {
+  if (value.find_first_of(",\"\r\n") == std::string::npos) return value;
+  std::string out = "\"";
+  for (const char c : value) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
 }  // namespace
 
 std::string contacts_csv(const ContactSummary& summary) {
-  std::string out = "onset_s,end_s,alarm_s,link,probability,open";
+  std::string out = "onset_s,end_s,alarm_s,link,probability,open,trajectory";
   for (const std::string& joint : summary.joints) {
     out += fmt::format(",torque_{},sigma_{}", joint, joint);
   }
   out += "\n";
   for (const ContactEvent& event : summary.events) {
-    out += fmt::format("{},{},{},{},{},{}", event.onset_s, event.end_s, event.alarm_s,
-                       link_name(summary, event.link), link_probability(event), event.open ? 1 : 0);
+    const LogClock& clock = summary.clock;
+    out += fmt::format("{},{},{},{},{},{},{}", clock.time_s(event.onset_s),
+                       clock.time_s(event.end_s), clock.time_s(event.alarm_s),
+                       link_name(summary, event.link), link_probability(event), event.open ? 1 : 0,
+                       cell(clock.trajectory(event.onset_s)));
     for (Eigen::Index j = 0; j < event.torque.size(); ++j) {
       out += fmt::format(",{},{}", event.torque[j],
                          std::sqrt(std::max(0.0, event.torque_covariance(j, j))));
@@ -89,7 +104,7 @@ json contact_json(const ContactSummary& summary) {
           {"model", text(summary.model)},
           {"inputs", report::inputs_json(summary.inputs)},
           {"findings", findings},
-          {"calibration", calibration_json(summary.calibration)},
+          {"calibration", calibration_json(summary.calibration, summary.learn_clock)},
           {"check",
            {{"hours", number(summary.check.hours)},
             {"alarms", summary.check.alarms},
@@ -107,8 +122,11 @@ std::string contact_verdict(const ContactSummary& summary) {
       fmt::format("{} contact{} (declared false alarms an hour: {:g}):", summary.events.size(),
                   summary.events.size() == 1 ? "" : "s", declared);
   for (const ContactEvent& event : summary.events) {
-    out += fmt::format(" {:.3f} to {:.3f} s at {};", event.onset_s, event.end_s,
-                       link_name(summary, event.link));
+    const std::string of = summary.clock.names.size() > 1
+                               ? fmt::format(" of {}", summary.clock.trajectory(event.onset_s))
+                               : "";
+    out += fmt::format(" {:.3f} to {:.3f} s{} at {};", summary.clock.time_s(event.onset_s),
+                       summary.clock.time_s(event.end_s), of, link_name(summary, event.link));
   }
   out.back() = '.';
   return out;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -33,12 +34,15 @@ std::string contact_table(const ContactSummary& summary, const nlohmann::json& d
               document);
   std::vector<std::string> head = {"Onset, s", "End, s", "Known after, ms", "Link",
                                    "Probability, %"};
+  const bool several = summary.clock.names.size() > 1;
+  if (several) head.insert(head.begin(), "Log");
   head.insert(head.end(), summary.joints.begin(), summary.joints.end());
   table.header(head);
   for (std::size_t k = 0; k < summary.events.size(); ++k) {
     const ContactEvent& event = summary.events[k];
     const std::string at = fmt::format("/contacts/{}", k);
     table.begin_row();
+    if (several) table.text(document.at("contacts")[k].at("trajectory").get<std::string>());
     table.number(at + "/onset_s", Quantity::kTime);
     table.number(at + "/end_s", Quantity::kTime);
     table.text(fmt::format("{:.0f}", 1e3 * (event.alarm_s - event.onset_s)));
@@ -49,6 +53,23 @@ std::string contact_table(const ContactSummary& summary, const nlohmann::json& d
     }
   }
   return table.str();
+}
+
+// Broken where another trajectory begins.
+std::vector<Eigen::Vector2d> broken(const std::vector<Eigen::Vector2d>& points,
+                                    const std::vector<double>& begins_s) {
+  std::vector<Eigen::Vector2d> out;
+  auto begin = begins_s.begin();
+  for (const Eigen::Vector2d& point : points) {
+    const auto next = std::upper_bound(begin, begins_s.end(), point.x());
+    if (next != begin && !out.empty()) {
+      constexpr double kBreak = std::numeric_limits<double>::quiet_NaN();
+      out.emplace_back(point.x(), kBreak);
+    }
+    begin = next;
+    out.push_back(point);
+  }
+  return out;
 }
 
 // External torque of one joint over time; contacts as bands.
@@ -85,8 +106,24 @@ std::string joint_plot(const ContactSummary& summary, Eigen::Index joint) {
   for (const ContactEvent& event : summary.events) {
     plot.band({event.onset_s, event.end_s}, {low, low}, {high, high}, series_class(1));
   }
-  plot.line(points, series_class(0));
+  plot.line(broken(points, summary.clock.clock.begins_s()), series_class(0));
   return figure(plot.str(), "", "wide");
+}
+
+// Where each trajectory lies on the time line.
+std::string where_trajectories_lie(const LogClock& log) {
+  const std::vector<double> begins_s = log.clock.begins_s();
+  if (begins_s.size() < 2) return "";
+  constexpr std::size_t kMostNamed = 12;
+  std::string out =
+      log.clock.moved() ? "The trajectories lie one behind the other: " : "The trajectories: ";
+  for (std::size_t k = 0; k < std::min(begins_s.size(), kMostNamed); ++k) {
+    out += fmt::format("{}{} from {:.1f} s", k > 0 ? ", " : "", log.trajectory(begins_s[k]),
+                       begins_s[k]);
+  }
+  if (begins_s.size() > kMostNamed)
+    out += fmt::format(" and {} more", begins_s.size() - kMostNamed);
+  return paragraph(out + ". The table's times are on the clock of each.");
 }
 
 std::string timeline(const ContactSummary& summary) {
@@ -95,6 +132,7 @@ std::string timeline(const ContactSummary& summary) {
   out += paragraph(
       "External torque as a momentum observer (25 per s) follows it; the bands are the contacts "
       "found, from onset to end.");
+  out += where_trajectories_lie(summary.clock);
   for (Eigen::Index j = 0; j < summary.external_torque.rows(); ++j) out += joint_plot(summary, j);
   return out + "</section>\n";
 }

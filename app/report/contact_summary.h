@@ -11,8 +11,20 @@
 #include "app/report/run_summary.h"
 #include "dynamics/contact/contact.h"
 #include "dynamics/data/log_findings.h"
+#include "dynamics/data/one_clock.h"
 
 namespace kinescope {
+
+/// When and where in a log, of trajectories that contact detection looked at one behind the other.
+struct LogClock {
+  OneClock clock;
+  std::vector<std::string> names;  ///< of the trajectories
+
+  [[nodiscard]] double time_s(double clock_s) const { return clock.moment(clock_s).t_s; }
+  [[nodiscard]] std::string trajectory(double clock_s) const {
+    return names[static_cast<std::size_t>(clock.moment(clock_s).trajectory)];
+  }
+};
 
 struct ContactSummary {
   std::string robot;
@@ -28,6 +40,8 @@ struct ContactSummary {
   std::vector<JointType> types;    ///< beside joints
   std::vector<std::string> links;  ///< the link that each joint moves
   std::string torque_unit = "Nm";
+  LogClock clock;        ///< of events, t_s
+  LogClock learn_clock;  ///< of the calibration's spans
   ContactCalibration calibration;
   FalseAlarmCheck check;  ///< on what was looked at, outside the contacts found
   std::vector<ContactEvent> events;
@@ -35,17 +49,20 @@ struct ContactSummary {
   Eigen::MatrixXd external_torque;  ///< joints x samples, as the momentum observer follows it
 };
 
-/// onset_s,end_s,alarm_s,link,probability,open, then the torque of each joint and its sigma.
+/// onset_s,end_s,alarm_s,link,probability,open,trajectory, then the torque of each joint and its
+/// sigma.
 [[nodiscard]] std::string contacts_csv(const ContactSummary& summary);
 
-/// contacts.json: schema "kinescope.contact". Torques in `unit`, times in s on the log's clock.
+/// contacts.json: schema "kinescope.contact". Torques in `unit`, times in s on the clock of
+/// the trajectory (the log's name, where it is one).
 ///
 ///   robot, version, unit, joints, links, learned, model, inputs, findings
-///   calibration  declared_per_hour, thresholds, exposure_s, excluded [begin_s, end_s], noise
+///   calibration  declared_per_hour, thresholds, exposure_s, excluded [trajectory, begin_s, end_s],
+///   noise
 ///                {velocity_sigma, torque_sigma, model_sigma, model_time_s}
 ///   check        hours, alarms, extrapolated_per_hour
-///   contacts     [onset_s, end_s, alarm_s, link, probability, open, torque, torque_sigma,
-///   statistic]
+///   contacts     [trajectory, onset_s, end_s, alarm_s, link, probability, open, torque,
+///                torque_sigma, statistic]
 [[nodiscard]] nlohmann::json contact_json(const ContactSummary& summary);
 
 /// What was found, in one or two sentences.

@@ -180,9 +180,7 @@ std::vector<Fold> folds_by_block(const TorqueSamples& samples, const std::vector
 void name_repeats(const TorqueSamples& samples, const std::vector<Piece>& pieces,
                   const std::vector<int>& same_as, std::vector<LogFinding>& findings) {
   const auto name = [&](std::size_t p) {
-    const auto number = static_cast<std::size_t>(samples.trajectory(pieces[p].begin));
-    return number < samples.trajectory_names.size() ? samples.trajectory_names[number]
-                                                    : fmt::format("{}", number);
+    return samples.trajectory_name(samples.trajectory(pieces[p].begin));
   };
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     if (same_as[p] == static_cast<int>(p)) continue;

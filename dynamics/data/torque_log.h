@@ -91,7 +91,8 @@ struct ReadTorqueLog {
 /// The rows for which `keep` is not 0; trajectory numbers stay.
 [[nodiscard]] TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep);
 
-/// One log after another; trajectory numbers go on. All must have the same joints and signals.
+/// One log after another; trajectory numbers go on, and names get that of their file. All must have
+/// the same joints and signals.
 [[nodiscard]] TorqueLog join(const std::vector<TorqueLog>& logs);
 
 }  // namespace kinescope

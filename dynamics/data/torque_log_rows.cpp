@@ -58,6 +58,24 @@ void append(TorqueLog& log, const TorqueLog& next) {
                               next.trajectory_names.end());
 }
 
+/// The file's name, with its folder's where another file has the same name.
+std::string short_name(const TorqueLog& log, const std::vector<TorqueLog>& all) {
+  const std::filesystem::path file(log.sources.front());
+  const auto alike = std::ranges::count_if(all, [&](const TorqueLog& other) {
+    return std::filesystem::path(other.sources.front()).filename() == file.filename();
+  });
+  if (alike < 2 || file.parent_path().filename().empty()) return file.filename().string();
+  return (file.parent_path().filename() / file.filename()).string();
+}
+
+/// Trajectories are named with their file: each file may have a first one.
+void name_after_file(const std::string& name, TorqueLog& log) {
+  const std::string file = std::filesystem::path(log.sources.front()).filename().string();
+  for (std::string& trajectory : log.trajectory_names) {
+    trajectory = trajectory == file ? name : fmt::format("{}: {}", name, trajectory);
+  }
+}
+
 }  // namespace
 
 std::string TorqueLog::place(Eigen::Index row) const {
@@ -97,7 +115,13 @@ TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep) {
 TorqueLog join(const std::vector<TorqueLog>& logs) {
   KINESCOPE_CHECK(!logs.empty(), "nothing to join");
   TorqueLog out = logs.front();
-  for (std::size_t k = 1; k < logs.size(); ++k) append(out, logs[k]);
+  if (logs.size() == 1) return out;
+  name_after_file(short_name(logs.front(), logs), out);
+  for (std::size_t k = 1; k < logs.size(); ++k) {
+    TorqueLog next = logs[k];
+    name_after_file(short_name(logs[k], logs), next);
+    append(out, next);
+  }
   return out;
 }
 

@@ -25,6 +25,11 @@ struct TorqueSamples {
 
   [[nodiscard]] Eigen::Index size() const { return t_s.size(); }
   [[nodiscard]] Eigen::Index joints() const { return q.cols(); }
+  /// Its name, or its number where it has none.
+  [[nodiscard]] std::string trajectory_name(int number) const {
+    const auto at = static_cast<std::size_t>(number);
+    return at < trajectory_names.size() ? trajectory_names[at] : std::to_string(number);
+  }
 };
 
 }  // namespace kinescope

@@ -41,14 +41,25 @@ std::vector<ContactSpan> find_contact_spans(const EffectMotion& motion,
   std::vector<ContactSpan> out;
   if (!(spread > 0.0)) return out;
   const Eigen::ArrayXd height = (level - median) / spread;
+  const auto trajectory = [&](Eigen::Index i) {
+    return motion.samples().trajectory(motion.kept()[static_cast<std::size_t>(i)]);
+  };
   Eigen::Index inside = 0;
   for (Eigen::Index i = 0; i < height.size(); ++i) {
     if (height[i] < options.level) continue;
     Eigen::Index first = i, last = i;
-    while (first > 0 && height[first - 1] > options.end_level) --first;
-    while (last + 1 < height.size() && height[last + 1] > options.end_level) ++last;
-    ContactSpan span{time_s[first], time_s[last], Eigen::VectorXd(sigma.size()),
-                     Eigen::VectorXd(sigma.size())};
+    const auto joined = [&](Eigen::Index next) {
+      return next >= 0 && next < height.size() && height[next] > options.end_level &&
+             trajectory(next) == trajectory(i);
+    };
+    while (joined(first - 1)) --first;
+    while (joined(last + 1)) ++last;
+    ContactSpan span{.from_s = time_s[first],
+                     .to_s = time_s[last],
+                     .from = motion.clock().moment(time_s[first]),
+                     .to = motion.clock().moment(time_s[last]),
+                     .peak = Eigen::VectorXd(sigma.size()),
+                     .noise_ratio = Eigen::VectorXd(sigma.size())};
     for (Eigen::Index j = 0; j < sigma.size(); ++j) {
       Eigen::Index at = 0;
       const auto rows = whitened.col(j).segment(first, last - first + 1);

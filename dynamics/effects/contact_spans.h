@@ -24,12 +24,14 @@ struct ContactSpanOptions {
   double most_share = 0.25;  ///< of the time: more than that is no burst but how the robot moves
 };
 
-/// From one sample to another, on the laid-out clock of the motion.
+/// From one sample to another of a trajectory.
 struct ContactSpan {
-  double from_s = 0.0;
+  double from_s = 0.0;  ///< on the laid-out clock of the motion
   double to_s = 0.0;
-  Eigen::VectorXd peak;         ///< largest residual torque of each joint, with its sign
-  Eigen::VectorXd noise_ratio;  ///< its size over the noise of the joint
+  LogMoment from = {};  ///< the same as the log has it
+  LogMoment to = {};
+  Eigen::VectorXd peak = {};         ///< largest residual torque of each joint, with its sign
+  Eigen::VectorXd noise_ratio = {};  ///< its size over the noise of the joint
 };
 
 /// `whitened`: instants x joints, `sigma` of each joint. In the order of time.

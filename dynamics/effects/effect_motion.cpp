@@ -16,7 +16,6 @@ namespace {
 constexpr int kParts = 4;             // of a step of the samples, where they are filtered
 constexpr double kEdgePeriods = 0.5;  // of the cut-off: the low-pass knows nothing beyond the ends
 constexpr Eigen::Index kFewestRows = 12;  // that a trajectory must have
-constexpr double kGapSteps = 50.0;        // between trajectories that are laid one behind the other
 
 void check_sizes(const TorqueSamples& s) {
   const bool fits = s.q.rows() == s.size() && s.dq.rows() == s.size() && s.ddq.rows() == s.size() &&
@@ -54,22 +53,17 @@ EffectMotion::EffectMotion(TorqueSamples samples, const EffectMotionOptions& opt
 }
 
 void EffectMotion::lay_out() {
-  time_s_ = samples_.t_s;
+  clock_ = OneClock(samples_.t_s, samples_.trajectory);
   for (Eigen::Index row = 0; row < samples_.size(); ++row) {
     if (row == 0 || samples_.trajectory(row) != samples_.trajectory(row - 1)) {
       pieces_.push_back({row, 0, 0.0});
     }
     ++pieces_.back().rows;
   }
-  double end_s = 0.0;
-  for (std::size_t p = 0; p < pieces_.size(); ++p) {
-    Piece& piece = pieces_[p];
+  for (Piece& piece : pieces_) {
     const auto t = samples_.t_s.segment(piece.begin, piece.rows);
     if (piece.rows > 1)
       piece.step_s = (t(piece.rows - 1) - t(0)) / static_cast<double>(piece.rows - 1);
-    const double late_s = p > 0 && t(0) <= end_s ? end_s + kGapSteps * piece.step_s - t(0) : 0.0;
-    time_s_.segment(piece.begin, piece.rows).array() += late_s;
-    end_s = time_s_(piece.begin + piece.rows - 1);
   }
 }
 
@@ -106,7 +100,7 @@ FinePath EffectMotion::fine(const Piece& piece, const Eigen::VectorXd& weights) 
   const Eigen::VectorXd q = samples_.q.middleRows(piece.begin, piece.rows) * weights;
   const Eigen::VectorXd dq = samples_.dq.middleRows(piece.begin, piece.rows) * weights;
   const Eigen::VectorXd ddq = samples_.ddq.middleRows(piece.begin, piece.rows) * weights;
-  const Eigen::VectorXd t = time_s_.segment(piece.begin, piece.rows);
+  const Eigen::VectorXd t = time_s().segment(piece.begin, piece.rows);
   if (parts_ == 1) return {q.array(), dq.array(), ddq.array(), t.array()};
   const Eigen::Index count = (piece.rows - 1) * parts_ + 1;
   FinePath out{Eigen::ArrayXd(count), Eigen::ArrayXd(count), Eigen::ArrayXd(count),

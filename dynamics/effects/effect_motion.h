@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 
 #include "dynamics/data/motion.h"
+#include "dynamics/data/one_clock.h"
 #include "dynamics/data/torque_samples.h"
 
 namespace kinescope {
@@ -55,7 +56,10 @@ class EffectMotion {
 
   /// Of every sample, increasing: trajectories whose clocks start anew are laid one behind the
   /// other.
-  [[nodiscard]] const Eigen::VectorXd& time_s() const { return time_s_; }
+  [[nodiscard]] const Eigen::VectorXd& time_s() const { return clock_.time_s(); }
+
+  /// Back from it to the log's own clocks.
+  [[nodiscard]] const OneClock& clock() const { return clock_; }
 
   /// A torque that depends on one joint's path, low-passed, at the instants kept. `torque` is
   /// called once a trajectory.
@@ -94,7 +98,7 @@ class EffectMotion {
   EffectMotionOptions options_;
   std::vector<Piece> pieces_;
   std::vector<Eigen::Index> kept_;
-  Eigen::VectorXd time_s_;
+  OneClock clock_;
   int parts_ = 1;  ///< of a step between samples
   // Of each joint, by piece; made when it is first asked for.
   mutable std::map<Eigen::Index, std::vector<FinePath>> paths_;

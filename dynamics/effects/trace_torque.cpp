@@ -20,17 +20,21 @@ double rms(const Eigen::VectorXd& values) {
                    static_cast<double>(std::max<Eigen::Index>(1, values.size())));
 }
 
-/// Spans that touch are one.
+/// Spans of a trajectory that touch are one.
 std::vector<ContactSpan> merged(std::vector<ContactSpan> spans, double gap_s) {
   std::ranges::sort(spans, {}, &ContactSpan::from_s);
   std::vector<ContactSpan> out;
   for (ContactSpan& span : spans) {
-    if (out.empty() || span.from_s > out.back().to_s + gap_s) {
+    if (out.empty() || span.from_s > out.back().to_s + gap_s ||
+        span.from.trajectory != out.back().from.trajectory) {
       out.push_back(std::move(span));
       continue;
     }
     ContactSpan& last = out.back();
-    last.to_s = std::max(last.to_s, span.to_s);
+    if (span.to_s > last.to_s) {
+      last.to_s = span.to_s;
+      last.to = span.to;
+    }
     for (Eigen::Index j = 0; j < span.peak.size(); ++j) {
       if (std::abs(span.peak[j]) > std::abs(last.peak[j])) last.peak[j] = span.peak[j];
       last.noise_ratio[j] = std::max(last.noise_ratio[j], span.noise_ratio[j]);
@@ -46,6 +50,13 @@ Trace trace_with(const TorqueTracedModel& model, const TorqueTraceOptions& optio
   return trace_effects(model, trace, progress);
 }
 
+/// "3.05 to 3.33 s", with the trajectory where there are several.
+std::string when(const ContactSpan& span, const TorqueSamples& samples) {
+  std::string out = fmt::format("{:.2f} to {:.2f} s", span.from.t_s, span.to.t_s);
+  if (samples.trajectory.minCoeff() == samples.trajectory.maxCoeff()) return out;
+  return out + " of " + samples.trajectory_name(span.from.trajectory);
+}
+
 /// A contact as an effect among the others: the joint that felt it most, and how much.
 TracedEffect contact_effect(const ContactSpan& span, const TorqueTracedModel& model,
                             const HeldOutError& before, const HeldOutError& after) {
@@ -54,7 +65,7 @@ TracedEffect contact_effect(const ContactSpan& span, const TorqueTracedModel& mo
   const auto j = static_cast<std::size_t>(joint);
   const EffectContext& context = model.context();
   TracedEffect out;
-  out.id = {"contact", fmt::format("{:.2f} to {:.2f} s", span.from_s, span.to_s)};
+  out.id = {"contact", when(span, model.motion().samples())};
   out.words = fmt::format("something pushed the robot, felt most at {}", context.joints[j]);
   out.check = "what stood in the way, or who touched the robot";
   out.size = std::abs(span.peak[joint]);

@@ -62,6 +62,29 @@ TEST_F(ContactCommand, LearnsFromTheLogItself) {
   EXPECT_TRUE(outcome.out.starts_with("3 contacts")) << outcome.out;
 }
 
+TEST_F(ContactCommand, EveryLogHasAClockOfItsOwn) {
+  folder_.write("again.csv", read_text_file(folder_.path() / "log.csv"));
+  std::vector<std::string> both = words();
+  both.insert(both.begin() + 2, path("again.csv"));
+  const Outcome outcome = run(both);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/contacts.json"));
+  const auto& contacts = document.at("contacts");
+  const std::size_t one = touched_.labels.size();
+  ASSERT_EQ(contacts.size(), 2 * one) << outcome.out;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    constexpr double kOnset = 0.05;  // s
+    EXPECT_EQ(contacts[k].at("trajectory"), k < one ? "log.csv" : "again.csv");
+    EXPECT_NEAR(contacts[k].at("onset_s").get<double>(), touched_.labels[k % one].begin_s, kOnset);
+  }
+  EXPECT_NE(read_text_file(folder_.path() / "out/contacts.csv").find(",again.csv,"),
+            std::string::npos);
+  const std::string page = read_text_file(folder_.path() / "out/contact.html");
+  EXPECT_NE(page.find("again.csv from "), std::string::npos);
+  const ProductCheck check = check_products(folder_.path() / "out");
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
+}
+
 TEST_F(ContactCommand, RefusesWhatCannotBe) {
   expect_refusal(words({"--false-alarms", "0"}), ExitCode::kBadRequest, "0");
   TorqueSamples without = touched_.samples;

@@ -163,5 +163,17 @@ TEST(TorqueLog, JoinsFilesAndRefusesDifferentOnes) {
             std::string::npos);
 }
 
+TEST(TorqueLog, TrajectoriesOfSeveralFilesAreNamedWithTheirFile) {
+  const TorqueLog a = read("t,q1,tau1\n0,1,1\n1,1,1\n").log;
+  TorqueLog b = a;
+  b.sources = {"night/run.csv"};
+  TorqueLog numbered = a;
+  numbered.sources = {"day/other.csv"};
+  numbered.trajectory_names = {"7"};
+  EXPECT_EQ(join({a}).trajectory_names, (std::vector<std::string>{"run.csv"}));
+  EXPECT_EQ(join({a, b, numbered}).trajectory_names,
+            (std::vector<std::string>{"run.csv", "night/run.csv", "other.csv: 7"}));
+}
+
 }  // namespace
 }  // namespace kinescope

@@ -247,6 +247,34 @@ TEST(TorqueEffects, a_push_is_found_and_left_out) {
   EXPECT_EQ(out.trace.accepted.front().id.effect, "contact");
 }
 
+TEST(ContactSpans, lie_in_one_trajectory_on_its_own_clock) {
+  constexpr Eigen::Index kRows = 400;  // of each of two trajectories, 0.01 s apart
+  TorqueSamples samples;
+  samples.t_s.resize(2 * kRows);
+  samples.trajectory.resize(2 * kRows);
+  for (Eigen::Index i = 0; i < 2 * kRows; ++i) {
+    samples.t_s[i] = 5.0 + 0.01 * static_cast<double>(i % kRows);
+    samples.trajectory[i] = i < kRows ? 0 : 1;
+  }
+  samples.q = samples.dq = samples.ddq = samples.torque = Eigen::MatrixXd::Zero(2 * kRows, 1);
+  const EffectMotion motion(samples, {.every_sample = true});
+  Rng rng = Rng::from_name("effects", 9);
+  Eigen::MatrixXd whitened(2 * kRows, 1);
+  for (Eigen::Index i = 0; i < 2 * kRows; ++i) whitened(i, 0) = rng.normal();
+  // One push in the second trajectory, and one that ends the first as another begins the second.
+  whitened.middleRows(kRows + 200, 30).array() += 60.0;
+  whitened.middleRows(kRows - 20, 40).array() += 60.0;
+  const auto spans = find_contact_spans(motion, whitened, Eigen::VectorXd::Ones(1));
+  ASSERT_EQ(spans.size(), 3U);
+  EXPECT_EQ(spans[0].to.trajectory, 0);
+  EXPECT_EQ(spans[1].from.trajectory, 1);
+  EXPECT_NEAR(spans[1].from.t_s, 5.0, 1e-9);
+  constexpr double kWindow_s = 0.1;
+  EXPECT_EQ(spans[2].to.trajectory, 1);
+  EXPECT_NEAR(spans[2].from.t_s, 7.0, kWindow_s);
+  EXPECT_NEAR(spans[2].to.t_s, 7.3, kWindow_s);
+}
+
 TEST(TorqueEffects, logs_that_do_not_fit_are_refused) {
   Rng rng = Rng::from_name("effects", 8);
   const EffectWorld world = effect_world({}, quiet_world(), rng);
