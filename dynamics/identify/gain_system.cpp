@@ -18,23 +18,36 @@ GainSystem::GainSystem(StackedSystem system, bool wanted, int reference)
 
 void GainSystem::find_gains(const WeightedFitOptions& options) {
   if (free_.empty()) return;
-  constexpr int kSteps = 50;
-  constexpr double kSettled = 1e-8;
   WeightedFitOptions plain = options;
   plain.loss = RobustLoss::kNone;
   parameters_ = weighted_fit(plain_, plain).parameters;
-  for (int step = 0; step < kSteps; ++step) {
-    const Eigen::VectorXd all = weighted_fit(extended(), padded(plain)).parameters;
-    parameters_ = all.head(plain_.parameters);
-    double largest = 0.0;
-    for (std::size_t k = 0; k < free_.size(); ++k) {
-      double& gain = gains_[free_[k]];
-      const double change = all[plain_.parameters + static_cast<Eigen::Index>(k)];
-      gain = std::max(gain + change, 0.1 * gain);  // a gain does not change its sign
-      largest = std::max(largest, std::abs(change));
-    }
-    if (largest < kSettled) break;
+  constexpr int kSteps = 50;
+  constexpr double kSettled = 1e-8;
+  iterate(plain, kSteps, kSettled);
+  if (options.loss == RobustLoss::kNone) return;
+  // Noise levels and weights chase each other below this; take() adds what is left.
+  constexpr int kRobustSteps = 20;
+  constexpr double kRobustSettled = 1e-6;
+  iterate(options, kRobustSteps, kRobustSettled);
+}
+
+void GainSystem::iterate(const WeightedFitOptions& options, int steps, double settled) {
+  for (int step = 0; step < steps; ++step) {
+    if (take(weighted_fit(extended(), padded(options)).parameters) < settled) return;
   }
+}
+
+double GainSystem::take(const Eigen::VectorXd& all) {
+  if (free_.empty()) return 0.0;
+  parameters_ = all.head(plain_.parameters);
+  double largest = 0.0;
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    double& gain = gains_[free_[k]];
+    const double change = all[plain_.parameters + static_cast<Eigen::Index>(k)];
+    gain = std::max(gain + change, 0.1 * gain);  // a gain does not change its sign
+    largest = std::max(largest, std::abs(change));
+  }
+  return largest;
 }
 
 StackedSystem GainSystem::final_system() const { return free_.empty() ? plain_ : extended(); }

@@ -20,8 +20,11 @@ class GainSystem {
   /// Joints whose gain is estimated, in the order of the last columns.
   [[nodiscard]] const std::vector<Eigen::Index>& free() const { return free_; }
 
-  /// Without the robust part of the loss.
+  /// Without the robust part of the loss first, then with it: outliers bend gains like anything
+  /// else.
   void find_gains(const WeightedFitOptions& options);
+  /// Adds the gains' changes that a fit of final_system() still found. Gives the largest.
+  double take(const Eigen::VectorXd& all);
 
   /// The system whose last columns are the gains' at the solution; without free gains, the plain
   /// one.
@@ -30,6 +33,7 @@ class GainSystem {
   [[nodiscard]] WeightedFitOptions padded(WeightedFitOptions options) const;
 
  private:
+  void iterate(const WeightedFitOptions& options, int steps, double settled);
   [[nodiscard]] StackedSystem extended() const;
 
   StackedSystem plain_;

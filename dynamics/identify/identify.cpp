@@ -215,6 +215,7 @@ Identification identify_dynamics(const DynamicModel& model, const TorqueSamples&
   const StackedSystem final_system = gains.final_system();
   const WeightedFitOptions final_options = gains.padded(fit_options);
   const WeightedFit fit = weighted_fit(final_system, final_options);
+  gains.take(fit.parameters);
   keep_fit(fit, gains, final_system, options.loss, out);
   estimate_covariance(rows, final_system, fit, gains, options, out);
   return out;

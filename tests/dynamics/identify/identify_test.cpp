@@ -177,6 +177,24 @@ TEST(Identify, GainsOfCurrentsAreFound) {
   EXPECT_LT(normalised_error_percent(log.torque, prediction.mean).maxCoeff(), 0.01);
 }
 
+TEST(Identify, OutliersDoNotBendTheGains) {
+  Rng rng = Rng::from_name("Identify.OutliersDoNotBendTheGains");
+  const DynamicModel model = random_arm(3, rng);
+  TorqueSamples log = torque_log_of(model, {.samples = 1500, .noise = 0.002}, rng);
+  const Eigen::Vector3d truth(1.0, 0.8, 1.3);
+  log.torque = log.torque * truth.asDiagonal();
+  const Eigen::MatrixXd clean = log.torque;
+  // Something pushes two joints, always the same way.
+  for (Eigen::Index t = 0; t < log.size(); ++t) {
+    if (t % 100 >= 12) continue;
+    for (const Eigen::Index j : {1, 2}) log.torque(t, j) += 2.0 * clean.col(j).cwiseAbs().mean();
+  }
+  const Identification fit = identify_dynamics(model, log, {.gains = true, .gain_reference = 0});
+  EXPECT_LT((fit.gains - truth).cwiseAbs().maxCoeff(), 0.02);
+  const TorquePrediction prediction = predict_torque(fit, log.q, log.dq, log.ddq);
+  EXPECT_LT(normalised_error_percent(clean, prediction.mean).maxCoeff(), 0.1);
+}
+
 TEST(Identify, CoupledDrivesAreFound) {
   Rng rng = Rng::from_name("Identify.CoupledDrivesAreFound");
   const DynamicModel model = random_arm(4, rng);
