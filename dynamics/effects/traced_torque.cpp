@@ -169,6 +169,7 @@ TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamp
 
 void TorqueTracedModel::Parts::refresh() {
   const TorqueSamples& samples = motion->samples();
+  base.rigid = context.rigid = make_rigid_model(model);
   context.motion = motion;
   context.cache = std::make_shared<ColumnCache>();
   q = motion->rows_at_instants(samples.q);
@@ -203,8 +204,11 @@ void TorqueTracedModel::Parts::refresh() {
   if (base.kind == TorqueBaseKind::kIdentified) {
     viscous.setZero();
     coulomb.setZero();
+    // What the drives add is found with the effects, as their friction is.
+    for (RigidBody& body : base.rigid.bodies) body.motor_inertia = 0.0;
+    context.rigid = base.rigid;
     const RigidModel identified =
-        with_body_parameters(nominal, effects::identified_bodies(data, base.sigma));
+        with_body_parameters(base.rigid, effects::identified_bodies(data, base.sigma));
     context.load = inverse_dynamics_of_samples(identified, q, dq, ddq);
     // Where gravity may pull is known only for masses that are: declared ones serve better.
     if (!has_masses(nominal)) context.rigid = identified;

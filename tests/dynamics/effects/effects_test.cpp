@@ -228,6 +228,29 @@ TEST(TorqueEffects, found_friction_goes_into_the_model_and_out_of_the_log) {
   EXPECT_LT(rms(error), 0.05 * coulomb);
 }
 
+TEST(TorqueEffects, identified_masses_predict_what_was_fitted) {
+  Rng rng = Rng::from_name("effects", 10);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.005;
+  EffectWorld world = effect_world({}, options, rng);
+  // A motor that the model declares: the fit of identified masses finds its own drives.
+  for (JointDynamics& joint : world.model.joints) joint.motor_inertia = 1.0;
+  TracedTorqueOptions traced;
+  traced.base = TorqueBaseKind::kIdentified;
+  const TorqueSamples samples = exact_samples(world);
+  const TorqueTracedModel model(world.model, samples, traced);
+  const Eigen::MatrixXd left = model.residual_torque(model.fit({}));
+  CorrectedTorqueModel found;
+  found.model = world.model;
+  found.base = model.fitted({});
+  found.travels = model.context().travels;
+  found.log = model.context().log;
+  const Eigen::MatrixXd predicted = model.motion().rows_at_instants(predict_torque(found, samples));
+  const Eigen::MatrixXd fitted = model.motion().rows_at_instants(samples.torque) - left;
+  constexpr double kShare = 1e-6;  // of the torque: normal equations
+  EXPECT_LT((predicted - fitted).norm(), kShare * fitted.norm());
+}
+
 TEST(TorqueEffects, a_push_is_found_and_left_out) {
   Rng rng = Rng::from_name("effects", 6);
   EffectWorldOptions options = quiet_world();
