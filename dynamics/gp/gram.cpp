@@ -67,8 +67,11 @@ Covariance::Covariance(const Kernel& kernel)
       tile_samples_(std::max(kStrip, kTileRows / kernel.outputs() / kStrip * kStrip)) {}
 
 void Covariance::prepare(const Inputs& inputs, Prepared& out) const {
-  node_->prepare(theta_, inputs, out);
+  node_->featurise(inputs, out);
+  node_->rescale(theta_, out);
 }
+
+void Covariance::rescale(Prepared& out) const { node_->rescale(theta_, out); }
 
 Prepared Covariance::prepare(const Inputs& inputs) const {
   Prepared out;

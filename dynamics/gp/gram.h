@@ -27,6 +27,8 @@ class Covariance {
   [[nodiscard]] Eigen::Index outputs() const { return outputs_; }
   [[nodiscard]] Prepared prepare(const Inputs& inputs) const;
   void prepare(const Inputs& inputs, Prepared& out) const;
+  /// The same inputs prepared by another covariance of this kernel, for these parameters.
+  void rescale(Prepared& out) const;
 
   /// The lower triangle of k(x, x); the tiles on the diagonal are complete, the rest is zero.
   [[nodiscard]] Eigen::MatrixXd lower(Workers& workers, const Prepared& x) const;

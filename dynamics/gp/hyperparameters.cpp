@@ -156,43 +156,54 @@ Dataset thinned(const Dataset& dataset, Index limit) {
   return subset(dataset, indices);
 }
 
-Eigen::VectorXd best_start(const GpModel& model, const Dataset& dataset,
-                           const std::vector<Free>& free, const EstimateOptions& options,
-                           Estimate& out) {
-  const Eigen::VectorXd log_values = log_values_of(model);
-  Eigen::VectorXd own = to_u(free, log_values);
-  const bool small = dataset.samples() <= options.samples_for_starts;
-  if (options.starts <= 1 && small) return own;
-  const auto objective = make_objective(model, thinned(dataset, options.samples_for_starts),
-                                        options.fit, options.score);
-  Eigen::VectorXd best = own;
-  double best_cost = std::numeric_limits<double>::infinity();
-  for (int s = 0; s < std::max(1, options.starts); ++s) {
+// The start that is ahead after a short climb each.
+Climb leader_of(Objective& objective, const std::vector<Free>& free,
+                const Eigen::VectorXd& log_values, const Eigen::VectorXd& own,
+                EstimateOptions options, std::vector<Start>& starts) {
+  options.max_iterations = std::min(options.max_iterations, options.start_iterations);
+  Climb best{.u = own, .cost = std::numeric_limits<double>::infinity(), .message = ""};
+  for (int s = 0; s < options.starts; ++s) {
     Eigen::VectorXd u = own;
     if (s > 0) {
       Rng rng = Rng::from_name("gp start " + std::to_string(s), options.seed);
       for (double& value : u) value += rng.normal(options.start_log_sigma);
     }
-    const Climb climbed = climb(*objective, free, log_values, u, options);
-    out.starts.push_back({-climbed.cost, climbed.evaluations, climbed.usable});
-    if (climbed.usable && climbed.cost < best_cost) {
-      best_cost = climbed.cost;
-      best = climbed.u;
-    }
+    Climb climbed = climb(objective, free, log_values, u, options);
+    starts.push_back({-climbed.cost, climbed.evaluations, climbed.usable});
+    if (climbed.usable && climbed.cost < best.cost) best = std::move(climbed);
   }
   return best;
 }
 
-}  // namespace
-
-Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
-                                  const EstimateOptions& options) {
-  const auto objective = make_objective(model, dataset, options.fit, options.score);
-  return estimate_hyperparameters(model, dataset, *objective, options);
+// From several starts, on few samples as long as there is a choice. `same`: `objective` is the
+// dense one of these samples.
+Climb best_climb(const GpModel& model, const Dataset& dataset, const std::vector<Free>& free,
+                 Objective& objective, bool same, const EstimateOptions& options,
+                 std::vector<Start>& starts) {
+  const Eigen::VectorXd log_values = log_values_of(model);
+  Climb leader{.u = to_u(free, log_values), .message = ""};
+  const bool few = dataset.samples() <= options.samples_for_starts;
+  if (options.starts > 1 || !few) {
+    const auto part = few && same
+                          ? nullptr
+                          : make_objective(model, thinned(dataset, options.samples_for_starts),
+                                           options.fit, options.score);
+    Objective& tried = part ? *part : objective;
+    if (options.starts > 1) {
+      leader = leader_of(tried, free, log_values, leader.u, options, starts);
+    }
+    if (!part && leader.converged) return leader;
+    if (part) {
+      const Climb on = climb(tried, free, log_values, leader.u, options);
+      if (options.starts <= 1) starts.push_back({-on.cost, on.evaluations, on.usable});
+      if (on.usable) leader = on;
+    }
+  }
+  return climb(objective, free, log_values, leader.u, options);
 }
 
-Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
-                                  Objective& objective, const EstimateOptions& options) {
+Estimate estimate(const GpModel& model, const Dataset& dataset, Objective& objective, bool same,
+                  const EstimateOptions& options) {
   // Ceres says in its summary what it also prints.
   FLAGS_minloglevel = google::GLOG_FATAL;
   const std::vector<Parameter> parameters = parameters_of(model);
@@ -203,8 +214,7 @@ Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
   out.score_before = score ? score->value : -std::numeric_limits<double>::infinity();
   Eigen::VectorXd values = before;
   if (!free.empty()) {
-    const Eigen::VectorXd start = best_start(model, dataset, free, options, out);
-    const Climb climbed = climb(objective, free, before, start, options);
+    const Climb climbed = best_climb(model, dataset, free, objective, same, options, out.starts);
     out.evaluations = climbed.evaluations;
     out.message = climbed.message;
     if (climbed.usable) {
@@ -231,6 +241,19 @@ Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
     }
   }
   return out;
+}
+
+}  // namespace
+
+Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
+                                  const EstimateOptions& options) {
+  const auto objective = make_objective(model, dataset, options.fit, options.score);
+  return estimate(model, dataset, *objective, true, options);
+}
+
+Estimate estimate_hyperparameters(const GpModel& model, const Dataset& dataset,
+                                  Objective& objective, const EstimateOptions& options) {
+  return estimate(model, dataset, objective, false, options);
 }
 
 }  // namespace kinescope::gp

@@ -24,7 +24,8 @@ struct EstimateOptions {
   std::uint64_t seed = 1;
   int max_iterations = 100;
   /// Stops where an iteration changes the score by less than this times the score.
-  double relative_tolerance = 1e-7;
+  double relative_tolerance = 1e-5;
+  int start_iterations = 20;  ///< of each start; then only the one that is ahead goes on
   /// Starts are compared on at most so many samples; only the best one sees all of them.
   Eigen::Index samples_for_starts = 500;
 };

@@ -26,11 +26,16 @@ class Composite : public KernelNode {
   [[nodiscard]] Index parameter_count() const override { return count_; }
   [[nodiscard]] const std::vector<NodePtr>& children() const { return children_; }
 
-  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
+  void featurise(const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.children.resize(children_.size());
     for (std::size_t c = 0; c < children_.size(); ++c) {
-      children_[c]->prepare(part(theta, c), inputs, out.children[c]);
+      children_[c]->featurise(inputs, out.children[c]);
+    }
+  }
+  void rescale(const Theta& theta, Prepared& out) const override {
+    for (std::size_t c = 0; c < children_.size(); ++c) {
+      children_[c]->rescale(part(theta, c), out.children[c]);
     }
   }
 

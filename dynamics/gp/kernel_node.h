@@ -52,7 +52,10 @@ class KernelNode {
   [[nodiscard]] virtual int outputs() const { return 1; }
   [[nodiscard]] virtual int input_columns() const = 0;
   [[nodiscard]] virtual Eigen::Index parameter_count() const = 0;
-  virtual void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const = 0;
+  /// What is the same for all theta: the features as they are.
+  virtual void featurise(const Inputs& inputs, Prepared& out) const = 0;
+  /// The rest, from that; may be called again with another theta.
+  virtual void rescale(const Theta& theta, Prepared& out) const = 0;
   /// out = k.
   virtual void evaluate(const Theta& theta, Samples a, Samples b, Scratch& scratch,
                         Block out) const = 0;

@@ -23,15 +23,16 @@ class DenseObjective : public Objective {
         problem_(std::move(problem)),
         workers_(threads),
         score_(score),
+        prepared_(Covariance(kernel_).prepare(problem_.inputs)),
         matrix_(Eigen::MatrixXd::Zero(problem_.rows(), problem_.rows())) {}
 
   [[nodiscard]] std::optional<Likelihood> evaluate(const Eigen::VectorXd& log_values) override {
     const Index kernel_count = static_cast<Index>(kernel_.parameters().size());
     const Covariance covariance(kernel_.with_log_values(log_values.head(kernel_count)));
     const auto log_noise = log_values.tail(log_values.size() - kernel_count);
-    const Prepared prepared = covariance.prepare(problem_.inputs);
+    covariance.rescale(prepared_);
     const Eigen::VectorXd noise = noise_of_rows(problem_, log_noise);
-    covariance.lower(workers_, prepared, matrix_);
+    covariance.lower(workers_, prepared_, matrix_);
     matrix_.diagonal() += noise;
     if (!matrix_.diagonal().allFinite() || tiled_cholesky(workers_, matrix_) != 0) {
       return std::nullopt;
@@ -47,12 +48,12 @@ class DenseObjective : public Objective {
     const Eigen::VectorXd inverse_diagonal = matrix_.colwise().squaredNorm();
     out.gradient.resize(log_values.size());
     if (score_ == Score::kLeaveOneOut) {
-      leave_one_out(covariance, prepared, noise, alpha, inverse_diagonal, out);
+      leave_one_out(covariance, noise, alpha, inverse_diagonal, out);
       return out;
     }
     // d L = 1/2 tr((alpha alpha' - K^-1) dK) (Rasmussen and Williams 2006, eq. 5.9).
-    out.gradient.head(kernel_count) =
-        covariance.contract_lower(workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
+    out.gradient.head(kernel_count) = covariance.contract_lower(
+        workers_, prepared_, [&](Index row, Index col, Scratch&, Block q) {
           inverse_tile(row, col, -0.5, q);
           q.noalias() +=
               0.5 * alpha.segment(row, q.rows()) * alpha.segment(col, q.cols()).transpose();
@@ -74,9 +75,8 @@ class DenseObjective : public Objective {
 
   // Sundararajan and Keerthi 2001. With B = K^-1, b_i = B_ii and e_i = alpha_i / b_i:
   // d score = e' B dK alpha - tr(B C B dK), C_ii = (1 + alpha_i e_i) / (2 b_i).
-  void leave_one_out(const Covariance& covariance, const Prepared& prepared,
-                     const Eigen::VectorXd& noise, const Eigen::VectorXd& alpha,
-                     const Eigen::VectorXd& b, Likelihood& out) {
+  void leave_one_out(const Covariance& covariance, const Eigen::VectorXd& noise,
+                     const Eigen::VectorXd& alpha, const Eigen::VectorXd& b, Likelihood& out) {
     const Index n = alpha.size();
     const Eigen::VectorXd error = alpha.cwiseQuotient(b);
     out.value = 0.5 * b.array().log().sum() - 0.5 * alpha.dot(error) -
@@ -88,8 +88,8 @@ class DenseObjective : public Objective {
     const Eigen::VectorXd root = ((1.0 + alpha.array() * error.array()) / (2.0 * b.array())).sqrt();
     full = full * root.asDiagonal();
     const auto kernel_count = static_cast<Index>(kernel_.parameters().size());
-    out.gradient.head(kernel_count) =
-        covariance.contract_lower(workers_, prepared, [&](Index row, Index col, Scratch&, Block q) {
+    out.gradient.head(kernel_count) = covariance.contract_lower(
+        workers_, prepared_, [&](Index row, Index col, Scratch&, Block q) {
           product_transposed(-1.0, full.middleRows(row, q.rows()), full.middleRows(col, q.cols()),
                              0.0, q);
           q.noalias() +=
@@ -107,6 +107,7 @@ class DenseObjective : public Objective {
   Problem problem_;
   Workers workers_;
   Score score_;
+  Prepared prepared_;
   Eigen::MatrixXd matrix_;
 };
 

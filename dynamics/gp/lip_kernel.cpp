@@ -36,7 +36,7 @@ class LipNode : public KernelNode {
   [[nodiscard]] int input_columns() const override { return 3 * n(); }
   [[nodiscard]] Index parameter_count() const override { return layout_.count; }
 
-  void prepare(const Theta&, const Inputs& inputs, Prepared& out) const override {
+  void featurise(const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
     out.tables.resize(kTables);
     for (Eigen::MatrixXd& table : out.tables) table.resize(inputs.rows(), n());
@@ -53,6 +53,7 @@ class LipNode : public KernelNode {
     out.tables[kVelocity] = inputs.middleCols(size(), size());
     out.tables[kAcceleration] = inputs.middleCols(2 * size(), size());
   }
+  void rescale(const Theta&, Prepared&) const override {}  // weights are read pair by pair
 
   void evaluate(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
     const Energies energies = read(theta);

@@ -84,14 +84,18 @@ class PolynomialNode : public KernelNode {
     return first_weight() + (common_ ? 1 : map_.size());
   }
 
-  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
+  // Tables: features times the root of their weights; features as they are.
+  void featurise(const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
-    out.tables.resize(1);
+    out.tables.resize(2);
+    out.tables[1].resize(inputs.rows(), map_.size());
+    map_.map(inputs, out.tables[1]);
+  }
+  void rescale(const Theta& theta, Prepared& out) const override {
     Eigen::MatrixXd& weighted = out.tables[0];
-    weighted.resize(inputs.rows(), map_.size());
-    map_.map(inputs, weighted);
+    weighted.resize(out.samples, map_.size());
     for (Index d = 0; d < map_.size(); ++d) {
-      weighted.col(d) *= std::exp(0.5 * theta[weight_index(d)]);
+      weighted.col(d) = std::exp(0.5 * theta[weight_index(d)]) * out.tables[1].col(d);
     }
   }
 

@@ -27,15 +27,20 @@ class RbfNode : public KernelNode {
     return first_scale() + (common_ ? 1 : map_.size());
   }
 
-  // Tables: features / length scale; half of their squared norm.
-  void prepare(const Theta& theta, const Inputs& inputs, Prepared& out) const override {
+  // Tables: features / length scale; half of their squared norm; features as they are.
+  void featurise(const Inputs& inputs, Prepared& out) const override {
     out.samples = inputs.rows();
-    out.tables.resize(2);
+    out.tables.resize(3);
+    out.tables[2].resize(inputs.rows(), map_.size());
+    map_.map(inputs, out.tables[2]);
+  }
+  void rescale(const Theta& theta, Prepared& out) const override {
     Eigen::MatrixXd& scaled = out.tables[0];
-    scaled.resize(inputs.rows(), map_.size());
-    map_.map(inputs, scaled);
-    for (Index d = 0; d < map_.size(); ++d) scaled.col(d) *= std::exp(-theta[scale_index(d)]);
-    out.tables[1].resize(inputs.rows(), 1);
+    scaled.resize(out.samples, map_.size());
+    for (Index d = 0; d < map_.size(); ++d) {
+      scaled.col(d) = std::exp(-theta[scale_index(d)]) * out.tables[2].col(d);
+    }
+    out.tables[1].resize(out.samples, 1);
     out.tables[1].setZero();
     for (Index d = 0; d < map_.size(); ++d) {
       out.tables[1].col(0).array() += 0.5 * scaled.col(d).array().square();

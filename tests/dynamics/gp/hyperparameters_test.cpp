@@ -94,6 +94,44 @@ TEST(Estimate, FeatureRouteReachesTheDenseOptimum) {
   EXPECT_NEAR(dense, features, 1e-4 * std::abs(dense));
 }
 
+// What does not depend on the parameters is computed once, however costly the map is.
+TEST(Estimate, AsksTheFeatureMapOnce) {
+  Rng rng = Rng::from_name("costly map");
+  const Dataset data = smooth_data(rng, 60, 2, 0.1);
+  FeatureMap map = first_columns(2);
+  int calls = 0;
+  map.map = [&calls, plain = map.map](const Inputs& inputs, Features features) {
+    ++calls;
+    plain(inputs, features);
+  };
+  const GpModel model = make_model(rbf(map) + linear(map), 0.1);
+  const auto objective = make_objective(model, data);
+  const Eigen::VectorXd values = log_values_of(model);
+  const Likelihood first = objective->evaluate(values).value();
+  EXPECT_NE(objective->evaluate(values.array() + 0.3).value().value, first.value);
+  EXPECT_EQ(objective->evaluate(values).value().value, first.value);
+  EXPECT_EQ(calls, 2);  // of two kernels
+}
+
+// With all samples seen by every start nothing is left to climb, and starts that fall behind are
+// given up early.
+TEST(Estimate, NoClimbIsMadeTwice) {
+  Rng rng = Rng::from_name("no climb twice");
+  const Dataset data = smooth_data(rng, 120, 2, 0.1);
+  const GpModel model = make_model(rbf(first_columns(2)), 0.3);
+  EstimateOptions options{.starts = 3, .start_iterations = 100, .samples_for_starts = 120};
+  const Estimate all = estimate_hyperparameters(model, data, options);
+  ASSERT_EQ(all.starts.size(), 3U);
+  const auto best = std::ranges::max_element(all.starts, {}, &Start::score);
+  EXPECT_EQ(all.status, EstimateStatus::kConverged);
+  EXPECT_EQ(all.evaluations, best->evaluations);
+  EXPECT_EQ(all.score, best->score);
+  options.start_iterations = 3;
+  const Estimate early = estimate_hyperparameters(model, data, options);
+  for (const Start& start : early.starts) EXPECT_LT(start.evaluations, 15);
+  EXPECT_NEAR(early.score, all.score, 1e-3 * std::abs(all.score));
+}
+
 TEST(Estimate, SaysWhichRangeIsWrong) {
   Rng rng = Rng::from_name("bad range");
   const Dataset data = smooth_data(rng, 20, 1, 0.1);
