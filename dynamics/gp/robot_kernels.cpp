@@ -12,6 +12,10 @@
 namespace kinescope::gp {
 namespace {
 
+// Of the weights of a joint's two factors: alike at the start they would stay alike.
+constexpr double kFirst = 1.0;
+constexpr double kSecond = 0.1;
+
 Kernel renamed(const Kernel& kernel, const std::string& prefix) {
   std::vector<Parameter> parameters = kernel.parameters();
   for (Parameter& parameter : parameters) parameter.name = prefix + " " + parameter.name;
@@ -67,42 +71,32 @@ FeatureMap accelerations_and_velocity_products(int joints) {
 Kernel gip(const JointKinds& joints) {
   const int n = static_cast<int>(joints.size());
   KINESCOPE_CHECK(n > 0, "at least one joint");
-  Kernel out = renamed(linear(accelerations_and_velocity_products(n)), "gip");
-  constexpr int kDegree = 2;
-  for (int j = 0; j < n; ++j) {
-    out =
-        out * renamed(multiplicative_polynomial(joint_position(joints, j), kDegree, Offset::kUnit),
-                      "gip");
-  }
-  return out;
+  return renamed(
+      linear(accelerations_and_velocity_products(n)) *
+          position_factors(joints, kFirst, kSecond, std::vector<double>(joints.size(), 1.0)),
+      "gip");
 }
 
 Kernel gip(const JointKinds& joints, const Inputs& inputs) {
   const int n = static_cast<int>(joints.size());
   KINESCOPE_CHECK(n > 0, "at least one joint");
   // A joint's factor is (1 + first weight) (1 + second weight) for features of mean square 1.
-  constexpr double kFirst = 1.0;
-  constexpr double kSecond = 0.1;
   const double factors = std::pow((1.0 + kFirst) * (1.0 + kSecond), n);
   const FeatureMap motion = accelerations_and_velocity_products(n);
   // A point mass at one metre: torque = m (ddq + g cos q).
   constexpr double kGravitySquared = 9.81 * 9.81;
   const double sum = mean_square(motion, inputs) * static_cast<double>(motion.size());
   const double weight = 1.0 / (factors * (kGravitySquared + sum));
-  Kernel out =
-      renamed(with_start(linear(motion), motion.size(), kGravitySquared * weight, weight), "gip");
+  std::vector<double> squares(joints.size(), 1.0);  // cos^2 + sin^2 is 1 as it is
   for (int j = 0; j < n; ++j) {
-    const FeatureMap position = joint_position(joints, j);
-    // cos^2 + sin^2 is 1 as it is.
-    const bool turns = joints[static_cast<std::size_t>(j)] == JointKind::kRevolute;
-    const double square = turns ? 1.0 : mean_square(position, inputs);
-    for (const double share : {kFirst, kSecond}) {
-      out = out * renamed(with_start(linear(position, Offset::kUnit), position.size(), 1.0,
-                                     share / square),
-                          "gip");
+    const auto at = static_cast<std::size_t>(j);
+    if (joints[at] == JointKind::kPrismatic) {
+      squares[at] = mean_square(joint_position(joints, j), inputs);
     }
   }
-  return out;
+  return renamed(with_start(linear(motion), motion.size(), kGravitySquared * weight, weight) *
+                     position_factors(joints, kFirst, kSecond, squares),
+                 "gip");
 }
 
 Kernel joint_friction(int joints, int joint, double transition_velocity) {

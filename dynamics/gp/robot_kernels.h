@@ -16,6 +16,11 @@ using JointKinds = std::vector<JointKind>;
 /// (ddq_i), (dq_i dq_j with i <= j): what a rigid body's torque is linear in beside gravity.
 [[nodiscard]] FeatureMap accelerations_and_velocity_products(int joints);
 
+/// For every joint the product of two linear kernels of its position with offset 1; their weights
+/// start at `first` and `second` over the joint's mean square.
+[[nodiscard]] Kernel position_factors(const JointKinds& joints, double first, double second,
+                                      const std::vector<double>& mean_squares);
+
 /// Geometrically inspired polynomial kernel (Dalla Libera and Carli 2020, arXiv 1904.13317,
 /// section IV) of one joint's torque: a linear kernel with offset in the accelerations and velocity
 /// products, times, for every joint, a multiplicative polynomial of degree 2 in its position. Each

@@ -45,6 +45,7 @@ std::vector<Case> all_kernels() {
       {"scaled sum in a product", 2.0 * (rbf(columns({0})) + constant()) * linear(columns({1})), 2},
       {"features", feature_kernel(first_columns(3), root * root.transpose()), 3},
       {"angles", linear(joined(angle(0), friction(1, 0.3))), 2},
+      {"positions", position_factors(kTwoTurnsOneSlide, 1.0, 0.1, {1.0, 0.3, 1.0}), 3},
       {"gip", gip(kTwoTurnsOneSlide) + joint_friction(3, 1), 9},
       {"semi-parametric",
        semi_parametric(first_columns(3), root * root.transpose(), first_columns(2)), 3},
@@ -147,7 +148,7 @@ TEST(Kernel, FeaturesGiveTheSameCovariance) {
     }
     ++checked;
   }
-  EXPECT_EQ(checked, 9);
+  EXPECT_EQ(checked, 10);
 }
 
 // The definition, written down once more without a single shared line.
