@@ -11,7 +11,7 @@
 #include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/gp/sparse.h"
-#include "dynamics/identify/torque_terms.h"
+#include "dynamics/identify/model_features.h"
 
 namespace kinescope::models {
 namespace {
@@ -23,12 +23,6 @@ constexpr double kNoiseStart = 1e-3;
 // Predictions that bands are read from: neighbours in time say the same.
 constexpr Eigen::Index kBandRows = 3000;
 
-Matrix inputs_of(const Matrix& q, const Matrix& dq, const Matrix& ddq) {
-  Matrix inputs(q.rows(), 3 * q.cols());
-  inputs << q, dq, ddq;
-  return inputs;
-}
-
 gp::JointKinds kinds_of(const RigidModel& rigid) {
   gp::JointKinds kinds;
   for (const RigidBody& body : rigid.bodies) {
@@ -38,53 +32,13 @@ gp::JointKinds kinds_of(const RigidModel& rigid) {
   return kinds;
 }
 
-// The independent columns of one joint's torque in the parametric model.
-struct ModelFeatures {
-  gp::FeatureMap map;
-  Matrix prior;  ///< covariance of their weights: each feature may explain the whole torque
-};
-
-ModelFeatures model_features(const DynamicModel& model, const TorqueSamples& samples, int joint,
-                             const DriveTerms& drives) {
-  const auto rigid = std::make_shared<const RigidModel>(make_rigid_model(model));
-  const auto terms = std::make_shared<const std::vector<TorqueTerm>>(torque_terms(*rigid, drives));
-  const auto at = static_cast<std::size_t>(joint);
-  const Matrix columns =
-      term_columns(*rigid, drives, *terms, samples.q, samples.dq, samples.ddq)[at];
-  std::vector<int> order(static_cast<std::size_t>(columns.cols()));
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  constexpr double kIndependent = 1e-7;  // relative to the largest pivot
-  const ColumnBasis basis = independent_columns(columns, order, kIndependent);
-  ModelFeatures out;
-  out.prior = Matrix::Zero(static_cast<Eigen::Index>(basis.kept.size()),
-                           static_cast<Eigen::Index>(basis.kept.size()));
-  for (std::size_t k = 0; k < basis.kept.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    const double square =
-        columns.col(basis.kept[k]).squaredNorm() / static_cast<double>(columns.rows());
-    out.prior(i, i) = 1.0 / square;
-    out.map.names.push_back((*terms)[static_cast<std::size_t>(basis.kept[k])].name);
-  }
-  const int n = static_cast<int>(samples.joints());
-  out.map.input_columns = 3 * n;
-  out.map.map = [rigid, terms, drives, at, n, kept = basis.kept](gp::Inputs inputs,
-                                                                 gp::Features features) {
-    const auto all = term_columns(*rigid, drives, *terms, inputs.leftCols(n),
-                                  inputs.middleCols(n, n), inputs.rightCols(n));
-    for (std::size_t k = 0; k < kept.size(); ++k) {
-      features.col(static_cast<Eigen::Index>(k)) = all[at].col(kept[k]);
-    }
-  };
-  return out;
-}
-
 gp::Kernel kernel_of_joint(TorqueModelKind kind, const DynamicModel& model,
                            const gp::JointKinds& joints, const TorqueSamples& samples, int joint,
                            const DriveTerms& drives) {
   const int n = static_cast<int>(joints.size());
   if (kind == TorqueModelKind::kRbf) return gp::rbf(gp::first_columns(3 * n));
   if (kind == TorqueModelKind::kGip) {
-    return gp::gip(joints, inputs_of(samples.q, samples.dq, samples.ddq)) +
+    return gp::gip(joints, motion_inputs(samples.q, samples.dq, samples.ddq)) +
            gp::joint_friction(n, joint, drives.coulomb_width_rad_s);
   }
   const ModelFeatures features = model_features(model, samples, joint, drives);
@@ -104,19 +58,25 @@ gp::Normalisation common_scale(const gp::Dataset& data) {
   return out;
 }
 
-// The hyperparameters on part of the samples, then the fit on all of them.
+// One process of all joints or one a joint, in their order.
+using Processes = std::vector<gp::FittedGp>;
+
+// The hyperparameters on part of the samples, then the fit on all of them. `known`: a fit of the
+// same kernel on other samples; the search starts there and stays in its mode.
 gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool physical_inputs,
-                    bool sparse, const TorqueModelOptions& options) {
+                    bool sparse, const TorqueModelOptions& options, const gp::FittedGp* known) {
   const gp::Normalisation normalisation = data.targets.cols() > 1 ? common_scale(data)
                                           : physical_inputs       ? gp::standardise_targets(data)
                                                                   : gp::standardise(data);
   const bool several = data.targets.cols() > 1;
-  const gp::GpModel start = gp::make_model(kernel, kNoiseStart, normalisation, several);
+  gp::GpModel start = gp::make_model(kernel, kNoiseStart, normalisation, several);
+  if (known != nullptr) start = gp::with_log_values(start, gp::log_values_of(known->model));
+  const auto few = evenly_chosen(data.samples(), options.hyperparameter_samples);
   gp::EstimateOptions estimate;
-  estimate.starts = options.starts;
+  estimate.starts = known != nullptr ? 1 : options.starts;
+  estimate.samples_for_starts = std::ssize(few) / (known != nullptr ? 1 : 2);
   estimate.seed = options.seed;
   estimate.fit.threads = options.threads;
-  const auto few = evenly_chosen(data.samples(), options.hyperparameter_samples);
   const gp::Estimate found = gp::estimate_hyperparameters(start, gp::subset(data, few), estimate);
   gp::FitOptions fit;
   fit.threads = options.threads;
@@ -127,8 +87,8 @@ gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool phys
   return gp::fit_sparse(found.model, data, inducing, fit);
 }
 
-TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matrix& inputs,
-                               Eigen::Index joints, int threads) {
+TorquePrediction prediction_of(const Processes& fits, const Matrix& inputs, Eigen::Index joints,
+                               int threads) {
   TorquePrediction out;
   out.mean.resize(inputs.rows(), joints);
   out.model_sigma.resize(inputs.rows(), joints);
@@ -147,7 +107,7 @@ TorquePrediction prediction_of(const std::vector<gp::FittedGp>& fits, const Matr
 }
 
 // The options of a fit on part of the samples, for the bands: as dense in time as the fit on all,
-// so that coloured noise looks the same to it, and one start of the search.
+// so that coloured noise looks the same to it.
 TorqueModelOptions for_part(TorqueModelOptions options, double share) {
   const auto part = [&](int count) {
     return std::max(1, static_cast<int>(std::lround(share * static_cast<double>(count))));
@@ -155,8 +115,6 @@ TorqueModelOptions for_part(TorqueModelOptions options, double share) {
   options.samples = part(options.samples);
   options.samples_of_all_joints = part(options.samples_of_all_joints);
   options.hyperparameter_samples = part(options.hyperparameter_samples);
-  options.starts = 1;
-  options.band_folds = 0;
   return options;
 }
 
@@ -175,42 +133,47 @@ FittedTorqueModel calibrated(FittedTorqueModel fitted, const LeftOutTorques& lef
   return fitted;
 }
 
-FittedTorqueModel with_gps(TorqueModelKind kind, int samples, std::vector<gp::FittedGp> fits,
-                           int threads) {
-  FittedTorqueModel out{kind, samples, {}};
-  const auto shared = std::make_shared<const std::vector<gp::FittedGp>>(std::move(fits));
+FittedTorqueModel with_gps(TorqueModelKind kind, Processes fits, int threads) {
+  FittedTorqueModel out{kind, static_cast<int>(fits.front().samples), {}};
+  const auto shared = std::make_shared<const Processes>(std::move(fits));
   out.predict = [shared, threads](const Matrix& q, const Matrix& dq, const Matrix& ddq) {
-    return prediction_of(*shared, inputs_of(q, dq, ddq), q.cols(), threads);
+    return prediction_of(*shared, motion_inputs(q, dq, ddq), q.cols(), threads);
   };
   return out;
 }
 
-FittedTorqueModel fit_processes(TorqueModelKind kind, const DynamicModel& model,
-                                const TorqueSamples& samples, const TorqueModelOptions& options) {
+// `known`: those of other samples, to start from.
+Processes fit_processes(TorqueModelKind kind, const DynamicModel& model,
+                        const TorqueSamples& samples, const TorqueModelOptions& options,
+                        const Processes* known) {
   const gp::JointKinds joints = kinds_of(make_rigid_model(model));
   const int n = static_cast<int>(joints.size());
-  const gp::Dataset all{inputs_of(samples.q, samples.dq, samples.ddq), samples.torque, {}, {}};
+  const gp::Dataset all{motion_inputs(samples.q, samples.dq, samples.ddq), samples.torque, {}, {}};
   const ProcessShare share = share_of(kind, samples.size(), options);
   const auto rows = evenly_chosen(samples.size(), share.samples);
   const gp::Dataset chosen = gp::subset(all, rows);
-  std::vector<gp::FittedGp> fits;
+  const auto known_of = [&](int number) {
+    return known != nullptr ? &(*known)[static_cast<std::size_t>(number)] : nullptr;
+  };
+  Processes fits;
   if (kind == TorqueModelKind::kLip) {
     std::vector<gp::Kernel> friction;
     friction.reserve(joints.size());
     for (int j = 0; j < n; ++j) {
       friction.push_back(gp::joint_friction(n, j, options.identify.drives.coulomb_width_rad_s));
     }
-    fits.push_back(
-        fit_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true, false, options));
+    fits.push_back(fit_gp(gp::lip(joints) + gp::independent_outputs(friction), chosen, true, false,
+                          options, known_of(0)));
   } else {
     for (int j = 0; j < n; ++j) {
       const gp::Dataset one{chosen.inputs, chosen.targets.col(j), {}, {}};
       const gp::Kernel kernel =
           kernel_of_joint(kind, model, joints, samples, j, options.identify.drives);
-      fits.push_back(fit_gp(kernel, one, kind != TorqueModelKind::kRbf, share.sparse, options));
+      fits.push_back(
+          fit_gp(kernel, one, kind != TorqueModelKind::kRbf, share.sparse, options, known_of(j)));
     }
   }
-  return with_gps(kind, static_cast<int>(chosen.samples()), std::move(fits), options.threads);
+  return fits;
 }
 
 }  // namespace
@@ -227,15 +190,18 @@ ProcessShare share_of(TorqueModelKind kind, Eigen::Index samples,
 FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind, const DynamicModel& model,
                                          const TorqueSamples& samples,
                                          const TorqueModelOptions& options) {
-  FittedTorqueModel fitted = fit_processes(kind, model, samples, options);
+  const Processes processes = fit_processes(kind, model, samples, options, nullptr);
+  FittedTorqueModel fitted = with_gps(kind, processes, options.threads);
   const int folds = std::min(options.band_folds, options.process_band_folds);
   if (folds < 2) return fitted;
   const auto all = static_cast<double>(samples.size());
   const auto left = leave_folds_out(
       samples, folds, kBandRows, [&](const TorqueSamples& train, const TorqueSamples& test) {
         const double share = static_cast<double>(train.size()) / all;
-        return fit_processes(kind, model, train, for_part(options, share))
-            .predict(test.q, test.dq, test.ddq);
+        const Processes part =
+            fit_processes(kind, model, train, for_part(options, share), &processes);
+        return prediction_of(part, motion_inputs(test.q, test.dq, test.ddq), test.joints(),
+                             options.threads);
       });
   return left ? calibrated(std::move(fitted), *left) : fitted;
 }

@@ -64,7 +64,8 @@ struct TorqueModelOptions {
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
   int band_folds = 8;  ///< of the parametric model's bands; below 2: the normal distribution's
-  /// The same for Gaussian processes, at most band_folds: each costs a search with one start.
+  /// The same for Gaussian processes, at most band_folds: each costs a search from the optimum of
+  /// all samples.
   int process_band_folds = 5;
   int threads = 0;                     ///< 0: all of the machine; never changes a result
   std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
