@@ -12,7 +12,10 @@
 namespace kinescope {
 namespace {
 
-constexpr double kUnitTolerance = 0.05;
+// A slide's scale may be the tags' size; a hinge's cannot, and is an effect of the robot unless no
+// gear is so wrong.
+constexpr double kSlideTolerance = 0.05;
+constexpr double kHingeTolerance = 0.25;
 constexpr double kClearSigmas = 4.0;
 
 bool has_answer(const Structure& structure) {
@@ -41,8 +44,10 @@ void check_scale(const Recording& recording, const StructureJoint& joint) {
   const auto ratio = times_as_far(joint.type, declared->second, term.scale);
   if (!ratio) return;
   const double off = std::abs(*ratio - 1.0);
-  if (off < kUnitTolerance || off < kClearSigmas * term.scale_sigma) return;
   const bool slides = joint.type == JointType::kPrismatic;
+  if (off < (slides ? kSlideTolerance : kHingeTolerance) || off < kClearSigmas * term.scale_sigma) {
+    return;
+  }
   throw undetermined(
       settings_file(recording),
       fmt::format("the channel '{}', declared in {}, moves its joint {:.3g} times as far", channel,
@@ -73,6 +78,12 @@ Error not_seen(const Recording& recording, TagId id) {
 }
 
 }  // namespace
+
+bool is_declared_in_si(const Recording& recording, const Joint& joint) {
+  const auto declared = recording.settings.units.find(joint.channel);
+  return declared != recording.settings.units.end() &&
+         times_as_far(joint.type, declared->second, joint.scale).has_value();
+}
 
 void require_declared_units(const Recording& recording, const Structure& structure) {
   if (!has_answer(structure)) return;

@@ -8,9 +8,14 @@
 
 namespace kinescope {
 
+/// True when the joint's channel is declared in rad, deg, m or mm, as suits the joint: its readings
+/// are rad or m, and what the joint does beyond them is an effect.
+[[nodiscard]] bool is_declared_in_si(const Recording& recording, const Joint& joint);
+
 /// Throws undetermined when a channel that is declared in rad, deg, m or mm moves a joint of that
-/// kind clearly (5 % and four standard deviations) more or less far than it says. A turning
-/// channel that slides a joint, or the other way round, has a scale of its own.
+/// kind clearly (four standard deviations, and 5 % of a slide, 25 % of a turn) more or less far
+/// than it says. A turning channel that slides a joint, or the other way round, has a scale of its
+/// own.
 void require_declared_units(const Recording& recording, const Structure& structure);
 
 /// Throws undetermined when one of the `fixed_tags` moves, and bad_input when one is not seen

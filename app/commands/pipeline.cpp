@@ -229,7 +229,7 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   start.tree.name = recording.settings.name;
   for (std::size_t j = 0; j < start.tree.joints.size(); ++j) {
     Joint& joint = start.tree.joints[j];
-    joint.scale = nearest_unit(joint.type, joint.scale);
+    joint.scale = is_declared_in_si(recording, joint) ? 1.0 : nearest_unit(joint.type, joint.scale);
     joint.couplings = couplings_by_design(structure.joints[j], recording.log);
   }
   for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);

@@ -67,6 +67,21 @@ TEST(DeclaredUnits, MustBeWhatTheJointMoves) {
   EXPECT_EQ(of_unit("", lift(1.2)), "accepted");
 }
 
+TEST(DeclaredUnits, AHingesScaleIsNoTagsSize) {
+  Structure hinge = lift(1.2);
+  hinge.joints[0].type = JointType::kRevolute;
+  EXPECT_EQ(of_unit("rad", hinge), "accepted") << "an effect of the robot";
+  hinge.joints[0].channel->scale = 0.0175;
+  EXPECT_NE(of_unit("rad", hinge).find("check the unit"), std::string::npos);
+  Joint joint;
+  joint.type = JointType::kRevolute;
+  joint.channel = "lift";
+  joint.scale = 1.2;
+  EXPECT_TRUE(is_declared_in_si(with("deg"), joint));
+  EXPECT_FALSE(is_declared_in_si(with("ticks"), joint));
+  EXPECT_FALSE(is_declared_in_si(with(""), joint));
+}
+
 TEST(DeclaredFixedTags, MustRest) {
   EXPECT_EQ(of_tags({TagId{1}}), "accepted");
   EXPECT_NE(of_tags({TagId{1}, TagId{2}}).find("names 2, but that marker moves with 'lift'"),
