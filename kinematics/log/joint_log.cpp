@@ -2,6 +2,7 @@
 #include "kinematics/log/joint_log.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>

@@ -3,7 +3,10 @@
 // The start against a nominal robot whose axes leave something free: parallel turns, slides alone.
 #include "calib/bundle/place_markers.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
