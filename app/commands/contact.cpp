@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "app/commands/commands.h"
+#include "app/commands/contact_model.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/torque_inputs.h"
 #include "app/commands/torque_stages.h"
 #include "dynamics/contact/momentum_observer.h"
-#include "dynamics/identify/consistent_model.h"
 
 namespace kinescope {
 namespace {
@@ -36,8 +36,8 @@ Eigen::MatrixXd velocities(const TorqueLog& log) {
   return dq;
 }
 
-// The log as it was measured, each trajectory by itself.
-std::vector<TorqueSamples> unfiltered(const TorqueLog& log) {
+// The log as it was measured, each trajectory by itself, without the drives' gains.
+std::vector<TorqueSamples> unfiltered(const TorqueLog& log, const Eigen::VectorXd& gains) {
   const Eigen::MatrixXd dq = velocities(log);
   const std::vector<Eigen::Index> bounds = log.bounds();
   std::vector<TorqueSamples> out;
@@ -51,7 +51,7 @@ std::vector<TorqueSamples> unfiltered(const TorqueLog& log) {
     part.t_s = log.t_s.segment(from, count);
     part.q = log.q.middleRows(from, count);
     part.dq = dq.middleRows(from, count);
-    part.torque = log.torque.middleRows(from, count);
+    part.torque = log.torque.middleRows(from, count) * gains.cwiseInverse().asDiagonal();
     part.trajectory = log.trajectory.segment(from, count);
     part.torque_unit = log.torque_unit;
     out.push_back(std::move(part));
@@ -68,30 +68,6 @@ TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel&
                     "name them with --torque, or log motor currents with --torque-unit A");
   }
   return log;
-}
-
-// The masses of the URDF, or those that the log to learn from shows.
-RigidBalance make_balance(const ContactCommandOptions& options, const DynamicModel& model,
-                          ContactSummary& summary) {
-  const auto& learn = options.learn_logs.empty() ? options.logs : options.learn_logs;
-  if (has_masses(model) && !options.identify) {
-    summary.model = "those of " + options.robot.filename().string();
-    return RigidBalance(make_rigid_model(model), friction_of(model));
-  }
-  const TorqueData data = read_torque_data(learn, wanted_joints(model.tree), options.data);
-  const Identification found = identify_dynamics(model, data.samples);
-  const ConsistentModel consistent = consistent_model(found);
-  summary.model =
-      fmt::format("identified from {} samples of {}", data.samples.size(), file_list(learn));
-  std::vector<DriveFriction> friction = friction_of(consistent.model);
-  for (std::size_t k = 0; k < found.terms.size(); ++k) {
-    const TorqueTerm& term = found.terms[k];
-    if (term.kind == TermKind::kOffset) {
-      friction[static_cast<std::size_t>(term.index)].offset =
-          consistent.terms[static_cast<Eigen::Index>(k)];
-    }
-  }
-  return RigidBalance(make_rigid_model(consistent.model), friction);
 }
 
 // What contact detection looks at: the trajectories of a log on one clock.
@@ -117,18 +93,30 @@ OneClock apart(const std::vector<TorqueSamples>& parts, double guard_s) {
   return {t_s, trajectory, {.least_gap_s = gap_s, .gap_s = gap_s}};
 }
 
-LogBalance balance_of(const RigidBalance& balance, const TorqueLog& log, double guard_s) {
-  const std::vector<TorqueSamples> parts = unfiltered(log);
+LogBalance balance_of(const ContactModel& model, const TorqueLog& log, double guard_s) {
+  const std::vector<TorqueSamples> parts = unfiltered(log, model.gains);
   LogBalance out;
   out.clock = {apart(parts, guard_s), log.trajectory_names};
   for (const TorqueSamples& part : parts) {
-    const std::vector<BalanceSample> samples = balance_samples(balance, part);
+    const std::vector<BalanceSample> samples = balance_samples(model.balance, part);
     out.samples.insert(out.samples.end(), samples.begin(), samples.end());
   }
   for (std::size_t i = 0; i < out.samples.size(); ++i) {
     out.samples[i].stamp_s = out.clock.clock.time_s()[static_cast<Eigen::Index>(i)];
   }
   return out;
+}
+
+// External torques and their noise as the log would show them.
+void apply_gains(const Eigen::VectorXd& gains, ContactSummary& summary) {
+  for (ContactEvent& event : summary.events) {
+    event.torque = event.torque.cwiseProduct(gains);
+    event.torque_covariance = gains.asDiagonal() * event.torque_covariance * gains.asDiagonal();
+  }
+  summary.external_torque = gains.asDiagonal() * summary.external_torque;
+  BalanceNoise& noise = summary.calibration.noise;
+  noise.torque_sigma = noise.torque_sigma.cwiseProduct(gains);
+  noise.model_sigma = noise.model_sigma.cwiseProduct(gains);
 }
 
 void print_result(const ContactSummary& summary, const OutputFolder& folder,
@@ -158,27 +146,28 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.types = robot.types;
   summary.links = robot.links;
   const TorqueLogReport log = read_log(options.logs, model, options.data);
-  summary.findings = log.findings;
-  summary.torque_unit = log.log.torque_unit;
-
-  const RigidBalance balance = make_balance(options, model, summary);
   const bool learn_apart = !options.learn_logs.empty();
+  const TorqueLogReport learn =
+      learn_apart ? read_log(options.learn_logs, model, options.data) : log;
+  summary.torque_unit = log.log.torque_unit;
   summary.learned = learn_apart ? file_list(options.learn_logs) : "the log itself";
+  const ContactModel expected = make_contact_model(options, model, log, learn);
+  summary.model = expected.words;
+  summary.findings = log.findings;
+  summary.findings.insert(summary.findings.begin(), expected.findings.begin(),
+                          expected.findings.end());
+
   ContactOptions contact = options.contact;
   for (const RigidBody& body : make_rigid_model(model).bodies) {
     contact.parents.push_back(body.parent);
   }
-  const LogBalance looked_at = balance_of(balance, log.log, contact.guard_s);
+  const LogBalance looked_at = balance_of(expected, log.log, contact.guard_s);
+  const LogBalance learned =
+      learn_apart ? balance_of(expected, learn.log, contact.guard_s) : looked_at;
   const std::vector<BalanceSample>& samples = looked_at.samples;
-  summary.clock = summary.learn_clock = looked_at.clock;
-  if (learn_apart) {
-    const TorqueLogReport learn = read_log(options.learn_logs, model, options.data);
-    const LogBalance learned = balance_of(balance, learn.log, contact.guard_s);
-    summary.learn_clock = learned.clock;
-    summary.calibration = calibrate_contacts(learned.samples, contact);
-  } else {
-    summary.calibration = calibrate_contacts(samples, contact);
-  }
+  summary.clock = looked_at.clock;
+  summary.learn_clock = learned.clock;
+  summary.calibration = calibrate_contacts(learned.samples, contact);
 
   summary.events = detect_contacts(summary.calibration, samples);
   std::vector<TimeSpan> spans;
@@ -187,6 +176,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.check = check_false_alarms(summary.calibration, samples, spans);
   summary.external_torque = observe_momentum(samples, kObserverGain);
   summary.t_s = summary.clock.clock.time_s();
+  apply_gains(expected.gains, summary);
 
   folder.write("contacts.csv", contacts_csv(summary));
   folder.write("contacts.json", contact_json(summary).dump(1) + "\n");

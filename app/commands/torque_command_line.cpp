@@ -175,7 +175,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
             "Logs of free motion to learn the noise from (default: the log itself)", false);
   command.add_flag("--identify", contact.identify,
                    "Masses and friction from the log to learn from (always so where the URDF has "
-                   "none)");
+                   "none, or the log holds currents)");
   command
       .add_option("--false-alarms", contact.contact.false_alarms_per_hour,
                   "False alarms an hour that are allowed")

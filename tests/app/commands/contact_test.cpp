@@ -19,9 +19,9 @@ class ContactCommand : public testing::Test {
   ContactCommand() {
     const DynamicModel model = contact_arm(3);
     Rng rng = Rng::from_name("contact command");
-    const ContactWorld free = contact_world(model, {.duration_s = 10.0}, rng);
+    free_ = contact_world(model, {.duration_s = 10.0}, rng);
     touched_ = contact_world(model, {.duration_s = 8.0, .contacts = 3}, rng);
-    folder_.write("free.csv", torque_log_csv(free.samples))
+    folder_.write("free.csv", torque_log_csv(free_.samples))
         .write("log.csv", torque_log_csv(touched_.samples))
         .write("robot.urdf", write_urdf(model));
   }
@@ -36,8 +36,18 @@ class ContactCommand : public testing::Test {
   }
 
   RecordingFolder folder_;
-  ContactWorld touched_;
+  ContactWorld free_, touched_;
 };
+
+/// The same with motor currents in place of torques.
+std::string currents(TorqueSamples samples) {
+  samples.torque = samples.torque * Eigen::Vector3d(0.1, 0.08, 0.13).asDiagonal();
+  std::string text = torque_log_csv(samples);
+  for (std::size_t at = text.find("tau"); at != std::string::npos; at = text.find("tau", at)) {
+    text.replace(at, 3, "i");
+  }
+  return text;
+}
 
 TEST_F(ContactCommand, FindsEveryContactAndInventsNone) {
   const Outcome outcome = run(words({"--learn", path("free.csv")}));
@@ -83,6 +93,34 @@ TEST_F(ContactCommand, EveryLogHasAClockOfItsOwn) {
   EXPECT_NE(page.find("again.csv from "), std::string::npos);
   const ProductCheck check = check_products(folder_.path() / "out");
   EXPECT_TRUE(check.passed || !check.done) << check.words;
+}
+
+TEST_F(ContactCommand, CurrentsAreNotHeldAgainstMasses) {
+  folder_.write("free.csv", currents(free_.samples)).write("log.csv", currents(touched_.samples));
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("3 contacts")) << outcome.out;
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/contacts.json"));
+  EXPECT_EQ(document.at("unit"), "A");
+  EXPECT_TRUE(document.at("model").get<std::string>().starts_with("identified"));
+  folder_.write("free.csv", torque_log_csv(free_.samples));
+  expect_refusal(words({"--learn", path("free.csv")}), ExitCode::kBadInput, "is in Nm");
+}
+
+TEST_F(ContactCommand, TorquesThatAreNotTheMassesAreRefused) {
+  TorqueSamples turned = touched_.samples;
+  turned.torque *= -1.0;
+  folder_.write("log.csv", torque_log_csv(turned));
+  expect_refusal(words(), ExitCode::kBadInput, "other sign");
+}
+
+TEST_F(ContactCommand, AnOffsetOfASensorIsNoContact) {
+  TorqueSamples shifted = touched_.samples;
+  shifted.torque.col(0).array() += 20.0;  // N m
+  folder_.write("log.csv", torque_log_csv(shifted));
+  const Outcome outcome = run(words());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("3 contacts")) << outcome.out;
 }
 
 TEST_F(ContactCommand, RefusesWhatCannotBe) {
