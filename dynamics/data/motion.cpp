@@ -210,8 +210,20 @@ class MotionDeriver {
       filter_butterworth(begin, end, part);
     else
       filter_spline(begin, end, part);
+    hold_still(begin, end, part);
     out_.samples.trajectory_names.push_back(name);
     parts.push_back(std::move(part));
+  }
+
+  /// A joint that holds its position is at rest exactly: rounding is no motion.
+  void hold_still(Eigen::Index begin, Eigen::Index end, Filtered& part) const {
+    for (Eigen::Index j = 0; j < log_.q.cols(); ++j) {
+      const auto q = log_.q.col(j).segment(begin, end - begin);
+      if (q.minCoeff() != q.maxCoeff()) continue;
+      part.q.col(j).setConstant(q[0]);
+      part.dq.col(j).setZero();
+      part.ddq.col(j).setZero();
+    }
   }
 
   /// One factorisation for all signals.

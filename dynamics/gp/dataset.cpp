@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/gp/dataset.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -26,8 +27,12 @@ Spread spread_of(const Eigen::MatrixXd& values) {
       ((values.rowwise() - out.mean).colwise().squaredNorm() / static_cast<double>(values.rows()))
           .cwiseSqrt();
   for (Eigen::Index k = 0; k < out.deviation.size(); ++k) {
-    // A constant column has a deviation of a few roundings.
-    if (!(out.deviation[k] > 1e-12 * std::abs(out.mean[k]))) out.deviation[k] = 1.0;
+    // A constant column has a deviation of a few roundings; so have the rates of a joint at rest,
+    // whose mean is none either (rad, m, N m per s or s^2).
+    constexpr double kRounding = 1e-9;
+    if (!(out.deviation[k] > std::max(kRounding, 1e-12 * std::abs(out.mean[k])))) {
+      out.deviation[k] = 1.0;
+    }
   }
   return out;
 }

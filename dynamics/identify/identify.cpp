@@ -10,6 +10,7 @@
 #include "dynamics/identify/block_jackknife.h"
 #include "dynamics/identify/gain_system.h"
 #include "dynamics/identify/prediction.h"
+#include "dynamics/identify/term_size.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
@@ -200,8 +201,10 @@ Identification identify_dynamics(const DynamicModel& model, const TorqueSamples&
     out.names.push_back(combination_name(out.basis.regroup.row(static_cast<Eigen::Index>(k)), names,
                                          out.basis.kept[k]));
   }
-  for (const Eigen::MatrixXd& all :
-       term_columns(out.rigid, options.drives, kept, rows.q, rows.dq, rows.ddq)) {
+  std::vector<Eigen::MatrixXd> columns =
+      term_columns(out.rigid, options.drives, kept, rows.q, rows.dq, rows.ddq);
+  identify::clear_columns_at_rest(identify::usual_sizes(out.rigid, options.drives, kept), columns);
+  for (const Eigen::MatrixXd& all : columns) {
     system.joints.push_back(identify::compact_columns(all));
   }
   system.parameters = count;

@@ -27,7 +27,7 @@ struct TorquePrediction {
                                                   const Eigen::MatrixXd& ddq);
 
 /// nMSE of each column: mean squared error over the variance of the measured values, per cent.
-/// Entries of weight 0 do not count; `weights` empty is 1 everywhere. Infinite where the measured
+/// Entries of weight 0 do not count; `weights` empty is 1 everywhere. NaN where the measured
 /// values are constant.
 [[nodiscard]] Eigen::VectorXd normalised_error_percent(const Eigen::MatrixXd& measured,
                                                        const Eigen::MatrixXd& predicted,

@@ -39,8 +39,9 @@ class Standardised {
   static Eigen::RowVectorXd spread(const Eigen::MatrixXd& centred) {
     Eigen::RowVectorXd out =
         (centred.colwise().squaredNorm() / static_cast<double>(centred.rows())).cwiseSqrt();
-    // A column that does not vary stays as it is.
-    for (double& s : out) s = s > 0.0 ? s : 1.0;
+    // A column that varies by rounding only (rad, m, N m and their rates) stays as it is.
+    constexpr double kRounding = 1e-6;
+    for (double& s : out) s = s > kRounding ? s : 1.0;
     return out;
   }
 

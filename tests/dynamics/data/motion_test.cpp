@@ -117,6 +117,20 @@ TEST(Motion, KeepsTrajectoriesApartAndNamesShortOnes) {
             std::string::npos);
 }
 
+TEST(Motion, AJointThatHoldsStillIsAtRestExactly) {
+  const LogWorld made = make_log_world(usual());
+  TorqueLogReport report = read_checked_log({write_log("still.csv", made.csv())}, made.joints, {});
+  report.log.q.col(1).setConstant(0.3);
+  report.log.dq.resize(report.log.rows(), 0);
+  for (const LowPass filter : {LowPass::kSmoothingSpline, LowPass::kButterworth}) {
+    const TorqueSamples samples = filtered_data(report, {.filter = filter}).samples;
+    EXPECT_TRUE((samples.q.col(1).array() == 0.3).all());
+    EXPECT_TRUE(samples.dq.col(1).isZero(0.0));
+    EXPECT_TRUE(samples.ddq.col(1).isZero(0.0));
+    EXPECT_GT(samples.ddq.col(0).norm(), 0.0);
+  }
+}
+
 TEST(Motion, WithoutAFilterTheRowsAreTheSamples) {
   LogWorld world = make_log_world(usual());
   TorqueDataOptions options;

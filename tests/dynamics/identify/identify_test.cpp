@@ -230,6 +230,30 @@ TEST(Identify, AJointAtRestIsSaidSo) {
   EXPECT_TRUE(std::isinf(prediction.sigma(3, 2)));
 }
 
+TEST(Identify, RoundingIsNoMotion) {
+  Rng rng = Rng::from_name("Identify.RoundingIsNoMotion");
+  const DynamicModel model = random_arm(3, rng);
+  TorqueSamples log = torque_log_of(model, {.noise = 0.01}, rng);
+  constexpr double kRounding = 1e-12;
+  for (Eigen::MatrixXd* m : {&log.q, &log.dq, &log.ddq}) {
+    for (double& value : m->col(2)) value = kRounding * rng.normal();
+  }
+  const Identification fit = identify_dynamics(model, log, {});
+  std::vector<std::string> names;
+  for (const int k : fit.undetermined) names.push_back(fit.names[static_cast<std::size_t>(k)]);
+  for (const char* term : {"viscous(", "coulomb("}) {
+    EXPECT_NE(std::ranges::find(names, term + model.tree.joints[2].name + ")"), names.end());
+  }
+  for (const int k : fit.undetermined) EXPECT_LT(std::abs(fit.parameters[k]), 1e3);
+  // At rest the torque is known all the same; in motion it is not.
+  TorquePrediction prediction = predict_torque(fit, log.q, log.dq, log.ddq);
+  EXPECT_TRUE(prediction.sigma.allFinite());
+  log.dq.col(2).setOnes();
+  prediction = predict_torque(fit, log.q, log.dq, log.ddq);
+  EXPECT_TRUE(std::isinf(prediction.sigma(3, 2)));
+  EXPECT_LT(prediction.mean.cwiseAbs().maxCoeff(), 1e6);
+}
+
 TEST(Identify, RefusesWhatCannotWork) {
   Rng rng = Rng::from_name("Identify.RefusesWhatCannotWork");
   const DynamicModel model = random_arm(3, rng);
@@ -249,6 +273,15 @@ TEST(Identify, RefusesWhatCannotWork) {
   options = {};
   options.drives.coupled_drives = {Eigen::Vector2d(1, 1)};
   EXPECT_THROW(static_cast<void>(identify_dynamics(model, log, options)), Error);
+}
+
+TEST(NormalisedError, AConstantChannelHasNone) {
+  Eigen::MatrixXd measured(4, 2);
+  measured << 1, 0.3, 2, 0.3, 3, 0.3 + 1e-15, 4, 0.3;
+  const Eigen::MatrixXd predicted = measured.array() + 0.5;
+  const Eigen::VectorXd error = normalised_error_percent(measured, predicted);
+  EXPECT_TRUE(std::isfinite(error[0]));
+  EXPECT_TRUE(std::isnan(error[1]));
 }
 
 TEST(NormalisedError, ByHand) {
