@@ -128,15 +128,19 @@ void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const Dynami
   }
 }
 
+// The least mean error; where no joint's torque varies, the first that could be fitted.
 int best_of(const std::vector<TorqueScore>& scores) {
-  int best = 0;
+  int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < scores.size(); ++k) {
-    if (!scores[k].failure.empty() || !(scores[k].nmse_percent.mean() < least)) continue;
-    least = scores[k].nmse_percent.mean();
+    if (!scores[k].failure.empty()) continue;
+    if (best < 0) best = static_cast<int>(k);
+    const double error = mean_nmse_percent(scores[k]);
+    if (!(error < least)) continue;
+    least = error;
     best = static_cast<int>(k);
   }
-  return best;
+  return std::max(best, 0);
 }
 
 // Every model on the held-out samples; the best one's prediction is kept.
@@ -187,7 +191,9 @@ void print_scores(const TorqueSummary& summary) {
       continue;
     }
     fmt::print("{:<16} {:>8}", to_string(score.kind), score.training_samples);
-    for (const double nmse : score.nmse_percent) fmt::print(" {:>10.3g}", nmse);
+    for (const double nmse : score.nmse_percent) {
+      fmt::print(" {:>10}", std::isfinite(nmse) ? fmt::format("{:.3g}", nmse) : "-");
+    }
     fmt::print("\n");
   }
 }

@@ -183,6 +183,12 @@ json payload_json(const TorqueSummary& summary) {
           {"at_rest", payload.at_rest ? estimate_json(*payload.at_rest, summary.joints) : json()}};
 }
 
+json best_model(const TorqueSummary& summary) {
+  if (summary.scores.empty()) return {};
+  const TorqueScore& best = summary.scores[static_cast<std::size_t>(summary.best)];
+  return std::isfinite(mean_nmse_percent(best)) ? json(to_string(best.kind)) : json();
+}
+
 }  // namespace
 
 json torque_json(const TorqueSummary& summary) {
@@ -190,32 +196,29 @@ json torque_json(const TorqueSummary& summary) {
   for (std::size_t j = 0; j < summary.joints.size(); ++j) {
     joints.push_back({{"name", text(summary.joints[j])}, {"type", to_string(summary.types[j])}});
   }
-  return {
-      {"schema", "kinescope.dynamics"},
-      {"schema_version", 1},
-      {"robot", text(summary.robot)},
-      {"version", text(summary.version)},
-      {"unit", text(summary.train.torque_unit)},
-      {"joints", joints},
-      {"gravity_m_s2", numbers(summary.gravity_m_s2)},
-      {"gravity_declared", summary.gravity_declared},
-      {"traced_gravity_m_s2",
-       summary.traced_gravity_m_s2 ? numbers(*summary.traced_gravity_m_s2) : json()},
-      {"data", data_json(summary)},
-      {"models", scores_json(summary.scores)},
-      {"best", summary.scores.empty()
-                   ? json()
-                   : json(to_string(summary.scores[static_cast<std::size_t>(summary.best)].kind))},
-      {"learning", learning_json(summary.learning)},
-      {"parameters", parameters_json(summary.identification)},
-      {"noise_sigma", numbers(summary.identification.sigma)},
-      {"correlation_samples", number(summary.identification.correlation_samples)},
-      {"drives", drives_json(summary.drives)},
-      {"robust", robust_json(summary.robust)},
-      {"payload", payload_json(summary)},
-      {"consistent", consistent_json(summary.consistent)},
-      {"trace", summary.trace ? trace_json(*summary.trace) : json(nullptr)},
-      {"warnings", report::texts(summary.warnings)}};
+  return {{"schema", "kinescope.dynamics"},
+          {"schema_version", 1},
+          {"robot", text(summary.robot)},
+          {"version", text(summary.version)},
+          {"unit", text(summary.train.torque_unit)},
+          {"joints", joints},
+          {"gravity_m_s2", numbers(summary.gravity_m_s2)},
+          {"gravity_declared", summary.gravity_declared},
+          {"traced_gravity_m_s2",
+           summary.traced_gravity_m_s2 ? numbers(*summary.traced_gravity_m_s2) : json()},
+          {"data", data_json(summary)},
+          {"models", scores_json(summary.scores)},
+          {"best", best_model(summary)},
+          {"learning", learning_json(summary.learning)},
+          {"parameters", parameters_json(summary.identification)},
+          {"noise_sigma", numbers(summary.identification.sigma)},
+          {"correlation_samples", number(summary.identification.correlation_samples)},
+          {"drives", drives_json(summary.drives)},
+          {"robust", robust_json(summary.robust)},
+          {"payload", payload_json(summary)},
+          {"consistent", consistent_json(summary.consistent)},
+          {"trace", summary.trace ? trace_json(*summary.trace) : json(nullptr)},
+          {"warnings", report::texts(summary.warnings)}};
 }
 
 }  // namespace kinescope

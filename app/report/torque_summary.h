@@ -88,6 +88,9 @@ struct TorqueSummary {
   std::vector<std::string> warnings;
 };
 
+/// Mean over the joints whose torque varies; NaN where none does.
+[[nodiscard]] double mean_nmse_percent(const TorqueScore& score);
+
 /// dynamics.json: schema "kinescope.dynamics". Arrays beside `joints` hold one entry a joint.
 /// Numbers that are not known are null. Torques in `unit`, everything else SI.
 ///
@@ -97,7 +100,7 @@ struct TorqueSummary {
 ///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
 ///             place, what, remedy]
 ///   models    [model, samples, nmse_percent, rms, coverage_90, coverage_95, failure]
-///   best      name of the model with the smallest mean nMSE
+///   best      name of the model with the smallest mean nMSE; null where there is none
 ///   learning  [model, points [samples, nmse_percent]]
 ///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
 ///   drives    [term, joint, value, sigma]

@@ -37,10 +37,28 @@ const TorqueScore* score_of(const TorqueSummary& summary, TorqueModelKind kind) 
   return nullptr;
 }
 
+// Of those whose torque varies.
 Eigen::Index worst_joint(const TorqueScore& score) {
-  Eigen::Index worst = 0;
-  score.nmse_percent.maxCoeff(&worst);
+  Eigen::Index worst = -1;
+  for (Eigen::Index j = 0; j < score.nmse_percent.size(); ++j) {
+    if (!std::isfinite(score.nmse_percent[j])) continue;
+    if (worst < 0 || score.nmse_percent[j] > score.nmse_percent[worst]) worst = j;
+  }
   return worst;
+}
+
+// A choice among several is itself made on the test.
+std::string choice_words(const TorqueSummary& summary) {
+  const auto fitted = std::ranges::count_if(
+      summary.scores, [](const TorqueScore& score) { return score.failure.empty(); });
+  return fitted > 1 ? fmt::format(", the best of {} on this test,", fitted) : "";
+}
+
+std::string joints_words(const TorqueScore& score) {
+  const auto varying = score.nmse_percent.array().isFinite().count();
+  if (varying == score.nmse_percent.size()) return "the joints";
+  return fmt::format("the {} of {} joints whose torque varies there", varying,
+                     score.nmse_percent.size());
 }
 
 // Masses to the place of two digits of half their interval.
@@ -103,6 +121,13 @@ std::string gravity_words(const TorqueSummary& summary) {
 
 }  // namespace
 
+double mean_nmse_percent(const TorqueScore& score) {
+  const auto varies = score.nmse_percent.array().isFinite();
+  const auto count = varies.count();
+  if (count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return varies.select(score.nmse_percent.array(), 0.0).sum() / static_cast<double>(count);
+}
+
 TorqueVerdict torque_verdict(const TorqueSummary& summary) {
   TorqueVerdict out;
   if (summary.payload) out.payload = payload_words(*summary.payload);
@@ -119,15 +144,21 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
     return out;
   }
   const Eigen::Index worst = worst_joint(best);
+  if (worst < 0) {
+    out.accurate =
+        fmt::format("On {} no joint's torque varies: it judges no model.", summary.split);
+    return out;
+  }
   out.accurate = fmt::format(
-      "On {} the {} model leaves {} of the torque's variance unexplained (mean over the joints; "
-      "worst {} with {}).",
-      summary.split, name_of(best.kind), percent(best.nmse_percent.mean()),
-      summary.joints[static_cast<std::size_t>(worst)], percent(best.nmse_percent[worst]));
+      "On {} the {} model{} leaves {} of the torque's variance unexplained (mean over {}; worst "
+      "{} with {}).",
+      summary.split, name_of(best.kind), choice_words(summary), percent(mean_nmse_percent(best)),
+      joints_words(best), summary.joints[static_cast<std::size_t>(worst)],
+      percent(best.nmse_percent[worst]));
   const TorqueScore* parametric = score_of(summary, TorqueModelKind::kParametric);
   if (parametric != nullptr && best.kind != TorqueModelKind::kParametric) {
     out.accurate +=
-        fmt::format(" The parametric model leaves {}.", percent(parametric->nmse_percent.mean()));
+        fmt::format(" The parametric model leaves {}.", percent(mean_nmse_percent(*parametric)));
   }
   if (best.nmse_percent[worst] > kPoor) {
     const auto at = static_cast<std::size_t>(worst);

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope dynamics` as a user meets it: results, products, refusals.
+#include <limits>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "app/report/torque_summary.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
@@ -151,6 +154,30 @@ TEST_F(DynamicsCommand, GravityThatNobodyDeclaredIsSaid) {
   EXPECT_NE(silent.out.find("Nothing was declared about gravity"), std::string::npos) << silent.out;
   const Outcome declared = run(words({"--no-trace", "--no-robust", "--gravity=0,0,-9.81"}));
   EXPECT_EQ(declared.out.find("Nothing was declared"), std::string::npos) << declared.out;
+}
+
+TEST(TorqueVerdictWords, AConstantChannelJudgesNoModel) {
+  TorqueSummary summary;
+  summary.joints = {"turn", "slide"};
+  summary.types = {JointType::kRevolute, JointType::kPrismatic};
+  summary.split = "a test";
+  summary.identification.sigma = Eigen::Vector2d(0.1, 0.1);
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  for (const double error : {2.0, 1.0}) {
+    TorqueScore score;
+    score.nmse_percent = Eigen::Vector2d(none, error);
+    score.rms = Eigen::Vector2d(0.1, 0.1);
+    score.coverage_95 = Eigen::Vector2d(0.95, 0.95);
+    summary.scores.push_back(score);
+  }
+  summary.best = 1;
+  EXPECT_EQ(mean_nmse_percent(summary.scores[1]), 1.0);
+  const std::string words = torque_verdict(summary).accurate;
+  EXPECT_NE(words.find("the best of 2 on this test"), std::string::npos) << words;
+  EXPECT_NE(words.find("the 1 of 2 joints"), std::string::npos) << words;
+  EXPECT_NE(words.find("worst slide with 1 %"), std::string::npos) << words;
+  for (TorqueScore& score : summary.scores) score.nmse_percent.setConstant(none);
+  EXPECT_NE(torque_verdict(summary).accurate.find("judges no model"), std::string::npos);
 }
 
 }  // namespace
