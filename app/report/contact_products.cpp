@@ -107,7 +107,6 @@ json contact_json(const ContactSummary& summary) {
           {"calibration", calibration_json(summary.calibration, summary.learn_clock)},
           {"check",
            {{"hours", number(summary.check.hours)},
-            {"alarms", summary.check.alarms},
             {"extrapolated_per_hour", number(summary.check.extrapolated_per_hour)}}},
           {"contacts", events}};
 }

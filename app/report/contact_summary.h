@@ -60,7 +60,7 @@ struct ContactSummary {
 ///   calibration  declared_per_hour, thresholds, exposure_s, excluded [trajectory, begin_s, end_s],
 ///   noise
 ///                {velocity_sigma, torque_sigma, model_sigma, model_time_s}
-///   check        hours, alarms, extrapolated_per_hour
+///   check        hours, extrapolated_per_hour
 ///   contacts     [trajectory, onset_s, end_s, alarm_s, link, probability, open, torque,
 ///                torque_sigma, statistic]
 [[nodiscard]] nlohmann::json contact_json(const ContactSummary& summary);
