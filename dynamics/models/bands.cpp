@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -27,15 +28,20 @@ struct Studentised {
   int fold = 0;
 };
 
-std::vector<Studentised> ascending(const LeftOutTorques& left, Index joint) {
+// Sorted; rows whose sigma is not finite say nothing.
+std::vector<Studentised> ascending(const LeftOutTorques& left, Index joint,
+                                   const Eigen::VectorXd& sigma) {
   std::vector<Studentised> out;
-  for (Index i = 0; i < left.residual.rows(); ++i) {
-    const double value = std::abs(left.residual(i, joint)) / left.sigma(i, joint);
+  for (Index i = 0; i < sigma.size(); ++i) {
+    if (!std::isfinite(sigma[i])) continue;
+    const double value = std::abs(left.residual(i, joint)) / sigma[i];
     if (std::isfinite(value)) out.push_back({value, left.fold[i]});
   }
   std::ranges::sort(out, {}, &Studentised::value);
   return out;
 }
+
+constexpr int kNone = -1;
 
 // The smallest value that `level` of n + 1 exchangeable ones do not exceed; `without`: a fold that
 // does not count.
@@ -61,14 +67,21 @@ double student_over_normal(double normal, double degrees) {
          (5.0 * square * square + 16.0 * square + 3.0) / (96.0 * degrees * degrees);
 }
 
-double width(const std::vector<Studentised>& values, double level, double normal, int folds) {
-  constexpr int kNone = -1;
+// Residuals over the sigma that comes of all folds but one, and the mean logarithm of that sigma
+// over the one of all: a band is a quantile times a sigma.
+struct WithoutFold {
+  std::vector<Studentised> values;
+  double log_scale = 0.0;
+};
+
+double width(const std::vector<Studentised>& values, const std::vector<WithoutFold>& without_folds,
+             double level, double normal) {
   constexpr double kFewestDegrees = 3.0;  // the expansion ends there
   const double all = quantile(values, level, kNone);
   std::vector<double> without;
-  for (int f = 0; f < folds; ++f) {
-    const double left = quantile(values, level, f);
-    if (left > 0.0) without.push_back(std::log(left));
+  for (std::size_t f = 0; f < without_folds.size(); ++f) {
+    const double left = quantile(without_folds[f].values, level, static_cast<int>(f));
+    if (left > 0.0) without.push_back(std::log(left) + without_folds[f].log_scale);
   }
   if (without.size() < 2) return all;
   const auto count = static_cast<double>(without.size());
@@ -108,6 +121,86 @@ Shape likeliest_shape(const Eigen::ArrayXd& squares, const Eigen::ArrayXd& funct
   return best;
 }
 
+struct JointParts {
+  double model_factor = 1.0;
+  double noise_sigma = 0.0;
+
+  [[nodiscard]] Eigen::VectorXd sigma(const Eigen::VectorXd& model_sigma) const {
+    // Not 0 times infinity: a model without any idea stays without.
+    return model_sigma.unaryExpr([this](double s) {
+      return std::isfinite(s) ? std::hypot(model_factor * s, noise_sigma) : s;
+    });
+  }
+};
+
+// `without`: a fold that does not count.
+JointParts parts_of(const LeftOutTorques& left, Index joint, int without) {
+  std::vector<Index> rows;
+  for (Index i = 0; i < left.residual.rows(); ++i) {
+    if (left.fold[i] != without && std::isfinite(left.model_sigma(i, joint))) rows.push_back(i);
+  }
+  if (rows.empty()) return {};
+  const Eigen::ArrayXd squares = left.residual(rows, joint).array().square();
+  const Eigen::ArrayXd function = left.model_sigma(rows, joint).array().square();
+  const double mean = function.mean();
+  // A model that claims to be sure everywhere says nothing about where it errs.
+  const bool varies = mean > 0.0 && std::isfinite(mean);
+  const Shape shape =
+      varies ? likeliest_shape(squares, function / mean) : Shape{0.0, squares.mean()};
+  return {varies ? std::sqrt(shape.scale * shape.share / mean) : 0.0,
+          std::sqrt(shape.scale * (1.0 - shape.share))};
+}
+
+// Of every row, as it comes of all folds but `without`.
+using SigmaOf = std::function<Eigen::VectorXd(Index joint, int without)>;
+
+double mean_log_ratio(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index i = 0; i < a.size(); ++i) {
+    const double one = std::log(a[i] / b[i]);
+    if (!std::isfinite(one)) continue;
+    sum += one;
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+double largest_finite(const Eigen::VectorXd& values) {
+  double largest = 0.0;
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  }
+  return largest;
+}
+
+BandFactors bands_from(const LeftOutTorques& left, const SigmaOf& sigma_of) {
+  const Index joints = left.residual.cols();
+  BandFactors out{Eigen::VectorXd::Constant(joints, kNormal90),
+                  Eigen::VectorXd::Constant(joints, kNormal95),
+                  left.folds,
+                  left.by_trajectory,
+                  Eigen::VectorXi::Zero(joints),
+                  Eigen::VectorXi::Zero(joints),
+                  Eigen::VectorXd::Zero(joints)};
+  for (Index j = 0; j < joints; ++j) {
+    const Eigen::VectorXd sigma = sigma_of(j, kNone);
+    const std::vector<Studentised> values = ascending(left, j, sigma);
+    out.skipped[j] = static_cast<int>(left.residual.rows() - std::ssize(values));
+    out.seen_sigma[j] = largest_finite(left.model_sigma.col(j));
+    if (values.size() < kFewest) continue;
+    std::vector<WithoutFold> without;
+    for (int f = 0; f < left.folds; ++f) {
+      const Eigen::VectorXd other = sigma_of(j, f);
+      without.push_back({ascending(left, j, other), mean_log_ratio(other, sigma)});
+    }
+    out.residuals[j] = static_cast<int>(values.size());
+    out.of_90[j] = width(values, without, 0.90, kNormal90);
+    out.of_95[j] = std::max(out.of_90[j], width(values, without, 0.95, kNormal95));
+  }
+  return out;
+}
+
 }  // namespace
 
 double BandFactors::width_90(Index joint) const {
@@ -121,11 +214,14 @@ double BandFactors::width_95(Index joint) const {
 std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int folds,
                                               Index most_rows, const FoldPredictor& predict) {
   const Index step = most_rows > 0 ? (samples.size() + most_rows - 1) / most_rows : 1;
+  bool by_trajectory = false;
   std::vector<TorqueSamples> tests;
   std::vector<TorquePrediction> predictions;
   Index rows = 0;
   try {
-    for (const Fold& fold : split_folds(samples, {.folds = folds}).folds) {
+    const Folds split = split_folds(samples, {.folds = folds});
+    by_trajectory = split.by_trajectory;
+    for (const Fold& fold : split.folds) {
       std::vector<Index> chosen;
       for (std::size_t k = 0; k < fold.test.size(); k += static_cast<std::size_t>(step)) {
         chosen.push_back(fold.test[k]);
@@ -140,6 +236,7 @@ std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int 
   }
   LeftOutTorques out;
   out.folds = static_cast<int>(tests.size());
+  out.by_trajectory = by_trajectory;
   out.residual.resize(rows, samples.joints());
   out.model_sigma = out.sigma = out.residual;
   out.fold.resize(rows);
@@ -156,16 +253,7 @@ std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int 
 }
 
 BandFactors bands_of(const LeftOutTorques& left) {
-  const Index joints = left.residual.cols();
-  BandFactors out{Eigen::VectorXd::Constant(joints, kNormal90),
-                  Eigen::VectorXd::Constant(joints, kNormal95), left.folds};
-  for (Index j = 0; j < joints; ++j) {
-    const std::vector<Studentised> values = ascending(left, j);
-    if (values.size() < kFewest) continue;
-    out.of_90[j] = width(values, 0.90, kNormal90, left.folds);
-    out.of_95[j] = std::max(out.of_90[j], width(values, 0.95, kNormal95, left.folds));
-  }
-  return out;
+  return bands_from(left, [&](Index joint, int) { return left.sigma.col(joint); });
 }
 
 BandFactors cross_validated_bands(const TorqueSamples& samples, int folds,
@@ -176,27 +264,27 @@ BandFactors cross_validated_bands(const TorqueSamples& samples, int folds,
 
 SigmaParts sigma_parts_of(const LeftOutTorques& left) {
   const Index joints = left.residual.cols();
-  SigmaParts out{Eigen::VectorXd::Ones(joints), Eigen::VectorXd::Zero(joints)};
+  SigmaParts out{Eigen::VectorXd(joints), Eigen::VectorXd(joints)};
   for (Index j = 0; j < joints; ++j) {
-    const Eigen::ArrayXd squares = left.residual.col(j).array().square();
-    const Eigen::ArrayXd function = left.model_sigma.col(j).array().square();
-    const double mean = function.mean();
-    // A model that claims to be sure everywhere says nothing about where it errs.
-    const bool varies = mean > 0.0 && std::isfinite(mean);
-    const Shape shape =
-        varies ? likeliest_shape(squares, function / mean) : Shape{0.0, squares.mean()};
-    out.model_factor[j] = varies ? std::sqrt(shape.scale * shape.share / mean) : 0.0;
-    out.noise_sigma[j] = std::sqrt(shape.scale * (1.0 - shape.share));
+    const JointParts parts = parts_of(left, j, kNone);
+    out.model_factor[j] = parts.model_factor;
+    out.noise_sigma[j] = parts.noise_sigma;
   }
   return out;
 }
 
+CalibratedSigma calibrate(const LeftOutTorques& left) {
+  return {sigma_parts_of(left), bands_from(left, [&](Index joint, int without) {
+            return parts_of(left, joint, without).sigma(left.model_sigma.col(joint));
+          })};
+}
+
 TorquePrediction with_sigma_parts(TorquePrediction prediction, const SigmaParts& parts) {
-  prediction.model_sigma = (prediction.model_sigma * parts.model_factor.asDiagonal()).eval();
   for (Index j = 0; j < prediction.sigma.cols(); ++j) {
-    const double noise = parts.noise_sigma[j];
-    prediction.sigma.col(j) =
-        (prediction.model_sigma.col(j).array().square() + noise * noise).sqrt();
+    const JointParts own{parts.model_factor[j], parts.noise_sigma[j]};
+    prediction.sigma.col(j) = own.sigma(prediction.model_sigma.col(j));
+    prediction.model_sigma.col(j) =
+        JointParts{own.model_factor, 0.0}.sigma(prediction.model_sigma.col(j));
   }
   return prediction;
 }

@@ -26,7 +26,15 @@ namespace kinescope {
 struct BandFactors {
   Eigen::VectorXd of_90;
   Eigen::VectorXd of_95;
-  int folds = 0;  ///< that they come from
+  int folds = 0;               ///< that they come from
+  bool by_trajectory = false;  ///< else blocks, with motion learned from on both sides
+  /// Residuals that they come from, one a joint; 0: too few, and the normal distribution's.
+  Eigen::VectorXi residuals = {};
+  /// Residuals without a finite sigma, which say nothing about its widths; one a joint.
+  Eigen::VectorXi skipped = {};
+  /// Largest model_sigma among the residuals: a model that doubts itself more than that is judged
+  /// by what it never was, and its band is extrapolated. One a joint; empty: not known.
+  Eigen::VectorXd seen_sigma = {};
 
   [[nodiscard]] double width_90(Eigen::Index joint) const;
   [[nodiscard]] double width_95(Eigen::Index joint) const;
@@ -43,6 +51,7 @@ struct LeftOutTorques {
   Eigen::MatrixXd sigma;
   Eigen::VectorXi fold;  ///< of each row
   int folds = 0;
+  bool by_trajectory = false;  ///< the folds are whole trajectories, not blocks
 };
 
 /// At most `folds` fits (dynamics/data/splits.h), and about `most_rows` predictions evenly spread
@@ -51,9 +60,10 @@ struct LeftOutTorques {
                                                             Eigen::Index most_rows,
                                                             const FoldPredictor& predict);
 
-/// Quantiles of |residual| / sigma. Each is widened by what it is in doubt itself, as Student's t
-/// is by the doubt of a sigma: its logarithm's variance by the jackknife over folds (Shao and Wu
-/// 1989: groups, not single values, for quantiles) stands for 1 / (2 degrees of freedom).
+/// Quantiles of |residual| / sigma where sigma is finite. Each is widened by what it is in doubt
+/// itself, as Student's t is by the doubt of a sigma: its logarithm's variance by the jackknife
+/// over folds (Shao and Wu 1989: groups, not single values, for quantiles) stands for 1 / (2
+/// degrees of freedom).
 [[nodiscard]] BandFactors bands_of(const LeftOutTorques& left);
 
 /// bands_of(leave_folds_out()); the normal distribution's where that gives nothing.
@@ -71,6 +81,14 @@ struct SigmaParts {
 /// Those of the largest normal predictive likelihood of residuals on motion left out (Gneiting and
 /// Raftery 2007, the logarithmic score), the common scale profiled out.
 [[nodiscard]] SigmaParts sigma_parts_of(const LeftOutTorques& left);
+
+/// The parts, and the bands of a sigma of these parts: with a fold left out the parts are others,
+/// too, and so the jackknife finds them anew.
+struct CalibratedSigma {
+  SigmaParts parts;
+  BandFactors bands;
+};
+[[nodiscard]] CalibratedSigma calibrate(const LeftOutTorques& left);
 
 /// The same mean with a sigma of these parts.
 [[nodiscard]] TorquePrediction with_sigma_parts(TorquePrediction prediction,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/models/comparison.h"
 
+#include <limits>
+
 #include "dynamics/data/splits.h"
 #include "kinematics/core/error.h"
 
@@ -18,10 +20,23 @@ Eigen::VectorXd coverage(const Eigen::MatrixXd& error, const Eigen::MatrixXd& si
   return out;
 }
 
+Eigen::VectorXd share_beyond(const Eigen::MatrixXd& model_sigma, const BandFactors& bands) {
+  const Eigen::Index joints = model_sigma.cols();
+  Eigen::VectorXd out = Eigen::VectorXd::Constant(joints, std::numeric_limits<double>::quiet_NaN());
+  for (Eigen::Index j = 0; j < bands.seen_sigma.size(); ++j) {
+    constexpr double kRounding = 1.0 + 1e-9;  // a sigma that is the same everywhere
+    const auto beyond = (model_sigma.col(j).array() > kRounding * bands.seen_sigma[j]).count();
+    out[j] = static_cast<double>(beyond) / static_cast<double>(model_sigma.rows());
+  }
+  return out;
+}
+
 }  // namespace
 
 TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamples& test) {
-  const TorquePrediction prediction = fitted.predict(test.q, test.dq, test.ddq);
+  const TorquePrediction claim = fitted.claim ? fitted.claim(test.q, test.dq, test.ddq)
+                                              : fitted.predict(test.q, test.dq, test.ddq);
+  const TorquePrediction prediction = fitted.claim ? with_sigma_parts(claim, fitted.parts) : claim;
   const Eigen::MatrixXd error = test.torque - prediction.mean;
   TorqueScore score;
   score.kind = fitted.kind;
@@ -34,6 +49,10 @@ TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamp
       coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_90(j); });
   score.coverage_95 =
       coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_95(j); });
+  score.extrapolated = share_beyond(claim.model_sigma, fitted.bands);
+  score.band_residuals = fitted.bands.residuals.size() > 0 ? fitted.bands.residuals
+                                                           : Eigen::VectorXi::Zero(error.cols());
+  score.bands_by_trajectory = fitted.bands.by_trajectory;
   return score;
 }
 

@@ -16,6 +16,14 @@ struct TorqueScore {
   Eigen::VectorXd rms;           ///< of the error, in the torque's unit
   Eigen::VectorXd coverage_90;   ///< share of the test samples within the 90 % band, 0 to 1
   Eigen::VectorXd coverage_95;
+  /// Share of the test samples where the model doubts itself more than at any sample that its bands
+  /// were calibrated on, 0 to 1: there they are extrapolated. NaN: not known.
+  Eigen::VectorXd extrapolated;
+  /// Residuals that the bands come from; 0: the normal distribution's.
+  Eigen::VectorXi band_residuals;
+  /// Those residuals are of whole trajectories; else of blocks with motion learned from around
+  /// them, which says less about what comes later.
+  bool bands_by_trajectory = false;
   std::string failure;  ///< why there is no score; empty where there is one
 };
 

@@ -22,6 +22,9 @@ using Matrix = Eigen::MatrixXd;
 constexpr double kNoiseStart = 1e-3;
 // Predictions that bands are read from: neighbours in time say the same.
 constexpr Eigen::Index kBandRows = 3000;
+// Processes of the folds are kept for their sigma up to here; five of seven joints and 1500 samples
+// take 0.4 GB.
+constexpr double kMostFoldBytes = 1e9;
 
 gp::JointKinds kinds_of(const RigidModel& rigid) {
   gp::JointKinds kinds;
@@ -74,7 +77,8 @@ gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool phys
   const auto few = evenly_chosen(data.samples(), options.hyperparameter_samples);
   gp::EstimateOptions estimate;
   estimate.starts = known != nullptr ? 1 : options.starts;
-  estimate.samples_for_starts = std::ssize(few) / (known != nullptr ? 1 : 2);
+  // On fewer ones than that a kernel of many features takes noise for function.
+  estimate.samples_for_starts = std::ssize(few);
   estimate.seed = options.seed;
   estimate.fit.threads = options.threads;
   const gp::Estimate found = gp::estimate_hyperparameters(start, gp::subset(data, few), estimate);
@@ -118,28 +122,57 @@ TorqueModelOptions for_part(TorqueModelOptions options, double share) {
   return options;
 }
 
-// Sigma and bands that hold on motion left out of the fit.
-FittedTorqueModel calibrated(FittedTorqueModel fitted, const LeftOutTorques& left) {
-  const SigmaParts parts = sigma_parts_of(left);
-  fitted.predict = [parts, claimed = std::move(fitted.predict)](const Matrix& q, const Matrix& dq,
-                                                                const Matrix& ddq) {
-    return with_sigma_parts(claimed(q, dq, ddq), parts);
-  };
-  LeftOutTorques judged = left;
-  const TorquePrediction sigmas =
-      with_sigma_parts({left.residual, left.model_sigma, left.sigma}, parts);
-  judged.sigma = sigmas.sigma;
-  fitted.bands = bands_of(judged);
-  return fitted;
+// Of their Cholesky factors, which outweigh everything else.
+double bytes_of(const std::vector<Processes>& folds) {
+  double bytes = 0.0;
+  for (const Processes& fold : folds) {
+    for (const gp::FittedGp& fitted : fold) {
+      const auto rows = static_cast<double>(fitted.route == gp::Route::kDense
+                                                ? fitted.samples * fitted.model.kernel.outputs()
+                                                : fitted.features);
+      bytes += 8.0 * rows * rows;
+    }
+  }
+  return bytes;
 }
 
-FittedTorqueModel with_gps(TorqueModelKind kind, Processes fits, int threads) {
+// The doubt of the processes that left a fold out, their root mean square: theirs is what residuals
+// were judged by, and a process of all samples is surer than that.
+Matrix doubt_of(const std::vector<Processes>& folds, const Matrix& inputs, Eigen::Index joints,
+                int threads) {
+  Matrix square = Matrix::Zero(inputs.rows(), joints);
+  for (const Processes& fold : folds) {
+    square += prediction_of(fold, inputs, joints, threads).model_sigma.cwiseAbs2();
+  }
+  return (square / static_cast<double>(folds.size())).cwiseSqrt();
+}
+
+// `folds`: may be empty.
+FittedTorqueModel with_gps(TorqueModelKind kind, Processes fits, std::vector<Processes> folds,
+                           int threads) {
   FittedTorqueModel out{kind, static_cast<int>(fits.front().samples), {}};
-  const auto shared = std::make_shared<const Processes>(std::move(fits));
-  out.predict = [shared, threads](const Matrix& q, const Matrix& dq, const Matrix& ddq) {
-    return prediction_of(*shared, motion_inputs(q, dq, ddq), q.cols(), threads);
+  const auto all = std::make_shared<const Processes>(std::move(fits));
+  const auto parts = std::make_shared<const std::vector<Processes>>(std::move(folds));
+  out.predict = [all, parts, threads](const Matrix& q, const Matrix& dq, const Matrix& ddq) {
+    const Matrix inputs = motion_inputs(q, dq, ddq);
+    TorquePrediction prediction = prediction_of(*all, inputs, q.cols(), threads);
+    if (!parts->empty()) prediction.model_sigma = doubt_of(*parts, inputs, q.cols(), threads);
+    return prediction;
   };
   return out;
+}
+
+// Sigma and bands that hold on motion left out of the fit.
+FittedTorqueModel calibrated(FittedTorqueModel fitted, const LeftOutTorques& left) {
+  CalibratedSigma found = calibrate(left);
+  fitted.claim = std::move(fitted.predict);
+  fitted.parts = std::move(found.parts);
+  fitted.bands = std::move(found.bands);
+  fitted.predict = [parts = fitted.parts, claim = fitted.claim](const Matrix& q, const Matrix& dq,
+                                                                const Matrix& ddq) {
+    return with_sigma_parts(claim(q, dq, ddq), parts);
+  };
+  return fitted;
 }
 
 // `known`: those of other samples, to start from.
@@ -191,18 +224,21 @@ FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind, const DynamicMode
                                          const TorqueSamples& samples,
                                          const TorqueModelOptions& options) {
   const Processes processes = fit_processes(kind, model, samples, options, nullptr);
-  FittedTorqueModel fitted = with_gps(kind, processes, options.threads);
   const int folds = std::min(options.band_folds, options.process_band_folds);
-  if (folds < 2) return fitted;
+  if (folds < 2) return with_gps(kind, processes, {}, options.threads);
+  std::vector<Processes> parts;
   const auto all = static_cast<double>(samples.size());
   const auto left = leave_folds_out(
       samples, folds, kBandRows, [&](const TorqueSamples& train, const TorqueSamples& test) {
         const double share = static_cast<double>(train.size()) / all;
         const Processes part =
             fit_processes(kind, model, train, for_part(options, share), &processes);
+        parts.push_back(part);
         return prediction_of(part, motion_inputs(test.q, test.dq, test.ddq), test.joints(),
                              options.threads);
       });
+  if (!left || bytes_of(parts) > kMostFoldBytes) parts.clear();
+  FittedTorqueModel fitted = with_gps(kind, processes, std::move(parts), options.threads);
   return left ? calibrated(std::move(fitted), *left) : fitted;
 }
 

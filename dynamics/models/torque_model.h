@@ -79,6 +79,11 @@ struct FittedTorqueModel {
                                  const Eigen::MatrixXd& ddq)>
       predict;
   BandFactors bands = {};  ///< calibrated for the parametric model and Gaussian processes
+  /// `predict` before its sigma was calibrated; empty: it is not.
+  std::function<TorquePrediction(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
+                                 const Eigen::MatrixXd& ddq)>
+      claim = {};
+  SigmaParts parts = {};  ///< that make `predict` of `claim`
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what

@@ -85,10 +85,11 @@ Covered rotated(TorqueModelKind kind, const TorqueSet& set, int folds,
   const auto add = [&](TorqueScore& sum, const TorqueScore& one) {
     const Eigen::Index joints = one.coverage_90.size();
     if (sum.coverage_90.size() == 0) {
-      sum.coverage_90 = sum.coverage_95 = Eigen::VectorXd::Zero(joints);
+      sum.coverage_90 = sum.coverage_95 = sum.extrapolated = Eigen::VectorXd::Zero(joints);
     }
     sum.coverage_90 += one.coverage_90 / count;
     sum.coverage_95 += one.coverage_95 / count;
+    sum.extrapolated += one.extrapolated / count;
   };
   for (const Fold& fold : outer.folds) {
     const Covered one = covered(kind, set, select_rows(set.train, fold.train),
@@ -118,6 +119,7 @@ void judge(const TorqueSet& set, const Options& options) {
                per_cent(found.calibrated.coverage_90), per_cent(found.claimed.coverage_90),
                fmt::format("{} folds", found.folds), per_cent(found.calibrated.coverage_95),
                per_cent(found.claimed.coverage_95));
+    fmt::print("{:>16} extrapolated {}\n", "", per_cent(found.calibrated.extrapolated));
     std::fflush(stdout);
   }
 }

@@ -2,6 +2,7 @@
 #include "dynamics/models/bands.h"
 
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -136,6 +137,49 @@ TEST(Bands, AModelSureOfItselfGetsTheNoiseThatIsThere) {
   const SigmaParts parts = sigma_parts_of(left);
   EXPECT_EQ(parts.model_factor[0], 0.0);
   EXPECT_NEAR(parts.noise_sigma[0], 1.0, 0.05);
+}
+
+// A residual over an infinite sigma is 0, however wrong the model was.
+TEST(Bands, AnInfiniteSigmaSaysNothing) {
+  Rng rng = Rng::from_name("infinite sigma");
+  const LeftOutTorques finite = left_out(residuals(300, rng));
+  LeftOutTorques both = left_out(residuals(900, rng));
+  both.residual.topRows(300) = finite.residual;
+  both.sigma.bottomRows(600).setConstant(std::numeric_limits<double>::infinity());
+  both.model_sigma = both.sigma;
+  const BandFactors bands = bands_of(both);
+  EXPECT_EQ(bands.of_95, bands_of(finite).of_95);
+  EXPECT_EQ(bands.residuals, Eigen::Vector2i(300, 300));
+  EXPECT_EQ(bands.skipped, Eigen::Vector2i(600, 600));
+  const SigmaParts parts = sigma_parts_of(both);
+  EXPECT_NEAR(parts.model_factor[1], 0.0, 1e-12 + parts.noise_sigma[1]);
+  EXPECT_TRUE(std::isfinite(parts.noise_sigma[0]));
+  EXPECT_GT(parts.noise_sigma[1], 1.0);
+  EXPECT_TRUE(std::isinf(
+      with_sigma_parts({both.residual, both.model_sigma, both.sigma}, parts).sigma(899, 0)));
+  // Too few are left: the normal distribution's, and that is said.
+  both.sigma.topRows(280).setConstant(std::numeric_limits<double>::infinity());
+  const BandFactors few = bands_of(both);
+  EXPECT_EQ(few.residuals, Eigen::Vector2i(0, 0));
+  EXPECT_EQ(few.skipped, Eigen::Vector2i(880, 880));
+  EXPECT_NEAR(few.width_95(1), 1.96, 1e-3);
+}
+
+// One fold of five is where the model doubts itself and errs: without it sigma has other parts.
+TEST(Bands, TheJackknifeFindsThePartsAnew) {
+  Rng rng = Rng::from_name("parts anew");
+  constexpr int kEach = 100;
+  LeftOutTorques left = left_out(Eigen::MatrixXd::Zero(5 * kEach, 1));
+  left.folds = 5;
+  for (int i = 0; i < 5 * kEach; ++i) {
+    left.fold[i] = i / kEach;
+    left.model_sigma(i, 0) = left.fold[i] == 0 ? rng.uniform(1.0, 5.0) : rng.uniform(0.1, 2.0);
+    left.residual(i, 0) = rng.normal(left.fold[i] == 0 ? left.model_sigma(i, 0) : 0.5);
+  }
+  const CalibratedSigma found = calibrate(left);
+  LeftOutTorques fixed = left;
+  fixed.sigma = with_sigma_parts({left.residual, left.model_sigma, left.sigma}, found.parts).sigma;
+  EXPECT_GT(found.bands.of_95[0], 1.02 * bands_of(fixed).of_95[0]);
 }
 
 }  // namespace

@@ -65,5 +65,56 @@ TEST(ProcessBands, CoverWithLearnedRemainders) {
   EXPECT_LT(claimed.of_90, calibrated.of_90 - 0.05);
 }
 
+TorqueSamples arm_log(DynamicModel& model, int trajectories) {
+  Rng rng = Rng::from_name("one arm");
+  const RandomRobot robot = random_robot({.joints = 1, .prismatic_share = 0.0}, rng);
+  model = random_masses(robot.tree, {}, rng);
+  return torque_log_of(
+      model, {.samples = 200, .rate_hz = 25.0, .noise = 0.1, .trajectories = trajectories}, rng);
+}
+
+TorqueModelOptions small_options() {
+  TorqueModelOptions options;
+  options.samples = 100;
+  options.hyperparameter_samples = 60;
+  options.starts = 1;
+  options.threads = 1;
+  return options;
+}
+
+// Residuals were judged by what processes of fewer samples doubted; one of all samples is surer.
+TEST(ProcessBands, TheSigmaUsedIsTheOneCalibrated) {
+  DynamicModel model;
+  const TorqueSamples log = arm_log(model, 4);
+  TorqueModelOptions options = small_options();
+  const FittedTorqueModel fitted = fit_torque_model(TorqueModelKind::kRbf, model, log, options);
+  options.band_folds = 0;
+  const FittedTorqueModel alone = fit_torque_model(TorqueModelKind::kRbf, model, log, options);
+  const Eigen::ArrayXd sure = alone.predict(log.q, log.dq, log.ddq).model_sigma;
+  const Eigen::ArrayXd doubt = fitted.claim(log.q, log.dq, log.ddq).model_sigma;
+  EXPECT_GT(doubt.mean(), 1.02 * sure.mean());
+  EXPECT_EQ(fitted.claim(log.q, log.dq, log.ddq).mean, alone.predict(log.q, log.dq, log.ddq).mean);
+}
+
+// Far from all motion the model doubts itself as it never did where its bands were made.
+TEST(ProcessBands, SayWhereTheyAreExtrapolated) {
+  DynamicModel model;
+  const TorqueSamples log = arm_log(model, 1);
+  const FittedTorqueModel fitted =
+      fit_torque_model(TorqueModelKind::kRbf, model, log, small_options());
+  const TorqueScore near = score_torque_model(fitted, log);
+  EXPECT_LT(near.extrapolated[0], 0.01);
+  EXPECT_EQ(near.band_residuals[0], 200);
+  EXPECT_FALSE(near.bands_by_trajectory);
+  TorqueSamples far = log;
+  far.ddq.array() *= 50.0;
+  EXPECT_GT(score_torque_model(fitted, far).extrapolated[0], 0.5);
+  DynamicModel other;
+  EXPECT_TRUE(
+      score_torque_model(
+          fit_torque_model(TorqueModelKind::kRbf, model, arm_log(other, 4), small_options()), log)
+          .bands_by_trajectory);
+}
+
 }  // namespace
 }  // namespace kinescope
