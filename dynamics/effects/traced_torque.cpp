@@ -24,13 +24,15 @@ constexpr int kFewestPaths = 5;  // to hold out whole trajectories
 constexpr Eigen::Index kFewestInstants = 60;
 
 /// Of every sample: trajectories of one path together where there are enough paths, else stretches
-/// of equal length.
+/// of equal length of each, the same of all trajectories of a path.
 std::vector<int> folds_of(const TorqueSamples& samples, int folds) {
   std::vector<int> out(static_cast<std::size_t>(samples.size()), 0);
-  std::vector<int> paths = repeated_paths(samples);
+  const std::vector<int> same_as = repeated_paths(samples);
+  std::vector<int> paths = same_as;
   std::ranges::sort(paths);
-  const auto distinct = std::ranges::unique(paths);
-  const auto count = static_cast<int>(paths.size() - distinct.size());
+  const auto repeats = std::ranges::unique(paths);
+  paths.erase(repeats.begin(), repeats.end());
+  const auto count = static_cast<int>(paths.size());
   if (count >= kFewestPaths) {
     const Folds split = split_folds(samples, {.folds = std::min(folds, count)});
     for (std::size_t f = 0; f < split.folds.size(); ++f) {
@@ -40,8 +42,16 @@ std::vector<int> folds_of(const TorqueSamples& samples, int folds) {
     }
     return out;
   }
-  for (Eigen::Index row = 0; row < samples.size(); ++row) {
-    out[static_cast<std::size_t>(row)] = static_cast<int>(row * folds / samples.size());
+  const int stretches = std::max(1, folds / count);
+  std::size_t piece = 0;
+  Eigen::Index end = 0;
+  for (Eigen::Index begin = 0; begin < samples.size(); begin = end, ++piece) {
+    while (end < samples.size() && samples.trajectory[end] == samples.trajectory[begin]) ++end;
+    const auto path = std::ranges::lower_bound(paths, same_as[piece]) - paths.begin();
+    for (Eigen::Index row = begin; row < end; ++row) {
+      const auto stretch = (row - begin) * stretches / (end - begin);
+      out[static_cast<std::size_t>(row)] = static_cast<int>(path * stretches + stretch);
+    }
   }
   return out;
 }

@@ -4,9 +4,11 @@
 // in it has the generator's torque, the size comes out, and nothing comes out where nothing is.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/data/splits.h"
 #include "dynamics/effects/trace_torque.h"
 #include "dynamics/effects/traced_torque.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -249,6 +251,31 @@ TEST(TorqueEffects, identified_masses_predict_what_was_fitted) {
   const Eigen::MatrixXd fitted = model.motion().rows_at_instants(samples.torque) - left;
   constexpr double kShare = 1e-6;  // of the torque: normal equations
   EXPECT_LT((predicted - fitted).norm(), kShare * fitted.norm());
+}
+
+TEST(TorqueEffects, repeats_of_a_path_are_held_out_together) {
+  Rng rng = Rng::from_name("effects", 11);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.005;
+  const EffectWorld world = effect_world({}, options, rng);
+  const TorqueSamples once = exact_samples(world);
+  const Eigen::Index n = once.size();
+  std::vector<Eigen::Index> rows;
+  for (int k = 0; k < 2; ++k) {
+    for (Eigen::Index row = 0; row < n; ++row) rows.push_back(row);
+  }
+  TorqueSamples twice = select_rows(once, rows);
+  twice.trajectory.tail(n).setConstant(twice.trajectory[n - 1] + 1);
+  const TorqueTracedModel model(world.model, twice);
+  const TracedFit fit = model.fit({});
+  // Instants of the two with the same posture are never in two folds.
+  std::map<Eigen::Index, int> fold_at;
+  for (std::size_t i = 0; i < model.motion().kept().size(); ++i) {
+    const Eigen::Index phase = model.motion().kept()[i] % n;
+    const auto [place, first] = fold_at.emplace(phase, fit.linear.fold[i]);
+    EXPECT_TRUE(first || place->second == fit.linear.fold[i]) << phase;
+  }
+  EXPECT_LT(fold_at.size(), model.motion().kept().size());
 }
 
 TEST(TorqueEffects, a_push_is_found_and_left_out) {
