@@ -45,6 +45,57 @@ void assign_folds(const Folds& folds, RobustTorque& out) {
   }
 }
 
+/// Of each row: 1 in the fold and, where folds are blocks of one motion, within the guard of it.
+std::vector<char> near_fold(const RobustTorque& learned, int fold) {
+  const auto n = static_cast<Index>(learned.fold_of.size());
+  const TorqueSamples& samples = learned.samples;
+  std::vector<char> near(learned.fold_of.size(), 0);
+  const double guard_s = learned.by_trajectory ? 0.0 : SplitOptions{}.guard_s;
+  for (const int direction : {1, -1}) {
+    Index last = -1;
+    for (Index k = 0; k < n; ++k) {
+      const Index row = direction > 0 ? k : n - 1 - k;
+      const bool within = learned.fold_of[static_cast<std::size_t>(row)] == fold;
+      if (within) last = row;
+      const bool guarded = last >= 0 && samples.trajectory[row] == samples.trajectory[last] &&
+                           std::abs(samples.t_s[row] - samples.t_s[last]) <= guard_s;
+      if (within || guarded) near[static_cast<std::size_t>(row)] = 1;
+    }
+  }
+  return near;
+}
+
+/// Every fold left out with its guard. Guards lie in the neighbouring blocks: even and odd folds by
+/// turns, so that none is left out twice at once.
+gp::LeaveOut leave_folds_out(const gp::FittedGp& fitted, const gp::Dataset& data,
+                             const RobustTorque& learned) {
+  if (learned.by_trajectory) {
+    return gp::leave_out(fitted, data, learned.fold_of, learned.threads);
+  }
+  gp::LeaveOut out;
+  for (const int parity : {0, 1}) {
+    std::vector<int> label(learned.fold_of.size(), -1);
+    for (int fold = parity; fold < learned.folds; fold += 2) {
+      const std::vector<char> near = near_fold(learned, fold);
+      for (std::size_t i = 0; i < label.size(); ++i) {
+        const bool own = learned.fold_of[i] == fold;
+        if (own || (near[i] != 0 && label[i] < 0 && learned.fold_of[i] % 2 != parity)) {
+          label[i] = fold;
+        }
+      }
+    }
+    const gp::LeaveOut left = gp::leave_out(fitted, data, label, learned.threads);
+    if (parity == 0) out = left;
+    for (Index i = 0; i < left.z.rows(); ++i) {
+      if (learned.fold_of[static_cast<std::size_t>(i)] % 2 != parity) continue;
+      out.z.row(i) = left.z.row(i);
+      out.variance.row(i) = left.variance.row(i);
+      out.residual.row(i) = left.residual.row(i);
+    }
+  }
+  return out;
+}
+
 gp::Dataset dataset_of(const TorqueSamples& samples, Index joint) {
   return {motion_inputs(samples.q, samples.dq, samples.ddq), samples.torque.col(joint), {}, {}};
 }
@@ -113,7 +164,7 @@ Judged judge(const JointModel& joint, const Search& search, const RobustTorque& 
   options.route = gp::Route::kDense;
   options.threads = folds.threads;
   const gp::FittedGp fitted = gp::fit(joint.at(search), joint.data(), options);
-  const gp::LeaveOut left = gp::leave_out(fitted, joint.data(), folds.fold_of, folds.threads);
+  const gp::LeaveOut left = leave_folds_out(fitted, joint.data(), folds);
   Judged out;
   for (Index i = 0; i < left.z.rows(); ++i) {
     const double z = left.z(i, 0);
@@ -254,8 +305,9 @@ RobustTorque learn_robust_torque(const DynamicModel& model, const TorqueSamples&
 
 std::vector<gp::FittedGp> without_fold(const RobustTorque& learned, int fold) {
   std::vector<Index> rows;
-  for (std::size_t i = 0; i < learned.fold_of.size(); ++i) {
-    if (learned.fold_of[i] != fold) rows.push_back(static_cast<Index>(i));
+  const std::vector<char> near = near_fold(learned, fold);
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    if (near[i] == 0) rows.push_back(static_cast<Index>(i));
   }
   std::vector<gp::FittedGp> out;
   const std::vector<gp::FittedGp>& all =

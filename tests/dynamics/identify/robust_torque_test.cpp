@@ -90,6 +90,23 @@ TEST(RobustTorque, PartsAddUpAndAreWhatTheyAreCalled) {
   }
 }
 
+TEST(RobustTorque, BlocksOfOneMotionAreLeftOutWithAGap) {
+  const DynamicModel model = arm();
+  Rng rng = Rng::from_name("one motion");
+  const TorqueSamples log = torque_log_of(model, {.samples = 1500, .trajectories = 1}, rng);
+  RobustTorqueOptions options = few();
+  options.samples = 120;
+  const RobustTorque learned = learn_robust_torque(model, log, options);
+  ASSERT_FALSE(learned.by_trajectory);
+  SplitOptions split;
+  split.folds = options.folds;
+  const Folds folds = split_folds(learned.samples, split);
+  ASSERT_EQ(learned.folds, static_cast<int>(folds.folds.size()));
+  const Fold& fold = folds.folds[1];
+  ASSERT_LT(fold.train.size() + fold.test.size(), 120U);
+  EXPECT_EQ(without_fold(learned, 1)[0].samples, static_cast<Eigen::Index>(fold.train.size()));
+}
+
 TEST(RobustTorque, TheSameForAnyNumberOfThreads) {
   const DynamicModel model = arm();
   const TorqueSamples log = log_of(model, "threads", 0.02, 0.02);
