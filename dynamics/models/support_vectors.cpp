@@ -9,13 +9,14 @@
 
 #include <libsvm/svm.h>
 
+#include "dynamics/data/splits.h"
 #include "dynamics/models/standardised.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::models {
 namespace {
 
-constexpr Eigen::Index kFolds = 4;
+constexpr int kFolds = 4;
 constexpr Eigen::Index kSearchSamples = 500;
 constexpr double kCacheMegabytes = 200.0;
 
@@ -89,23 +90,16 @@ Machine train(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& targets,
   return machine;
 }
 
-// Mean squared error over contiguous blocks that were left out.
+// Mean squared error over motions that were left out: trajectories, or blocks with a gap to what
+// was learned from.
 double error_left_out(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& targets,
-                      const Setting& setting) {
-  const Eigen::Index n = inputs.rows();
+                      const Folds& folds, const Setting& setting) {
   double sum = 0.0;
-  for (Eigen::Index fold = 0; fold < kFolds; ++fold) {
-    const Eigen::Index begin = fold * n / kFolds;
-    const Eigen::Index count = (fold + 1) * n / kFolds - begin;
-    Eigen::MatrixXd rest(n - count, inputs.cols());
-    Eigen::VectorXd rest_targets(n - count);
-    rest << inputs.topRows(begin), inputs.bottomRows(n - begin - count);
-    rest_targets << targets.head(begin), targets.tail(n - begin - count);
-    const Machine machine = train(rest, rest_targets, setting);
-    sum += (machine.predict(inputs.middleRows(begin, count)) - targets.segment(begin, count))
-               .squaredNorm();
+  for (const Fold& fold : folds.folds) {
+    const Machine machine = train(inputs(fold.train, Eigen::all), targets(fold.train), setting);
+    sum += (machine.predict(inputs(fold.test, Eigen::all)) - targets(fold.test)).squaredNorm();
   }
-  return sum / static_cast<double>(n);
+  return sum / static_cast<double>(inputs.rows());
 }
 
 struct Choice {
@@ -113,14 +107,14 @@ struct Choice {
   double error = std::numeric_limits<double>::infinity();
 };
 
-Choice choose(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& targets) {
+Choice choose(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& targets, const Folds& folds) {
   Choice best;
   const double dimension = static_cast<double>(inputs.cols());
   for (const double penalty : {1.0, 10.0, 100.0}) {
     for (const double width : {0.1, 0.3, 1.0, 3.0}) {
       for (const double tube : {0.003, 0.03}) {
         const Setting setting{penalty, width / dimension, tube};
-        const double error = error_left_out(inputs, targets, setting);
+        const double error = error_left_out(inputs, targets, folds, setting);
         if (error < best.error) best = {setting, error};
       }
     }
@@ -136,12 +130,13 @@ FittedTorqueModel fit_support_vectors(const TorqueSamples& samples) {
   }
   const Standardised data(samples);
   const auto few = evenly_chosen(samples.size(), kSearchSamples);
+  const Folds folds = split_folds(select_rows(samples, few), {.folds = kFolds});
   const Eigen::MatrixXd inputs = data.inputs(samples.q, samples.dq, samples.ddq);
   const Eigen::MatrixXd targets = data.targets(samples.torque);
   std::vector<Machine> machines;
   Eigen::RowVectorXd sigma(samples.joints());
   for (Eigen::Index j = 0; j < samples.joints(); ++j) {
-    const Choice choice = choose(inputs(few, Eigen::all), targets(few, j));
+    const Choice choice = choose(inputs(few, Eigen::all), targets(few, j), folds);
     machines.push_back(train(inputs, targets.col(j), choice.setting));
     sigma[j] = std::sqrt(choice.error) * data.torque_scale()[j];
   }

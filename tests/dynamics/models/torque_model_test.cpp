@@ -2,12 +2,14 @@
 #include "dynamics/models/torque_model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include <gtest/gtest.h>
 
 #include "dynamics/data/splits.h"
 #include "dynamics/models/comparison.h"
+#include "dynamics/models/support_vectors.h"
 #include "kinematics/core/error.h"
 #include "tests/truth/torque_world.h"
 
@@ -163,6 +165,27 @@ TEST(EvenlyChosen, SpreadsOverAll) {
   EXPECT_EQ(evenly_chosen(10, 5), (std::vector<Eigen::Index>{0, 2, 4, 6, 8}));
   EXPECT_EQ(evenly_chosen(3, 5), (std::vector<Eigen::Index>{0, 1, 2}));
   EXPECT_TRUE(evenly_chosen(0, 5).empty());
+}
+
+TEST(SupportVectors, DoNotJudgeThemselvesByARepeat) {
+  // The same sweep twice: the repeat of a posture tells its torque, other postures do not.
+  constexpr Eigen::Index kRows = 150;
+  TorqueSamples samples;
+  samples.t_s.resize(2 * kRows);
+  samples.q.resize(2 * kRows, 1);
+  samples.trajectory.resize(2 * kRows);
+  for (Eigen::Index i = 0; i < 2 * kRows; ++i) {
+    samples.t_s[i] = 0.05 * static_cast<double>(i % kRows);
+    samples.q(i, 0) = samples.t_s[i];
+    samples.trajectory[i] = i < kRows ? 0 : 1;
+  }
+  samples.dq = Eigen::MatrixXd::Ones(2 * kRows, 1);
+  samples.ddq = Eigen::MatrixXd::Zero(2 * kRows, 1);
+  samples.torque = (2.5 * samples.q).array().sin() + 0.5 * (4.0 * samples.q).array().sin();
+  const FittedTorqueModel fitted = models::fit_support_vectors(samples);
+  const double sigma = fitted.predict(samples.q, samples.dq, samples.ddq).sigma(0, 0);
+  const double spread = std::sqrt(samples.torque.squaredNorm() / (2.0 * kRows));
+  EXPECT_GT(sigma, 0.8 * spread);
 }
 
 }  // namespace
