@@ -73,6 +73,42 @@ std::string learning_plot(const TorqueSummary& summary) {
   return figure(plot.str(), "Learning curve: samples of the training part, evenly chosen.");
 }
 
+// Of the test samples; below, a band is as good as it says.
+constexpr double kFewExtrapolated = 0.01;
+
+std::string band_label(const TorqueScore& score, Eigen::Index joint) {
+  const double share = joint < score.extrapolated.size() ? score.extrapolated[joint] : 0.0;
+  if (!(share > kFewExtrapolated)) return "95 % band";
+  return fmt::format("95 % band, extrapolated at {:.0f} % of the samples", 100.0 * share);
+}
+
+// What the model's bands do not promise; empty where they hold what they say.
+std::string band_limits(const TorqueScore& score, const std::vector<std::string>& joints) {
+  std::string out;
+  Eigen::Index calibrated = 0;
+  for (Eigen::Index j = 0; j < score.band_residuals.size(); ++j) {
+    if (score.band_residuals[j] > 0) ++calibrated;
+  }
+  if (calibrated > 0 && calibrated < score.band_residuals.size()) {
+    out +=
+        " too few residuals with a finite sigma for some joints, whose bands are the normal "
+        "distribution's;";
+  }
+  if (calibrated > 0 && !score.bands_by_trajectory) {
+    out +=
+        " calibrated on blocks of one path with motion learned from on both sides, which says "
+        "less about what comes after it;";
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (at >= score.extrapolated.size() || !(score.extrapolated[at] > kFewExtrapolated)) continue;
+    out += fmt::format(" extrapolated at {:.0f} % of the samples of {};",
+                       100.0 * score.extrapolated[at], joints[j]);
+  }
+  if (!out.empty()) out.back() = '.';
+  return out;
+}
+
 std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.test.size();
   const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
@@ -109,8 +145,8 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   plot.line(measured, series_class(7));
   plot.line(predicted, series_class(0));
   plot.legend("measured", series_class(7));
-  plot.legend("predicted, 95 % band", series_class(0));
   const TorqueScore& score = summary.scores[static_cast<std::size_t>(summary.best)];
+  plot.legend("predicted, " + band_label(score, joint), series_class(0));
   const double error = score.rms[joint];
   // A line on a line is no riddle to leave to the reader.
   const bool alike = error < 0.005 * (high - low);
@@ -141,6 +177,11 @@ std::string torque_models_section(const TorqueFacts& facts) {
       out += paragraph(fmt::format("{} was not fitted: {}", to_string(score.kind), score.failure),
                        "note");
     }
+  }
+  for (const TorqueScore& score : facts.summary.scores) {
+    const std::string limits = band_limits(score, facts.summary.joints);
+    if (limits.empty()) continue;
+    out += paragraph(fmt::format("Bands of {}:{}", to_string(score.kind), limits), "note");
   }
   return out + learning_plot(facts.summary) + "</section>\n";
 }

@@ -53,6 +53,10 @@ json scores_json(const std::vector<TorqueScore>& scores) {
                    {"rms", numbers(score.rms)},
                    {"coverage_90", numbers(score.coverage_90)},
                    {"coverage_95", numbers(score.coverage_95)},
+                   {"extrapolated", numbers(score.extrapolated)},
+                   {"band_residuals",
+                    std::vector<int>(score.band_residuals.begin(), score.band_residuals.end())},
+                   {"bands_by_trajectory", score.bands_by_trajectory},
                    {"failure", text(score.failure)}});
   }
   return out;

@@ -99,7 +99,8 @@ struct TorqueSummary {
 ///   data      rows_read, rows_used, log_rate_hz, rate_hz, filter, source, cutoff_hz, training,
 ///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
 ///             place, what, remedy]
-///   models    [model, samples, nmse_percent, rms, coverage_90, coverage_95, failure]
+///   models    [model, samples, nmse_percent, rms, coverage_90, coverage_95, extrapolated,
+///             band_residuals, bands_by_trajectory, failure]
 ///   best      name of the model with the smallest mean nMSE; null where there is none
 ///   learning  [model, points [samples, nmse_percent]]
 ///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
