@@ -17,7 +17,8 @@ struct ProcessShare {
 
 /// Hyperparameters by marginal likelihood. Sigma and bands are those of residuals on motion left
 /// out, with a search of its own in every fold (bands.h) that starts where that of all samples
-/// ended: of several modes, the folds speak of the one that is used. What is claimed by itself
+/// ended: of several modes, the folds speak of the one that is used. The folds' processes stay with
+/// the fit for their doubt about the function (up to 1 GB). What is claimed by itself
 /// covers far too little, as noise is taken for white and the hyperparameters for known.
 [[nodiscard]] FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind,
                                                        const DynamicModel& model,
