@@ -15,7 +15,7 @@ namespace kinescope {
 namespace {
 
 std::string log_csv(const JointLog& log) {
-  std::string out = "t";
+  std::string out = log.time_column;
   for (const std::string& channel : log.channels) out += "," + channel;
   out += "\n";
   for (std::size_t i = 0; i < log.size(); ++i) {

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "app/io/dynamics_settings.h"
-#include "kinematics/core/csv.h"
 
 namespace kinescope {
 namespace {
@@ -24,36 +23,27 @@ std::optional<fs::path> file_named(const Recording& recording, std::string_view 
   return std::nullopt;
 }
 
-// Torque columns in the file's order: those that are no channel of the joint log and no time.
-std::vector<std::string> torque_columns(const fs::path& joints, const JointLog& log) {
-  std::vector<std::string> out;
-  for (const std::string& column : read_csv(joints).header) {
-    if (column == "t" || std::ranges::count(log.channels, column) > 0) continue;
-    out.push_back(column);
-  }
-  return out;
-}
-
-// A torque column belongs to the channel whose name it ends with; else the order says which.
-std::string torque_of(const std::string& channel, std::size_t place,
-                      const std::vector<std::string>& torques) {
+// A torque column belongs to the channel whose name it ends with; else the order says which, unless
+// a column is missing in it.
+std::string torque_of(const std::string& channel, const JointLog& log) {
+  const std::vector<std::string>& torques = log.torque_columns;
   for (const std::string& torque : torques) {
     if (torque.ends_with(channel)) return torque;
   }
+  if (!log.left_out.empty() && torques.size() != log.channels.size()) return {};
+  const auto place = static_cast<std::size_t>(value_of(log.channel(channel)));
   return place < torques.size() ? torques[place] : std::string();
 }
 
 // Which columns of joints.csv are what, in the order of the tree's joints; nothing where a joint
 // has no torque.
 std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& log,
-                                     const std::vector<std::string>& torques, LogMapping mapping) {
-  mapping.time = "t";
+                                     LogMapping mapping) {
+  mapping.time = log.time_column;
   for (const Joint& joint : tree.joints) {
     if (joint.type == JointType::kFixed) continue;
-    const auto channel = log.channel(joint.channel);
-    if (!channel) return std::nullopt;
-    const std::string torque =
-        torque_of(joint.channel, static_cast<std::size_t>(*channel), torques);
+    if (!log.channel(joint.channel)) return std::nullopt;
+    const std::string torque = torque_of(joint.channel, log);
     if (torque.empty()) return std::nullopt;
     mapping.position.push_back(joint.channel);
     mapping.torque.push_back(torque);
@@ -70,8 +60,7 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
                                        const Progress& progress) {
   if (recording.log.empty()) return {};
   const fs::path joints = recording.log.source;
-  const std::vector<std::string> torques = torque_columns(joints, recording.log);
-  if (torques.empty()) return {};
+  if (recording.log.torque_columns.empty()) return {};
   std::vector<std::string> words;
   try {
     TorqueDataOptions data;
@@ -79,7 +68,7 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
       data = read_dynamics_settings(*settings);
     }
     data.mapping.torque.clear();
-    const auto mapping = mapping_of(tree, recording.log, torques, data.mapping);
+    const auto mapping = mapping_of(tree, recording.log, data.mapping);
     if (!mapping) return {"Torques: not every joint has a logged channel and a torque column."};
     data.mapping = *mapping;
     DynamicsOptions dynamics;

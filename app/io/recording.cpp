@@ -51,6 +51,8 @@ void read_log(Recording& recording, const RecordingFiles& files) {
   }
   RecordingSettings& settings = recording.settings;
   recording.log = read_joint_log(*files.joints, settings.torque_channels);
+  recording.warnings.insert(recording.warnings.end(), recording.log.warnings.begin(),
+                            recording.log.warnings.end());
   if (!settings.torque_channels.empty()) {
     const JointLog all = read_joint_log(*files.joints);
     for (const std::string& name : settings.torque_channels) {

@@ -116,6 +116,7 @@ CsvTable parse_csv(std::string_view text, std::string source) {
                     "export the table as CSV (UTF-8)");
   }
   std::size_t line_number = 0;
+  bool unnamed_end = false;
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     const std::string_view line = text.substr(0, end);
@@ -125,10 +126,19 @@ CsvTable parse_csv(std::string_view text, std::string source) {
     if (content.empty() || content.starts_with('#')) continue;
     std::vector<std::string> cells = split(line);
     if (table.header.empty()) {
+      unnamed_end = cells.size() > 1 && cells.back().empty();
+      if (unnamed_end) cells.pop_back();
       table.header = std::move(cells);
       table.header_line = line_number;
       check_header(table);
       continue;
+    }
+    // Some loggers end every line with a comma.
+    const bool one_more = cells.size() == table.header.size() + 1;
+    if (one_more && cells.back().empty()) cells.pop_back();
+    if (one_more && cells.size() > table.header.size() && unnamed_end) {
+      throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
+                      fmt::format("column {} has no name", cells.size()), "name every column");
     }
     if (cells.size() != table.header.size()) {
       throw bad_input(

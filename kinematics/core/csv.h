@@ -36,7 +36,8 @@ struct CsvTable {
 };
 
 /// Parses text. Throws bad_input for: nothing in it, another delimiter than the comma, two columns
-/// of one name, an unnamed column, a row shorter or longer than the header, a NUL byte.
+/// of one name, an unnamed column, a row shorter or longer than the header, a NUL byte. A comma at
+/// the end of a line opens no column.
 [[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source);
 /// The same from a file, also from one packed with gzip.
 [[nodiscard]] CsvTable read_csv(const std::filesystem::path& path);

@@ -2,6 +2,7 @@
 #include "kinematics/log/joint_log.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -13,39 +14,105 @@
 namespace kinescope {
 namespace {
 
-JointLog from_table(const CsvTable& table, const std::vector<std::string>& torque_channels) {
-  JointLog log;
-  log.source = table.source;
-  const std::size_t time_column = table.require_column("t");
+std::size_t time_column(const CsvTable& table) {
+  for (const std::string_view name : {"t", "time", "stamp", "timestamp"}) {
+    const auto found = std::ranges::find_if(table.header, [&](const std::string& column) {
+      return std::ranges::equal(column, name, [](unsigned char a, unsigned char b) {
+        return std::tolower(a) == static_cast<int>(b);
+      });
+    });
+    if (found != table.header.end()) return static_cast<std::size_t>(found - table.header.begin());
+  }
+  return table.require_column("t");
+}
+
+bool is_blank(const std::string& cell) {
+  const auto value = parse_number(cell);
+  return cell.empty() || (value && std::isnan(*value));
+}
+
+bool holds_a_number(const CsvTable& table, std::size_t column) {
+  return std::ranges::any_of(table.rows, [&](const std::vector<std::string>& row) {
+    const auto value = parse_number(row[column]);
+    return value && std::isfinite(*value);
+  });
+}
+
+// The columns of the channels; names them, the torques and what is no channel in `log`.
+std::vector<std::size_t> channel_columns(const CsvTable& table, std::size_t time,
+                                         const std::vector<std::string>& torque_channels,
+                                         JointLog& log) {
   std::vector<std::size_t> columns;
   for (std::size_t c = 0; c < table.header.size(); ++c) {
     const std::string& name = table.header[c];
-    const bool torque = name.starts_with("tau") ||
-                        std::ranges::find(torque_channels, name) != torque_channels.end();
-    if (c == time_column || torque) continue;
-    columns.push_back(c);
-    log.channels.push_back(name);
+    if (c == time) continue;
+    if (name.starts_with("tau") ||
+        std::ranges::find(torque_channels, name) != torque_channels.end()) {
+      log.torque_columns.push_back(name);
+    } else if (!holds_a_number(table, c)) {
+      log.left_out.push_back(name);
+      log.warnings.push_back(
+          fmt::format("{}: column '{}' holds no number and is left out", table.source, name));
+    } else {
+      columns.push_back(c);
+      log.channels.push_back(name);
+    }
   }
-  if (columns.empty()) {
-    throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
-                    "no joint channel beside 't'",
-                    "add one column a joint with its value in rad, m or ticks");
-  }
-  const auto rows = static_cast<Eigen::Index>(table.rows.size());
-  log.values.resize(rows, static_cast<Eigen::Index>(columns.size()));
+  if (!columns.empty()) return columns;
+  throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
+                  fmt::format("no joint channel beside '{}'", table.header[time]),
+                  "add one column a joint with its value in rad, m or ticks");
+}
+
+// The first row in which every channel has spoken; the first of all where there is none.
+std::size_t first_whole_row(const CsvTable& table, const std::vector<std::size_t>& columns) {
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    const double time_s = table.number(r, time_column);
+    const bool whole =
+        std::ranges::none_of(columns, [&](std::size_t c) { return is_blank(table.rows[r][c]); });
+    if (whole) return r;
+  }
+  return 0;
+}
+
+JointLog from_table(const CsvTable& table, const std::vector<std::string>& torque_channels) {
+  JointLog log;
+  log.source = table.source;
+  const std::size_t time = time_column(table);
+  log.time_column = table.header[time];
+  const std::vector<std::size_t> columns = channel_columns(table, time, torque_channels, log);
+  const std::size_t first = first_whole_row(table, columns);
+  if (first > 0) {
+    log.warnings.push_back(
+        fmt::format("{}: the first {} rows, in which a channel is blank, are "
+                    "left out",
+                    table.source, first));
+  }
+  const auto most = static_cast<Eigen::Index>(table.rows.size() - first);
+  log.values.resize(most, static_cast<Eigen::Index>(columns.size()));
+  int repeated = 0;
+  for (std::size_t r = first; r < table.rows.size(); ++r) {
+    const auto row = static_cast<Eigen::Index>(log.size());
+    const double time_s = table.number(r, time);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double value = table.number(r, columns[c]);
+      log.values(row, static_cast<Eigen::Index>(c)) = value;
+    }
     if (!log.times_s.empty() && time_s <= log.times_s.back()) {
+      if (time_s == log.times_s.back() && log.values.row(row) == log.values.row(row - 1)) {
+        ++repeated;
+        continue;
+      }
       throw bad_input(
           table.place(r),
           fmt::format("time {:.6f} s does not come after {:.6f} s", time_s, log.times_s.back()),
           "sort the rows by time and remove repeated stamps");
     }
     log.times_s.push_back(time_s);
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      log.values(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
-          table.number(r, columns[c]);
-    }
+  }
+  log.values.conservativeResize(static_cast<Eigen::Index>(log.size()), Eigen::NoChange);
+  if (repeated > 0) {
+    log.warnings.push_back(
+        fmt::format("{}: {} rows repeat the row before and are left out", table.source, repeated));
   }
   return log;
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   joints.csv: `t` in s, then one column a channel (rad, m or raw ticks), any order and
-// name. Gives   JointLog: named channels over their own clock, and their values between the
+// name.
+// Gives   JointLog: named channels over their own clock, and their values between the
 // samples. Method  cubic Hermite interpolation with three-point slopes (Catmull-Rom for uneven
 // steps). Not here: which channel drives what (kinematics/structure), torques (dynamics).
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +27,13 @@ struct JointLog {
   std::vector<double> times_s;        ///< strictly increasing
   std::vector<std::string> channels;  ///< names, in the file's order
   Eigen::MatrixXd values;             ///< samples x channels, in the channel's own unit
+  std::string time_column = "t";      ///< its name in the file
+  std::vector<std::string> torque_columns = {};  ///< in the file's order
+  std::vector<std::string> left_out = {};        ///< other columns that are no channel
+  /// What a declared unit made the values be multiplied by; channels that stayed as logged are
+  /// absent.
+  std::map<std::string, double> unit_factors = {};
+  std::vector<std::string> warnings = {};  ///< what was left out, and why
 
   [[nodiscard]] std::size_t size() const { return times_s.size(); }
   [[nodiscard]] bool empty() const { return times_s.empty(); }
@@ -37,9 +46,12 @@ struct ChannelValue {
   double rate = 0.0;  ///< per s
 };
 
-/// Reads joints.csv. `torque_channels` and columns that begin with "tau" are left out.
-/// Throws bad_input: missing or empty file, no column `t`, a cell that is no finite number, stamps
-/// that do not increase, no channel. Each names file, line and remedy.
+/// Reads joints.csv. `torque_channels` and columns that begin with "tau" are left out. Without a
+/// column `t` one named time, stamp or timestamp (any case) is the time. Left out with a warning:
+/// rows that repeat the one before, columns without any number, first rows in which a channel is
+/// still blank.
+/// Throws bad_input: missing or empty file, no time, a cell that is no finite number, stamps that
+/// do not increase, no channel. Each names file, line and remedy.
 [[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
                                       const std::vector<std::string>& torque_channels = {});
 [[nodiscard]] JointLog parse_joint_log(std::string_view text, const std::string& source,

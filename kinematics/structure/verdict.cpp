@@ -15,6 +15,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Larger log-odds mean nothing: the models are not that right.
 constexpr double kMostLogOdds = 1000.0;
+// Channels that agree this well hold the same numbers, perhaps in another unit.
+constexpr double kAlike = 1.0 - 1e-9;
 // Channels that agree this well move together.
 constexpr double kTogether = 0.995;
 // A channel that moves less than this many times what a marker could show is one that hardly moves.
@@ -168,11 +170,13 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
     told.push_back(pair);
     const std::string first = channel_words(log, readings, pair.first);
     const std::string second = channel_words(log, readings, pair.second);
+    const bool alike = channel_correlation(readings, pair.first, pair.second) > kAlike;
     verdict.doubts.push_back(
         {fmt::format(
              "channels {} and {} move together: which of them drives which joint cannot be told",
              first, second),
-         fmt::format("record again with {} and {} moving at different times or speeds", first,
+         fmt::format("{}record again with {} and {} moving at different times or speeds",
+                     alike ? "if one column is a copy of the other, remove it; else " : "", first,
                      second),
          {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
     verdict.status = StructureStatus::kUndetermined;

@@ -76,6 +76,8 @@ TEST_F(RunRefusals, TwoJointsThatMoveTogether) {
   write_poses(together.recording);
   const std::string line = refused(ExitCode::kUndetermined, together.channel[0]);
   EXPECT_NE(line.find(together.channel[2]), std::string::npos) << line;
+  EXPECT_NE(line.find("if one column is a copy of the other, remove it"), std::string::npos)
+      << line;
 }
 
 TEST_F(RunRefusals, MarkersThatNeverMove) {

@@ -56,6 +56,14 @@ TEST_F(ReadRecording, UnitsAreMadeSi) {
   EXPECT_EQ(read_recording(folder_.paths()).log.values(1, 0), 180.0) << "ticks stay";
 }
 
+TEST_F(ReadRecording, WhatALogLeavesOutIsAWarning) {
+  folder_.write("joints.csv", "t,a,mode,b\n0,90,AUTO,100\n1,180,AUTO,200\n");
+  const Recording recording = read_recording(folder_.paths());
+  EXPECT_EQ(recording.log.channels, (std::vector<std::string>{"a", "b"}));
+  ASSERT_EQ(recording.warnings.size(), 1U);
+  EXPECT_NE(recording.warnings[0].find("column 'mode'"), std::string::npos);
+}
+
 TEST_F(ReadRecording, TorquesAreLeftOut) {
   folder_.write("recording.yaml", "torques: [b]\n");
   EXPECT_EQ(read_recording(folder_.paths()).log.channels, (std::vector<std::string>{"a"}));

@@ -49,10 +49,21 @@ TEST(Csv, RefusesWithPlaceAndRemedy) {
   EXPECT_EQ(parse_refusal("t,x,x\n1,2,3\n"),
             "a.csv:1: two columns are named 'x' (give every column its own name)");
   EXPECT_EQ(parse_refusal("t,,x\n1,2,3\n"), "a.csv:1: column 2 has no name (name every column)");
+  EXPECT_EQ(parse_refusal("t,x,\n1,2,3\n"), "a.csv:1: column 3 has no name (name every column)");
+  EXPECT_NE(parse_refusal("t,x\n1,2,,\n").find("4 cells where the header has 2"),
+            std::string::npos);
   EXPECT_NE(parse_refusal("1,2\n3,4\n").find("not column names"), std::string::npos);
   EXPECT_EQ(parse_refusal("t,x\n1,2\n\n3\n"),
             "a.csv:4: 1 cells where the header has 2 (is the file cut off, or a comma missing?)");
   EXPECT_NE(parse_refusal(std::string_view("t,x\n1,\0\n", 8)).find("NUL"), std::string::npos);
+}
+
+TEST(Csv, ACommaAtTheEndOfALineOpensNoColumn) {
+  for (const char* text : {"t,x,\n1,2,\n", "t,x\n1,2,\n", "t,x,\n1,2\n"}) {
+    const CsvTable table = parse_csv(text, "a.csv");
+    EXPECT_EQ(table.header, (std::vector<std::string>{"t", "x"})) << text;
+    EXPECT_EQ(table.rows[0], (std::vector<std::string>{"1", "2"})) << text;
+  }
 }
 
 TEST(Csv, NamesTheLineOfAHeaderBelowComments) {

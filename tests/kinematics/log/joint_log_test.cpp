@@ -57,12 +57,53 @@ TEST(JointLog, RefusesWithLineAndRemedy) {
             std::string::npos);
   EXPECT_NE(refusal("t,a\nnan,1\n").find("joints.csv:2: column 't' holds 'nan'"),
             std::string::npos);
-  EXPECT_NE(refusal("time,a\n0,1\n").find("no column 't'"), std::string::npos);
+  EXPECT_NE(refusal("clock,a\n0,1\n").find("no column 't'"), std::string::npos);
   EXPECT_NE(refusal("t,tau1\n0,1\n").find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,x\n0,1\n", {"x"}).find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,a,a\n0,1,2\n").find("two columns"), std::string::npos);
   EXPECT_NE(refusal("t;a\n0;1\n").find("separated by ';'"), std::string::npos);
   EXPECT_NE(refusal("").find("is empty"), std::string::npos);
+}
+
+TEST(JointLog, TakesTheTimeUnderItsUsualNames) {
+  for (const char* name : {"t", "T", "time", "Time", "stamp", "timestamp"}) {
+    const JointLog log = parse_joint_log(std::string("a,") + name + "\n1,0\n2,0.1\n", "j");
+    EXPECT_EQ(log.time_column, name);
+    EXPECT_EQ(log.channels, std::vector<std::string>{"a"});
+    EXPECT_EQ(log.times_s, (std::vector<double>{0.0, 0.1}));
+  }
+  const JointLog log = parse_joint_log("time,t\n1,0\n2,0.1\n", "j");
+  EXPECT_EQ(log.time_column, "t");
+  EXPECT_EQ(log.channels, std::vector<std::string>{"time"});
+}
+
+TEST(JointLog, LeavesOutWhatIsNoChannelWithAWarning) {
+  const JointLog log =
+      parse_joint_log("t,a,mode,temp,spare,tau1\n0,1,AUTO,nan,,5\n0.1,2,AUTO,nan,,5\n", "j");
+  EXPECT_EQ(log.channels, std::vector<std::string>{"a"});
+  EXPECT_EQ(log.left_out, (std::vector<std::string>{"mode", "temp", "spare"}));
+  EXPECT_EQ(log.torque_columns, std::vector<std::string>{"tau1"});
+  ASSERT_EQ(log.warnings.size(), 3U);
+  EXPECT_EQ(log.warnings[0], "j: column 'mode' holds no number and is left out");
+  EXPECT_EQ(log.values(1, 0), 2.0);
+  EXPECT_NE(refusal("t,mode\n0,AUTO\n").find("no joint channel"), std::string::npos);
+  EXPECT_NE(refusal("t,a\n0,1\n1,2 deg\n").find("joints.csv:3: column 'a' holds '2 deg'"),
+            std::string::npos);
+}
+
+TEST(JointLog, LeavesOutRepeatedRowsAndTheFirstBlankOnes) {
+  const JointLog log =
+      parse_joint_log("t,a,b\n0,,\n0.1,1,\n0.2,1,nan\n0.3,2,5\n0.3,2,5\n0.4,3,6\n", "j");
+  EXPECT_EQ(log.times_s, (std::vector<double>{0.3, 0.4}));
+  ASSERT_EQ(log.values.rows(), 2);
+  EXPECT_EQ(log.values(1, 1), 6.0);
+  ASSERT_EQ(log.warnings.size(), 2U);
+  EXPECT_EQ(log.warnings[0], "j: the first 3 rows, in which a channel is blank, are left out");
+  EXPECT_EQ(log.warnings[1], "j: 1 rows repeat the row before and are left out");
+  EXPECT_NE(refusal("t,a,b\n0,1,1\n1,,1\n2,2,1\n").find("joints.csv:3: column 'a' holds ''"),
+            std::string::npos);
+  EXPECT_NE(refusal("t,a,b\n0,1,\n1,,1\n").find("joints.csv:2: column 'b' holds ''"),
+            std::string::npos);
 }
 
 TEST(Interpolation, IsExactOnParabolasBetweenEvenOrUnevenSamples) {
