@@ -17,14 +17,14 @@ constexpr double kLittleMotion = 0.01;  ///< rad or m; an axis seen over less is
 constexpr double kUnevenShare = 0.5;    ///< of the mean step
 
 /// Whole numbers over a wide range are encoder ticks; more than a turn in either direction are
-/// degrees.
+/// degrees, or mm.
 std::string guess_unit(const Eigen::VectorXd& values) {
   const double range = values.maxCoeff() - values.minCoeff();
   const bool whole = (values.array() == values.array().round()).all();
   if (whole && range > 20.0) return "ticks?";
   constexpr double kMoreThanATurn = 2.5 * std::numbers::pi;
   if (values.cwiseAbs().maxCoeff() > kMoreThanATurn && values.cwiseAbs().maxCoeff() <= 400.0)
-    return "deg?";
+    return "deg or mm?";
   return "rad or m";
 }
 
@@ -48,11 +48,12 @@ ChannelFacts look_at_channel(const JointLog& log, Eigen::Index channel,
                             "record it over a larger range",
                             facts.name, facts.upper - facts.lower)});
   }
-  if (facts.unit == "deg?") {
+  if (facts.unit == "deg or mm?") {
     findings.push_back(
-        {false, fmt::format("channel '{}' looks like degrees ({:.1f} to {:.1f}): declare "
-                            "units: {{{}: deg}} in recording.yaml if so",
-                            facts.name, facts.lower, facts.upper, facts.name)});
+        {false, fmt::format("channel '{}' looks like degrees or mm ({:.1f} to {:.1f}): declare "
+                            "units: {{{}: deg}} in recording.yaml if its joint turns, {{{}: mm}} "
+                            "if it slides",
+                            facts.name, facts.lower, facts.upper, facts.name, facts.name)});
   }
   return facts;
 }

@@ -48,8 +48,7 @@ struct VideoFacts {
 
 struct ChannelFacts {
   std::string name;
-  std::string
-      unit;  ///< declared, or "rad or m"; "ticks?" and "deg?" where the values look like that
+  std::string unit;  ///< declared, or "rad or m"; "ticks?", "deg or mm?" where the values look so
   double lower = 0.0;
   double upper = 0.0;
   bool moves = true;

@@ -2,6 +2,8 @@
 #include "app/io/recording.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -138,6 +140,35 @@ void check_fixed_tags(const Recording& recording, const RecordingFiles& files) {
   }
 }
 
+double mean_step_s(const std::vector<double>& times_s) {
+  return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
+}
+
+/// One clock in a thousandth, millionth or billionth of a second: seen by how long both run, where
+/// the slower one has steps over which nothing can be said. Postures have any steps.
+void require_seconds(const JointLog& log, const std::vector<double>& times_s,
+                     const std::string& source) {
+  constexpr double kLongStepS = 1.0;
+  if (log.size() < 2 || times_s.size() < 2 || is_posture_log(log, times_s)) return;
+  const double log_s = log.times_s.back() - log.times_s.front();
+  const double frames_s = times_s.back() - times_s.front();
+  if (!(log_s > 0.0 && frames_s > 0.0)) return;
+  const bool slow_log = log_s > frames_s;
+  if (!slow_log && times_s.size() < 3) return;  // first and last alone do not show the steps
+  if (mean_step_s(slow_log ? log.times_s : times_s) <= kLongStepS) return;
+  const double ratio = slow_log ? log_s / frames_s : frames_s / log_s;
+  const double thousands = std::round(std::log10(ratio) / 3.0);
+  if (thousands < 1.0 || thousands > 3.0) return;
+  constexpr std::array<const char*, 3> kUnits{"ms", "us", "ns"};
+  const std::string log_name = log.source.empty() ? "joints.csv" : log.source;
+  throw bad_input(
+      slow_log ? log_name : source,
+      fmt::format("runs for {:.6g} s, {} for {:.6g} s: are its stamps in {}?",
+                  slow_log ? log_s : frames_s, slow_log ? source : log_name,
+                  slow_log ? frames_s : log_s, kUnits[static_cast<std::size_t>(thousands) - 1]),
+      fmt::format("stamps are in s: divide them by {:.0f}", std::pow(1e3, thousands)));
+}
+
 }  // namespace
 
 std::string_view to_string(RecordingEntry entry) {
@@ -157,6 +188,7 @@ std::string_view to_string(RecordingEntry entry) {
 void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
                           const std::string& source) {
   if (log.empty() || times_s.empty()) return;
+  require_seconds(log, times_s, source);
   const auto [first, last] = std::ranges::minmax(times_s);
   if (first <= log.times_s.back() && last >= log.times_s.front()) return;
   throw bad_input(

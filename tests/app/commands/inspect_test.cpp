@@ -48,7 +48,7 @@ TEST(InspectLog, RangesRatesAndUnits) {
   EXPECT_NEAR(facts.channels[0].upper, 1.0, 1e-3);
   EXPECT_FALSE(facts.channels[1].moves);
   EXPECT_EQ(facts.channels[2].unit, "ticks?");
-  EXPECT_EQ(facts.channels[3].unit, "deg?");
+  EXPECT_EQ(facts.channels[3].unit, "deg or mm?");
   EXPECT_TRUE(says(findings, "channel 'rest' never changes")) << all(findings);
   EXPECT_TRUE(says(findings, "channel 'angle' looks like degrees")) << all(findings);
   EXPECT_EQ(findings.size(), 2U) << all(findings);

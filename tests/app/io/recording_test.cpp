@@ -6,6 +6,7 @@
 
 #include <numbers>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "app/io/sha256.h"
@@ -62,6 +63,33 @@ TEST_F(ReadRecording, WhatALogLeavesOutIsAWarning) {
   EXPECT_EQ(recording.log.channels, (std::vector<std::string>{"a", "b"}));
   ASSERT_EQ(recording.warnings.size(), 1U);
   EXPECT_NE(recording.warnings[0].find("column 'mode'"), std::string::npos);
+}
+
+// 20 s of both, one of the clocks in another unit.
+TEST_F(ReadRecording, StampsThatAreNoSecondsAreRefused) {
+  const auto table = [](const std::string& header, const std::string& cells, double step) {
+    std::string text = header + "\n";
+    for (int i = 0; i < 40; ++i) text += fmt::format("{},{}\n", i * step, cells);
+    return text;
+  };
+  const auto poses = [&](double step) {
+    return table("t,body,x,y,z,qx,qy,qz,qw", "1,0,0,1,0,0,0,1", step);
+  };
+  folder_.write("poses.csv", poses(0.513));
+  for (const auto& [unit, factor] : {std::pair{"ms", 1e3}, {"us", 1e6}, {"ns", 1e9}}) {
+    folder_.write("joints.csv", table("t,a", "1", 0.5 * factor));
+    const std::string refusal = folder_.refusal();
+    EXPECT_TRUE(refusal.starts_with("joints.csv: runs for ")) << refusal;
+    EXPECT_NE(refusal.find(fmt::format("stamps in {}?", unit)), std::string::npos) << refusal;
+    EXPECT_NE(refusal.find(fmt::format("by {:.0f})", factor)), std::string::npos) << refusal;
+  }
+  folder_.write("joints.csv", table("t,a", "1", 0.5)).write("poses.csv", poses(513.0));
+  EXPECT_TRUE(folder_.refusal().starts_with("poses.csv: runs for "));
+  // Postures have any steps, and a log may go on for long.
+  folder_.write("joints.csv", table("t,a", "1", 10.0)).write("poses.csv", poses(10.0));
+  EXPECT_EQ(folder_.refusal(), "accepted");
+  folder_.write("joints.csv", table("t,a", "1", 100.0));
+  EXPECT_EQ(folder_.refusal(), "accepted");
 }
 
 TEST_F(ReadRecording, TorquesAreLeftOut) {
