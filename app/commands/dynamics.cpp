@@ -247,6 +247,8 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   if (options.trace) {
     add_trace(options, model, log, folder, progress, summary);
     clock.lap("trace", summary.times);
+  } else {
+    remove_torque_trace(options.trace_file, folder);
   }
   folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
   folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));

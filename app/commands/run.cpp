@@ -27,6 +27,7 @@ namespace kinescope {
 namespace {
 
 constexpr std::string_view kReport = "report.html";
+constexpr std::string_view kRun = "run.json";
 // Of a run without an answer, beside the products of an earlier one that has one.
 constexpr std::string_view kFailedReport = "failed_report.html";
 
@@ -71,16 +72,16 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
   fmt::print("report  {}\n", folder.file(report).string());
 }
 
-void write_tracks(const RunSummary& run, const RunFolder& folder) {
+void write_tracks(const RunSummary& run, RunFolder& folder) {
   if (!run.tracks.tracks.empty()) folder.write("tracks.csv", tracks_csv(run.tracks));
 }
 
-void write_structure(const RunSummary& run, const RunFolder& folder) {
+void write_structure(const RunSummary& run, RunFolder& folder) {
   if (!run.structure) return;
   folder.write("structure.json", structure_json(*run.structure, run.log).dump(2) + "\n");
 }
 
-void write_products(const RunSummary& run, const std::string& urdf, const RunFolder& folder) {
+void write_products(const RunSummary& run, const std::string& urdf, RunFolder& folder) {
   write_tracks(run, folder);
   write_structure(run, folder);
   folder.write("robot.urdf", urdf);
@@ -100,7 +101,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
   const Recording recording = read_recording(options.recording);
-  const RunFolder folder(options, recording);
+  RunFolder folder(options, recording);
   clock.lap("read", run.times);
 
   const Observed observed =
@@ -158,12 +159,16 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (answered) folder.keep_observations(recording, observed.tags);
   write_products(run, urdf, folder);
   clock.lap("write", run.times);
-  run.torque =
+  const TorqueStages torque =
       torque_stages(recording, options, run.calibration.tree, folder.file(""), console.progress);
+  run.torque = torque.words;
+  folder.add_products(torque.products);
   if (!run.torque.empty()) clock.lap("torque", run.times);
   folder.write(kReport, report_html(run, urdf));
   clock.lap("report", run.times);
-  folder.write("run.json", run_json(run).dump(2) + "\n");
+  folder.add_products({std::string(kRun)});
+  folder.remove_stale_products();
+  folder.write(kRun, run_json(run, folder.products()).dump(2) + "\n");
 
   print_result(run, folder, kReport, console);
   require_answer(run, "the report shows the details");

@@ -2,6 +2,8 @@
 #include "app/commands/run_folder.h"
 
 #include <algorithm>
+#include <array>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -17,6 +19,23 @@ using nlohmann::json;
 
 constexpr std::string_view kObservations = "observations.csv";
 constexpr std::string_view kObservationsKey = "observations.json";
+// Only `run` writes these, also where it ends without an answer and without a run.json.
+constexpr std::array<std::string_view, 5> kOwn{kObservations, kObservationsKey, "tracks.csv",
+                                               "structure.json", "failed_report.html"};
+
+// The products that a run.json names; none where there is none that can be read.
+std::set<std::string> products_of(const fs::path& run_json) {
+  std::set<std::string> out;
+  if (!fs::exists(run_json)) return out;
+  const json document = json::parse(read_text_file(run_json), nullptr, false);
+  if (!document.is_object() || !document.contains("products")) return out;
+  for (const json& name : document.at("products")) {
+    if (!name.is_string()) continue;
+    const fs::path path = name.get<std::string>();
+    if (path == path.filename()) out.insert(path.string());
+  }
+  return out;
+}
 
 std::string describe_geometry(FreeGeometry free) {
   switch (free) {
@@ -51,7 +70,8 @@ RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
     : OutputFolder(options.output.empty() ? fs::path(recording_name(recording.folder) + "_run")
                                           : options.output),
       detect_(options.detect),
-      force_(options.force) {}
+      force_(options.force),
+      earlier_products_(products_of(file("run.json"))) {}
 
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
@@ -92,8 +112,7 @@ std::optional<TagObservations> RunFolder::cached_observations(const Recording& r
   return observations;
 }
 
-void RunFolder::keep_observations(const Recording& recording,
-                                  const TagObservations& observations) const {
+void RunFolder::keep_observations(const Recording& recording, const TagObservations& observations) {
   if (observations.observations.empty()) return;
   write(kObservations, observations_csv(observations));
   if (recording.entry != RecordingEntry::kVideo) return;
@@ -119,6 +138,26 @@ bool RunFolder::holds_answer() const {
   };
   return status("calibration") != to_string(CalibrationStatus::kUndetermined) &&
          status("structure") != to_string(StructureStatus::kAmbiguous);
+}
+
+void RunFolder::write(std::string_view name, std::string_view content) {
+  OutputFolder::write(name, content);
+  products_.emplace(name);
+}
+
+void RunFolder::add_products(const std::vector<std::string>& names) {
+  products_.insert(names.begin(), names.end());
+}
+
+void RunFolder::remove_stale_products() const {
+  std::set<std::string> stale = earlier_products_;
+  stale.insert(kOwn.begin(), kOwn.end());
+  for (const std::string& name : stale) {
+    std::error_code error;  // what cannot be removed is no reason to lose the run
+    if (!products_.contains(name) && fs::is_regular_file(file(name), error)) {
+      fs::remove(file(name), error);
+    }
+  }
 }
 
 std::vector<InputFile> hash_inputs(const Recording& recording) {
@@ -148,7 +187,7 @@ std::vector<std::pair<std::string, std::string>> list_options(const RunOptions& 
           {"least sightings of a marker", fmt::format("{}", options.detect.min_sightings)}};
 }
 
-json run_json(const RunSummary& run) {
+json run_json(const RunSummary& run, const std::set<std::string>& products) {
   json inputs = json::array();
   for (const InputFile& file : run.inputs) {
     inputs.push_back({{"name", file.name}, {"sha256", file.sha256}});
@@ -171,6 +210,7 @@ json run_json(const RunSummary& run) {
           {"inputs", inputs},
           {"options", options},
           {"seed", nullptr},
+          {"products", products},
           {"stages", std::move(times)}};
 }
 

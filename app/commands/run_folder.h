@@ -4,7 +4,10 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -22,15 +25,24 @@ class RunFolder : public OutputFolder {
   /// The observations of an earlier run with the same video, tags and detection options.
   [[nodiscard]] std::optional<TagObservations> cached_observations(
       const Recording& recording) const;
-  void keep_observations(const Recording& recording, const TagObservations& observations) const;
+  void keep_observations(const Recording& recording, const TagObservations& observations);
   /// A robot of an earlier run, unless that run's result.json says that it is no answer.
   [[nodiscard]] bool holds_answer() const;
+
+  void write(std::string_view name, std::string_view content);
+  /// Products that are written elsewhere.
+  void add_products(const std::vector<std::string>& names);
+  [[nodiscard]] const std::set<std::string>& products() const { return products_; }
+  /// What an earlier run wrote here and this one did not: it would tell of another robot.
+  void remove_stale_products() const;
 
  private:
   [[nodiscard]] std::string detection_key(const Recording& recording) const;
 
   DetectOptions detect_;
   bool force_ = false;
+  std::set<std::string> earlier_products_;  // of run.json
+  std::set<std::string> products_;          // of this run
 };
 
 /// Every file that was read, with its SHA-256.
@@ -48,7 +60,7 @@ struct RunAgain {
 /// Relative paths as seen from another folder.
 void resolve_paths(RecordingPaths& paths, const std::filesystem::path& from);
 
-/// run.json: inputs' hashes, options, version, times.
-[[nodiscard]] nlohmann::json run_json(const RunSummary& run);
+/// run.json: inputs' hashes, options, version, times, names of the products.
+[[nodiscard]] nlohmann::json run_json(const RunSummary& run, const std::set<std::string>& products);
 
 }  // namespace kinescope

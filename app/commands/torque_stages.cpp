@@ -53,15 +53,25 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
   return mapping;
 }
 
+std::vector<std::string> torque_products(const DynamicsOptions& options,
+                                         const TorqueSummary& summary) {
+  std::vector<std::string> out{"dynamics.json", "robot_dynamics.urdf", "dynamics.html"};
+  if (!summary.trace) return out;
+  out.push_back(options.trace_file);
+  if (summary.trace->verdict == TraceVerdict::kNothingToSay) return out;
+  out.insert(out.end(), {"robot_traced.urdf", "torque_compensated.csv"});
+  return out;
+}
+
 }  // namespace
 
-std::vector<std::string> torque_stages(const Recording& recording, const RunOptions& options,
-                                       const KinematicTree& tree, const fs::path& folder,
-                                       const Progress& progress) {
+TorqueStages torque_stages(const Recording& recording, const RunOptions& options,
+                           const KinematicTree& tree, const fs::path& folder,
+                           const Progress& progress) {
   if (recording.log.empty()) return {};
   const fs::path joints = recording.log.source;
   if (recording.log.torque_columns.empty()) return {};
-  std::vector<std::string> words;
+  TorqueStages out;
   try {
     TorqueDataOptions data;
     if (const auto settings = file_named(recording, "recording.yaml")) {
@@ -69,7 +79,9 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
     }
     data.mapping.torque.clear();
     const auto mapping = mapping_of(tree, recording.log, data.mapping);
-    if (!mapping) return {"Torques: not every joint has a logged channel and a torque column."};
+    if (!mapping) {
+      return {.words = {"Torques: not every joint has a logged channel and a torque column."}};
+    }
     data.mapping = *mapping;
     DynamicsOptions dynamics;
     dynamics.logs = {joints};
@@ -82,20 +94,25 @@ std::vector<std::string> torque_stages(const Recording& recording, const RunOpti
     dynamics.models = {"parametric", "gip"};      // the others on request, by kinescope dynamics
     dynamics.models_options.samples = kGpSamples;
     dynamics.command_line = options.command_line;
-    const TorqueVerdict verdict = torque_verdict(model_torque(dynamics, progress));
-    words = {"Torques: " + verdict.found, verdict.accurate, verdict.limits};
+    const TorqueSummary summary = model_torque(dynamics, progress);
+    out.products = torque_products(dynamics, summary);
+    const TorqueVerdict verdict = torque_verdict(summary);
+    out.words = {"Torques: " + verdict.found, verdict.accurate, verdict.limits};
     ContactCommandOptions contact;
     contact.logs = {joints};
     contact.robot = folder / "robot_dynamics.urdf";
     contact.output = folder;
     contact.data = data;
     contact.command_line = options.command_line;
-    words.push_back("Contacts: " + contact_verdict(find_contacts(contact)));
+    out.words.push_back("Contacts: " + contact_verdict(find_contacts(contact)));
+    for (const char* name : {"contacts.csv", "contacts.json", "contact.html"}) {
+      out.products.emplace_back(name);
+    }
   } catch (const Error& error) {
     // The kinematics stand all the same.
-    words.push_back(fmt::format("Torques could not be used: {}", error.what()));
+    out.words.push_back(fmt::format("Torques could not be used: {}", error.what()));
   }
-  return words;
+  return out;
 }
 
 }  // namespace kinescope

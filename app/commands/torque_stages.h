@@ -18,13 +18,16 @@ namespace kinescope {
 /// Writes contacts.csv, contacts.json and contact.html.
 [[nodiscard]] ContactSummary find_contacts(const ContactCommandOptions& options);
 
+struct TorqueStages {
+  std::vector<std::string> words = {};     ///< what was found, or why not, in sentences
+  std::vector<std::string> products = {};  ///< names of the files that were written
+};
+
 /// Where the recording's joint log has torques: both of the above into the run's folder, with the
-/// robot that was learned. Gives what was found in sentences, and the reason where it could not be
-/// done; empty without torques.
-[[nodiscard]] std::vector<std::string> torque_stages(const Recording& recording,
-                                                     const RunOptions& options,
-                                                     const KinematicTree& tree,
-                                                     const std::filesystem::path& folder,
-                                                     const Progress& progress);
+/// robot that was learned. Empty without torques.
+[[nodiscard]] TorqueStages torque_stages(const Recording& recording, const RunOptions& options,
+                                         const KinematicTree& tree,
+                                         const std::filesystem::path& folder,
+                                         const Progress& progress);
 
 }  // namespace kinescope

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/torque_trace_stage.h"
 
+#include <system_error>
+
 #include <fmt/format.h>
 
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 #include "dynamics/data/torque_data.h"
+#include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -60,7 +63,23 @@ nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts,
   return list;
 }
 
+void remove_corrected(const OutputFolder& folder) {
+  std::error_code error;
+  for (const char* name : {"robot_traced.urdf", "torque_compensated.csv"}) {
+    std::filesystem::remove(folder.file(name), error);
+  }
+}
+
 }  // namespace
+
+void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder) {
+  remove_corrected(folder);
+  const std::filesystem::path path = folder.file(trace_file);
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return;
+  const auto document = nlohmann::json::parse(read_text_file(path), nullptr, false);
+  if (document.is_object() && document.contains("left_out")) std::filesystem::remove(path, error);
+}
 
 TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,
                                const TorqueLogReport& log, const CutoffChoice& cutoff,
@@ -77,7 +96,10 @@ TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicMode
   document["effects"] = corrected_json(out.corrected);
   document["left_out"] = contacts_json(out.contacts, traced.samples);
   folder.write(options.trace_file, document.dump(1) + "\n");
-  if (out.trace.verdict == TraceVerdict::kNothingToSay) return out;
+  if (out.trace.verdict == TraceVerdict::kNothingToSay) {
+    remove_corrected(folder);
+    return out;
+  }
   folder.write("robot_traced.urdf", write_urdf(out.corrected.model));
   std::vector<std::string> joints;
   for (const WantedJoint& joint : wanted_joints(model.tree)) joints.push_back(joint.name);

@@ -18,4 +18,7 @@ namespace kinescope {
                                              const CutoffChoice& cutoff, const OutputFolder& folder,
                                              const Progress& progress);
 
+/// Removes what the above wrote in an earlier run; a trace that is no torque log's stays.
+void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder);
+
 }  // namespace kinescope

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/app/commands/poses_of_arm.h"
@@ -139,6 +140,38 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
     EXPECT_TRUE(fs::exists(kept / "report.html"));
     EXPECT_FALSE(fs::exists(kept / "failed_report.html"));
   }
+}
+
+// What an earlier run wrote and this one does not goes; what others put there stays.
+TEST_F(RunRefusals, StaleProductsGo) {
+  RecordingOptions few;
+  few.frames = 200;
+  write_poses(arm("answer", few, 2).recording);
+  const fs::path out = output();
+  std::vector<std::string> words{
+      "run", folder_.path().string(), "--output", output(), "--quiet", "--no-trace"};
+  ASSERT_EQ(run(words).code, 0);
+  nlohmann::json earlier = nlohmann::json::parse(read_text_file(out / "run.json"));
+  EXPECT_EQ(earlier.at("products"),
+            nlohmann::json({"calibration.json", "report.html", "residuals.csv", "result.json",
+                            "robot.urdf", "run.json", "structure.json", "tracks.csv"}));
+  for (const char* name : {"trace.json", "dynamics.json", "../nominal.urdf"}) {
+    earlier["products"].push_back(name);
+  }
+  folder_.write("out/run.json", earlier.dump());
+  for (const char* name : {"trace.json", "dynamics.json", "failed_report.html", "notes.txt"}) {
+    folder_.write(std::string("out/") + name, "of an earlier run");
+  }
+  folder_.write("nominal.urdf", read_text_file(out / "robot.urdf"));
+  words.insert(words.end(), {"--free", "placement"});
+  ASSERT_EQ(run(words).code, 0);
+  for (const char* name : {"structure.json", "trace.json", "dynamics.json", "failed_report.html"}) {
+    EXPECT_FALSE(fs::exists(out / name)) << name;
+  }
+  for (const char* name : {"notes.txt", "robot.urdf", "report.html", "run.json", "tracks.csv"}) {
+    EXPECT_TRUE(fs::exists(out / name)) << name;
+  }
+  EXPECT_TRUE(fs::exists(folder_.path() / "nominal.urdf"));
 }
 
 TEST_F(RunRefusals, AFolderThatCannotBeWritten) {
