@@ -2,6 +2,7 @@
 //
 // `kinescope correct`: a joint log without the effects that a run found.
 #include <cstdio>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -52,13 +53,32 @@ KinematicTree tree_of_run(const std::filesystem::path& run_folder,
   return tree;
 }
 
+void to_si(JointLog& log, const std::map<std::string, double>& factors) {
+  for (const auto& [name, factor] : factors) {
+    if (const auto channel = log.channel(name)) log.values.col(*channel) *= factor;
+  }
+}
+
+// What was changed in SI, in the log's own units; the rest keeps its digits.
+void from_si(JointLog& log, const JointLog& before, const std::map<std::string, double>& factors) {
+  for (const auto& [name, factor] : factors) {
+    const auto channel = log.channel(name);
+    if (!channel) continue;
+    const Eigen::VectorXd own = before.values.col(*channel);
+    log.values.col(*channel) = own + (log.values.col(*channel) - factor * own) / factor;
+  }
+}
+
 }  // namespace
 
 ExitCode correct_command(const CorrectOptions& options, const Console& console) {
   const CalibratedEffects found = read_effects(options.run_folder / "calibration.json");
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
   const JointLog log = read_joint_log(options.log);
-  const CorrectedLog corrected = corrected_log(log, tree, found.effects, found.gravity_base);
+  JointLog in_si = log;
+  to_si(in_si, found.unit_factors);
+  CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
+  from_si(corrected.log, log, found.unit_factors);
   write_file_atomically(options.output, log_csv(corrected.log));
   if (console.quiet) return ExitCode::kDone;
   fmt::print("{}\n", corrected.undone.empty()

@@ -88,6 +88,7 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   nlohmann::json calibration = calibration_json(run.calibration);
   calibration["effects"] = effects_json(run.effects);
   if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
+  if (!run.log.unit_factors.empty()) calibration["unit_factors"] = run.log.unit_factors;
   folder.write("calibration.json", calibration.dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));
   if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");

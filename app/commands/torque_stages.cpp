@@ -47,7 +47,9 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
     if (torque.empty()) return std::nullopt;
     mapping.position.push_back(joint.channel);
     mapping.torque.push_back(torque);
-    mapping.position_factor.push_back(joint.scale);
+    const auto unit = log.unit_factors.find(joint.channel);
+    mapping.position_factor.push_back(unit == log.unit_factors.end() ? joint.scale
+                                                                     : joint.scale * unit->second);
     mapping.torque_factor.push_back(joint.scale < 0.0 ? -1.0 : 1.0);
   }
   return mapping;

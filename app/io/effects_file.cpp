@@ -70,6 +70,19 @@ std::vector<ChannelShare> couplings_of(const json& joint, const std::filesystem:
   return out;
 }
 
+std::map<std::string, double> unit_factors(const json& document,
+                                           const std::filesystem::path& path) {
+  std::map<std::string, double> out;
+  const auto factors = document.find("unit_factors");
+  if (factors == document.end()) return out;
+  if (!factors->is_object()) throw wrong(path, "unit_factors is no list of channels");
+  for (const auto& [channel, factor] : factors->items()) {
+    out[channel] = finite(factor, path, "unit_factors: " + channel);
+    if (out[channel] <= 0.0) throw wrong(path, "unit_factors: " + channel + " is not above 0");
+  }
+  return out;
+}
+
 }  // namespace
 
 json effects_json(const std::vector<FittedEffect>& effects) {
@@ -97,6 +110,7 @@ CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
     throw wrong(calibration_json, "this is no calibration");
   }
   CalibratedEffects out;
+  out.unit_factors = unit_factors(document, calibration_json);
   if (const auto gravity = document.find("gravity_base"); gravity != document.end()) {
     if (!gravity->is_array() || gravity->size() != 3) {
       throw wrong(calibration_json, "gravity_base is no vector");

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,7 +19,7 @@ namespace kinescope {
 /// A list: effect, place, at (the value of its scan), parameters (name, unit, value, reference).
 [[nodiscard]] nlohmann::json effects_json(const std::vector<FittedEffect>& effects);
 
-/// How channels become a joint's value (`Joint`).
+/// How channels become a joint's value (`Joint`), readings in SI where their unit was declared.
 struct JointChannel {
   std::string joint;
   std::string channel;
@@ -32,6 +33,8 @@ struct CalibratedEffects {
   std::vector<JointChannel> channels;
   std::vector<FittedEffect> effects;
   std::optional<Eigen::Vector3d> gravity_base;  ///< key `gravity_base`
+  /// Channel: what its logged values are to be multiplied by first; absent: 1. Key `unit_factors`.
+  std::map<std::string, double> unit_factors;
 };
 
 /// Throws bad_input: missing file, no JSON, another schema, numbers that are none.

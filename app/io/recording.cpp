@@ -20,13 +20,12 @@ namespace {
 
 /// Brings a channel to SI. Ticks stay: their scale is found from the motion.
 void convert_channel(JointLog& log, int channel, std::string& unit) {
-  if (unit == "deg") {
-    log.values.col(channel) *= std::numbers::pi / 180.0;
-    unit = "rad";
-  } else if (unit == "mm") {
-    log.values.col(channel) *= 1e-3;
-    unit = "m";
-  }
+  if (unit != "deg" && unit != "mm") return;
+  const bool turns = unit == "deg";
+  const double factor = turns ? std::numbers::pi / 180.0 : 1e-3;
+  log.values.col(channel) *= factor;
+  log.unit_factors[log.channels[static_cast<std::size_t>(channel)]] = factor;
+  unit = turns ? "rad" : "m";
 }
 
 void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& settings_file) {

@@ -121,6 +121,23 @@ TEST_F(Correct, UndoesWhatTheRunFound) {
   EXPECT_EQ(log.values(1, 0), 0.2);
 }
 
+// The run took the second channel in degrees: the scale of 0.5 is of the reading in rad.
+TEST_F(Correct, KeepsToTheUnitsOfTheRecording) {
+  calibration_["unit_factors"] = {{"b", kRadPerDegree}};
+  write_calibration();
+  folder_.write("new.csv", "t,a,b\n0,0.1,114.6\n0.1,0.2,229.2\n0.2,0.3,343.8\n");
+  const Outcome outcome = run(command());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const JointLog log = read_joint_log(path("corrected.csv"));
+  // 0.5 x 229.2 deg + 0.2 rad: 1 % of it, in degrees, over 0.5.
+  EXPECT_NEAR(log.values(1, 1), 229.2 + 0.01 * (229.2 + 0.4 / kRadPerDegree), 1e-9);
+  EXPECT_EQ(log.values(1, 0), 0.2);
+  calibration_["unit_factors"] = {{"b", 0.0}};
+  write_calibration();
+  folder_.remove("corrected.csv");
+  refused(ExitCode::kBadInput, "unit_factors");
+}
+
 TEST_F(Correct, SaysWhatALogCannotShow) {
   calibration_["effects"][0]["effect"] = "helical";
   write_calibration();
