@@ -38,11 +38,16 @@ CLI::Option* add_choice(CLI::App& command, const char* name,
       ->check(check);
 }
 
+std::string refuse_empty(const std::string& path) {
+  return path.empty() ? "the path is empty" : "";
+}
+
 void add_path(CLI::App& command, const char* name, std::optional<std::filesystem::path>& path,
               const char* help) {
   command
       .add_option_function<std::string>(
           name, [&path](const std::string& text) { path = text; }, help)
+      ->check(refuse_empty)
       ->type_name("FILE")
       ->group("Files in place of those in the recording");
 }
@@ -52,6 +57,7 @@ void add_recording_options(CLI::App& command, RecordingPaths& paths) {
       .add_option_function<std::string>(
           "RECORDING", [&paths](const std::string& text) { paths.folder = text; },
           "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml")
+      ->check(refuse_empty)
       ->required()
       ->type_name("FOLDER");
   add_path(command, "--video", paths.video, "Video file, or folder of images with times.csv");

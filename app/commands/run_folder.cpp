@@ -64,6 +64,28 @@ std::string sha256_of_path(const fs::path& path) {
   return sha256_of_text(list);
 }
 
+// The table holds only frames with a marker; the times of all frames and what was rejected stand in
+// `kept`. Nothing where the two do not belong together; throws json::exception where something is
+// missing.
+std::optional<TagObservations> observations_of(const json& kept, TagObservations table) {
+  const auto times = kept.at("times_s").get<std::vector<double>>();
+  std::size_t next = 0;
+  for (TagObservation& seen : table.observations) {
+    const double t = table.times_s[static_cast<std::size_t>(seen.frame)];
+    while (next < times.size() && times[next] < t) ++next;
+    if (next == times.size()) return std::nullopt;
+    seen.frame = static_cast<int>(next);
+  }
+  table.times_s = times;
+  table.width = kept.at("width").get<int>();
+  table.height = kept.at("height").get<int>();
+  for (const json& tag : kept.at("rejected")) {
+    table.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
+                              tag.at("reason").get<std::string>()});
+  }
+  return table;
+}
+
 }  // namespace
 
 RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
@@ -90,26 +112,15 @@ std::optional<TagObservations> RunFolder::cached_observations(const Recording& r
   if (force_ || recording.entry != RecordingEntry::kVideo) return std::nullopt;
   if (!fs::exists(file(kObservations)) || !fs::exists(file(kObservationsKey))) return std::nullopt;
   const json kept = json::parse(read_text_file(file(kObservationsKey)), nullptr, false);
-  if (!kept.is_object() || kept.value("key", "") != detection_key(recording)) return std::nullopt;
-  if (kept.value("sha256", "") != sha256_of_file(file(kObservations))) return std::nullopt;
-  TagObservations observations = read_corners(file(kObservations), recording.markers);
-  // The table holds only frames with a marker; the times of all frames and what was rejected stand
-  // here.
-  const std::vector<double> times = kept.at("times_s").get<std::vector<double>>();
-  std::size_t next = 0;
-  for (TagObservation& seen : observations.observations) {
-    const double t = observations.times_s[static_cast<std::size_t>(seen.frame)];
-    while (next < times.size() && times[next] < t) ++next;
-    seen.frame = static_cast<int>(next);
+  if (!kept.is_object() || kept.value("key", json()) != detection_key(recording) ||
+      kept.value("sha256", json()) != sha256_of_file(file(kObservations))) {
+    return std::nullopt;
   }
-  observations.times_s = times;
-  observations.width = kept.value("width", 0);
-  observations.height = kept.value("height", 0);
-  for (const json& tag : kept.at("rejected")) {
-    observations.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
-                                     tag.at("reason").get<std::string>()});
+  try {
+    return observations_of(kept, read_corners(file(kObservations), recording.markers));
+  } catch (const json::exception&) {
+    return std::nullopt;  // damaged: the video is read once more
   }
-  return observations;
 }
 
 void RunFolder::keep_observations(const Recording& recording, const TagObservations& observations) {

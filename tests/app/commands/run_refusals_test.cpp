@@ -142,6 +142,13 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
   }
 }
 
+// A path that is empty, as of a shell's variable that is not set.
+TEST_F(RunRefusals, AnEmptyPath) {
+  expect_refusal({"run", ""}, ExitCode::kBadRequest, "RECORDING");
+  expect_refusal({"inspect", ""}, ExitCode::kBadRequest, "RECORDING");
+  expect_refusal({"run", folder_.path().string(), "--video", ""}, ExitCode::kBadRequest, "--video");
+}
+
 // What an earlier run wrote and this one does not goes; what others put there stays.
 TEST_F(RunRefusals, StaleProductsGo) {
   RecordingOptions few;
@@ -247,6 +254,24 @@ TEST_F(RunRefusalsOfImages, ACameraOfAnotherShape) {
                 "[500, 0, 149.5, 0, 500, 149.5, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
                 "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
   refused(ExitCode::kBadInput, "camera.yaml");
+}
+
+// A cache that is damaged is none: the video is read once more.
+TEST_F(RunRefusalsOfImages, ADamagedCache) {
+  film(false);
+  const std::vector<std::string> words{"run", folder_.path().string(), "--output", output(),
+                                       "--quiet"};
+  const std::string line = expect_refusal(words, ExitCode::kUndetermined, "move");
+  const auto kept = nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json"));
+  for (const char* damage : {R"({"key": 5})", R"({"times_s": null})", R"({"times_s": []})",
+                             R"({"rejected": [{}]})", R"({"rejected": null, "width": "wide"})"}) {
+    nlohmann::json damaged = kept;
+    damaged.merge_patch(nlohmann::json::parse(damage));
+    folder_.write("out/observations.json", damaged.dump());
+    EXPECT_EQ(expect_refusal(words, ExitCode::kUndetermined, "move"), line) << damage;
+    EXPECT_EQ(nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json")),
+              kept);
+  }
 }
 
 TEST_F(RunRefusalsOfImages, ALogOfAnotherTime) {
