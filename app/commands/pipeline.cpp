@@ -205,7 +205,7 @@ CameraModel choose_camera(const Recording& recording, const TagObservations& tag
   }
   if (tags.width == 0) return *recording.camera;
   return with_image_size(*recording.camera, tags.width, tags.height,
-                         (recording.folder / "camera.yaml").string());
+                         recording.camera_file.string());
 }
 
 Structure find_robot(const Recording& recording, const PoseTracks& tracks,

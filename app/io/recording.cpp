@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/io/nearest_name.h"
 #include "app/io/recording_files.h"
@@ -40,6 +41,18 @@ void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& s
   }
 }
 
+/// Where a nominal robot stands can be seen without a log only when nothing of it moves.
+void require_no_joints(const KinematicTree& nominal, const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const Joint& joint : nominal.joints) {
+    if (joint.type != JointType::kFixed) names.push_back(joint.name);
+  }
+  if (names.empty()) return;
+  throw bad_input((folder / "joints.csv").string(),
+                  "no such file, but the nominal robot has joints",
+                  fmt::format("add it with the columns t, {}", fmt::join(names, ", ")));
+}
+
 /// Torque channels that are declared must be columns, or the declaration is a slip of the pen.
 void read_log(Recording& recording, const RecordingFiles& files) {
   if (!files.joints) {
@@ -48,6 +61,7 @@ void read_log(Recording& recording, const RecordingFiles& files) {
                       "units are declared, but there is no joints.csv",
                       "add it, or remove the units");
     }
+    if (recording.nominal) require_no_joints(*recording.nominal, recording.folder);
     return;
   }
   RecordingSettings& settings = recording.settings;
@@ -93,6 +107,11 @@ void read_sightings(Recording& recording, const RecordingFiles& files) {
       break;
     case RecordingEntry::kCorners:
       recording.corners = read_corners(value_of(files.corners), recording.markers);
+      if (!files.camera) {
+        throw bad_input((recording.folder / "camera.yaml").string(),
+                        "no such file, and corners.csv does not say how large the images were",
+                        "add the camera's intrinsics, or name them with --camera");
+      }
       if (recording.camera) {
         value_of(recording.corners).width = recording.camera->width;
         value_of(recording.corners).height = recording.camera->height;
@@ -228,7 +247,9 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
   step([&] { read_markers(recording, files); });
   step([&] { check_fixed_tags(recording, files); });
   step([&] {
-    if (files.camera) recording.camera = read_camera(*files.camera);
+    if (!files.camera) return;
+    recording.camera = read_camera(*files.camera);
+    recording.camera_file = *files.camera;
   });
   step([&] {
     if (files.nominal) recording.nominal = read_urdf(*files.nominal);

@@ -61,6 +61,7 @@ struct Recording {
   std::optional<PointObservations> points;  ///< points.csv
   JointLog log;                             ///< empty when there is no joints.csv
   std::optional<CameraModel> camera;        ///< none: to be estimated
+  std::filesystem::path camera_file;        ///< that it was read from
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
   std::vector<std::filesystem::path> files;  ///< everything that was read, sorted

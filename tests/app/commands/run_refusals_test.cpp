@@ -256,6 +256,16 @@ TEST_F(RunRefusalsOfImages, ACameraOfAnotherShape) {
   refused(ExitCode::kBadInput, "camera.yaml");
 }
 
+TEST_F(RunRefusalsOfImages, ACameraOfAnotherShapeThatWasNamed) {
+  film(true);
+  fs::rename(folder_.path() / "camera.yaml", folder_.path() / "other.yaml");
+  std::string text = read_text_file(folder_.path() / "other.yaml");
+  text.replace(text.find("320"), 3, "300");
+  folder_.write("other.yaml", text);
+  refused(ExitCode::kBadInput, "other.yaml: made for images of 300 x 240",
+          {"--camera", (folder_.path() / "other.yaml").string()});
+}
+
 // A cache that is damaged is none: the video is read once more.
 TEST_F(RunRefusalsOfImages, ADamagedCache) {
   film(false);

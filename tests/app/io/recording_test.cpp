@@ -92,6 +92,23 @@ TEST_F(ReadRecording, StampsThatAreNoSecondsAreRefused) {
   EXPECT_EQ(folder_.refusal(), "accepted");
 }
 
+TEST_F(ReadRecording, WhatIsMissingIsNamed) {
+  folder_.write("nominal.urdf",
+                "<robot name='r'><link name='a'/><link name='b'/><joint name='elbow' "
+                "type='continuous'><parent link='a'/><child link='b'/></joint></robot>");
+  folder_.remove("joints.csv");
+  EXPECT_EQ(folder_.refusal(),
+            "joints.csv: no such file, but the nominal robot has joints (add it with the columns "
+            "t, elbow)");
+  folder_.remove("nominal.urdf");
+  folder_.remove("poses.csv");
+  folder_.write("tags.yaml", "default_size: 0.05\n");
+  std::string corners = "t,tag,corner,u,v\n";
+  for (int c = 0; c < 4; ++c) corners += fmt::format("0,1,{},{},{}\n", c, c, c % 2);
+  const std::string refusal = with("corners.csv", corners);
+  EXPECT_TRUE(refusal.starts_with("camera.yaml: no such file")) << refusal;
+}
+
 TEST_F(ReadRecording, TorquesAreLeftOut) {
   folder_.write("recording.yaml", "torques: [b]\n");
   EXPECT_EQ(read_recording(folder_.paths()).log.channels, (std::vector<std::string>{"a"}));
