@@ -37,6 +37,12 @@ std::string names_of(const std::vector<EffectId>& effects) {
   return out;
 }
 
+nlohmann::json effects_list(const std::vector<EffectId>& effects) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const EffectId& id : effects) out.push_back({{"effect", id.effect}, {"place", id.place}});
+  return out;
+}
+
 // The tree with the channels and their units, which the URDF does not hold.
 KinematicTree tree_of_run(const std::filesystem::path& run_folder,
                           const std::vector<JointChannel>& channels) {
@@ -80,7 +86,16 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   from_si(corrected.log, log, found.unit_factors);
   write_file_atomically(options.output, log_csv(corrected.log));
+  if (console.json) {
+    const nlohmann::json out{{"undone", effects_list(corrected.undone)},
+                             {"left", effects_list(corrected.left)},
+                             {"warnings", log.warnings},
+                             {"log", options.output.string()}};
+    fmt::print("{}\n", out.dump(2));
+    return ExitCode::kDone;
+  }
   if (console.quiet) return ExitCode::kDone;
+  for (const std::string& warning : log.warnings) fmt::print("{}\n", warning);
   fmt::print("{}\n", corrected.undone.empty()
                          ? std::string("The run found no effect that a joint log shows: unchanged.")
                          : "Undone: " + names_of(corrected.undone) + ".");

@@ -1,31 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <initializer_list>
+
 #include <fmt/format.h>
 
 #include "calib/camera/camera_formats.h"
 
 namespace kinescope::camera_file {
 
+namespace {
+
+// The key of a file of camera_calibration, or that of the message as `topic echo` prints it (ROS 2,
+// ROS 1). Where none is there, the first.
+std::string key_of(const YAML::Node& root, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (root[name]) return name;
+  }
+  return *names.begin();
+}
+
+// A matrix as its data alone, or with rows, cols and data.
+std::vector<double> data_of(const Source& source, const std::string& key, const YAML::Node& node) {
+  return node.IsMap() ? to_numbers(source, key + ".data", need(source, node, "data"))
+                      : to_numbers(source, key, node);
+}
+
+}  // namespace
+
 CameraModel read_ros(const Source& source, const YAML::Node& root) {
   CameraModel camera;
-  camera.width =
-      to_size(source, "image_width", need(source, root, "image_width").as<std::string>(""));
-  camera.height =
-      to_size(source, "image_height", need(source, root, "image_height").as<std::string>(""));
+  const std::string width = key_of(root, {"image_width", "width"});
+  const std::string height = key_of(root, {"image_height", "height"});
+  camera.width = to_size(source, width, need(source, root, width).as<std::string>(""));
+  camera.height = to_size(source, height, need(source, root, height).as<std::string>(""));
   if (const YAML::Node name = root["camera_name"]; name && name.IsScalar()) {
     camera.name = name.Scalar();
   }
-  const YAML::Node matrix = need(source, root, "camera_matrix");
-  if (!matrix.IsMap()) {
+  const std::string k = key_of(root, {"camera_matrix", "k", "K"});
+  const YAML::Node matrix = need(source, root, k);
+  if (k == "camera_matrix" && !matrix.IsMap()) {
     throw source.bad("camera_matrix", "has no rows, cols and data", "see ROS camera_info files");
   }
-  set_matrix(source, "camera_matrix.data",
-             to_numbers(source, "camera_matrix.data", need(source, matrix, "data")), camera);
-  check_values(source, camera, "camera_matrix.data");
+  const std::string matrix_key = matrix.IsMap() ? k + ".data" : k;
+  set_matrix(source, matrix_key, data_of(source, k, matrix), camera);
+  check_values(source, camera, matrix_key);
   const std::string model = need(source, root, "distortion_model").as<std::string>("");
-  const YAML::Node coefficients = need(source, root, "distortion_coefficients");
-  const std::string key = "distortion_coefficients.data";
-  const std::vector<double> d = to_numbers(
-      source, key, coefficients.IsMap() ? need(source, coefficients, "data") : coefficients);
+  const std::string key = key_of(root, {"distortion_coefficients", "d", "D"});
+  const std::vector<double> d = data_of(source, key, need(source, root, key));
   if (model == "plumb_bob") {
     set_polynomial(source, key, d, DistortionModel::kPlumbBob, camera);
   } else if (model == "rational_polynomial") {

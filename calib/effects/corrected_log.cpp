@@ -76,9 +76,9 @@ bool undo_clock(const FittedEffect& effect, JointLog& log) {
 }
 
 Error refused(const JointLog& log, const FittedEffect& effect, const std::string& what) {
-  return bad_request(log.source.empty() ? "the joint log" : log.source,
-                     fmt::format("{} at {}: {}", effect.id.effect, effect.id.place, what),
-                     "give a log with the channels of the recording, and the run's own results");
+  return bad_input(log.source.empty() ? "the joint log" : log.source,
+                   fmt::format("{} at {}: {}", effect.id.effect, effect.id.place, what),
+                   "give a log with the channels of the recording, and the run's own results");
 }
 
 // Throws for an effect at a joint that is not there.
@@ -88,9 +88,8 @@ void check_place(const FittedEffect& effect, const KinematicTree& tree, const Jo
   if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");
-  if (!log.channel(tree.joints[joint->index()].channel)) {
-    throw refused(log, effect, "no column for this joint");
-  }
+  const std::string& channel = tree.joints[joint->index()].channel;
+  if (!log.channel(channel)) throw refused(log, effect, fmt::format("no column '{}'", channel));
 }
 
 // True where the joint's channel drives a second one, which has no part in the effect.

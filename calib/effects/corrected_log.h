@@ -21,7 +21,7 @@ struct CorrectedLog {
   std::vector<EffectId> left;  ///< those that a log cannot show
 };
 
-/// Throws bad_request for an effect at a joint that the tree or the log does not have.
+/// Throws bad_input for an effect at a joint that the tree or the log does not have.
 [[nodiscard]] CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
                                          const std::vector<FittedEffect>& effects,
                                          const std::optional<Eigen::Vector3d>& gravity_base);

@@ -2,6 +2,7 @@
 #include "calib/vision/video_file.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -143,6 +144,9 @@ class VideoFileReader final : public VideoReader {
     // "file:" keeps FFmpeg from reading a colon in the name as a protocol.
     const int status = avformat_open_input(&raw, ("file:" + path_).c_str(), nullptr, &settings);
     av_dict_free(&settings);
+    if (status == AVERROR(EACCES) || status == AVERROR(EPERM)) {
+      throw bad_input(path_, "may not be read", "check its permissions");
+    }
     if (status < 0) {
       throw bad_input(path_,
                       "not a video that can be read, or one that is cut off before its index",

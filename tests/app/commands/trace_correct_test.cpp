@@ -138,6 +138,19 @@ TEST_F(Correct, KeepsToTheUnitsOfTheRecording) {
   refused(ExitCode::kBadInput, "unit_factors");
 }
 
+TEST_F(Correct, SaysItToAProgram) {
+  std::vector<std::string> words = command();
+  words.emplace_back("--json");
+  folder_.write("new.csv", "t,a,b,mode\n0,0.1,2,AUTO\n0.1,0.2,4,AUTO\n");
+  const Outcome outcome = run(words);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const json said = json::parse(outcome.out);
+  EXPECT_EQ(said.at("undone"), json::parse(R"([{"effect": "encoder_scale", "place": "joint2"}])"));
+  EXPECT_TRUE(said.at("left").empty());
+  ASSERT_EQ(said.at("warnings").size(), 1U);
+  EXPECT_EQ(said.at("log"), path("corrected.csv"));
+}
+
 TEST_F(Correct, SaysWhatALogCannotShow) {
   calibration_["effects"][0]["effect"] = "helical";
   write_calibration();
@@ -159,7 +172,7 @@ TEST_F(Correct, NeedsTheFilesOfTheRun) {
 
 TEST_F(Correct, NeedsALogWithTheChannels) {
   folder_.write("new.csv", "t,a,c\n0,0.1,2\n0.1,0.2,4\n");
-  refused(ExitCode::kBadRequest, "joint2");
+  refused(ExitCode::kBadInput, "joint2: no column 'b'");
   folder_.remove("new.csv");
   refused(ExitCode::kBadInput, "new.csv");
 }
@@ -167,7 +180,7 @@ TEST_F(Correct, NeedsALogWithTheChannels) {
 TEST_F(Correct, NeedsEffectsOfThisRobot) {
   calibration_["effects"][0]["place"] = "joint9";
   write_calibration();
-  refused(ExitCode::kBadRequest, "joint9");
+  refused(ExitCode::kBadInput, "joint9");
 }
 
 }  // namespace

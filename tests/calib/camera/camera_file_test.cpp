@@ -216,6 +216,28 @@ TEST_F(CameraFile, NamesTheKeyThatIsWrong) {
   }
 }
 
+// As `ros2 topic echo --once /camera/camera_info` prints it; ROS 1 writes D and K.
+TEST_F(CameraFile, ReadsAnEchoedMessage) {
+  const std::string ros2 =
+      "header:\n  frame_id: cam\nheight: 720\nwidth: 1280\ndistortion_model: plumb_bob\n"
+      "d:\n- -0.125\n- 0.25\n- 0.0\n- 0.0\n- 0.5\n"
+      "k:\n- 926.0\n- 0.0\n- 632.5\n- 0.0\n- 924.5\n- 354.25\n- 0.0\n- 0.0\n- 1.0\n---\n";
+  const std::string ros1 =
+      "height: 720\nwidth: 1280\ndistortion_model: \"plumb_bob\"\nD: [-0.125, 0.25, 0.0, 0.0, "
+      "0.5]\nK: [926.0, 0.0, 632.5, 0.0, 924.5, 354.25, 0.0, 0.0, 1.0]\n";
+  for (const std::string& message : {ros2, ros1}) {
+    const CameraModel camera = read_camera(write(message));
+    EXPECT_EQ(camera.width, 1280);
+    EXPECT_EQ(camera.height, 720);
+    EXPECT_EQ(camera.fx, 926.0);
+    EXPECT_EQ(camera.cy, 354.25);
+    EXPECT_EQ(camera.distortion, (std::array<double, 8>{-0.125, 0.25, 0.0, 0.0, 0.5}));
+  }
+  EXPECT_NE(complaint("width: 640\nheight: 480\ndistortion_model: plumb_bob\nk: [1, 2]\nd: []\n")
+                .find("k: "),
+            std::string::npos);
+}
+
 TEST_F(CameraFile, ReadsTheFilesOfOthers) {
   struct Case {
     std::string path;

@@ -241,13 +241,13 @@ TEST(CorrectedLog, NamesWhatALogCannotShow) {
   EXPECT_EQ(corrected.log.times_s, log.times_s);
 }
 
-void expect_bad_request(const std::vector<FittedEffect>& effects, const JointLog& log,
-                        const std::string& part) {
+void expect_bad_input(const std::vector<FittedEffect>& effects, const JointLog& log,
+                      const std::string& part) {
   try {
     static_cast<void>(undo(effects, log));
     ADD_FAILURE() << "accepted: " << part;
   } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ExitCode::kBadRequest);
+    EXPECT_EQ(error.code(), ExitCode::kBadInput);
     const std::string what = error.what();
     EXPECT_NE(what.find(part), std::string::npos) << what;
     EXPECT_NE(what.find("new_joints.csv"), std::string::npos) << what;
@@ -256,12 +256,12 @@ void expect_bad_request(const std::vector<FittedEffect>& effects, const JointLog
 
 TEST(CorrectedLog, AnotherLogOrRobotIsRefused) {
   JointLog log = log_of(values_as_logged());
-  expect_bad_request({fitted("encoder_scale", "q9", {0.01})}, log, "q9");
+  expect_bad_input({fitted("encoder_scale", "q9", {0.01})}, log, "q9");
   // Of another library, or of another gravity: numbers that nothing takes.
-  expect_bad_request({fitted("eccentricity", "q1", {0.01}, 1.0)}, log, "eccentricity at q1");
+  expect_bad_input({fitted("eccentricity", "q1", {0.01}, 1.0)}, log, "eccentricity at q1");
   log.channels[0] = "another";
-  expect_bad_request({fitted("encoder_scale", "q2", {0.01})}, log, "q2");
-  expect_bad_request({fitted("coupling", "q1", {0.01}, 1.0)}, log, "coupling at q1");
+  expect_bad_input({fitted("encoder_scale", "q2", {0.01})}, log, "q2");
+  expect_bad_input({fitted("coupling", "q1", {0.01}, 1.0)}, log, "coupling at q1");
   EXPECT_NO_THROW(static_cast<void>(undo({fitted("encoder_scale", "q1", {0.01})}, log)));
 }
 
