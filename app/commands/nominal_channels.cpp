@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -47,6 +48,7 @@ void take_in_order(const JointLog& log, NominalChannels& out) {
                     fmt::format("name the columns {}", fmt::join(names, ", ")));
   }
   for (std::size_t k = 0; k < own.size(); ++k) own[k]->channel = log.channels[k];
+  out.in_order = true;
   out.warnings.push_back(
       fmt::format("no column of {} is named like a joint of the nominal robot: taken in order ({} "
                   "drives {}, ..)",
@@ -105,6 +107,31 @@ void hold_the_others(const JointLog& log, NominalChannels& out) {
       log.source, fmt::join(held, ", "), held.size() == 1 ? "it" : "them"));
 }
 
+// Each joint hangs on the one before it.
+bool is_chain(const Structure& structure) {
+  for (std::size_t k = 1; k < structure.joints.size(); ++k) {
+    if (structure.joints[k].parent_link != structure.joints[k - 1].child_link) return false;
+  }
+  return true;
+}
+
+// The movable joints, first to last; nothing where they are no chain or one follows another.
+std::vector<std::size_t> chain_of(const KinematicTree& tree) {
+  std::vector<std::size_t> chain;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (!is_movable(tree.joints[j])) continue;
+    const std::vector<JointId> path = tree.path_to(tree.joints[j].child);
+    const auto on_path = [&](std::size_t k) {
+      return std::ranges::find(path, JointId{static_cast<int>(k)}) != path.end();
+    };
+    if (!std::ranges::all_of(chain, on_path)) return {};
+    chain.push_back(j);
+  }
+  std::set<std::string> channels;
+  for (const std::size_t j : chain) channels.insert(tree.joints[j].channel);
+  return channels.size() == chain.size() ? chain : std::vector<std::size_t>();
+}
+
 }  // namespace
 
 NominalChannels match_channels(const Recording& recording) {
@@ -128,6 +155,35 @@ NominalChannels match_channels(const Recording& recording) {
   follow_others(log, out.tree);
   hold_the_others(log, out);
   return out;
+}
+
+NominalChannels by_motion(NominalChannels matched, const Structure& structure,
+                          const JointLog& log) {
+  const std::vector<std::size_t> chain = chain_of(matched.tree);
+  if (structure.status != StructureStatus::kDetermined || !is_chain(structure) ||
+      structure.joints.size() != chain.size()) {
+    return matched;
+  }
+  std::vector<std::string> columns;
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    const StructureJoint& found = structure.joints[k];
+    const Joint& joint = matched.tree.joints[chain[k]];
+    if (!found.channel || found.type != joint.type) return matched;
+    columns.push_back(log.channels[static_cast<std::size_t>(found.channel->channel)]);
+    words.push_back(fmt::format("{} drives {}", columns.back(), joint.name));
+  }
+  if (std::set<std::string>(columns.begin(), columns.end()).size() != columns.size()) {
+    return matched;
+  }
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    matched.tree.joints[chain[k]].channel = columns[k];
+  }
+  matched.warnings = {
+      fmt::format("no column of {} is named like a joint of the nominal robot: taken by what the "
+                  "markers show ({})",
+                  log.source, fmt::join(words, ", "))};
+  return matched;
 }
 
 }  // namespace kinescope

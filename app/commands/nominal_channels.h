@@ -11,15 +11,22 @@
 #include <vector>
 
 #include "app/io/recording.h"
+#include "kinematics/structure/structure.h"
 
 namespace kinescope {
 
 struct NominalChannels {
   KinematicTree tree;
   std::vector<std::string> warnings;
+  bool in_order = false;  ///< no column is named like a joint
 };
 
 /// Throws bad_input, naming joints and columns, where a column is missing or belongs to no joint.
 [[nodiscard]] NominalChannels match_channels(const Recording& recording);
+
+/// The same with the columns that the markers show to move the joints, first to last, of a robot
+/// that is one chain as the structure is, with joints of the same kinds; as it is otherwise.
+[[nodiscard]] NominalChannels by_motion(NominalChannels matched, const Structure& structure,
+                                        const JointLog& log);
 
 }  // namespace kinescope

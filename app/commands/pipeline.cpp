@@ -244,7 +244,11 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
 CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,
                                   const PoseTracks& tracks, const CameraModel& camera,
                                   std::vector<std::string>& warnings) {
-  const NominalChannels matched = match_channels(recording);
+  NominalChannels matched = match_channels(recording);
+  if (matched.in_order && !tracks.tracks.empty()) {
+    const Structure structure = find_structure(tracks, recording.log);
+    matched = by_motion(std::move(matched), structure, recording.log);
+  }
   const KinematicTree& nominal = matched.tree;
   warnings.insert(warnings.end(), matched.warnings.begin(), matched.warnings.end());
   const auto place = [&](const KinematicTree& tree) {

@@ -138,6 +138,17 @@ std::string scale_words(const KinematicTree& tree) {
   return text;
 }
 
+/// " No column is named like these joints: ch3 drives joint1." of a nominal robot.
+std::string column_words(const KinematicTree& tree, const JointLog& log) {
+  std::vector<std::string> words;
+  for (const Joint& joint : tree.joints) {
+    if (joint.type == JointType::kFixed || joint.channel.empty() || log.channel(joint.name))
+      continue;
+    words.push_back(fmt::format("{} drives {}", joint.channel, joint.name));
+  }
+  return words.empty() ? "" : " No column is named like these joints: " + joined(words) + ".";
+}
+
 std::string found_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
   const std::size_t moving = moving_joints(tree);
@@ -149,6 +160,7 @@ std::string found_words(const RunSummary& run) {
     if (moving > 0) text += fmt::format(" ({})", type_letters(tree));
     text +=
         fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), what), driving_words(run));
+    text += column_words(tree, run.log);
     for (const NominalFault& fault : run.nominal_faults)
       text += " " + fault_words(value_of(run.nominal), fault);
     return text;

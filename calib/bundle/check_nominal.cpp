@@ -9,6 +9,8 @@
 #include <set>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -177,6 +179,63 @@ struct Trial {
   Errors errors;
 };
 
+std::string length_words(double length, bool px) {
+  return px ? fmt::format("{:.0f} px", length) : fmt::format("{:.1f} mm", 1e3 * length);
+}
+
+// Distances of the sightings of every marker from their mean: corners in px, places in m.
+std::map<TagId, double> typical_motions(const Measurements& measurements) {
+  std::map<TagId, std::vector<Eigen::VectorXd>> places;
+  for (const TagObservation& seen : measurements.corners) {
+    Eigen::VectorXd corners(2 * static_cast<Eigen::Index>(seen.corners_px.size()));
+    for (std::size_t i = 0; i < seen.corners_px.size(); ++i) {
+      corners.segment<2>(2 * static_cast<Eigen::Index>(i)) = seen.corners_px[i];
+    }
+    // Root mean square over the corners, as an error is.
+    places[seen.id].emplace_back(corners / std::sqrt(static_cast<double>(seen.corners_px.size())));
+  }
+  for (const PoseTrack& track : measurements.poses.tracks) {
+    for (const PoseSample& sample : track.samples)
+      places[track.id].emplace_back(sample.T_camera_marker.translation);
+  }
+  for (const PointObservation& point : measurements.points.observations) {
+    if (point.position_m) places[point.id].emplace_back(*point.position_m);
+  }
+  std::map<TagId, double> out;
+  for (const auto& [id, all] : places) {
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(all.front().size());
+    for (const Eigen::VectorXd& place : all) mean += place / static_cast<double>(all.size());
+    std::vector<double> away;
+    for (const Eigen::VectorXd& place : all) away.push_back((place - mean).norm());
+    out[id] = median_of(std::move(away));
+  }
+  return out;
+}
+
+// A marker that the robot moves far and yet misses by a share of that: no drawing's inaccuracy, but
+// another robot, other columns or other units.
+void require_fit(const Errors& errors, const Measurements& measurements) {
+  constexpr double kGross = 0.1;  // of its motion
+  constexpr double kFar = 0.2;    // of the motion of the marker that moves most
+  const std::map<TagId, double> motions = typical_motions(measurements);
+  double most = 0.0;
+  for (const auto& [id, motion] : motions) most = std::max(most, motion);
+  for (const auto& [id, motion] : motions) {
+    const auto error = errors.find(id);
+    if (error == errors.end() || motion < kFar * most) continue;
+    const bool corners = error->second.px > 0.0;
+    const double missed = corners ? error->second.px : error->second.m;
+    if (missed < kGross * motion) continue;
+    throw undetermined(
+        "nominal robot",
+        fmt::format("it does not fit with these columns: tag_{} is typically {} from where it "
+                    "should be, and moves by {}",
+                    id.value, length_words(missed, corners), length_words(motion, corners)),
+        "check that the columns are named like the joints that they drive, their units, and that "
+        "the URDF is this robot's; kinescope run without --nominal shows what each column moves");
+  }
+}
+
 }  // namespace
 
 CheckedNominal check_nominal(const KinematicTree& nominal,
@@ -234,6 +293,7 @@ CheckedNominal check_nominal(const KinematicTree& nominal,
     faults = std::move(others);
     now = std::move(without);
   }
+  require_fit(now->errors, few);
   return {std::move(now->start), std::move(faults)};
 }
 

@@ -40,7 +40,7 @@ struct CheckedNominal {
   std::vector<NominalFault> faults;
 };
 
-/// `place` makes the start of a drawing; it may throw undetermined.
+/// `place` makes the start of a drawing; it may throw undetermined, as this does if nothing fits.
 [[nodiscard]] CheckedNominal check_nominal(
     const KinematicTree& nominal,
     const std::function<CalibrationStart(const KinematicTree&)>& place,

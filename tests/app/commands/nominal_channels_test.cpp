@@ -107,6 +107,45 @@ TEST(NominalChannels, FollowersHaveNoPlaceInTheOrder) {
   EXPECT_NE(matched.warnings.at(0).find("taken in order"), std::string::npos);
 }
 
+/// Two joints about parallel axes in a chain, driven by the columns in the order given.
+Structure two_turns(const std::vector<int>& channels) {
+  Structure structure;
+  structure.status = StructureStatus::kDetermined;
+  structure.links.resize(channels.size() + 1);
+  for (std::size_t k = 0; k < channels.size(); ++k) {
+    StructureJoint joint;
+    joint.parent_link = static_cast<int>(k);
+    joint.child_link = static_cast<int>(k) + 1;
+    joint.channel = ChannelTerm{.channel = channels[k]};
+    structure.joints.push_back(joint);
+  }
+  return structure;
+}
+
+TEST(NominalChannels, WithoutNamesTheMarkersSayWhichColumnDrivesWhat) {
+  Recording recording = with_columns({"a", "b"});
+  KinematicTree& arm = *recording.nominal;
+  arm.joints.resize(2);
+  arm.links.resize(3);
+  const NominalChannels ordered = match_channels(recording);
+  ASSERT_TRUE(ordered.in_order);
+  const NominalChannels moved = by_motion(ordered, two_turns({1, 0}), recording.log);
+  EXPECT_EQ(moved.tree.joints[0].channel, "b");
+  EXPECT_EQ(moved.tree.joints[1].channel, "a");
+  ASSERT_EQ(moved.warnings.size(), 1U);
+  EXPECT_NE(moved.warnings[0].find("b drives shoulder, a drives elbow"), std::string::npos)
+      << moved.warnings[0];
+  // As it was where the structure is another one, or no answer.
+  Structure other = two_turns({1, 0});
+  other.joints[1].type = JointType::kPrismatic;
+  EXPECT_EQ(by_motion(ordered, other, recording.log).tree.joints[0].channel, "a");
+  other = two_turns({1, 0});
+  other.status = StructureStatus::kAmbiguous;
+  EXPECT_EQ(by_motion(ordered, other, recording.log).tree.joints[0].channel, "a");
+  EXPECT_EQ(by_motion(ordered, two_turns({1}), recording.log).tree.joints[0].channel, "a");
+  EXPECT_EQ(by_motion(ordered, two_turns({1, 1}), recording.log).tree.joints[0].channel, "a");
+}
+
 TEST(NominalChannels, InspectSaysTheSame) {
   const RecordingFolder folder;
   folder.write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,1,0,0,1,0,0,0,1\n1,1,0,0,1,0,0,0,1\n")

@@ -109,6 +109,14 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
       << verdict.found;
 }
 
+TEST(Verdict, NamesTheColumnsOfANominalRobotWhoseJointsAreCalledOtherwise) {
+  RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true});
+  EXPECT_FALSE(has(make_verdict(run).found, "No column")) << make_verdict(run).found;
+  run.calibration.tree.joints[0].name = "shoulder";
+  const std::string found = make_verdict(run).found;
+  EXPECT_TRUE(has(found, "No column is named like these joints: q1 drives shoulder.")) << found;
+}
+
 TEST(Verdict, AnOddScaleIsSaidWithTheTagSizeAsACause) {
   RunSummary run = synthetic_run();
   EXPECT_FALSE(has(make_verdict(run).found, "unit of its own")) << make_verdict(run).found;

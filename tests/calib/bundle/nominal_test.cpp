@@ -236,6 +236,24 @@ TEST(CheckNominal, LeavesARobotAloneThatIsOnlyInaccurate) {
   EXPECT_TRUE(check(lab, measurements).faults.empty());
 }
 
+TEST(CheckNominal, RefusesColumnsThatNoMendingExplains) {
+  Lab lab = make_lab("other columns", 0.02, 0.003);
+  for (std::size_t j = 3; j < 6; ++j)
+    lab.nominal.joints[j].type = lab.real.joints[j].type = JointType::kFixed;
+  Lab other = lab;
+  for (int j = 0; j < 3; ++j) other.values.col(j) = lab.values.col((j + 1) % 3);
+  const Measurements measurements = tracked_poses(other, {}, 2e-4, 1e-4);
+  try {
+    static_cast<void>(check(lab, measurements));
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUndetermined);
+    EXPECT_NE(std::string(error.what()).find("does not fit with these columns: tag_3"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Nominal, PointsOfATracker) {
   constexpr double kSigma = 5e-5;
   const Lab lab = make_lab("tracker points", 0.01, 0.002);
