@@ -212,12 +212,30 @@ std::map<TagId, double> typical_motions(const Measurements& measurements) {
   return out;
 }
 
+// The declared noise of every marker's sightings as a length: px of a corner, m of a place.
+std::map<TagId, double> typical_noise(const Measurements& measurements) {
+  std::map<TagId, std::vector<double>> all;
+  for (const TagObservation& seen : measurements.corners)
+    all[seen.id].push_back(std::sqrt(2.0) * seen.sigma_px);
+  for (const PoseTrack& track : measurements.poses.tracks) {
+    for (const PoseSample& sample : track.samples)
+      all[track.id].push_back(std::sqrt(sample.covariance.bottomRightCorner<3, 3>().trace()));
+  }
+  for (const PointObservation& point : measurements.points.observations)
+    all[point.id].push_back(std::sqrt(3.0) * point.sigma_m);
+  std::map<TagId, double> out;
+  for (auto& [id, sigmas] : all) out[id] = median_of(std::move(sigmas));
+  return out;
+}
+
 // A marker that the robot moves far and yet misses by a share of that: no drawing's inaccuracy, but
 // another robot, other columns or other units.
 void require_fit(const Errors& errors, const Measurements& measurements) {
   constexpr double kGross = 0.1;  // of its motion
   constexpr double kFar = 0.2;    // of the motion of the marker that moves most
+  constexpr double kNoise = 5.0;  // times the declared one
   const std::map<TagId, double> motions = typical_motions(measurements);
+  const std::map<TagId, double> noise = typical_noise(measurements);
   double most = 0.0;
   for (const auto& [id, motion] : motions) most = std::max(most, motion);
   for (const auto& [id, motion] : motions) {
@@ -225,7 +243,7 @@ void require_fit(const Errors& errors, const Measurements& measurements) {
     if (error == errors.end() || motion < kFar * most) continue;
     const bool corners = error->second.px > 0.0;
     const double missed = corners ? error->second.px : error->second.m;
-    if (missed < kGross * motion) continue;
+    if (missed < std::max(kGross * motion, kNoise * noise.at(id))) continue;
     throw undetermined(
         "nominal robot",
         fmt::format("it does not fit with these columns: tag_{} is typically {} from where it "
