@@ -163,11 +163,11 @@ double mean_step_s(const std::vector<double>& times_s) {
 }
 
 /// One clock in a thousandth, millionth or billionth of a second: seen by how long both run, where
-/// the slower one has steps over which nothing can be said. Postures have any steps.
+/// the slower one has steps over which nothing can be said. Stamps that agree are of one clock.
 void require_seconds(const JointLog& log, const std::vector<double>& times_s,
                      const std::string& source) {
   constexpr double kLongStepS = 1.0;
-  if (log.size() < 2 || times_s.size() < 2 || is_posture_log(log, times_s)) return;
+  if (log.size() < 2 || times_s.size() < 2 || is_posture_log(log, times_s, {})) return;
   const double log_s = log.times_s.back() - log.times_s.front();
   const double frames_s = times_s.back() - times_s.front();
   if (!(log_s > 0.0 && frames_s > 0.0)) return;
