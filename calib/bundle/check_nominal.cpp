@@ -231,7 +231,7 @@ std::map<TagId, double> typical_noise(const Measurements& measurements) {
 // A marker that the robot moves far and yet misses by a share of that: no drawing's inaccuracy, but
 // another robot, other columns or other units.
 void require_fit(const Errors& errors, const Measurements& measurements) {
-  constexpr double kGross = 0.1;  // of its motion
+  constexpr double kGross = 0.2;  // of its motion
   constexpr double kFar = 0.2;    // of the motion of the marker that moves most
   constexpr double kNoise = 5.0;  // times the declared one
   const std::map<TagId, double> motions = typical_motions(measurements);

@@ -99,14 +99,17 @@ class PositionFactorsNode : public KernelNode {
     multiply(theta, a, b, scratch, out);
   }
 
-  void multiply(const Theta& theta, Samples a, Samples b, Scratch&, Block out) const override {
+  void multiply(const Theta& theta, Samples a, Samples b, Scratch& scratch,
+                Block out) const override {
+    const Scratch::Frame frame(scratch);
     const auto x = a.rows(0);
-    const Eigen::VectorXd weights = theta.array().exp();
+    Eigen::Map<Eigen::MatrixXd> weights = scratch.take(theta.size(), 1);
+    weights.col(0) = theta.array().exp();
     for (Index j = 0; j < b.size; ++j) {
       for (std::size_t m = 0; m < maps_.size(); ++m) {
         const double* x0 = x.col(firsts_[m]).data();
-        multiply_factors(x0, second(x0, x.outerStride(), m), slopes(weights, b, j, m), a.size,
-                         out.col(j).data());
+        multiply_factors(x0, second(x0, x.outerStride(), m), slopes(weights.data(), b, j, m),
+                         a.size, out.col(j).data());
       }
     }
   }
@@ -117,7 +120,8 @@ class PositionFactorsNode : public KernelNode {
     const Scratch::Frame frame(scratch);
     const auto count = static_cast<Index>(maps_.size());
     const auto x = a.rows(0);
-    const Eigen::VectorXd weights = theta.array().exp();
+    Eigen::Map<Eigen::MatrixXd> weights = scratch.take(theta.size(), 1);
+    weights.col(0) = theta.array().exp();
     Eigen::Map<Eigen::MatrixXd> left = scratch.take(a.size, count);
     Eigen::Map<Eigen::MatrixXd> right = scratch.take(a.size, 1);
     std::array<double, 4> sums{};
@@ -129,17 +133,17 @@ class PositionFactorsNode : public KernelNode {
       for (Index m = 0; m + 1 < count; ++m) {
         const auto at = static_cast<std::size_t>(m);
         left.col(m + 1) = left.col(m);
-        multiply_factors(x0_of(m), second(x0_of(m), x.outerStride(), at), slopes(weights, b, j, at),
-                         a.size, left.col(m + 1).data());
+        multiply_factors(x0_of(m), second(x0_of(m), x.outerStride(), at),
+                         slopes(weights.data(), b, j, at), a.size, left.col(m + 1).data());
       }
       right.setOnes();
       for (Index m = count; m-- > 0;) {
         const auto at = static_cast<std::size_t>(m);
-        const Slopes s = slopes(weights, b, j, at);
+        const Slopes s = slopes(weights.data(), b, j, at);
         const double* x1 = second(x0_of(m), x.outerStride(), at);
         left.col(m).array() *= right.col(0).array();
         contract_factors(x0_of(m), x1, s, a.size, left.col(m).data(), sums);
-        add_slopes(weights, b, j, at, sums, gradient);
+        add_slopes(weights.data(), b, j, at, sums, gradient);
         if (m > 0) multiply_factors(x0_of(m), x1, s, a.size, right.data());
       }
     }
@@ -155,7 +159,7 @@ class PositionFactorsNode : public KernelNode {
     return maps_[m].size() > 1 ? x0 + stride : x0;
   }
 
-  [[nodiscard]] Slopes slopes(const Eigen::VectorXd& weights, const Samples& b, Index j,
+  [[nodiscard]] Slopes slopes(const double* weights, const Samples& b, Index j,
                               std::size_t m) const {
     const Index first = firsts_[m];
     const Index size = maps_[m].size();
@@ -167,7 +171,7 @@ class PositionFactorsNode : public KernelNode {
   }
 
   // d/dlog w = w d/dw.
-  void add_slopes(const Eigen::VectorXd& weights, const Samples& b, Index j, std::size_t m,
+  void add_slopes(const double* weights, const Samples& b, Index j, std::size_t m,
                   const std::array<double, 4>& sums, Gradient& gradient) const {
     const Slopes s = slopes(weights, b, j, m);
     const Index size = maps_[m].size();

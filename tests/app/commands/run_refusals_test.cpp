@@ -106,7 +106,7 @@ TEST_F(RunRefusals, ANominalRobotThatCannotBeRead) {
 TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
   RecordingOptions few;
   few.frames = 200;
-  const PosesOfArm good = arm("answer", few, 2);
+  const PosesOfArm good = arm("answer", few, 3);
   write_poses(good.recording);
   const fs::path kept = output();
   std::vector<std::string> words{
@@ -114,12 +114,12 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
       "--no-trace"};
   ASSERT_EQ(run(words).code, 0);
   folder_.write("nominal.urdf", read_text_file(kept / "robot.urdf"));
-  // The last body is mostly not where the robot says.
+  // The last body is mostly not where the robot says, though not as far off as another robot's.
   RobotRecording astray = good.recording;
   Rng rng = Rng::from_name("astray");
   for (PoseSample& sample : astray.tracks.tracks.back().samples) {
     if (rng.uniform() < 0.35) continue;
-    for (double& x : sample.T_camera_marker.translation) x += rng.uniform(-0.3, 0.3);
+    for (double& x : sample.T_camera_marker.translation) x += rng.uniform(-0.02, 0.02);
   }
   write_poses(astray);
   const auto before = contents(kept);

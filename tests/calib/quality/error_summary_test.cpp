@@ -103,6 +103,7 @@ TEST(SummariseErrors, CornersAreJudgedAcrossTheirOwnLineOfSight) {
                                      .child = LinkId{1},
                                      .T_parent_joint = {},
                                      .channel = "",
+                                     .couplings = {},
                                      .limits = {}});
   calibration.tree.joints[0].axis = Eigen::Vector3d::UnitX();
   calibration.T_camera_base.translation = {0.0, 0.0, 2.0};
