@@ -195,6 +195,25 @@ bool look_at_signal(const TorqueLog& log, const Eigen::MatrixXd& signal,
   return constant_while_moving;
 }
 
+/// Drivers that measure no torque publish zeros.
+std::optional<LogFinding> dead_torques(const TorqueLog& log) {
+  if (log.torque.cols() == 0) return std::nullopt;
+  for (Eigen::Index c = 0; c < log.torque.cols(); ++c) {
+    if (look_at(log, log.torque.col(c), log.torque_columns[static_cast<std::size_t>(c)]).sigma >
+        0.0) {
+      return std::nullopt;
+    }
+  }
+  return LogFinding{LogFault::kConstant,
+                    FaultWeight::kRefusal,
+                    log.torque_columns.front(),
+                    1.0,
+                    0.0,
+                    log.sources.front(),
+                    "no torque changes throughout: nothing was measured",
+                    "log measured torques or motor currents; some drivers publish zeros instead"};
+}
+
 /// How much later the position is than its command: the shift with the smallest squared difference.
 std::optional<LogFinding> command_lag(const TorqueLog& log) {
   const double step_s = median_of(steps_of(log.t_s, log.trajectory));
@@ -235,6 +254,7 @@ CheckedLog check_channels(TorqueLog log) {
   const bool drop_dq = look_at_signal(log, log.dq, log.dq_columns, out.findings);
   const bool drop_ddq = look_at_signal(log, log.ddq, log.ddq_columns, out.findings);
   look_at_signal(log, log.torque, log.torque_columns, out.findings);
+  if (auto dead = dead_torques(log)) out.findings.push_back(std::move(*dead));
   if (auto lag = command_lag(log)) out.findings.push_back(std::move(*lag));
   if (drop_dq) log.dq.resize(log.rows(), 0);
   if (drop_ddq) log.ddq.resize(log.rows(), 0);

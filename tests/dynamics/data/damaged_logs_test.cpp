@@ -273,6 +273,16 @@ TEST(DamagedLog, ConstantTorque) {
   EXPECT_EQ(looked.first(LogFault::kConstant).channel, "tau2");
 }
 
+TEST(DamagedLog, TorquesThatNobodyMeasured) {
+  LogWorld world = make_log_world(usual());
+  for (const char* column : {"tau1", "tau2", "tau3"}) {
+    world.rows.col(world.column(column)).setZero();
+  }
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "constant constant constant constant ");
+  EXPECT_THROW(throw_refusals(looked.report.findings), Error);
+}
+
 TEST(DamagedLog, ClippedTorque) {
   LogWorld world = make_log_world(usual());
   const Eigen::Index tau = world.column("tau1");
