@@ -71,7 +71,9 @@ bool undo_clock(const FittedEffect& effect, JointLog& log) {
     return true;
   }
   if (effect.id.effect != "clock_drift") return false;
-  for (double& t : log.times_s) t -= effect.values[0] * (t - effect.references[0]);
+  // The log's clock is ahead by drift x (camera's time - reference).
+  const double drift = effect.values[0];
+  for (double& t : log.times_s) t -= drift / (1.0 + drift) * (t - effect.references[0]);
   return true;
 }
 

@@ -157,7 +157,7 @@ struct Trace {
   TraceVerdict verdict = TraceVerdict::kNotRun;
   std::string reason;                  ///< in one sentence
   std::vector<TracedEffect> accepted;  ///< in the order in which they were found
-  std::vector<AddedEffect> added;      ///< the same, as TracedModel::fit takes them
+  std::vector<AddedEffect> added;      ///< what the search found, as TracedModel::fit takes it
   std::vector<Ambiguity> ambiguities;
   std::vector<Rest> rest;
   std::vector<TestedCandidate> candidates;

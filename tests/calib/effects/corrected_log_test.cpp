@@ -185,7 +185,8 @@ TEST(CorrectedLog, StampsMoveToTheCamerasClock) {
   const CorrectedLog drifted = undo({drift}, log);
   for (std::size_t i = 0; i < log.size(); ++i) {
     EXPECT_NEAR(offset.log.times_s[i], log.times_s[i] - 0.03, kExact);
-    EXPECT_NEAR(drifted.log.times_s[i], log.times_s[i] - 1e-3 * (log.times_s[i] - 7.0), kExact);
+    const double camera_s = drifted.log.times_s[i];
+    EXPECT_NEAR(camera_s + 1e-3 * (camera_s - 7.0), log.times_s[i], kExact);
   }
   EXPECT_EQ(offset.log.values, log.values);
   EXPECT_EQ(offset.undone.size(), 1U);
