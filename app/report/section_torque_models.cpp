@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/report/html.h"
 #include "app/report/plot.h"
@@ -109,6 +110,19 @@ std::string band_limits(const TorqueScore& score, const std::vector<std::string>
   return out;
 }
 
+// Joints of a semi-parametric model that stayed parametric; empty: none.
+std::string plainer_note(const TorqueScore& score, const std::vector<std::string>& joints) {
+  std::vector<std::string> names;
+  for (const int joint : score.plainer_joints) {
+    names.push_back(joints[static_cast<std::size_t>(joint)]);
+  }
+  if (names.empty()) return "";
+  return fmt::format(
+      "{} is the model-based one at {}: its squared exponential predicted motion left out of the "
+      "fit worse.",
+      to_string(score.kind), fmt::join(names, ", "));
+}
+
 std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.test.size();
   const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
@@ -177,6 +191,10 @@ std::string torque_models_section(const TorqueFacts& facts) {
       out += paragraph(fmt::format("{} was not fitted: {}", to_string(score.kind), score.failure),
                        "note");
     }
+  }
+  for (const TorqueScore& score : facts.summary.scores) {
+    const std::string plainer = plainer_note(score, facts.summary.joints);
+    if (!plainer.empty()) out += paragraph(plainer, "note");
   }
   for (const TorqueScore& score : facts.summary.scores) {
     const std::string limits = band_limits(score, facts.summary.joints);

@@ -57,6 +57,7 @@ json scores_json(const std::vector<TorqueScore>& scores) {
                    {"band_residuals",
                     std::vector<int>(score.band_residuals.begin(), score.band_residuals.end())},
                    {"bands_by_trajectory", score.bands_by_trajectory},
+                   {"plainer_joints", score.plainer_joints},
                    {"failure", text(score.failure)}});
   }
   return out;

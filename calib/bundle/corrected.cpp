@@ -11,6 +11,12 @@ const std::vector<int>& path_of(const Spec& spec, const Sighting& sighting) {
   return spec.path[marker.link.index()];
 }
 
+// Of a joint that is on the way to the marker.
+std::size_t place_on_path(const Spec& spec, const Sighting& sighting, int joint) {
+  const std::vector<int>& path = path_of(spec, sighting);
+  return static_cast<std::size_t>(std::ranges::find(path, joint) - path.begin());
+}
+
 double share_at(const Correction& correction, int frame) {
   return correction.share.size() == 0 ? 1.0 : correction.share[frame];
 }
@@ -47,15 +53,20 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
         bears = std::ranges::find(path, correction.index) != path.end();
         break;
       case CorrectedPart::kMarker:
-      case CorrectedPart::kMarkerSize:
         bears = correction.index == sighting.marker;
+        break;
+      case CorrectedPart::kMarkerSize:
+        bears = correction.index == kEverywhere || correction.index == sighting.marker;
         break;
       case CorrectedPart::kIntrinsic:
       case CorrectedPart::kReadout:
         bears = sighting.kind == MeasurementKind::kCorners;
         break;
-      case CorrectedPart::kCamera:
       case CorrectedPart::kClock:
+        bears = correction.index == kEverywhere ||
+                std::ranges::find(path, correction.index) != path.end();
+        break;
+      case CorrectedPart::kCamera:
         break;
     }
     if (bears) out.push_back(static_cast<int>(c));
@@ -65,19 +76,16 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
 
 CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
                                   const std::vector<int>& which, const double* values) {
-  const std::vector<int>& path = path_of(spec, sighting);
   CorrectedSighting out;
-  out.joints.assign(path.size(), Vector6d::Zero());
+  out.joints.assign(path_of(spec, sighting).size(), Vector6d::Zero());
   for (const int c : which) {
     const Correction& correction = spec.corrections[static_cast<std::size_t>(c)];
     const Vector6d twist = values[c] * twist_at(correction, sighting.frame);
     const double amount = values[c] * share_at(correction, sighting.frame);
     switch (correction.part) {
-      case CorrectedPart::kJoint: {
-        const auto k = std::ranges::find(path, correction.index) - path.begin();
-        out.joints[static_cast<std::size_t>(k)] += twist;
+      case CorrectedPart::kJoint:
+        out.joints[place_on_path(spec, sighting, correction.index)] += twist;
         break;
-      }
       case CorrectedPart::kMarker:
         out.marker += twist;
         break;
@@ -102,7 +110,7 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
 
 std::optional<CorrectedError> corrected_error(
     const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
-    const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
     const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m) {
   for (std::size_t k = 0; k < joints.size(); ++k) {
     joints[k].correction = corrected.joints[k];
@@ -117,6 +125,7 @@ std::optional<CorrectedError> corrected_error(
   Vector6d velocity = Vector6d::Zero();
   for (std::size_t k = 0; k < joints.size(); ++k) velocity += out.chain.d_value[k] * rates[k];
   out.d_time = out.error.d_marker * velocity;
+  out.rates = std::move(rates);
   if (corrected.line_delay_s != 0.0) {
     for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(2 * i);
@@ -133,11 +142,9 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
   const double share = share_at(correction, sighting.frame);
   const Vector6d twist = twist_at(correction, sighting.frame);
   switch (correction.part) {
-    case CorrectedPart::kJoint: {
-      const std::vector<int>& path = path_of(spec, sighting);
-      const auto k = std::ranges::find(path, correction.index) - path.begin();
-      return at.error.d_marker * (at.chain.d_link[static_cast<std::size_t>(k)] * twist);
-    }
+    case CorrectedPart::kJoint:
+      return at.error.d_marker *
+             (at.chain.d_link[place_on_path(spec, sighting, correction.index)] * twist);
     case CorrectedPart::kMarker:
       return at.error.d_marker * twist;
     case CorrectedPart::kCamera:
@@ -160,8 +167,11 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
       }
       return out;
     }
-    case CorrectedPart::kClock:
-      return at.d_time * share;
+    case CorrectedPart::kClock: {
+      if (correction.index == kEverywhere) return at.d_time * share;
+      const std::size_t k = place_on_path(spec, sighting, correction.index);
+      return at.error.d_marker * (at.chain.d_value[k] * (at.rates[k] * share));
+    }
   }
   return Eigen::VectorXd::Zero(at.error.residual.size());
 }

@@ -30,14 +30,15 @@ struct CorrectedSighting {
 struct CorrectedError {
   ChainDerivatives chain;
   SightingError error;
-  Eigen::VectorXd d_time;  ///< of the residual by the log's time, per s
+  std::vector<double> rates;  ///< of the joints on the path, rad/s or m/s
+  Eigen::VectorXd d_time;     ///< of the residual by the log's time, per s
 };
 
 /// `joints` as without corrections but for those of the clock, `rates` the rate of each (rad/s,
 /// m/s). Nothing when a corner lies behind the camera.
 [[nodiscard]] std::optional<CorrectedError> corrected_error(
     const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
-    const Pose& T_camera_base, std::vector<ChainJoint> joints, const std::vector<double>& rates,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
     const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m);
 
 /// Derivative of the residual by one correction's value.

@@ -18,8 +18,10 @@ enum class CorrectedPart {
   kCamera,      ///< a twist of everything seen, in the camera's frame
   kIntrinsic,   ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
   kReadout,     ///< s per image row by which a corner is seen later than the frame's middle row
-  kClock        ///< s by which the joint log's clock is further ahead than the time offset says
+  kClock        ///< s by which the log is further ahead than the time offset says
 };
+
+inline constexpr int kEverywhere = -1;
 
 /// A parameter of the bundle that is zero where the effect is absent.
 struct Correction {
@@ -27,7 +29,9 @@ struct Correction {
   std::string block;  ///< "joint3", "tag_12", "camera", "clock"
   std::string unit;
   CorrectedPart part = CorrectedPart::kJoint;
-  int index = 0;  ///< of the joint or the marker in the tree, or of the intrinsic parameter
+  /// Of the joint or the marker in the tree, or of the intrinsic parameter; kEverywhere: the sizes
+  /// of all markers, the readings of all joints.
+  int index = 0;
   Vector6d direction = Vector6d::Zero();  ///< twists: rotation, then translation
   Eigen::VectorXd share;                  ///< frames; empty: 1 everywhere
   /// Frames x 6: the twist itself, where its direction changes from frame to frame; takes the place

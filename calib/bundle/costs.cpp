@@ -57,9 +57,10 @@ class SightingCost final : public ceres::CostFunction {
     if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[mount + 2]);
     const double* values = corrections_.empty() ? nullptr : parameters[correction_block()];
     const CorrectedSighting corrected = sum_corrections(*spec_, *sighting_, corrections_, values);
-    const auto at = corrected_error(*spec_, *sighting_, corrected, from_block(parameters[0]),
-                                    std::move(joints), rates, from_block(parameters[mount]), camera,
-                                    sighting_->target >= 0 ? &target : nullptr);
+    const auto at =
+        corrected_error(*spec_, *sighting_, corrected, from_block(parameters[0]), std::move(joints),
+                        std::move(rates), from_block(parameters[mount]), camera,
+                        sighting_->target >= 0 ? &target : nullptr);
     if (!at || !at->error.residual.allFinite()) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = at->error.residual;
     if (jacobians != nullptr) fill_jacobians(parameters, corrected, *at, jacobians);

@@ -30,17 +30,25 @@ class ReadingsCallback final : public ceres::EvaluationCallback {
   const State* state_;
 };
 
-// Frames: joint-log time minus frame time.
-Eigen::VectorXd clock_of(const Spec& spec, const State& state) {
-  Eigen::VectorXd ahead_s = Eigen::VectorXd::Constant(
-      static_cast<Eigen::Index>(spec.times_s.size()), state.time_offset[0]);
+// Frames x joints: joint-log time minus frame time.
+Eigen::MatrixXd constant_clock(const Spec& spec, double time_offset_s) {
+  return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
+                                   static_cast<Eigen::Index>(spec.tree.joints.size()),
+                                   time_offset_s);
+}
+
+Eigen::MatrixXd clock_of(const Spec& spec, const State& state) {
+  Eigen::MatrixXd ahead_s = constant_clock(spec, state.time_offset[0]);
   for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
     const Correction& correction = spec.corrections[c];
     if (correction.part != CorrectedPart::kClock) continue;
+    const bool everywhere = correction.index == kEverywhere;
+    auto joints =
+        ahead_s.middleCols(everywhere ? 0 : correction.index, everywhere ? ahead_s.cols() : 1);
     if (correction.share.size() == 0) {
-      ahead_s.array() += state.corrections[c];
+      joints.array() += state.corrections[c];
     } else {
-      ahead_s += state.corrections[c] * correction.share;
+      joints.colwise() += state.corrections[c] * correction.share;
     }
   }
   return ahead_s;
@@ -93,9 +101,7 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
 }
 
 Readings::Readings(const Spec& spec, double time_offset_s)
-    : spec_(&spec),
-      ahead_s_(Eigen::VectorXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
-                                         time_offset_s)) {
+    : spec_(&spec), ahead_s_(constant_clock(spec, time_offset_s)) {
   read();
 }
 
@@ -105,7 +111,7 @@ Readings::Readings(const Spec& spec, const State& state)
 }
 
 void Readings::update(const State& state) {
-  Eigen::VectorXd ahead_s = clock_of(*spec_, state);
+  Eigen::MatrixXd ahead_s = clock_of(*spec_, state);
   if (ahead_s == ahead_s_) return;
   ahead_s_ = std::move(ahead_s);
   read();
@@ -124,7 +130,7 @@ void Readings::read() {
     for (std::size_t f = 0; f < spec_->times_s.size(); ++f) {
       const auto row = static_cast<Eigen::Index>(f);
       const auto column = static_cast<Eigen::Index>(j);
-      const double time_s = spec_->times_s[f] + ahead_s_[row];
+      const double time_s = spec_->times_s[f] + ahead_s_(row, column);
       // Where the clock moves a frame past the log's end while solving, the end's value stays.
       const double inside_s =
           std::clamp(time_s, spec_->log.times_s.front(), spec_->log.times_s.back());

@@ -104,7 +104,7 @@ class Readings {
   void read();
 
   const Spec* spec_;
-  Eigen::VectorXd ahead_s_;  // frames: joint-log time minus frame time
+  Eigen::MatrixXd ahead_s_;  // frames x joints: joint-log time minus frame time
   Eigen::MatrixXd value_;
   Eigen::MatrixXd rate_;
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> known_;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "calib/effects/camera_effects.h"
+#include "calib/effects/joint_shares.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -56,8 +57,9 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   return world;
 }
 
-// True when the correction only turns (or slides) the joint itself.
+// True when the correction is one of the joint's value, and of nothing else.
 bool is_joint_value(const Correction& correction, const Joint& joint) {
+  if (correction.part == CorrectedPart::kClock) return true;
   if (correction.part != CorrectedPart::kJoint || correction.twists.rows() > 0) return false;
   const bool turns = joint.type == JointType::kRevolute;
   return turns ? correction.direction.tail<3>().isZero(0.0)
@@ -66,7 +68,7 @@ bool is_joint_value(const Correction& correction, const Joint& joint) {
 
 // Moves the stamps to the camera's clock; false for other effects.
 bool undo_clock(const FittedEffect& effect, JointLog& log) {
-  if (effect.id.effect == "time_offset") {
+  if (effect.id == EffectId{"time_offset", "clock"}) {
     for (double& t : log.times_s) t -= effect.values[0];
     return true;
   }
@@ -112,10 +114,29 @@ void hold_followers(const KinematicTree& tree, const Joint& changed, const Eigen
   }
 }
 
+// What the encoder of a joint did not show, in the unit of its value.
+Eigen::VectorXd missing_value(const FittedEffect& effect,
+                              const std::vector<Correction>& corrections,
+                              const JointMotion& motion) {
+  const Eigen::VectorXd value = motion.value.col(corrections.front().index);
+  if (corrections.front().part == CorrectedPart::kClock) {
+    std::vector<double> read_s = motion.times_s;
+    for (double& t : read_s) t += effect.values[0];
+    return effects::read_at(motion.times_s, value, read_s) - value;
+  }
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(value.size());
+  for (std::size_t k = 0; k < corrections.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    out +=
+        effect.values[at] * corrections[k].reference / effect.references[at] * corrections[k].share;
+  }
+  return out;
+}
+
 // Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
 bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
-                const std::vector<effects::CameraEffect>& library, const JointLog& log,
-                JointLog& corrected) {
+                const std::vector<effects::CameraEffect>& library, const JointMotion& motion,
+                const JointLog& log, JointLog& corrected) {
   check_place(effect, tree, log);
   const auto found = std::ranges::find_if(
       library, [&](const effects::CameraEffect& known) { return known.candidate.id == effect.id; });
@@ -134,13 +155,8 @@ bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
   if (drives_another(tree, joint)) return false;
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(log.values.rows());  // in the channel's unit
-  for (std::size_t k = 0; k < corrections.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    const double amount =
-        effect.values[at] * corrections[k].reference / effect.references[at] / joint.scale;
-    change += amount * corrections[k].share;
-  }
+  // In the channel's unit.
+  const Eigen::VectorXd change = missing_value(effect, corrections, motion) / joint.scale;
   corrected.values.col(value_of(log.channel(joint.channel))) += change;
   hold_followers(tree, joint, change, corrected);
   return true;
@@ -156,8 +172,8 @@ CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
   const effects::EffectWorld world = world_of(log, tree, gravity_base);
   const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
   for (const FittedEffect& effect : effects) {
-    const bool undone =
-        undo_clock(effect, out.log) || undo_joint(effect, tree, library, log, out.log);
+    const bool undone = undo_clock(effect, out.log) ||
+                        undo_joint(effect, tree, library, world.frames, log, out.log);
     (undone ? out.undone : out.left).push_back(effect.id);
   }
   return out;

@@ -76,6 +76,26 @@ CameraEffect effect(const Suspect& s, std::string name, std::string words,
   return out;
 }
 
+// Of one joint against the others; of all of them it is the clock's.
+CameraEffect late_reading(const Suspect& s) {
+  constexpr double kLatest = 1.0;  // s
+  CameraEffect out = effect(s, "time_offset", fmt::format("{} is read late (or early)", s.name),
+                            {{"offset", "s"}}, "s");
+  out.candidate.possible = [](const Eigen::VectorXd& offset) {
+    return std::abs(offset[0]) < kLatest;
+  };
+  out.candidate.check =
+      "filters and bus cycles of this drive; a log of commanded in place of measured values";
+  out.candidate.record = fmt::format("move {} faster, and at changing speed", s.name);
+  out.corrections = [s](double) {
+    Correction late = turn(s, "time offset", "s", {});
+    late.part = CorrectedPart::kClock;
+    late.direction.setZero();
+    return std::vector{late};
+  };
+  return out;
+}
+
 CameraEffect encoder_scale(const Suspect& s) {
   CameraEffect out = effect(s, "encoder_scale",
                             fmt::format("{} moves by more (or less) than its encoder says, in "
@@ -84,6 +104,8 @@ CameraEffect encoder_scale(const Suspect& s) {
                             {{"scale", ""}}, "");
   out.candidate.check =
       "gear ratio, ticks a turn, belt, spindle pitch in the driver's configuration";
+  // Where no other length is known, a page printed too large says the same.
+  if (!s.turns) out.candidate.check += "; size of the printed markers (a black square's edge)";
   out.candidate.record = fmt::format("move {} over a larger range", s.name);
   out.corrections = [s](double) { return std::vector{turn(s, "scale error", "", s.value)}; };
   return out;
@@ -341,6 +363,7 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);
     if (!world.known && !(s.value.maxCoeff() > s.value.minCoeff())) continue;
+    if (!world.postures && world.driven.size() > 1) out.push_back(late_reading(s));
     out.push_back(encoder_scale(s));
     if (s.turns) out.push_back(eccentricity(s));
     if (CameraEffect gear = gear_error(world, s); world.known || !gear.candidate.scan.empty()) {

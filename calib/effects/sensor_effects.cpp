@@ -26,13 +26,15 @@ CameraEffect effect(std::string name, std::string place, std::string words,
   return out;
 }
 
-Correction correct(CorrectedPart part, const CameraEffect& effect, std::size_t parameter) {
+Correction correct(CorrectedPart part, const CameraEffect& effect, std::size_t parameter,
+                   int index = kEverywhere) {
   Correction out;
   out.block = effect.candidate.id.place;
   out.name = out.block + " " + effect.candidate.id.effect + " " +
              effect.candidate.parameters[parameter].name;
   out.unit = effect.candidate.parameters[parameter].unit;
   out.part = part;
+  out.index = index;
   return out;
 }
 
@@ -91,8 +93,7 @@ CameraEffect lens(std::string place, std::string words, const std::vector<int>& 
   out.corrections = [like = out, intrinsics](double) {
     std::vector<Correction> corrections;
     for (std::size_t i = 0; i < intrinsics.size(); ++i) {
-      corrections.push_back(correct(CorrectedPart::kIntrinsic, like, i));
-      corrections.back().index = intrinsics[i];
+      corrections.push_back(correct(CorrectedPart::kIntrinsic, like, i, intrinsics[i]));
     }
     return corrections;
   };
@@ -132,9 +133,32 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
   // One view, for ever: what it says of the size is the errors of its corners.
   if (rests(world, marker)) out.candidate.floor = std::numeric_limits<double>::infinity();
   out.corrections = [like = out, marker](double) {
-    Correction size = correct(CorrectedPart::kMarkerSize, like, 0);
-    size.index = marker;
-    return std::vector{size};
+    return std::vector{correct(CorrectedPart::kMarkerSize, like, 0, marker)};
+  };
+  return out;
+}
+
+// A page printed too large shows against lengths that the robot knows: its slides' encoders, or a
+// nominal model's. Beside a single slide it says what that encoder's scale says.
+bool may_be_misprinted(const EffectWorld& world) {
+  const auto slides = std::ranges::count_if(world.driven, [&](int joint) {
+    return world.tree.joints[static_cast<std::size_t>(joint)].type == JointType::kPrismatic;
+  });
+  const auto moving =
+      std::ranges::count_if(world.seen, [&](int marker) { return !rests(world, marker); });
+  return slides != 1 && moving > 1;
+}
+
+CameraEffect all_tag_sizes() {
+  CameraEffect out = effect("tag_size", "tags", "all markers are larger (or smaller) than declared",
+                            {{"relative size", ""}}, "");
+  out.candidate.check =
+      "measure a black square's edge: printers scale a page. Were the markers right, the scale of "
+      "every slide (of the nominal model) would be wrong";
+  out.candidate.record =
+      "measure a black square's edge: without a known length no recording says it";
+  out.corrections = [like = out](double) {
+    return std::vector{correct(CorrectedPart::kMarkerSize, like, 0)};
   };
   return out;
 }
@@ -162,8 +186,7 @@ void happens_at_a_time(const EffectWorld& world, CorrectedPart part, int index, 
   out.corrections = [like = out, part, index, time](double at_s) {
     std::vector<Correction> corrections;
     for (std::size_t i = 0; i < kTwist.size(); ++i) {
-      Correction twist = correct(part, like, i);
-      twist.index = index;
+      Correction twist = correct(part, like, i, index);
       twist.direction = Vector6d::Unit(static_cast<Eigen::Index>(i));
       twist.share = (time.array() >= at_s).cast<double>();
       corrections.push_back(std::move(twist));
@@ -219,6 +242,7 @@ std::vector<CameraEffect> camera_effects(const EffectWorld& world) {
   if (corners) {
     for (CameraEffect& lens : lenses(world.camera)) out.push_back(std::move(lens));
     for (const int marker : world.seen) out.push_back(tag_size(world, marker));
+    if (may_be_misprinted(world)) out.push_back(all_tag_sizes());
   }
   for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
   out.push_back(camera_bump(world));

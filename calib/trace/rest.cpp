@@ -189,7 +189,9 @@ bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain)
   found.rest.explained = gain / system.total().rr;
   if (found.rest.explained < kLeastShare) return false;
   found.rest.held_out_before = held_out_error(system, held_out_instants(system));
-  found.rest.held_out_after = held_out_error(after, held_out_instants(after));
+  const HeldOutInstants instants = held_out_instants(after);
+  found.rest.held_out_after = held_out_error(after, instants);
+  found.held_out = instants.whitened;
   // What does not help to predict is no structure.
   return found.rest.held_out_after.value < found.rest.held_out_before.value;
 }

@@ -14,8 +14,9 @@ namespace kinescope::trace {
 struct FoundRest {
   Rest rest;
   std::vector<EffectColumn> columns;  ///< of the Gaussian process: hats on its knots
-  Eigen::MatrixXd rows;   ///< of a field, in place of them: what the data show of it, row by row
-  Eigen::MatrixXd prior;  ///< information of either, whitened
+  Eigen::MatrixXd rows;      ///< of a field, in place of them: what the data show of it, row by row
+  Eigen::MatrixXd prior;     ///< information of either, whitened
+  Eigen::VectorXd held_out;  ///< with it: whitened squared errors of every instant
 };
 
 /// The model with it.

@@ -28,7 +28,13 @@ Trace Tracer::run() {
   report_progress(progress_, "trace", 0, 0);
   base_ = stage_of({});
   now_ = options_.start.empty() ? base_ : stage_of(options_.start);
-  if (!can_say(*now_)) return trace_;
+  if (can_say(*now_)) search();
+  const int rounds = std::max(1, round_);
+  report_progress(progress_, "trace", rounds, rounds);
+  return trace_;
+}
+
+void Tracer::search() {
   add_step(0, "the model as it is", *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
   do {
@@ -38,7 +44,6 @@ Trace Tracer::run() {
   summarise();
   list_not_found();
   conclude();
-  return trace_;
 }
 
 StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
@@ -66,6 +71,11 @@ bool Tracer::can_say(const Stage& stage) {
   }
   trace_.verdict = TraceVerdict::kNothingToSay;
   return false;
+}
+
+bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
+                                    const Eigen::VectorXd& other) const {
+  return paired_t(now_->system.partition(), one, other) > kClearlyWorse;
 }
 
 void Tracer::forward() {

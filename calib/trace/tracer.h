@@ -39,6 +39,7 @@ class Tracer {
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_say(const Stage& stage);
+  void search();
   void forward();
   /// Beyond what the sensor's own errors do.
   [[nodiscard]] bool is_large(const Candidate& candidate, const Score& score) const;
@@ -61,6 +62,9 @@ class Tracer {
   void look_for_curves();
   [[nodiscard]] bool look_for_field();
   [[nodiscard]] double rest_level() const;
+  /// Of two models' whitened squared errors, by instant.
+  [[nodiscard]] bool predicts_clearly_worse(const Eigen::VectorXd& one,
+                                            const Eigen::VectorXd& other) const;
   /// True where a rest is large enough beside what an effect explains to put its name in doubt.
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   [[nodiscard]] bool drop_what_rests_explain();

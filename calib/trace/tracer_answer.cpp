@@ -44,7 +44,7 @@ void Tracer::replace_waves_by_a_curve() {
     const auto curve = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
                                  rest_level(), options_.floor);
     if (!curve || !same_place(curve->rest.place, id.place) ||
-        curve->rest.held_out_after.value > now_->error.interval.high) {
+        predicts_clearly_worse(curve->held_out, now_->held_out.whitened)) {
       continue;
     }
     removed_.insert(id);
@@ -164,7 +164,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
                            : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
                                        {}, rest_level(), options_.floor);
     if (!alone || alone->rest.place != found.rest.place ||
-        alone->rest.held_out_after.value > found.rest.held_out_after.interval.high) {
+        predicts_clearly_worse(alone->held_out, found.held_out)) {
       continue;
     }
     removed_.insert(id);

@@ -131,8 +131,7 @@ bool Tracer::check(std::size_t index) {
   detail.explained =
       (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
   // What clearly helps to predict stays, however few stretches judge its parameters.
-  const bool needed = paired_t(now_->system.partition(), stage->held_out.whitened,
-                               now_->held_out.whitened) > kClearlyWorse;
+  const bool needed = predicts_clearly_worse(stage->held_out.whitened, now_->held_out.whitened);
   const bool slight = now_->added.size() > 1 && detail.explained < kImperfection;
   const bool shown =
       slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
@@ -158,9 +157,11 @@ bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous)
   effects[index] = other;
   StagePtr swapped = stage_of(std::move(effects));
   if (!swapped->fit.converged) return false;
-  // What says the same predicts as well, within its own doubt.
-  const double bar = superfluous ? now_->error.value : now_->error.interval.high;
-  if (swapped->error.value >= bar) return false;
+  // What says the same predicts as well.
+  if (superfluous ? swapped->error.value >= now_->error.value
+                  : predicts_clearly_worse(swapped->held_out.whitened, now_->held_out.whitened)) {
+    return false;
+  }
   if (superfluous) removed_.insert(id);
   mark(round_, id, CandidateState::kRemoved, now_->error.value);
   mark(round_, other.id, CandidateState::kAccepted, swapped->error.value);

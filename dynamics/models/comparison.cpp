@@ -53,6 +53,7 @@ TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamp
   score.band_residuals = fitted.bands.residuals.size() > 0 ? fitted.bands.residuals
                                                            : Eigen::VectorXi::Zero(error.cols());
   score.bands_by_trajectory = fitted.bands.by_trajectory;
+  score.plainer_joints = fitted.plainer_joints;
   return score;
 }
 

@@ -24,7 +24,8 @@ struct TorqueScore {
   /// Those residuals are of whole trajectories; else of blocks with motion learned from around
   /// them, which says less about what comes later.
   bool bands_by_trajectory = false;
-  std::string failure;  ///< why there is no score; empty where there is one
+  std::vector<int> plainer_joints = {};  ///< FittedTorqueModel's
+  std::string failure;                   ///< why there is no score; empty where there is one
 };
 
 [[nodiscard]] TorqueScore score_torque_model(const FittedTorqueModel& fitted,

@@ -209,6 +209,53 @@ Processes fit_processes(TorqueModelKind kind, const DynamicModel& model,
   return fits;
 }
 
+// Processes of all samples, those that left a fold out, and what they said about it.
+struct Trained {
+  Processes all;
+  std::vector<Processes> folds;
+  std::optional<LeftOutTorques> left;
+};
+
+Trained train(TorqueModelKind kind, const DynamicModel& model, const TorqueSamples& samples,
+              const TorqueModelOptions& options) {
+  Trained out{fit_processes(kind, model, samples, options, nullptr), {}, {}};
+  const int folds = std::min(options.band_folds, options.process_band_folds);
+  if (folds < 2) return out;
+  const auto all = static_cast<double>(samples.size());
+  out.left = leave_folds_out(
+      samples, folds, kBandRows, [&](const TorqueSamples& train, const TorqueSamples& test) {
+        const double share = static_cast<double>(train.size()) / all;
+        out.folds.push_back(fit_processes(kind, model, train, for_part(options, share), &out.all));
+        return prediction_of(out.folds.back(), motion_inputs(test.q, test.dq, test.ddq),
+                             test.joints(), options.threads);
+      });
+  return out;
+}
+
+// Joints whose processes predict motion left out worse than those of a plainer kind get the
+// latter's: neighbouring samples err alike, and a likelihood that takes them for independent can
+// prefer a process that has learned their noise.
+std::vector<int> take_the_plainer(const Trained& plainer, Trained& trained) {
+  std::vector<int> out;
+  if (!trained.left || !plainer.left) return out;
+  for (Eigen::Index j = 0; j < trained.left->residual.cols(); ++j) {
+    if (trained.left->residual.col(j).squaredNorm() <=
+        plainer.left->residual.col(j).squaredNorm()) {
+      continue;
+    }
+    const auto at = static_cast<std::size_t>(j);
+    trained.all[at] = plainer.all[at];
+    for (std::size_t f = 0; f < trained.folds.size(); ++f) {
+      trained.folds[f][at] = plainer.folds[f][at];
+    }
+    trained.left->residual.col(j) = plainer.left->residual.col(j);
+    trained.left->model_sigma.col(j) = plainer.left->model_sigma.col(j);
+    trained.left->sigma.col(j) = plainer.left->sigma.col(j);
+    out.push_back(static_cast<int>(j));
+  }
+  return out;
+}
+
 }  // namespace
 
 ProcessShare share_of(TorqueModelKind kind, Eigen::Index samples,
@@ -223,23 +270,17 @@ ProcessShare share_of(TorqueModelKind kind, Eigen::Index samples,
 FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind, const DynamicModel& model,
                                          const TorqueSamples& samples,
                                          const TorqueModelOptions& options) {
-  const Processes processes = fit_processes(kind, model, samples, options, nullptr);
-  const int folds = std::min(options.band_folds, options.process_band_folds);
-  if (folds < 2) return with_gps(kind, processes, {}, options.threads);
-  std::vector<Processes> parts;
-  const auto all = static_cast<double>(samples.size());
-  const auto left = leave_folds_out(
-      samples, folds, kBandRows, [&](const TorqueSamples& train, const TorqueSamples& test) {
-        const double share = static_cast<double>(train.size()) / all;
-        const Processes part =
-            fit_processes(kind, model, train, for_part(options, share), &processes);
-        parts.push_back(part);
-        return prediction_of(part, motion_inputs(test.q, test.dq, test.ddq), test.joints(),
-                             options.threads);
-      });
-  if (!left || bytes_of(parts) > kMostFoldBytes) parts.clear();
-  FittedTorqueModel fitted = with_gps(kind, processes, std::move(parts), options.threads);
-  return left ? calibrated(std::move(fitted), *left) : fitted;
+  Trained trained = train(kind, model, samples, options);
+  std::vector<int> plainer;
+  if (kind == TorqueModelKind::kSemiParametric && trained.left) {
+    plainer =
+        take_the_plainer(train(TorqueModelKind::kModelBased, model, samples, options), trained);
+  }
+  if (!trained.left || bytes_of(trained.folds) > kMostFoldBytes) trained.folds.clear();
+  FittedTorqueModel fitted =
+      with_gps(kind, std::move(trained.all), std::move(trained.folds), options.threads);
+  fitted.plainer_joints = std::move(plainer);
+  return trained.left ? calibrated(std::move(fitted), *trained.left) : fitted;
 }
 
 }  // namespace kinescope::models

@@ -84,6 +84,9 @@ struct FittedTorqueModel {
                                  const Eigen::MatrixXd& ddq)>
       claim = {};
   SigmaParts parts = {};  ///< that make `predict` of `claim`
+  /// Joints at which a semi-parametric model is the model-based one: its squared exponential
+  /// predicted motion left out worse.
+  std::vector<int> plainer_joints = {};
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what

@@ -66,7 +66,7 @@ double visibility(const InjectedEffect& effect, const TraceCase& of) {
   CalibrateOptions options;
   options.folds = 0;
   options.reject_sigma = 1e9;  // what an effect throws off is the effect
-  options.estimate_time_offset = effect.effect != "time_offset";
+  options.estimate_time_offset = effect.place != "clock";
   const auto calibrated = [&](const std::vector<InjectedEffect>& effects) {
     const World world = world_with(of, effects);
     return calibrate(world.measurements, world.markers, world.log, start_of(world, of), options);

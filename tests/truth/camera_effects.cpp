@@ -97,7 +97,7 @@ void add_lens(const InjectedEffect& effect, CameraModel& camera) {
 void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out) {
   Rng rng = Rng::from_name(fmt::format("injected {} {}", effect.effect, effect.place), robot.seed);
   const double time_s = effect.detail * robot.duration_s;
-  if (effect.effect == "time_offset") {
+  if (effect.effect == "time_offset" && effect.place == "clock") {
     out.clock.offset_s += effect.size;
   } else if (effect.effect == "clock_drift") {
     out.clock.drift = effect.size;
@@ -113,13 +113,16 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out
     const double direction = rng.uniform(0.0, kTwoPi);
     out.chequer = {effect.detail,
                    effect.size * Eigen::Vector2d(std::cos(direction), std::sin(direction))};
+  } else if (effect.effect == "tag_size" && effect.place == "tags") {
+    for (const Marker& marker : robot.tree.markers) out.size_factor[marker.id] = 1.0 + effect.size;
   } else if (effect.effect == "tag_size") {
     out.size_factor[tag_named(robot, effect.place)] = 1.0 + effect.size;
   } else if (effect.effect == "tag_slip") {
     const TagId id = tag_named(robot, effect.place);
     out.slips[id] = slip_of(effect, robot.markers.size_m(id), time_s, rng);
   } else {
-    KINESCOPE_CHECK(sits_on_joint(effect.effect), "an effect has a known name");
+    KINESCOPE_CHECK(sits_on_joint(effect.effect) || is_late_joint(effect),
+                    "an effect has a known name");
   }
 }
 

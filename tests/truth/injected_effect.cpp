@@ -120,6 +120,10 @@ const std::vector<std::string>& own_effects() {
 
 bool sits_on_joint(std::string_view effect) { return among(kOnJoints, effect); }
 
+bool is_late_joint(const InjectedEffect& effect) {
+  return effect.effect == "time_offset" && effect.place != "clock";
+}
+
 bool can_have(JointType type, std::string_view effect) {
   if (type == JointType::kFixed || !sits_on_joint(effect)) return false;
   if (effect == "curved_slider") return type == JointType::kPrismatic;
@@ -152,8 +156,13 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
       if (effect == "tag_size" && marker.link == LinkId{0}) continue;
       places.push_back(fmt::format("tag_{}", marker.id.value));
     }
+    const auto slides = std::ranges::count(robot.tree.joints, JointType::kPrismatic, &Joint::type);
+    if (effect == "tag_size" && slides > 1) places.emplace_back("tags");
   } else {
     places.emplace_back(effect == "time_offset" || effect == "clock_drift" ? "clock" : "camera");
+    if (effect == "time_offset" && robot.tree.joints.size() > 1) {
+      for (const Joint& joint : robot.tree.joints) places.push_back(joint.name);
+    }
   }
   for (const std::string& place : places) {
     Rng rng = Rng::from_name(fmt::format("weakest {} {}", effect, place), robot.seed);

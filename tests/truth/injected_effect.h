@@ -15,7 +15,7 @@
 namespace kinescope::truth {
 
 /// `effect`, its `size` and `detail`:
-///   time_offset      s, joint-log time = frame time + size
+///   time_offset      s, joint-log time = frame time + size; on a joint: of its reading alone
 ///   clock_drift      s/s, the log's clock gains this; detail: share of the recording at which the
 ///                    clocks agree
 ///   encoder_scale    1, true = (1 + size) x logged
@@ -32,7 +32,7 @@ namespace kinescope::truth {
 ///                    a bent shaft: no wobble but another geometry)
 ///   lens_distortion  1, change of k1; detail: of k2. `with` "tangential": of p1 and p2
 ///   rolling_shutter  s a row; detail: row exposed at the frame's stamp, share of the height
-///   tag_size         1, the tag is (1 + size) x as large as declared
+///   tag_size         1, the tag (on "tags": every one) is (1 + size) x as large as declared
 ///   tag_slip         m, in the tag's plane, with a small turn; detail: when, share of the time
 ///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
 /// and of the test's own making, in no library:
@@ -55,6 +55,8 @@ struct InjectedEffect {
 
 /// True for effects that sit on a joint; the others sit on a tag, the camera or the clock.
 [[nodiscard]] bool sits_on_joint(std::string_view effect);
+/// A time_offset that is not the clock's.
+[[nodiscard]] bool is_late_joint(const InjectedEffect& effect);
 /// False where an effect makes no sense: a slide has no screw, a hinge no curvature.
 [[nodiscard]] bool can_have(JointType type, std::string_view effect);
 

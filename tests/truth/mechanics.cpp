@@ -229,7 +229,7 @@ Mechanics::Mechanics(const FilmedRobot& robot, const std::vector<InjectedEffect>
         [&joint](double value) { return joint_motion(joint.type, joint.axis, value); });
   }
   for (const InjectedEffect& effect : effects) {
-    if (sits_on_joint(effect.effect)) add(effect);
+    if (sits_on_joint(effect.effect) || is_late_joint(effect)) add(effect);
   }
 }
 
@@ -237,6 +237,13 @@ void Mechanics::add(const InjectedEffect& effect) {
   Rng rng = Rng::from_name(fmt::format("injected {} {}", effect.effect, effect.place), robot_.seed);
   const double phase = rng.uniform(0.0, kTwoPi);
   const std::size_t j = joint_named(robot_.tree, effect.place);
+  if (is_late_joint(effect)) {
+    laws_[j].push_back(
+        [&motion = robot_.motions[j], late_s = effect.size](double q, const auto&, double t) {
+          return q + motion.value(t + late_s) - motion.value(t);
+        });
+    return;
+  }
   KINESCOPE_CHECK(can_have(robot_.tree.joints[j].type, effect.effect),
                   "an effect sits on a joint that can have it");
   if (effect.effect == "backlash") {

@@ -192,6 +192,20 @@ TEST(CorrectedLog, StampsMoveToTheCamerasClock) {
   EXPECT_EQ(offset.undone.size(), 1U);
 }
 
+TEST(CorrectedLog, AJointThatIsReadLateIsReadInTime) {
+  constexpr Eigen::Index kSamples = 2;  // by so many its reading is late
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  for (Eigen::Index i = 0; i < logged.rows(); ++i) {
+    truth(i, 1) = logged(std::min(i + kSamples, logged.rows() - 1), 1);
+  }
+  const CorrectedLog corrected =
+      undo({fitted("time_offset", "q2", {0.02 * kSamples})}, log_of(logged));
+  EXPECT_LT((values_of(corrected.log) - truth).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_EQ(corrected.log.times_s, log_of(logged).times_s);
+  EXPECT_EQ(corrected.undone.size(), 1U);
+}
+
 // A sag is told by the largest load of the recording, whatever the loads of this log.
 TEST(CorrectedLog, ASagFollowsItsLoadIntoAnotherPosture) {
   KinematicTree tree = robot();

@@ -101,13 +101,33 @@ TEST_P(Named, SizedAndCorrected) {
   EXPECT_NEAR(corrected.final_rms, std::numbers::sqrt2 * kSigma, kSigmaTolerance);
 }
 
-INSTANTIATE_TEST_SUITE_P(TraceCalibration, Named,
-                         ::testing::Values(std::pair{"eccentricity", "q2"},
-                                           std::pair{"backlash", "q3"},
-                                           std::pair{"tag_slip", "tag_12"},
-                                           std::pair{"camera_bump", "camera"},
-                                           std::pair{"clock_drift", "clock"}),
-                         [](const auto& tested) { return tested.param.first; });
+INSTANTIATE_TEST_SUITE_P(
+    TraceCalibration, Named,
+    ::testing::Values(std::pair{"eccentricity", "q2"}, std::pair{"backlash", "q3"},
+                      std::pair{"tag_slip", "tag_12"}, std::pair{"camera_bump", "camera"},
+                      std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"}),
+    [](const auto& tested) { return tested.param.first; });
+
+// A page printed 1 % too large, beside slides that know how far they went.
+TEST(TraceCalibration, APrintersScaleIsThatOfAllMarkers) {
+  EffectWorldOptions options = filmed();
+  options.kind = truth::RobotKind::kGantry;
+  options.effects = {{"tag_size", "tags", 0.01}};
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"tag_size", "tags"})) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), 0.01)) << trace.accepted.front().size;
+}
+
+// Hinges know no length: whatever its size, the page's scale is the robot's.
+TEST(TraceCalibration, APrintersScaleDoesNotShowOnHinges) {
+  const std::vector<NotFoundEffect>& missing = clean_trace().trace.not_found;
+  const auto scale = std::ranges::find(missing, EffectId{"tag_size", "tags"}, &NotFoundEffect::id);
+  ASSERT_NE(scale, missing.end());
+  EXPECT_TRUE(scale->hidden);
+  EXPECT_NE(scale->record.find("measure"), std::string::npos);
+}
 
 // A curve beside a joint's frame stretches the way, too: it contains the scale and is no rival.
 TEST(TraceCalibration, ASlidesScaleStandsAlone) {

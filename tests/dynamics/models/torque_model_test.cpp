@@ -83,6 +83,34 @@ TEST(TorqueModel, EveryKindExplainsUnseenMotion) {
   EXPECT_LT(nmse(TorqueModelKind::kGip), nmse(TorqueModelKind::kRbf));
 }
 
+// Neighbouring samples that err alike look like a function of the motion to a likelihood that takes
+// them for independent.
+TEST(TorqueModel, NoiseThatLastsIsNoFunctionOfTheMotion) {
+  constexpr double kMemory = 0.95;  // from one sample to the next
+  constexpr double kSlow = 0.2;     // share of each joint's rms torque
+  Experiment e = two_joints();
+  Rng rng = Rng::from_name("noise that lasts");
+  for (Eigen::Index j = 0; j < e.train.joints(); ++j) {
+    const double rms = e.train.torque.col(j).norm() / std::sqrt(double(e.train.size()));
+    double slow = rng.normal();
+    for (Eigen::Index i = 0; i < e.train.size(); ++i) {
+      slow = kMemory * slow + std::sqrt(1.0 - kMemory * kMemory) * rng.normal();
+      e.train.torque(i, j) += kSlow * rms * slow;
+    }
+  }
+  const FittedTorqueModel semi =
+      fit_torque_model(TorqueModelKind::kSemiParametric, e.model, e.train, quick());
+  const FittedTorqueModel plain =
+      fit_torque_model(TorqueModelKind::kModelBased, e.model, e.train, quick());
+  ASSERT_FALSE(semi.plainer_joints.empty());
+  const TorqueScore semi_score = score_torque_model(semi, e.test);
+  EXPECT_EQ(semi_score.plainer_joints, semi.plainer_joints);
+  const Eigen::VectorXd plain_nmse = score_torque_model(plain, e.test).nmse_percent;
+  for (const int joint : semi.plainer_joints) {
+    EXPECT_EQ(semi_score.nmse_percent[joint], plain_nmse[joint]);
+  }
+}
+
 TEST(TorqueModel, SameSamplesSameNumbersWithAnyThreads) {
   const Experiment e = two_joints();
   TorqueModelOptions options = quick();
