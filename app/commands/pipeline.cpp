@@ -14,6 +14,7 @@
 #include "app/commands/nominal_channels.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
+#include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -200,9 +201,7 @@ Observed observe(const Recording& recording, const RunOptions& options,
 
 CameraModel choose_camera(const Recording& recording, const TagObservations& tags) {
   if (tags.observations.empty()) return {};
-  if (!recording.camera) {
-    return pinhole_guess(tags.width, tags.height, focal_from_tags(tags, recording.markers));
-  }
+  if (!recording.camera) return camera_from_tags(tags, recording.markers);
   if (tags.width == 0) return *recording.camera;
   return with_image_size(*recording.camera, tags.width, tags.height,
                          recording.camera_file.string());
@@ -239,6 +238,24 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   start.time_offset_s = structure.time_offset_s;
   start.joint_values = structure.joint_values;
   return start;
+}
+
+CameraModel camera_from_motion(const Recording& recording, const Observed& observed,
+                               const CameraModel& camera, CalibrateOptions options) {
+  options.estimate_intrinsics = true;
+  options.folds = 0;
+  try {
+    const PoseTracks tracks = pose_tracks_from_tags(observed.tags, camera, recording.markers);
+    const Structure structure = find_robot(recording, tracks, options);
+    require_determined(structure);
+    const Calibration calibration =
+        calibrate(observed.measurements, recording.markers, recording.log,
+                  start_from_structure(structure, recording, camera), options);
+    if (calibration.status != CalibrationStatus::kUndetermined) return calibration.camera;
+  } catch (const Error&) {
+    // What is wrong will be said of the answer, not of this first look.
+  }
+  return camera;
 }
 
 CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,

@@ -29,8 +29,14 @@ struct Observed {
                                const std::optional<TagObservations>& cached,
                                const Progress& progress);
 
-/// The declared camera, checked against the image size, or a guess from the markers' shapes.
+/// The declared camera, checked against the image size, or what the markers' shapes say of it.
 [[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
+
+/// What a first calibration, on the structure that `camera` shows, says of the camera: lens and
+/// planar poses that are right to a per cent would pass for motion in the search for the structure.
+/// `camera` where that leads nowhere.
+[[nodiscard]] CameraModel camera_from_motion(const Recording& recording, const Observed& observed,
+                                             const CameraModel& camera, CalibrateOptions options);
 
 /// The structure, with the clocks' offset scanned for unless they are trusted to agree. Throws
 /// bad_request for points, which show no structure, and what declared.h throws.

@@ -113,7 +113,11 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!answered) folder.keep_observations(recording, observed.tags);
   clock.lap("detect", run.times);
 
-  const CameraModel camera = choose_camera(recording, observed.tags);
+  CameraModel camera = choose_camera(recording, observed.tags);
+  if (!run.camera_declared && !recording.nominal) {
+    camera = camera_from_motion(recording, observed, camera, options.calibrate);
+    clock.lap("camera", run.times);
+  }
   run.tracks = observed.tags.observations.empty()
                    ? observed.measurements.poses
                    : pose_tracks_from_tags(observed.tags, camera, recording.markers);

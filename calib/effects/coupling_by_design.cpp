@@ -96,6 +96,11 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
   std::string names;
   for (const std::size_t k : all) {
     TracedEffect effect = described(bundle, options, trace.added, k);
+    // A ratio that the structure took for likely may be nothing.
+    if (effect.p_value > trace.false_alarm_rate ||
+        effect.held_out_before.value <= effect.held_out_after.value) {
+      continue;
+    }
     effect.explained = std::clamp(effect.explained / plain->system.total().rr, 0.0, 1.0);
     names += (names.empty() ? "" : ", ") + trace::name_of(effect.id);
     // What the search found beyond the ratio is a part of it.
@@ -106,6 +111,7 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
                   [&](const NotFoundEffect& missing) { return missing.id == effect.id; });
     found.push_back(std::move(effect));
   }
+  if (found.empty()) return;
   trace.accepted.insert(trace.accepted.begin(), found.begin(), found.end());
   trace.held_out_before = plain->error;
   trace.steps.insert(trace.steps.begin(),

@@ -28,17 +28,26 @@ class LinesOfSight {
  public:
   explicit LinesOfSight(const Calibration& calibration) : calibration_(calibration) {}
 
-  /// The optical axis where the posture is not known.
+  /// The optical axis where the place is not known.
   [[nodiscard]] Eigen::Vector3d to(const SightingResidual& sighting) {
     const Marker* marker = calibration_.tree.marker(sighting.id);
     const Eigen::MatrixXd& values = calibration_.joint_values;
-    if (marker == nullptr || sighting.frame < 0 || sighting.frame >= values.rows() ||
-        !values.row(sighting.frame).allFinite()) {
+    if (marker == nullptr || sighting.frame < 0 || sighting.frame >= values.rows()) {
       return Eigen::Vector3d::UnitZ();
     }
     if (sighting.frame != frame_) {
       frame_ = sighting.frame;
-      links_ = forward_kinematics(calibration_.tree, values.row(frame_).transpose());
+      values_ = values.row(frame_).transpose();
+      // Joints that are not known move what is behind them, not the base and its markers.
+      links_ = forward_kinematics(calibration_.tree, values_.unaryExpr([](double value) {
+        return std::isfinite(value) ? value : 0.0;
+      }));
+    }
+    const auto is_known = [&](JointId joint) {
+      return std::isfinite(values_[static_cast<Eigen::Index>(joint.index())]);
+    };
+    if (!std::ranges::all_of(calibration_.tree.path_to(marker->link), is_known)) {
+      return Eigen::Vector3d::UnitZ();
     }
     const Pose T_base_marker = links_[marker->link.index()] * marker->T_link_marker;
     const Eigen::Vector3d place = calibration_.T_camera_base * T_base_marker.translation;
@@ -48,6 +57,7 @@ class LinesOfSight {
  private:
   const Calibration& calibration_;
   int frame_ = -1;
+  Eigen::VectorXd values_;   ///< of frame_
   std::vector<Pose> links_;  ///< of frame_
 };
 

@@ -6,6 +6,7 @@
 
 #include <apriltag/tag16h5.h>
 #include <apriltag/tag25h9.h>
+#include <apriltag/tag36h10.h>
 #include <apriltag/tag36h11.h>
 #include <apriltag/tagCircle21h7.h>
 #include <apriltag/tagCircle49h12.h>
@@ -35,9 +36,10 @@ struct Entry {
   void (*destroy)(apriltag_family_t*);
 };
 
-constexpr std::array<Entry, 9> kFamilies = {{
+constexpr std::array<Entry, 10> kFamilies = {{
     {"tag36h11", tag36h11_create, tag36h11_destroy},
     {"tag36h11b2", tag36h11_wide_create, tag36h11_destroy},
+    {"tag36h10", tag36h10_create, tag36h10_destroy},
     {"tag25h9", tag25h9_create, tag25h9_destroy},
     {"tag16h5", tag16h5_create, tag16h5_destroy},
     {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},

@@ -69,7 +69,9 @@ Channel look_at(const TorqueLog& log, const Eigen::VectorXd& x, const std::strin
   Channel channel;
   channel.name = name;
   channel.values = to_vector(x);
-  channel.sigma = standard_deviation(x);
+  // The mean of equal numbers need not be exactly theirs.
+  const bool constant = x.size() > 0 && x.maxCoeff() == x.minCoeff();
+  channel.sigma = constant ? 0.0 : standard_deviation(x);
   for (Eigen::Index row = 1; row < x.size(); ++row) {
     if (log.trajectory(row) == log.trajectory(row - 1)) {
       channel.changes.push_back(std::abs(x(row) - x(row - 1)));

@@ -225,6 +225,17 @@ TEST(TraceCalibration, ACouplingByDesignIsAnEffectWithItsErrorBefore) {
   EXPECT_TRUE(found.corrections.empty());
 }
 
+// A short recording may suggest a ratio to the structure that is nothing.
+TEST(TraceCalibration, ACouplingByDesignThatIsNothingIsNotNamed) {
+  const World world = make_effect_world(filmed());
+  CalibrationStart start = start_of(world);
+  start.tree.joints[value_of(start.tree.joint("q3")).index()].couplings = {{"q2", 1e-6}};
+  const Trace trace =
+      trace_calibration(world.measurements, world.markers, world.log, start, {}).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+}
+
 TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {
   const CalibrationTrace found = trace_of_coupled(0.31, 0.3);
   expect_coupling(found, 0.31);

@@ -120,6 +120,29 @@ TEST(SummariseErrors, CornersAreJudgedAcrossTheirOwnLineOfSight) {
   EXPECT_NEAR(summarise_errors(calibration).all.training_rad.max, 0.0, kExact);
 }
 
+// Where the log has nothing the base's markers are where they always are.
+TEST(SummariseErrors, TheBasesLineOfSightNeedsNoJointValue) {
+  Calibration calibration = two_links(MeasurementKind::kCorners);
+  calibration.tree.joints.push_back({.name = "slide",
+                                     .type = JointType::kPrismatic,
+                                     .parent = LinkId{0},
+                                     .child = LinkId{1},
+                                     .T_parent_joint = {},
+                                     .channel = "",
+                                     .couplings = {},
+                                     .limits = {}});
+  Marker& base = calibration.tree.markers.at(0);
+  base.link = LinkId{0};
+  base.T_link_marker = {};
+  calibration.T_camera_base.translation = {2.0, 0.0, 2.0};
+  calibration.joint_values = Eigen::MatrixXd::Constant(1, 1, std::nan(""));
+  SightingResidual along = sighting_of(0, base.id.value);
+  along.corners_px = {{1, 0}};
+  along.displacement = twist(0.0, 0, 0.0, 0.5, 0, 0.5);
+  calibration.residuals = {along};
+  EXPECT_NEAR(summarise_errors(calibration).all.training_m.max, 0.0, kExact);
+}
+
 TEST(SummariseErrors, RejectedSightingsAreInNoFigure) {
   Calibration calibration = two_links(MeasurementKind::kCorners);
   SightingResidual good = sighting_of(0, 5);

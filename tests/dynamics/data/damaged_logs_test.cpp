@@ -267,7 +267,7 @@ TEST(DamagedLog, AccelerationsThatAreNone) {
 
 TEST(DamagedLog, ConstantTorque) {
   LogWorld world = make_log_world(usual());
-  world.rows.col(world.column("tau2")).setConstant(0.25);
+  world.rows.col(world.column("tau2")).setConstant(3.3);  // no sum of powers of two
   const Looked looked = look(world);
   EXPECT_EQ(looked.loud(), "constant ");
   EXPECT_EQ(looked.first(LogFault::kConstant).channel, "tau2");
