@@ -143,6 +143,7 @@ ExitCode run_again(const CommandLine& line, const Console& console) {
   resolve_paths(options.recording, again.working_folder);
   options.output = folder;
   options.trace = true;
+  options.must_trace = true;
   options.arguments = again.arguments;
   options.command_line = "kinescope trace " + folder.string();
   return run_command(options, console);

@@ -35,8 +35,9 @@ struct RunOptions {
   DetectOptions detect;
   CalibrateOptions calibrate;
   bool estimate_intrinsics = false;
-  bool trace = true;   ///< close the loop: look for effects that the calibration lacks
-  bool force = false;  ///< run every stage again, also where nothing changed
+  bool trace = true;        ///< close the loop: look for effects that the calibration lacks
+  bool must_trace = false;  ///< tracing is what was asked for: exit code 4 where it says nothing
+  bool force = false;       ///< run every stage again, also where nothing changed
   std::vector<std::string>
       fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5
   std::string command_line;  ///< for the report

@@ -106,6 +106,12 @@ bool is_answer(const RunSummary& run) {
          !(run.structure && run.structure->status == StructureStatus::kAmbiguous);
 }
 
+void require_trace(const RunSummary& run) {
+  if (!run.trace || run.trace->verdict != TraceVerdict::kNothingToSay) return;
+  throw undetermined("tracing", run.trace->reason,
+                     "record longer, through more postures; the calibration stands");
+}
+
 void require_answer(const RunSummary& run, std::string_view see) {
   if (is_answer(run)) return;
   if (run.calibration.status == CalibrationStatus::kUndetermined) {

@@ -28,6 +28,9 @@ struct Limit {
 /// another one as probable.
 [[nodiscard]] bool is_answer(const RunSummary& run);
 
+/// Throws undetermined when tracing was able to say nothing.
+void require_trace(const RunSummary& run);
+
 /// Throws undetermined when the result is no answer. `see` says where the details are. Called once
 /// everything is written.
 void require_answer(const RunSummary& run, std::string_view see);

@@ -56,6 +56,12 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.nominal = recording.nominal;
 }
 
+// What is odd about the input, beside the result: the report has it, too.
+void print_warnings(const RunSummary& run, const Console& console) {
+  if (console.quiet) return;
+  for (const std::string& warning : run.warnings) fmt::print(stderr, "warning: {}\n", warning);
+}
+
 void print_result(const RunSummary& run, const RunFolder& folder, std::string_view report,
                   const Console& console) {
   if (console.json) {
@@ -108,6 +114,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   const Observed observed =
       observe(recording, options, folder.cached_observations(recording), console.progress);
   describe_recording(recording, observed, options, run);
+  print_warnings(run, console);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
   if (!answered) folder.keep_observations(recording, observed.tags);
@@ -177,6 +184,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
 
   print_result(run, folder, kReport, console);
   require_answer(run, "the report shows the details");
+  if (options.must_trace) require_trace(run);
   return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
 }
 

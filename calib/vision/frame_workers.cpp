@@ -106,6 +106,9 @@ std::vector<double> for_each_run(VideoReader& reader, std::size_t workers, std::
     queue.close();
   }  // threads join
   if (failure) std::rethrow_exception(failure);
+  // A file that ends early, or does not say how long it is.
+  const int frames = static_cast<int>(times.size());
+  if (frames != reader.info().frame_count) report_progress(progress, stage, frames, frames);
   results.resize(times.size());
   return times;
 }

@@ -244,6 +244,24 @@ void add_axis_and_limit(XMLElement& element, const Joint& joint) {
   limit.SetAttribute("upper", number_text(joint.limits->upper).c_str());
 }
 
+/// Of joints that one channel drives all but the first follow that one.
+void add_mimic(XMLElement& element, const KinematicTree& tree, std::size_t number,
+               const Names& names) {
+  const Joint& joint = tree.joints[number];
+  if (joint.channel.empty() || joint.type == JointType::kFixed || !joint.couplings.empty()) return;
+  const auto first = std::ranges::find_if(tree.joints, [&](const Joint& other) {
+    return other.channel == joint.channel && other.type != JointType::kFixed &&
+           other.couplings.empty() && other.scale != 0.0;
+  });
+  const auto leader = static_cast<std::size_t>(first - tree.joints.begin());
+  if (leader >= number) return;
+  const double multiplier = joint.scale / first->scale;
+  XMLElement& mimic = add(element, "mimic");
+  mimic.SetAttribute("joint", names.joints[leader].c_str());
+  mimic.SetAttribute("multiplier", number_text(multiplier).c_str());
+  mimic.SetAttribute("offset", number_text(joint.offset - multiplier * first->offset).c_str());
+}
+
 void add_mujoco_extension(XMLElement& robot, bool bound) {
   XMLElement& compiler = add(add(robot, "mujoco"), "compiler");
   compiler.SetAttribute("boundmass", number_text(bound ? kMujocoMassKg : 0.0).c_str());
@@ -303,6 +321,7 @@ void add_joints(XMLElement& robot, const DynamicModel& model, const Names& names
         add_joint(robot, names.joints[j], urdf_type(joint), joint.T_parent_joint,
                   names.links[joint.parent.index()], names.links[joint.child.index()]);
     add_axis_and_limit(element, joint);
+    add_mimic(element, tree, j, names);
     urdf_document::add_joint_dynamics(element, model.joints[j]);
   }
   for (const Marker& marker : tree.markers) {

@@ -64,6 +64,34 @@ TEST(UrdfRoundTrip, KeepsEverythingElse) {
   }
 }
 
+// Two fingers of a gripper: the second one closes as far as the first, the other way.
+TEST(UrdfRoundTrip, JointsOfOneChannelFollowTheFirst) {
+  KinematicTree tree;
+  tree.links = {{"hand"}, {"left"}, {"right"}};
+  for (int j = 0; j < 2; ++j) {
+    Joint finger;
+    finger.name = j == 0 ? "grip" : "grip_2";
+    finger.channel = "grip";
+    finger.type = JointType::kPrismatic;
+    finger.parent = LinkId{0};
+    finger.child = LinkId{j + 1};
+    finger.axis = Eigen::Vector3d::UnitX();
+    finger.scale = j == 0 ? 1e-3 : -1e-3;
+    finger.offset = j == 0 ? 0.02 : -0.03;
+    tree.joints.push_back(finger);
+  }
+  const std::string text = write_urdf(tree);
+  EXPECT_EQ(write_urdf(tree), text);
+  const KinematicTree back = parse_urdf(text, "gripper.urdf");
+  ASSERT_EQ(back.joints.size(), 2U);
+  EXPECT_EQ(back.joints[1].channel, "grip");
+  for (const double reading : {-5.0, 0.0, 12.0}) {
+    const double first = tree.joints[0].scale * reading + tree.joints[0].offset;
+    const double second = tree.joints[1].scale * reading + tree.joints[1].offset;
+    EXPECT_NEAR(back.joints[1].scale * first + back.joints[1].offset, second, 1e-12);
+  }
+}
+
 TEST(UrdfRoundTrip, SecondWritingIsTheSameText) {
   Rng rng = Rng::from_name("UrdfRoundTrip.SecondWriting");
   const KinematicTree tree = random_tree(rng, 6, 3);
