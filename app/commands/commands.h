@@ -68,6 +68,8 @@ struct DynamicsOptions {
   TorqueModelOptions models_options;
   std::vector<std::string> models;              ///< names; empty: all but the network
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
+  /// Where nobody declared it and the torques contradict the default, what they say is taken.
+  bool gravity_from_torques = false;
   bool learning_curve = false;
   bool robust = true;  ///< the robust regressions beside the models
   /// What the robot carries: against the URDF's masses, or against logs without the load.

@@ -19,6 +19,7 @@
 #include "app/report/trace_lines.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/data/torque_scale.h"
+#include "dynamics/identify/gravity_from_torques.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -198,6 +199,14 @@ void print_scores(const TorqueSummary& summary) {
   }
 }
 
+void take_gravity_of(const TorqueSamples& samples, DynamicModel& model, TorqueSummary& summary) {
+  const GravityFromTorques found = gravity_from_torques(model, samples);
+  if (!found.contradicts()) return;
+  summary.default_gravity_m_s2 = model.gravity_m_s2;
+  model.gravity_m_s2 = model.gravity_m_s2.norm() * found.direction;
+  summary.gravity_m_s2 = model.gravity_m_s2;
+}
+
 }  // namespace
 
 TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progress) {
@@ -205,7 +214,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   TorqueSummary summary;
   const std::vector<TorqueModelKind> kinds = parse_models(options.models);
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
-  const DynamicModel& model = robot.model;
+  DynamicModel model = robot.model;
   const OutputFolder folder(options.output);
   summary.robot = model.tree.name;
   summary.log = "Log " + file_list(options.logs);
@@ -220,6 +229,9 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   const TorqueLogReport log =
       read_checked_log(options.logs, wanted_joints(model.tree), options.data);
   summary.data = filtered_data(log, options.data.motion);
+  if (options.gravity_from_torques && !options.gravity_m_s2) {
+    take_gravity_of(summary.data.samples, model, summary);
+  }
   check_scale(model, summary);
   split_samples(options, model, summary);
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), options.models_options);

@@ -172,7 +172,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   write_products(run, urdf, folder);
   clock.lap("write", run.times);
   const TorqueStages torque =
-      torque_stages(recording, options, run.calibration.tree, folder.file(""), console.progress);
+      torque_stages(recording, options, run.calibration, folder.file(""), console.progress);
   run.torque = torque.words;
   folder.add_products(torque.products);
   if (!run.torque.empty()) clock.lap("torque", run.times);

@@ -15,6 +15,7 @@ namespace fs = std::filesystem;
 
 // Enough for a first look that does not keep the kinematics waiting.
 constexpr int kGpSamples = 600;
+constexpr double kGravity = 9.81;  // m/s^2
 
 std::optional<fs::path> file_named(const Recording& recording, std::string_view name) {
   for (const fs::path& file : recording.files) {
@@ -68,7 +69,7 @@ std::vector<std::string> torque_products(const DynamicsOptions& options,
 }  // namespace
 
 TorqueStages torque_stages(const Recording& recording, const RunOptions& options,
-                           const KinematicTree& tree, const fs::path& folder,
+                           const Calibration& calibration, const fs::path& folder,
                            const Progress& progress) {
   if (recording.log.empty()) return {};
   const fs::path joints = recording.log.source;
@@ -80,7 +81,7 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
       data = read_dynamics_settings(*settings);
     }
     data.mapping.torque.clear();
-    const auto mapping = mapping_of(tree, recording.log, data.mapping);
+    const auto mapping = mapping_of(calibration.tree, recording.log, data.mapping);
     if (!mapping) {
       return {.words = {"Torques: not every joint has a logged channel and a torque column."}};
     }
@@ -90,6 +91,12 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
     dynamics.robot = folder / "robot.urdf";
     dynamics.output = folder;
     dynamics.data = data;
+    if (const auto& gravity = recording.settings.gravity) {
+      dynamics.gravity_m_s2 =
+          kGravity * (calibration.T_camera_base.rotation.inverse() * gravity->normalized());
+    }
+    // Else z of the base is a marker's normal, as likely as not.
+    dynamics.gravity_from_torques = true;
     dynamics.trace = options.trace;
     dynamics.robust = false;                      // on request, by kinescope dynamics
     dynamics.trace_file = "dynamics_trace.json";  // trace.json is the calibration's
@@ -100,11 +107,13 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
     out.products = torque_products(dynamics, summary);
     const TorqueVerdict verdict = torque_verdict(summary);
     out.words = {"Torques: " + verdict.found, verdict.accurate, verdict.limits};
+    if (!verdict.gravity.empty()) out.words.push_back(verdict.gravity);
     ContactCommandOptions contact;
     contact.logs = {joints};
     contact.robot = folder / "robot_dynamics.urdf";
     contact.output = folder;
     contact.data = data;
+    contact.gravity_m_s2 = summary.gravity_m_s2;
     contact.command_line = options.command_line;
     out.words.push_back("Contacts: " + contact_verdict(find_contacts(contact)));
     for (const char* name : {"contacts.csv", "contacts.json", "contact.html"}) {

@@ -9,6 +9,7 @@
 #include "app/commands/commands.h"
 #include "app/report/contact_summary.h"
 #include "app/report/torque_summary.h"
+#include "calib/bundle/calibration.h"
 
 namespace kinescope {
 
@@ -26,7 +27,7 @@ struct TorqueStages {
 /// Where the recording's joint log has torques: both of the above into the run's folder, with the
 /// robot that was learned. Empty without torques.
 [[nodiscard]] TorqueStages torque_stages(const Recording& recording, const RunOptions& options,
-                                         const KinematicTree& tree,
+                                         const Calibration& calibration,
                                          const std::filesystem::path& folder,
                                          const Progress& progress);
 

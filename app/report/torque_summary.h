@@ -65,7 +65,9 @@ struct TorqueSummary {
   std::vector<std::string> joints;
   std::vector<JointType> types;  ///< beside joints
   Eigen::Vector3d gravity_m_s2 = Eigen::Vector3d::Zero();
-  bool gravity_declared = false;  ///< else down along z
+  bool gravity_declared = false;  ///< else down along z, or what the torques say
+  /// Down along z, where the torques contradicted it before anything was fitted.
+  std::optional<Eigen::Vector3d> default_gravity_m_s2;
   /// As tracing found it, where it found another one.
   std::optional<Eigen::Vector3d> traced_gravity_m_s2;
   TorqueData data;    ///< of the log learned from; its samples are `train` and, without a log of

@@ -100,23 +100,37 @@ std::string payload_words(const PayloadSummary& payload) {
   return out;
 }
 
+double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const double cosine = std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0);
+  return std::acos(cosine) * 180.0 / std::numbers::pi;
+}
+
 std::string gravity_words(const TorqueSummary& summary) {
   const Eigen::Vector3d& used = summary.gravity_m_s2;
   const std::string from =
-      summary.gravity_declared
-          ? std::string("Gravity was declared")
+      summary.gravity_declared ? std::string("Gravity was declared")
+      : summary.default_gravity_m_s2
+          ? fmt::format(
+                "Nothing was declared about gravity; the torques say that it points along ({:.3f}, "
+                "{:.3f}, {:.3f}) in the base frame, {:.0f} degrees from down along z, and so it "
+                "was "
+                "taken: declare it (gravity in recording.yaml, in the camera's frame)",
+                used.normalized().x(), used.normalized().y(), used.normalized().z(),
+                degrees_between(used, *summary.default_gravity_m_s2))
           : fmt::format(
                 "Nothing was declared about gravity, which was taken as {:.4g} m/s^2 down "
                 "along z of the base",
                 used.norm());
-  if (!summary.traced_gravity_m_s2) return summary.gravity_declared ? "" : from + " (--gravity).";
+  if (!summary.traced_gravity_m_s2) {
+    if (summary.gravity_declared) return "";
+    return from + (summary.default_gravity_m_s2 ? "." : " (--gravity).");
+  }
   const Eigen::Vector3d& found = *summary.traced_gravity_m_s2;
-  const double cosine = std::clamp(used.normalized().dot(found.normalized()), -1.0, 1.0);
   return fmt::format(
       "{}, but the torques say that it points {:.0f} degrees from there: is the base on a wall, a "
       "ceiling, a slope? Check how it stands and say --gravity={:.3g},{:.3g},{:.3g}; the models "
       "above were fitted with the wrong direction.",
-      from, std::acos(cosine) * 180.0 / std::numbers::pi, found.x(), found.y(), found.z());
+      from, degrees_between(used, found), found.x(), found.y(), found.z());
 }
 
 }  // namespace

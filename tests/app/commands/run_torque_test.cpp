@@ -90,6 +90,22 @@ TEST(RunTorque, FromCornersToTorqueModelAndContacts) {
   EXPECT_NE(read_text_file(folder.path() / "out/report.html").find("Torques and contacts"),
             std::string::npos);
 
+  EXPECT_TRUE(document.at("gravity_declared"));
+
+  // The base's z is the normal of its marker, which hangs on no level wall.
+  folder.remove("recording.yaml");
+  const std::string undeclared = (folder.path() / "undeclared").string();
+  const Outcome again =
+      run({"run", folder.path().string(), "--output", undeclared, "--quiet", "--no-trace"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_NE(again.out.find("the torques say that it points along"), std::string::npos) << again.out;
+  const auto found = nlohmann::json::parse(read_text_file(undeclared + "/dynamics.json"));
+  EXPECT_FALSE(found.at("gravity_declared"));
+  for (const auto& score : found.at("models")) {
+    if (score.at("model") != "parametric") continue;
+    for (const auto& nmse : score.at("nmse_percent")) EXPECT_LT(nmse.get<double>(), 1.0);
+  }
+
   const ProductCheck check = check_products(folder.path() / "out");
   if (!check.done) GTEST_SKIP() << "the files' schemas were not checked: " << check.words;
   EXPECT_TRUE(check.passed) << check.words;
@@ -102,9 +118,9 @@ TEST(RunTorque, FromCornersToTorqueModelAndContacts) {
   misspelt["verdikt"] = misspelt.at("verdict");
   misspelt.erase("verdict");
   folder.write("out/trace.json", misspelt.dump());
-  const ProductCheck again = check_products(folder.path() / "out");
-  EXPECT_FALSE(again.passed);
-  EXPECT_NE(again.words.find("verdikt"), std::string::npos) << again.words;
+  const ProductCheck misspelt_check = check_products(folder.path() / "out");
+  EXPECT_FALSE(misspelt_check.passed);
+  EXPECT_NE(misspelt_check.words.find("verdikt"), std::string::npos) << misspelt_check.words;
 }
 
 }  // namespace
