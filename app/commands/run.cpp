@@ -57,9 +57,8 @@ void describe_recording(const Recording& recording, const Observed& observed,
 }
 
 // What is odd about the input, beside the result: the report has it, too.
-void print_warnings(const RunSummary& run, const Console& console) {
-  if (console.quiet) return;
-  for (const std::string& warning : run.warnings) fmt::print(stderr, "warning: {}\n", warning);
+void print_warning(const std::string& warning, const Console& console) {
+  if (!console.quiet) fmt::print(stderr, "warning: {}\n", warning);
 }
 
 void print_result(const RunSummary& run, const RunFolder& folder, std::string_view report,
@@ -114,7 +113,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   const Observed observed =
       observe(recording, options, folder.cached_observations(recording), console.progress);
   describe_recording(recording, observed, options, run);
-  print_warnings(run, console);
+  for (const std::string& warning : run.warnings) print_warning(warning, console);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
   if (!answered) folder.keep_observations(recording, observed.tags);
@@ -157,6 +156,13 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     run.effects = std::move(traced.effects);
     run.gravity_base = traced.gravity_base;
     run.calibration = std::move(traced.calibration);
+    if (traced.stamp_jitter_s > 0.0) {
+      run.warnings.push_back(fmt::format(
+          "the frames' stamps scatter by {:.2g} ms (standard deviation) about the joint log's "
+          "clock: use stamps of the camera's own clock, or a camera that is triggered",
+          1e3 * traced.stamp_jitter_s));
+      print_warning(run.warnings.back(), console);
+    }
     clock.lap("trace", run.times);
   }
   run.errors = summarise_errors(run.calibration);

@@ -32,7 +32,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
                               const CalibrationStart& start, const Calibration& plain,
                               const CalibrateOptions& options, const Progress& progress) {
   if (options.free != FreeGeometry::kGeometry) {
-    TracedCalibration out{{}, plain, {}, {}};
+    TracedCalibration out{{}, plain, {}, {}, 0.0};
     out.trace.verdict = TraceVerdict::kNothingToSay;
     out.trace.reason =
         "the robot's geometry is held as declared, and its errors cannot be told from effects: "
@@ -49,7 +49,8 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   CalibrationStart from = continued(start, plain);
   const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
                                                    recording.log, from, trace_options, progress);
-  TracedCalibration out{found.trace, plain, found.effects, trace_options.gravity_base};
+  TracedCalibration out{found.trace, plain, found.effects, trace_options.gravity_base,
+                        found.stamp_jitter_s};
   if (found.corrections.empty()) return out;
   from.corrections = found.corrections;
   out.calibration =

@@ -13,6 +13,7 @@ struct TracedCalibration {
   Calibration calibration;  ///< with the effects that were found
   std::vector<FittedEffect> effects;
   std::optional<Eigen::Vector3d> gravity_base;
+  double stamp_jitter_s = 0.0;  ///< CalibrationTrace's
 };
 
 /// `start` is where `plain` began. The time offset stays estimated whether it is found to matter or

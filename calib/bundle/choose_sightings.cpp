@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "calib/bundle/corrected.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/median.h"
 
@@ -22,22 +23,131 @@ std::size_t path_length(const Spec& spec, const Sighting& sighting) {
   return spec.path[marker.link.index()].size();
 }
 
-// Squared distance, per row, of a sighting's residual to the median of its neighbours'.
-double stands_out(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
+// A sighting's residual less the median of its neighbours'; zero without any.
+Eigen::VectorXd from_neighbours(const std::vector<Eigen::VectorXd>& series, std::size_t at) {
   const std::size_t first = at < kNeighbours ? 0 : at - kNeighbours;
   const std::size_t last = std::min(series.size() - 1, at + kNeighbours);
   const Eigen::VectorXd& own = series[at];
-  double sum = 0.0;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(own.size());
   for (Eigen::Index row = 0; row < own.size(); ++row) {
     std::vector<double> others;
     for (std::size_t i = first; i <= last; ++i) {
       if (i != at && series[i].size() == own.size()) others.push_back(series[i][row]);
     }
-    if (others.empty()) return 0.0;
-    const double difference = own[row] - median_of(std::move(others));
-    sum += difference * difference;
+    if (others.empty()) return Eigen::VectorXd::Zero(own.size());
+    out[row] = own[row] - median_of(std::move(others));
   }
-  return sum / static_cast<double>(own.size()) / kDifferenceVariance;
+  return out;
+}
+
+// Of the residual by each joint's value; joints that do not move the marker: zero.
+Eigen::MatrixXd d_values_of(const Spec& spec, const Sighting& sighting, const CorrectedError& at) {
+  const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+  const std::vector<int>& path = spec.path[marker.link.index()];
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(
+      at.error.residual.size(),
+      static_cast<Eigen::Index>(std::max<std::size_t>(1, spec.tree.joints.size())));
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    out.col(path[k]) = at.error.d_marker * at.chain.d_value[k];
+  }
+  return out;
+}
+
+// One marker's sightings, in time.
+struct Series {
+  std::vector<int> indices;
+  std::vector<int> frames;
+  std::vector<Eigen::VectorXd> residuals;  // whitened, as declared
+  std::vector<SightingError> errors;       // of a marker at rest
+  std::vector<Eigen::VectorXd> d_time;     // of the residuals, per s
+  std::vector<Eigen::MatrixXd> d_values;   // rows x joints of the tree, per rad or m
+  std::vector<Eigen::VectorXd> differences;
+  std::vector<bool> far;
+
+  // Per row, of the noise's variance.
+  [[nodiscard]] double distance(std::size_t i) const {
+    return differences[i].squaredNorm() / static_cast<double>(differences[i].size()) /
+           kDifferenceVariance;
+  }
+};
+
+// What the frames' stamps scatter by, s. All that moves in a frame is then off by the same time,
+// and by another one in the next frame; what an encoder or a gear does goes with its own joint.
+double stamp_jitter(const std::map<int, Series>& all) {
+  constexpr std::size_t kFewestFrames = 30;
+  constexpr double kTimesNoise = 3.0;  // what one time a frame explains, at the least
+  constexpr double kShared = 0.5;      // of the differences beyond the noise, explained by it
+  struct Frame {
+    double speed = 0.0;           // sum of squares, 1 / s^2
+    double product = 0.0;         // with the differences
+    Eigen::ArrayXd joint_speeds;  // the same of each joint's value
+    Eigen::ArrayXd joint_products;
+    double squares = 0.0;  // of the differences
+    double rows = 0.0;
+  };
+  std::map<int, Frame> by_frame;
+  int moving = 0;
+  for (const auto& [marker, series] : all) {
+    if (!series.errors.empty()) continue;
+    ++moving;
+    for (std::size_t i = 0; i < series.indices.size(); ++i) {
+      if (series.far[i]) continue;
+      Frame& frame = by_frame[series.frames[i]];
+      frame.speed += series.d_time[i].squaredNorm();
+      frame.product += series.d_time[i].dot(series.differences[i]);
+      const Eigen::MatrixXd& by_joint = series.d_values[i];
+      if (frame.joint_speeds.size() == 0) {
+        frame.joint_speeds = frame.joint_products = Eigen::ArrayXd::Zero(by_joint.cols());
+      }
+      frame.joint_speeds += by_joint.colwise().squaredNorm().transpose().array();
+      frame.joint_products += (by_joint.transpose() * series.differences[i]).array();
+      frame.squares += series.differences[i].squaredNorm();
+      frame.rows += static_cast<double>(series.differences[i].size());
+    }
+  }
+  if (moving < 2 || by_frame.size() < 3 * kFewestFrames) return 0.0;
+  std::vector<Frame> frames;
+  for (const auto& [number, frame] : by_frame) frames.push_back(frame);
+  std::ranges::stable_sort(frames, {}, [](const Frame& f) { return f.speed / f.rows; });
+  const std::size_t third = frames.size() / 3;
+  std::vector<double> slow;
+  for (std::size_t i = 0; i < third; ++i) slow.push_back(frames[i].squares / frames[i].rows);
+  const double noise = median_of(std::move(slow));
+  double explained = 0.0;
+  Eigen::ArrayXd by_joint = Eigen::ArrayXd::Zero(frames.front().joint_speeds.size());
+  double squares = 0.0;
+  double speeds = 0.0;
+  double rows = 0.0;
+  for (std::size_t i = frames.size() - third; i < frames.size(); ++i) {
+    const Frame& frame = frames[i];
+    if (!(frame.speed > 0.0)) return 0.0;
+    explained += frame.product * frame.product / frame.speed;
+    by_joint += (frame.joint_speeds > 0.0)
+                    .select(frame.joint_products.square() / frame.joint_speeds.max(1e-300), 0.0);
+    squares += frame.squares;
+    speeds += frame.speed;
+    rows += frame.rows;
+  }
+  // Of noise alone one number a frame explains one row's part.
+  const double by_noise = noise * static_cast<double>(third);
+  const bool shared = explained - by_noise > kShared * (squares - noise * rows);
+  const bool one_joints = by_joint.maxCoeff() >= explained;
+  if (explained < kTimesNoise * by_noise || !shared || one_joints) return 0.0;
+  return std::sqrt((explained - by_noise) / speeds / kDifferenceVariance);
+}
+
+// Of a sighting at rest, whitened as declared: the median of those that the jitter moves least.
+double noise_of(const Series& series, double jitter_s) {
+  std::vector<std::size_t> order(series.indices.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  if (jitter_s > 0.0) {
+    std::ranges::stable_sort(order, {},
+                             [&](std::size_t i) { return series.d_time[i].squaredNorm(); });
+    order.resize(std::max<std::size_t>(1, order.size() / 3));
+  }
+  std::vector<double> distance;
+  for (const std::size_t i : order) distance.push_back(series.distance(i));
+  return std::max(median_of(std::move(distance)), 1e-12);
 }
 
 // Marks runs that are far beyond whatever else their marker does, and end again: something covered
@@ -99,42 +209,48 @@ void widen(Sighting& sighting, double factor) {
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
                                      double reject_sigma) {
   const Readings readings(spec, state);
-  std::map<int, std::vector<int>> of_marker;
-  std::map<int, std::vector<Eigen::VectorXd>> residuals;
-  std::map<int, std::vector<SightingError>> errors;
+  std::map<int, Series> all;
   for (const int index : usable) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
-    const auto error = error_of(spec, state, readings, sighting);
-    if (!error || !error->residual.allFinite()) continue;
-    of_marker[sighting.marker].push_back(index);
-    residuals[sighting.marker].push_back(error->residual);
-    if (path_length(spec, sighting) == 0) errors[sighting.marker].push_back(*error);
+    auto at = corrected_error_of(spec, state, readings, sighting);
+    if (!at || !at->error.residual.allFinite()) continue;
+    Series& series = all[sighting.marker];
+    series.indices.push_back(index);
+    series.frames.push_back(sighting.frame);
+    series.residuals.push_back(at->error.residual);
+    series.d_time.push_back(std::move(at->d_time));
+    series.d_values.push_back(d_values_of(spec, sighting, *at));
+    if (path_length(spec, sighting) == 0) series.errors.push_back(std::move(at->error));
+  }
+  for (auto& [marker, series] : all) {
+    for (std::size_t i = 0; i < series.indices.size(); ++i) {
+      series.differences.push_back(from_neighbours(series.residuals, i));
+    }
+    series.far = far_runs(series.residuals);
   }
   ChosenSightings out;
-  for (const auto& [marker, indices] : of_marker) {
-    std::vector<double> distance;
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      distance.push_back(stands_out(residuals[marker], i));
-    }
-    const std::vector<bool> far = far_runs(residuals[marker]);
-    const double typical = std::max(median_of(distance), 1e-12);
-    const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
+  out.jitter_s = stamp_jitter(all);
+  for (const auto& [marker, series] : all) {
+    const double typical = noise_of(series, out.jitter_s);
+    const Sighting& first = spec.sightings[static_cast<std::size_t>(series.indices.front())];
     double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
     // A marker at rest repeats its bias in every frame: all of them together say what one does.
-    const bool rests = path_length(spec, first) == 0;
-    if (rests) {
-      const double seen = lasting_bend(errors[marker]);
+    if (!series.errors.empty()) {
+      const double seen = lasting_bend(series.errors);
       out.bias_px = std::max(out.bias_px, seen * first.sigma);
-      bias = std::max(bias, seen) * std::sqrt(static_cast<double>(indices.size()));
+      bias = std::max(bias, seen) * std::sqrt(static_cast<double>(series.indices.size()));
     }
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      Sighting& sighting = spec.sightings[static_cast<std::size_t>(indices[i])];
+    for (std::size_t i = 0; i < series.indices.size(); ++i) {
+      Sighting& sighting = spec.sightings[static_cast<std::size_t>(series.indices[i])];
       const double freedom = sighting.dimension();
       // Median and scatter of a mean of `freedom` squares, to first order.
-      const double noise = typical / (1.0 - 2.0 / (9.0 * freedom));
+      // All rows are off by the same time: together they say no more of it than one does.
+      const double noise = typical / (1.0 - 2.0 / (9.0 * freedom)) +
+                           out.jitter_s * out.jitter_s * series.d_time[i].squaredNorm();
       widen(sighting, std::sqrt(noise + bias * bias));
-      if (!far[i] && distance[i] < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
-        out.used.push_back(indices[i]);
+      if (!series.far[i] &&
+          series.distance(i) < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
+        out.used.push_back(series.indices[i]);
       }
     }
   }

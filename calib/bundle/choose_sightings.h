@@ -13,10 +13,14 @@ namespace kinescope::bundle {
 struct ChosenSightings {
   std::vector<int> used;  ///< those that do not stand out from their neighbours in time
   double bias_px = 0.0;   ///< what corners of markers at rest are off by, all the time
+  /// Scatter of the frames' stamps about the joint log's clock, standard deviation; 0 where it does
+  /// not show.
+  double jitter_s = 0.0;
 };
 
 /// Sets the sigmas in `spec` to how much residuals at `state` differ from those of their
-/// neighbours; markers at rest count once for all their frames.
+/// neighbours; markers at rest count once for all their frames. Where the stamps of the frames
+/// jitter, sightings in motion count for less: the faster, the less.
 [[nodiscard]] ChosenSightings choose_by_neighbours(Spec& spec, const State& state,
                                                    const std::vector<int>& usable,
                                                    double reject_sigma);

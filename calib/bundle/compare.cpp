@@ -72,21 +72,27 @@ std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_cam
   return std::nullopt;
 }
 
-std::optional<SightingError> error_of(const Spec& spec, const State& state,
-                                      const Readings& readings, const Sighting& sighting) {
+std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& state,
+                                                 const Readings& readings,
+                                                 const Sighting& sighting) {
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
   if (sighting.target >= 0) {
     target = Eigen::Vector3d(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
   const CorrectedSighting corrected =
       sum_corrections(spec, sighting, corrections_of(spec, sighting), state.corrections.data());
-  const auto at = corrected_error(
-      spec, sighting, corrected, from_block(state.camera_base.data()),
-      chain_of(spec, state, readings, sighting), rates_of(spec, state, readings, sighting),
-      from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data()),
-      camera_of(spec, state), sighting.target >= 0 ? &target : nullptr);
+  return corrected_error(spec, sighting, corrected, from_block(state.camera_base.data()),
+                         chain_of(spec, state, readings, sighting),
+                         rates_of(spec, state, readings, sighting),
+                         from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data()),
+                         camera_of(spec, state), sighting.target >= 0 ? &target : nullptr);
+}
+
+std::optional<SightingError> error_of(const Spec& spec, const State& state,
+                                      const Readings& readings, const Sighting& sighting) {
+  auto at = corrected_error_of(spec, state, readings, sighting);
   if (!at) return std::nullopt;
-  return at->error;
+  return std::move(at->error);
 }
 
 }  // namespace kinescope::bundle

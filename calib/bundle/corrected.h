@@ -41,6 +41,11 @@ struct CorrectedError {
     const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
     const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m);
 
+/// The same at a state.
+[[nodiscard]] std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& state,
+                                                               const Readings& readings,
+                                                               const Sighting& sighting);
+
 /// Derivative of the residual by one correction's value.
 [[nodiscard]] Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
                                            const Correction& correction, const CorrectedError& at);

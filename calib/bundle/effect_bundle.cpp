@@ -87,6 +87,7 @@ struct EffectBundle::Impl {
   std::vector<int> fold;
   std::vector<DesignCoupling> couplings;
   double bias_px = 0.0;
+  double jitter_s = 0.0;
   // Where the last fit of the same change ended: the next one begins there.
   mutable std::map<std::vector<std::string>, State> ends;
 
@@ -115,6 +116,7 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
         bundle::choose_by_neighbours(spec, state, usable, options.reject_sigma);
     impl_->used = std::move(chosen.used);
     impl_->bias_px = chosen.bias_px;
+    impl_->jitter_s = chosen.jitter_s;
   }
   impl_->offset_start_s = state.time_offset[0];
   impl_->start = state;
@@ -340,6 +342,7 @@ const KinematicTree& EffectBundle::tree() const { return impl_->spec.tree; }
 MeasurementKind EffectBundle::kind() const { return impl_->spec.kind; }
 const CameraModel& EffectBundle::camera() const { return impl_->spec.camera; }
 double EffectBundle::corner_bias_px() const { return impl_->bias_px; }
+double EffectBundle::stamp_jitter_s() const { return impl_->jitter_s; }
 bool EffectBundle::postures() const { return impl_->spec.postures; }
 const std::vector<int>& EffectBundle::fold_of_frame() const { return impl_->fold; }
 const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->spec.times_s; }

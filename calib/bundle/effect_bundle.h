@@ -83,6 +83,8 @@ class EffectBundle {
   [[nodiscard]] const CameraModel& camera() const;
   /// By how much corners are off in ways that repeat, as markers at rest show it; 0 without one.
   [[nodiscard]] double corner_bias_px() const;
+  /// Standard deviation of the frames' stamps about the log's clock; 0 where it does not show.
+  [[nodiscard]] double stamp_jitter_s() const;
   /// Postures at rest, each on its own: no clock, no motion.
   [[nodiscard]] bool postures() const;
   /// A fold for every frame, by posture; -1 for frames without a sighting.

@@ -22,6 +22,7 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
   }
   CalibrationTrace out;
+  out.stamp_jitter_s = bundle.stamp_jitter_s();
   out.trace = trace_effects(model, trace_options, progress);
   effects::add_couplings_by_design(bundle, options, out.trace);
   effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added);

@@ -162,6 +162,29 @@ TEST(TraceCalibration, AStrongDriftIsFollowedToTheEnds) {
             kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
+// Stamps at arrival, up to 10 ms late: 5 ms on average, and noise that grows with the speed.
+TEST(TraceCalibration, StampsThatJitterAreNoSlip) {
+  constexpr double kLatest = 0.01;
+  World world = make_effect_world(filmed({}, 600));
+  Rng rng = Rng::from_name("late stamps");
+  for (double& t : world.measurements.times_s) t += rng.uniform(0.0, kLatest);
+  const CalibrationTrace found = trace_of(world);
+  const Trace& trace = found.trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"time_offset", "clock"})) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), -0.5 * kLatest));
+  EXPECT_NEAR(found.stamp_jitter_s, kLatest / std::sqrt(12.0), 0.1 * kLatest);
+}
+
+TEST(TraceCalibration, WhatAGearDoesIsNoJitterOfTheStamps) {
+  EXPECT_EQ(clean_trace().stamp_jitter_s, 0.0);
+  const CalibrationTrace found =
+      trace_of(make_effect_world(filmed({strong("gear_error", "q2")}, 600)));
+  EXPECT_EQ(found.stamp_jitter_s, 0.0);
+  ASSERT_EQ(found.trace.accepted.size(), 1U) << answer(found.trace);
+  EXPECT_EQ(found.trace.accepted.front().id, (EffectId{"gear_error", "q2"}));
+}
+
 // The place of a joint's frame along its axis is nobody's to see, and no bearing need sit there.
 CalibrationStart with_frame_moved(CalibrationStart start, const std::string& name, double along_m) {
   Joint& joint = start.tree.joints[value_of(start.tree.joint(name)).index()];
