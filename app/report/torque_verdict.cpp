@@ -100,6 +100,24 @@ std::string payload_words(const PayloadSummary& payload) {
   return out;
 }
 
+// Masses for its size that no robot has; empty where they are likely, or of currents.
+std::string mass_words(const TorqueSummary& summary) {
+  constexpr double kHeaviest = 1000.0;  // kg a metre of reach: three times a heavy foundry robot
+  constexpr double kLightest = 0.03;    // a tenth of a toy's
+  if (summary.train.torque_unit != "Nm") return "";
+  const DynamicModel& model = summary.consistent.model;
+  double mass = 0.0;
+  for (const InertialParameters& link : model.links) mass += link.mass_kg;
+  double reach = 0.0;
+  for (const Joint& joint : model.tree.joints) reach += joint.T_parent_joint.translation.norm();
+  if (!(reach > 0.0) || !(mass > 0.0)) return "";
+  if (mass > kLightest * reach && mass < kHeaviest * reach) return "";
+  return fmt::format(
+      "The masses that these torques ask for add up to {:.3g} kg on a reach of {:.3g} m: check the "
+      "unit of the torques (N m is taken; torque_unit, torque_factor) and of the lengths. ",
+      mass, reach);
+}
+
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double cosine = std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0);
   return std::acos(cosine) * 180.0 / std::numbers::pi;
@@ -182,6 +200,13 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
         "error {:.3g} {}. ",
         summary.joints[at], found.sigma[worst], unit, best.rms[worst], unit);
   }
+  if (best.nmse_percent[worst] > 100.0) {
+    out.limits += fmt::format(
+        "On motion it has not seen it predicts {} worse than a constant would: nothing of it was "
+        "learned; record longer, moving all joints at changing speeds. ",
+        summary.joints[static_cast<std::size_t>(worst)]);
+  }
+  out.limits += mass_words(summary);
   Eigen::Index narrow = 0;
   if (best.coverage_95.minCoeff(&narrow) < kLeastCoverage) {
     out.limits += fmt::format(

@@ -194,5 +194,36 @@ TEST(TorqueVerdictWords, AConstantChannelJudgesNoModel) {
   EXPECT_NE(torque_verdict(summary).accurate.find("judges no model"), std::string::npos);
 }
 
+// A robot of one joint whose torques ask for this mass, 0.5 m away.
+std::string limits_of(double mass_kg, double nmse_percent) {
+  TorqueSummary summary;
+  summary.joints = {"turn"};
+  summary.types = {JointType::kRevolute};
+  summary.identification.sigma = Eigen::VectorXd::Constant(1, 0.1);
+  DynamicModel& model = summary.consistent.model;
+  model.tree.joints.resize(1);
+  model.tree.joints[0].T_parent_joint.translation = {0.5, 0.0, 0.0};
+  model.links.resize(2);
+  model.links[1].mass_kg = mass_kg;
+  TorqueScore score;
+  score.nmse_percent = Eigen::VectorXd::Constant(1, nmse_percent);
+  score.rms = Eigen::VectorXd::Constant(1, 0.1);
+  score.coverage_95 = Eigen::VectorXd::Constant(1, 0.95);
+  summary.scores = {score};
+  return torque_verdict(summary).limits;
+}
+
+TEST(TorqueVerdictWords, MassesThatNoRobotHasAskForTheUnit) {
+  EXPECT_EQ(limits_of(3.0, 0.1).find("masses"), std::string::npos) << limits_of(3.0, 0.1);
+  EXPECT_NE(limits_of(3000.0, 0.1).find("3e+03 kg on a reach of 0.5 m"), std::string::npos)
+      << limits_of(3000.0, 0.1);
+  EXPECT_NE(limits_of(0.003, 0.1).find("check the unit of the torques"), std::string::npos);
+}
+
+TEST(TorqueVerdictWords, WorseThanAConstantIsNothingLearned) {
+  EXPECT_NE(limits_of(3.0, 250.0).find("worse than a constant"), std::string::npos);
+  EXPECT_EQ(limits_of(3.0, 50.0).find("worse than a constant"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace kinescope
