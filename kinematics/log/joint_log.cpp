@@ -10,6 +10,7 @@
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/log/unwrap.h"
 
 namespace kinescope {
 namespace {
@@ -74,6 +75,21 @@ std::size_t first_whole_row(const CsvTable& table, const std::vector<std::size_t
   return 0;
 }
 
+// Interpolation across a jump to the other end of the range gives postures that never were.
+void unwrap_channels(JointLog& log) {
+  for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
+    const auto unwrapped = unwrap(log.times_s, log.values.col(c));
+    if (!unwrapped) continue;
+    const auto row = static_cast<Eigen::Index>(unwrapped->first);
+    log.warnings.push_back(fmt::format(
+        "{}: channel '{}' starts again at the end of its range ({} jumps, the first from {:g} to "
+        "{:g} at t = {:.3f} s): it is unwrapped, with a period of {:.6g}",
+        log.source, log.channels[static_cast<std::size_t>(c)], unwrapped->jumps, log.values(row, c),
+        log.values(row + 1, c), log.times_s[unwrapped->first], unwrapped->period));
+    log.values.col(c) = unwrapped->values;
+  }
+}
+
 JointLog from_table(const CsvTable& table, const std::vector<std::string>& torque_channels) {
   JointLog log;
   log.source = table.source;
@@ -114,6 +130,7 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
     log.warnings.push_back(
         fmt::format("{}: {} rows repeat the row before and are left out", table.source, repeated));
   }
+  unwrap_channels(log);
   return log;
 }
 
