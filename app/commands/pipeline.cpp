@@ -170,9 +170,10 @@ Observed observe(const Recording& recording, const RunOptions& options,
         Detection detection =
             detect_tags(recording.video, recording.markers, options.detect, progress);
         out.tags = std::move(detection.observations);
-        out.warnings = std::move(detection.warnings);
+        out.tags.warnings = std::move(detection.warnings);
         for (double& t : out.tags.times_s) t += recording.settings.video_start_s;
       }
+      out.warnings = out.tags.warnings;
       break;
     }
     case RecordingEntry::kCorners:

@@ -64,9 +64,9 @@ std::string sha256_of_path(const fs::path& path) {
   return sha256_of_text(list);
 }
 
-// The table holds only frames with a marker; the times of all frames and what was rejected stand in
-// `kept`. Nothing where the two do not belong together; throws json::exception where something is
-// missing.
+// The table holds only frames with a marker; the times of all frames, what was rejected and the
+// detection's warnings stand in `kept`. Nothing where the two do not belong together; throws
+// json::exception where something is missing.
 std::optional<TagObservations> observations_of(const json& kept, TagObservations table) {
   const auto times = kept.at("times_s").get<std::vector<double>>();
   std::size_t next = 0;
@@ -83,6 +83,7 @@ std::optional<TagObservations> observations_of(const json& kept, TagObservations
     table.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
                               tag.at("reason").get<std::string>()});
   }
+  table.warnings = kept.at("warnings").get<std::vector<std::string>>();
   return table;
 }
 
@@ -132,9 +133,10 @@ void RunFolder::keep_observations(const Recording& recording, const TagObservati
     rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
   }
   const json kept{
-      {"key", detection_key(recording)}, {"sha256", sha256_of_file(file(kObservations))},
-      {"width", observations.width},     {"height", observations.height},
-      {"times_s", observations.times_s}, {"rejected", std::move(rejected)}};
+      {"key", detection_key(recording)},  {"sha256", sha256_of_file(file(kObservations))},
+      {"width", observations.width},      {"height", observations.height},
+      {"times_s", observations.times_s},  {"rejected", std::move(rejected)},
+      {"warnings", observations.warnings}};
   write(kObservationsKey, kept.dump(1) + "\n");
 }
 

@@ -37,6 +37,7 @@ struct TagObservations {
   int height = 0;               ///< px
   std::vector<TagObservation> observations;  ///< by frame, then id
   std::vector<RejectedTag> rejected;
+  std::vector<std::string> warnings = {};  ///< of the detection, one line each
 };
 
 }  // namespace kinescope

@@ -273,14 +273,29 @@ TEST_F(RunRefusalsOfImages, ADamagedCache) {
                                        "--quiet"};
   const std::string line = expect_refusal(words, ExitCode::kUndetermined, "move");
   const auto kept = nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json"));
-  for (const char* damage : {R"({"key": 5})", R"({"times_s": null})", R"({"times_s": []})",
-                             R"({"rejected": [{}]})", R"({"rejected": null, "width": "wide"})"}) {
+  for (const char* damage :
+       {R"({"key": 5})", R"({"times_s": null})", R"({"times_s": []})", R"({"rejected": [{}]})",
+        R"({"rejected": null, "width": "wide"})", R"({"warnings": null})"}) {
     nlohmann::json damaged = kept;
     damaged.merge_patch(nlohmann::json::parse(damage));
     folder_.write("out/observations.json", damaged.dump());
     EXPECT_EQ(expect_refusal(words, ExitCode::kUndetermined, "move"), line) << damage;
     EXPECT_EQ(nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json")),
               kept);
+  }
+}
+
+// A second run says what the first one said.
+TEST_F(RunRefusalsOfImages, TheCacheKeepsTheWarnings) {
+  film(false);
+  folder_.write("tags.yaml", "family: tag36h11\ndefault_size: 0.05\nsizes: {99: 0.05}\n");
+  const std::vector<std::string> words{"run", folder_.path().string(), "--output", output(),
+                                       "--quiet"};
+  for (int round = 0; round < 2; ++round) {
+    expect_refusal(words, ExitCode::kUndetermined, "move");
+    const auto kept =
+        nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json"));
+    EXPECT_EQ(kept["warnings"], nlohmann::json({"marker 99 is declared and never seen"})) << round;
   }
 }
 
