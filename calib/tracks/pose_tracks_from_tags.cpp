@@ -8,6 +8,7 @@
 
 #include "calib/tracks/planar_pose.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -26,23 +27,32 @@ constexpr std::size_t kFocalViews = 120;
 constexpr double kFreedom = 2.0;
 constexpr double kWorstMisfit = 13.8;
 
-// Corners that no pose explains have errors that are no noise (half hidden, blurred): as wrong as
-// they show themselves to be (Birge 1932).
-PlanarPose with_own_misfit(PlanarPose pose) {
-  if (pose.best.chi_square <= kWorstMisfit) return pose;
-  const double variance = pose.best.chi_square / kFreedom;
-  const auto widen = [variance](PlanarBranch& branch) {
+void widen(PlanarPose& pose, double variance) {
+  const auto widen_branch = [variance](PlanarBranch& branch) {
     branch.chi_square /= variance;
     branch.covariance *= variance;
   };
-  widen(pose.best);
-  if (pose.other) widen(*pose.other);
+  widen_branch(pose.best);
+  if (pose.other) widen_branch(*pose.other);
+}
+
+// Corners that no pose explains have errors that are no noise (half hidden, blurred): as wrong as
+// they show themselves to be (Birge 1932).
+PlanarPose with_own_misfit(PlanarPose pose) {
+  if (pose.best.chi_square > kWorstMisfit) widen(pose, pose.best.chi_square / kFreedom);
   return pose;
+}
+
+// The median of chi-square with that many degrees of freedom (Wilson and Hilferty 1931).
+double median_chi_square(double freedom) {
+  const double root = 1.0 - 2.0 / (9.0 * freedom);
+  return freedom * root * root * root;
 }
 
 struct Candidate {
   int frame = 0;
   PlanarPose pose;
+  double freedom = kFreedom;
   [[nodiscard]] int count() const { return pose.other ? 2 : 1; }
   [[nodiscard]] const PlanarBranch& branch(int k) const { return k == 0 ? pose.best : *pose.other; }
 };
@@ -53,6 +63,19 @@ double step_cost(const PlanarBranch& a, const PlanarBranch& b, double dt_s) {
       a.covariance.topLeftCorner<3, 3>().trace() + b.covariance.topLeftCorner<3, 3>().trace();
   const double spread = kTurnFloor + kTurnRate * dt_s;
   return std::min(kMaxStepCost, angle * angle / (spread * spread + noise));
+}
+
+// How much larger the variance of the corners is than was declared, or assumed where nothing was.
+// Half of the sightings fit better than the median, whatever the worst do. Where the corners fit
+// better than they should, what they declared may hold errors that a pose takes up: it stays.
+double variance_of_corners(const std::map<TagId, std::vector<Candidate>>& candidates) {
+  std::vector<double> shares;
+  for (const auto& [id, list] : candidates) {
+    for (const Candidate& c : list) {
+      shares.push_back(c.pose.best.chi_square / median_chi_square(c.freedom));
+    }
+  }
+  return std::max(1.0, median_of(std::move(shares)));
 }
 
 // The most probable sequence of branches (Viterbi).
@@ -140,10 +163,17 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
   for (const TagObservation& observation : observations.observations) {
     const auto pose = estimate_planar_pose(camera, markers.corners_m(observation.id),
                                            observation.corners_px, observation.sigma_px);
-    if (pose) candidates[observation.id].push_back({observation.frame, with_own_misfit(*pose)});
+    if (!pose) continue;
+    const double freedom = 2.0 * static_cast<double>(observation.corners_px.size()) - 6.0;
+    candidates[observation.id].push_back({observation.frame, *pose, freedom});
   }
+  const double variance = variance_of_corners(candidates);
   PoseTracks tracks{observations.times_s, {}};
   for (auto& [id, list] : candidates) {
+    for (Candidate& c : list) {
+      widen(c.pose, variance);
+      c.pose = with_own_misfit(std::move(c.pose));
+    }
     std::ranges::sort(list, {}, &Candidate::frame);
     tracks.tracks.push_back(make_track(id, list, observations.times_s));
   }
