@@ -4,12 +4,15 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "app/commands/inspection.h"
 #include "calib/camera/camera_file.h"
+#include "calib/vision/double_ids.h"
+#include "calib/vision/sightings.h"
 #include "calib/vision/tag_detector.h"
 #include "kinematics/core/median.h"
 
@@ -67,10 +70,10 @@ std::optional<Step> step_across(const ImageView& image, const Eigen::Vector2d& a
 struct Sightings {
   std::vector<double> edges_px, contrasts, blurs_px;
   int frames = 0;
+  int doubled = 0;  ///< frames in which it was seen in two places
 };
 
 void add_sighting(Sightings& out, const ImageView& image, const TagObservation& tag) {
-  ++out.frames;
   for (std::size_t i = 0; i < tag.corners_px.size(); ++i) {
     const Eigen::Vector2d& a = tag.corners_px[i];
     const Eigen::Vector2d& b = tag.corners_px[(i + 1) % tag.corners_px.size()];
@@ -79,6 +82,32 @@ void add_sighting(Sightings& out, const ImageView& image, const TagObservation& 
       out.contrasts.push_back(step->contrast);
       out.blurs_px.push_back(step->blur_px);
     }
+  }
+}
+
+void add_frame(std::map<TagId, Sightings>& seen, const ImageView& image,
+               const std::vector<TagObservation>& tags) {
+  std::map<TagId, const TagObservation*> first;
+  std::set<TagId> doubled;
+  for (const TagObservation& tag : tags) {
+    add_sighting(seen[tag.id], image, tag);
+    const auto [other, is_first] = first.emplace(tag.id, &tag);
+    if (!is_first && !is_same_place(tag.corners_px, other->second->corners_px)) {
+      doubled.insert(tag.id);
+    }
+  }
+  for (const auto& [id, tag] : first) ++seen[id].frames;
+  for (const TagId id : doubled) ++seen[id].doubled;
+}
+
+// A wrong detection here and there is put aside by `run`.
+void judge_doubled(const std::map<TagId, Sightings>& seen, std::vector<Finding>& findings) {
+  constexpr double kShareOfWrongOnes = 0.1;
+  for (const auto& [id, sightings] : seen) {
+    if (sightings.doubled < 2 || sightings.doubled < kShareOfWrongOnes * sightings.frames) continue;
+    findings.push_back(
+        {false, fmt::format("{} {} are in view (in {} of {} frames): remove one", kTwoMarkers,
+                            id.value, sightings.doubled, sightings.frames)});
   }
 }
 
@@ -217,19 +246,18 @@ VideoFacts look_at_video(const Recording& recording, const Progress& progress,
     facts.times_s.push_back(frame->time_s + recording.settings.video_start_s);
     if (facts.frames_decoded++ % every != 0) continue;
     report_progress(progress, "inspect", facts.frames_decoded, expected);
-    for (const TagObservation& tag : detector->detect(frame->image.view())) {
-      add_sighting(seen[tag.id], frame->image.view(), tag);
-    }
+    add_frame(seen, frame->image.view(), detector->detect(frame->image.view()));
     if (seen.empty() && facts.frames_searched % 9 == 0) kept.push_back(std::move(frame->image));
     ++facts.frames_searched;
   }
   report_progress(progress, "inspect", expected, expected);
   for (const std::string& warning : video->warnings()) findings.push_back({false, warning});
   facts.markers = summarise(seen, recording.markers);
+  judge_doubled(seen, findings);
   if (recording.camera) {
     try {
       static_cast<void>(with_image_size(*recording.camera, facts.info.width, facts.info.height,
-                                        recording.video.string()));
+                                        recording.camera_file.string()));
     } catch (const Error& error) {
       findings.push_back({true, error.what()});
     }

@@ -13,6 +13,7 @@
 #include "app/report/facts.h"
 #include "app/report/findings.h"
 #include "app/report/numbers.h"
+#include "calib/vision/double_ids.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::report {
@@ -307,6 +308,11 @@ Verdict make_verdict(const RunSummary& run, const Analysis& analysis) {
     if (finding.remedy.empty() || verdict.next.find(finding.remedy) != std::string::npos) continue;
     if (!verdict.next.empty()) verdict.next += ' ';
     verdict.next += finding.remedy;
+  }
+  for (std::string warning : run.warnings) {
+    if (!warning.starts_with(kTwoMarkers)) continue;
+    warning.front() = 'T';
+    verdict.limits += fmt::format("{}{}.", verdict.limits.empty() ? "" : " ", warning);
   }
   if (verdict.next.empty()) {
     verdict.next =

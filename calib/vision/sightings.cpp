@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/vision/double_ids.h"
 #include "calib/vision/tag_detector.h"
 
 namespace kinescope {
@@ -249,6 +250,7 @@ std::vector<std::string> sort_out_sightings(TagObservations& observations, const
     if (!tag.partly_hidden) return std::nullopt;
     return "something covers a part of it";
   });
+  const auto second_markers = put_second_markers_aside(observations, min_sightings);
   const std::map<TagId, int> doubles = settle_doubles(observations);
   reject_jumps(observations);
   reject_rare(observations, min_sightings);
@@ -257,14 +259,17 @@ std::vector<std::string> sort_out_sightings(TagObservations& observations, const
   });
 
   std::vector<std::string> warnings;
+  for (const auto& [id, taken] : second_markers) {
+    warnings.push_back(two_markers_warning(id, taken));
+  }
   for (const auto& [id, count] : doubles) {
-    if (count < std::max(2, min_sightings)) continue;
+    if (count < std::max(2, min_sightings) || second_markers.contains(id)) continue;
     warnings.push_back(fmt::format(
         "marker {} is seen twice in {} frames: are there two with this id?", id.value, count));
   }
   const auto tracks = by_marker(observations.observations);
   for (const auto& [id, size] : markers.sizes_m) {
-    if (!tracks.contains(id)) {
+    if (!tracks.contains(id) && !second_markers.contains(id)) {
       warnings.push_back(fmt::format("marker {} is declared and never seen", id.value));
     }
   }

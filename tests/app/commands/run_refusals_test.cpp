@@ -200,7 +200,7 @@ TEST_F(RunRefusals, ALimitThatIsNoLimit) {
 // Recordings as images: one marker at rest, or two of which one moves, or none.
 class RunRefusalsOfImages : public RunRefusals {
  protected:
-  void film(bool moving, const std::string& family = "tag36h11") const {
+  void film(bool moving, const std::string& family = "tag36h11", bool twice = false) const {
     const CameraModel camera = pinhole_guess(320, 240, 500.0);
     Rng rng = Rng::from_name("film");
     std::string times = "image,t\n";
@@ -211,7 +211,12 @@ class RunRefusalsOfImages : public RunRefusals {
       const double turn = moving ? 0.05 * f : 0.0;
       marker.T_camera_tag =
           pose_showing(camera, {150.0, 110.0}, 70.0, marker.size_m, 0.3, 0.2, turn);
-      const GreyImage image = render_markers(camera, {marker}, {.supersample = 3}, rng);
+      std::vector<PlacedMarker> markers{marker};
+      if (twice) {
+        marker.T_camera_tag = pose_showing(camera, {270.0, 50.0}, 50.0, marker.size_m, 0.3, 0.2, 0);
+        markers.push_back(marker);
+      }
+      const GreyImage image = render_markers(camera, markers, {.supersample = 3}, rng);
       const cv::Mat picture(image.height, image.width, CV_8UC1,
                             const_cast<std::uint8_t*>(image.pixels.data()));
       const std::string name = fmt::format("{:03d}.png", f);
@@ -264,6 +269,14 @@ TEST_F(RunRefusalsOfImages, ACameraOfAnotherShapeThatWasNamed) {
   folder_.write("other.yaml", text);
   refused(ExitCode::kBadInput, "other.yaml: made for images of 300 x 240",
           {"--camera", (folder_.path() / "other.yaml").string()});
+}
+
+TEST_F(RunRefusalsOfImages, TwoMarkersWithOneId) {
+  film(false, "tag36h11", true);
+  const Outcome outcome = run({"inspect", folder_.path().string()});
+  EXPECT_NE(outcome.out.find("two markers with id 4 are in view (in 20 of 20 frames): remove one"),
+            std::string::npos)
+      << outcome.out;
 }
 
 // A cache that is damaged is none: the video is read once more.

@@ -55,6 +55,17 @@ TEST(Verdict, ADoubtThatTracingSettlesIsNoLimit) {
   EXPECT_FALSE(has(make_verdict(run).limits, "only roughly"));
 }
 
+TEST(Verdict, NamesAnIdThatTwoMarkersCarry) {
+  RunSummary run = synthetic_run();
+  run.warnings = {"marker 9 is declared and never seen",
+                  "two markers with id 7 are in view: remove one (the one that moves is taken)"};
+  const Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(verdict.limits.ends_with(
+      ". Two markers with id 7 are in view: remove one (the one that moves is taken)."))
+      << verdict.limits;
+  EXPECT_FALSE(has(verdict.limits, "marker 9"));
+}
+
 TEST(Verdict, ALateLogHasAMinus) {
   RunSummary run = synthetic_run();
   run.calibration.time_offset_s = -0.0123;

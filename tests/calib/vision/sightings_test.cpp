@@ -96,7 +96,7 @@ TEST(Sightings, TwoMarkersWithOneIdAreBothRejectedAndReported) {
   EXPECT_TRUE(all.observations.empty());
   EXPECT_EQ(rejected(all, "not to be told apart"), 2 * kFrames);
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_NE(warnings[0].find("two with this id"), std::string::npos);
+  EXPECT_NE(warnings[0].find("two markers with id 3 are in view: remove one"), std::string::npos);
 }
 
 TEST(Sightings, JumpsAwayAndBackAreRejected) {
