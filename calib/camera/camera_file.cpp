@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/camera/camera_file.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "calib/camera/camera_formats.h"
@@ -26,6 +28,22 @@ YAML::Node parse_yaml(const Source& source, std::string text) {
                     fmt::format("not YAML: {}", error.msg), std::string(kKnownFiles));
   }
   throw bad_input(source.file, "holds no camera", std::string(kKnownFiles));
+}
+
+// A file that does not tell the size of its images may be of another resolution, or of a crop: the
+// middle of the image then lies elsewhere. Lenses are centred far better than this.
+void require_centred(const CameraModel& camera, int width, int height, const std::string& source) {
+  constexpr double kOffCentre = 0.15;  // of the image's side
+  const double x = camera.cx - 0.5 * (width - 1);
+  const double y = camera.cy - 0.5 * (height - 1);
+  if (std::abs(x) <= kOffCentre * width && std::abs(y) <= kOffCentre * height) return;
+  throw bad_input(
+      source,
+      fmt::format("its principal point ({:.0f}, {:.0f}) is not near the middle of images of {} x "
+                  "{}, and it does not say which size it was made for",
+                  camera.cx, camera.cy, width, height),
+      "add image_width and image_height to it, or calibrate the camera at the resolution of the "
+      "video (kinescope camera)");
 }
 
 bool is_opencv_yaml(const std::string& text) {
@@ -60,6 +78,7 @@ CameraModel read_camera(const std::filesystem::path& path) {
 
 CameraModel with_image_size(CameraModel camera, int width, int height, const std::string& source) {
   if (camera.width == 0 && camera.height == 0) {
+    require_centred(camera, width, height, source);
     camera.width = width;
     camera.height = height;
     return camera;

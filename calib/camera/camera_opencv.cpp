@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cctype>
+#include <initializer_list>
 #include <optional>
 
 #include <fmt/format.h>
@@ -85,6 +88,50 @@ auto first_of(const std::vector<std::string>& keys, Get get) {
   return std::pair(std::move(found), std::move(key));
 }
 
+enum class Lens { kPolynomial, kFisheye };
+
+/// A model's name, of the lens or of the whole camera; nothing for "pinhole", which leaves the lens
+/// open.
+std::optional<Lens> lens_of(const Source& source, const std::string& key, const std::string& said) {
+  std::string name = said;
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
+    return std::ranges::find(names, name) != names.end();
+  };
+  if (name.empty() || name == "pinhole") return std::nullopt;
+  if (is_one_of({"plumb_bob", "radtan", "rational_polynomial", "rational", "brown_conrady"})) {
+    return Lens::kPolynomial;
+  }
+  if (is_one_of({"fisheye", "equidistant", "equi", "kannala_brandt", "kannala_brandt4"})) {
+    return Lens::kFisheye;
+  }
+  throw source.bad(key, fmt::format("'{}' is not known", said),
+                   "known: plumb_bob, rational_polynomial, equidistant (fisheye)");
+}
+
+/// What the file says of its lens, in whichever of its keys; a polynomial where it says nothing, as
+/// OpenCV does.
+Lens declared_lens(const Source& source, const Storage& storage) {
+  std::optional<Lens> lens;
+  std::string said;
+  const auto add = [&](const std::string& key, std::optional<Lens> other) {
+    if (!other) return;
+    if (lens && *lens != *other) {
+      throw source.bad(key, fmt::format("contradicts {}", said), "keep the one that is right");
+    }
+    lens = other;
+    said = key;
+  };
+  for (const char* key : {"distortion_model", "camera_model"}) {
+    if (const auto name = storage.scalar(key)) add(key, lens_of(source, key, *name));
+  }
+  const auto [flag, key] = first_of({"fisheye_model", "fisheye"},
+                                    [&](const std::string& k) { return storage.scalar(k); });
+  if (flag) add(key, *flag == "1" || *flag == "true" ? Lens::kFisheye : Lens::kPolynomial);
+  return lens.value_or(Lens::kPolynomial);
+}
+
 CameraModel read_opencv(const Source& source, const Storage& storage) {
   const auto matrix = [&](const std::string& key) { return storage.matrix(key); };
   const auto scalar = [&](const std::string& key) { return storage.scalar(key); };
@@ -98,8 +145,7 @@ CameraModel read_opencv(const Source& source, const Storage& storage) {
                                     "distCoeffs", "dist_coeffs", "DistCoeffs", "D", "D1"},
                                    matrix);
   if (!d) throw source.bad("distortion_coefficients", "is missing", std::string(kKnownFiles));
-  const auto fisheye = scalar("fisheye_model");
-  if (fisheye && *fisheye == "1") {
+  if (declared_lens(source, storage) == Lens::kFisheye) {
     set_equidistant(source, d_key, *d, camera);
   } else {
     set_polynomial(

@@ -139,6 +139,52 @@ distortion_coefficients: !!opencv-matrix
   EXPECT_EQ(camera.distortion, (std::array<double, 8>{-0.25, -0.03, 1.5e-3, -2.5e-4, 0.25}));
 }
 
+constexpr const char* kOpenCvFourTerms = R"(%YAML:1.0
+---
+image_width: 1280
+image_height: 960
+K: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 420., 0., 640., 0., 421., 480., 0., 0., 1. ]
+D: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ -.02, .003, -.001, .0002 ]
+)";
+
+TEST_F(CameraFile, TakesTheLensThatAnOpenCvFileDeclares) {
+  const auto read = [&](const std::string& lines) {
+    return read_camera(write(kOpenCvFourTerms + lines));
+  };
+  EXPECT_EQ(read("").model, DistortionModel::kPlumbBob);
+  EXPECT_EQ(read("camera_model: pinhole\n").model, DistortionModel::kPlumbBob);
+  for (const char* lines :
+       {"distortion_model: fisheye\n", "distortion_model: Equidistant\n", "fisheye_model: 1\n",
+        "camera_model: fisheye\n", "camera_model: pinhole\ndistortion_model: equidistant\n",
+        "camera_model: KANNALA_BRANDT\n"}) {
+    const CameraModel camera = read(lines);
+    EXPECT_EQ(camera.model, DistortionModel::kEquidistant) << lines;
+    EXPECT_EQ(camera.distortion, (std::array<double, 8>{-0.02, 0.003, -0.001, 0.0002})) << lines;
+  }
+  for (const char* lines :
+       {"distortion_model: plumb_bob\n", "distortion_model: radtan\n", "fisheye_model: 0\n"}) {
+    EXPECT_EQ(read(lines).model, DistortionModel::kPlumbBob) << lines;
+  }
+  EXPECT_NE(complaint(std::string(kOpenCvFourTerms) + "distortion_model: double_sphere\n")
+                .find("distortion_model: 'double_sphere' is not known (known: plumb_bob, "),
+            std::string::npos);
+  EXPECT_NE(complaint(std::string(kOpenCvFourTerms) + "camera_model: omni\n")
+                .find("camera_model: 'omni' is not known"),
+            std::string::npos);
+  EXPECT_NE(
+      complaint(std::string(kOpenCvFourTerms) + "distortion_model: plumb_bob\nfisheye_model: 1\n")
+          .find("fisheye_model: contradicts distortion_model"),
+      std::string::npos);
+}
+
 TEST_F(CameraFile, ReadsOpenCvXmlWithoutSize) {
   const CameraModel camera = read_camera(write(R"(<?xml version="1.0"?>
 <opencv_storage>
@@ -167,6 +213,24 @@ TEST_F(CameraFile, RefusesAnotherImageSize) {
   EXPECT_EQ(with_image_size(camera, 1280, 720, "camera.yaml"), camera);
   EXPECT_THROW((void)with_image_size(camera, 640, 480, "camera.yaml"), Error);
   EXPECT_THROW((void)with_image_size(camera, 720, 1280, "camera.yaml"), Error);
+}
+
+TEST_F(CameraFile, RefusesAPrincipalPointOfAnotherResolution) {
+  CameraModel camera = pinhole_guess(1920, 1080, 1389.0);
+  camera.width = camera.height = 0;
+  EXPECT_EQ(with_image_size(camera, 1920, 1080, "camera.xml").width, 1920);
+  try {
+    (void)with_image_size(camera, 1280, 720, "camera.xml");
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "camera.xml: its principal point (960, 540) is not near the middle of images of 1280 "
+              "x 720, and it does not say which size it was made for (add image_width and "
+              "image_height to it, or calibrate the camera at the resolution of the video "
+              "(kinescope camera))");
+  }
+  camera.cx += 0.1 * 1920.0;  // a lens that is badly centred, or a small crop
+  EXPECT_EQ(with_image_size(camera, 1920, 1080, "camera.xml").height, 1080);
 }
 
 TEST_F(CameraFile, NamesTheKeyThatIsWrong) {
