@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "kinematics/core/median.h"
 
@@ -218,6 +219,29 @@ bool drives_something(const GrownTree& tree, int channel) {
   return false;
 }
 
+// Columns that never change are a gripper that stays closed, a flag, an axis nobody uses: markers
+// that never move against each other are one link of this recording.
+void add_constant_doubt(const GrownTree& tree, const Readings& readings, const JointLog& log,
+                        Verdict& verdict) {
+  std::vector<std::string> quoted;
+  std::vector<std::string> names;
+  for (int c = 0; c < readings.channels(); ++c) {
+    if (readings.moves(c) || drives_something(tree, c)) continue;
+    quoted.push_back(channel_words(log, readings, c));
+    names.push_back(quoted.back().substr(1, quoted.back().size() - 2));
+  }
+  if (quoted.empty()) return;
+  const bool one = quoted.size() == 1;
+  const std::string list = fmt::format("{}", fmt::join(quoted, ", "));
+  verdict.doubts.push_back(
+      {fmt::format("{} {} never change{}: a joint that {} would not be seen, and markers on both "
+                   "sides of it count as one link",
+                   one ? "channel" : "channels", list, one ? "s" : "",
+                   one ? "it drives" : "one of them drives"),
+       fmt::format("if {} drives a joint, record again with it moving", one ? list : "one of them"),
+       std::move(names)});
+}
+
 // Channels that hardly move, while there are markers between which their joint could hide.
 void add_still_doubts(const GrownTree& tree, const Series& series, const Readings& readings,
                       const JointLog& log, Verdict& verdict) {
@@ -225,13 +249,12 @@ void add_still_doubts(const GrownTree& tree, const Series& series, const Reading
   for (const GrownBody& b : tree.bodies) {
     if (b.link >= 0) ++markers[static_cast<std::size_t>(b.link)];
   }
-  const bool shared = std::ranges::any_of(markers, [](int m) { return m >= 2; });
+  const bool hides = markers[0] >= 1 || std::ranges::any_of(markers, [](int m) { return m >= 2; });
   const double scale = usual_scale(tree, readings);
   for (int c = 0; c < readings.channels(); ++c) {
-    if (drives_something(tree, c)) continue;
+    if (!readings.moves(c) || drives_something(tree, c)) continue;
     const double motion = readings.rms[static_cast<std::size_t>(c)] * scale;
     if (motion > visible_motion(series)) continue;
-    const bool hides = shared || (markers[0] >= 1 && readings.moves(c));
     const std::string name = channel_words(log, readings, c);
     verdict.doubts.push_back(
         {fmt::format("channel {} hardly moves: whether it drives a joint cannot be told", name),
@@ -324,6 +347,7 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
                               "record longer, with larger motions of the joints concerned",
                               {}});
   }
+  add_constant_doubt(tree, readings, log, verdict);
   return verdict;
 }
 
