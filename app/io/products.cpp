@@ -198,6 +198,7 @@ json structure_json(const Structure& structure, const JointLog& log) {
            {"tags", json::array()},
            {"free_markers", tag_list(structure.free_markers)},
            {"idle_channels", json::array()},
+           {"copied_channels", json::array()},
            {"doubts", json::array()}};
   for (std::size_t j = 0; j < structure.joints.size(); ++j) {
     out["joints"].push_back(structure_joint_json(structure.joints[j], tree.joints[j].name, log));
@@ -211,6 +212,10 @@ json structure_json(const Structure& structure, const JointLog& log) {
   }
   for (const int channel : structure.idle_channels) {
     out["idle_channels"].push_back(channel_name(log, channel));
+  }
+  for (const ChannelCopy& copy : structure.copied_channels) {
+    out["copied_channels"].push_back(
+        {{"channel", channel_name(log, copy.channel)}, {"of", channel_name(log, copy.of)}});
   }
   for (const StructureDoubt& doubt : structure.doubts) {
     out["doubts"].push_back(

@@ -46,7 +46,7 @@ struct Verdict {
 ///   structure      null for a nominal robot; else status (determined, ambiguous, undetermined),
 ///   probability, runner_up,
 ///                  runner_up_log_odds, links [name, markers], free_markers, idle_channels,
-///                  doubts [what, remedy, names],
+///                  copied_channels [channel, of], doubts [what, remedy, names],
 ///                  joints [type, parent, child, driven_by {channel, scale, scale_sigma},
 ///                  couplings, offset, travel, rotation_rms_rad, translation_rms_m, log_odds,
 ///                  runner_up]

@@ -151,6 +151,12 @@ json structure_json(const RunSummary& run) {
       idle.push_back(text(run.log.channels[index]));
     }
   }
+  json copied = json::array();
+  for (const ChannelCopy& copy : structure.copied_channels) {
+    copied.push_back(
+        {{"channel", text(run.log.channels.at(static_cast<std::size_t>(copy.channel)))},
+         {"of", text(run.log.channels.at(static_cast<std::size_t>(copy.of)))}});
+  }
   return {{"status", status_words(structure.status)},
           {"probability", number(structure.probability)},
           {"runner_up", text(structure.runner_up)},
@@ -159,6 +165,7 @@ json structure_json(const RunSummary& run) {
           {"links", links},
           {"free_markers", free_markers},
           {"idle_channels", idle},
+          {"copied_channels", copied},
           {"doubts", doubts}};
 }
 

@@ -9,9 +9,11 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/structure/assemble.h"
+#include "kinematics/structure/copied_channels.h"
 #include "kinematics/structure/natural_units.h"
 #include "kinematics/structure/readings.h"
 #include "kinematics/structure/search.h"
@@ -55,6 +57,29 @@ struct Answer {
   Series thin;
   double allowance = 0.0;
 };
+
+// The log without the columns that repeat others.
+struct OwnLog {
+  JointLog log;
+  std::vector<int> channels;         // of the whole log
+  std::vector<SameQuantity> groups;  // of the whole log
+  std::vector<int> chosen;           // of each group
+};
+
+OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups, std::vector<int> chosen) {
+  OwnLog out;
+  out.channels = channels_with(log, groups, chosen);
+  out.log = with_channels(log, out.channels);
+  out.groups = std::move(groups);
+  out.chosen = std::move(chosen);
+  return out;
+}
+
+OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups) {
+  std::vector<int> first;
+  for (const SameQuantity& group : groups) first.push_back(group.front());
+  return own_log(log, std::move(groups), std::move(first));
+}
 
 Series with_allowance(Series series, double share) {
   Vector6d variance;
@@ -116,18 +141,57 @@ Answer search_with(Series full, double allowance, const JointLog& log,
   return out;
 }
 
+// Columns that tell the same and yet drive a joint each are of joints that move alike.
+std::vector<SameQuantity> copies_only(std::vector<SameQuantity> groups, const Answer& every) {
+  std::vector<int> driving;
+  for (const int c : driving_channels(every.found.tree))
+    driving.push_back(every.found.readings.log_channel[static_cast<std::size_t>(c)]);
+  driving.erase(std::ranges::unique(driving).begin(), driving.end());
+  std::erase_if(groups, [&](const SameQuantity& group) {
+    return std::ranges::count_if(
+               group, [&](int c) { return std::ranges::find(driving, c) != driving.end(); }) > 1;
+  });
+  return groups;
+}
+
+// With the sightings' own noise, and the log without the columns that repeat others.
+Answer search_plainly(Series full, const JointLog& log, const StructureOptions& options,
+                      OwnLog& own) {
+  own = own_log(log, same_quantities(log));
+  Answer plain = search_with(std::move(full), 0.0, own.log, options);
+  if (own.groups.empty() || is_whole(plain.found.tree)) return plain;
+  Answer every = search_with(plain.full, 0.0, log, options);
+  std::vector<SameQuantity> copies = copies_only(own.groups, every);
+  if (copies.size() == own.groups.size()) return plain;
+  own = own_log(log, std::move(copies));
+  if (own.groups.empty()) return every;
+  return search_with(std::move(every.full), 0.0, own.log, options);
+}
+
 // With the sightings' own noise or, where that makes no whole robot or leaves far more than itself,
 // with the smallest allowance that makes one of as many channels.
-Answer search(Series full, const JointLog& log, const StructureOptions& options) {
-  Answer plain = search_with(std::move(full), 0.0, log, options);
+Answer search_allowing(Series full, const JointLog& log, const StructureOptions& options,
+                       OwnLog& own) {
+  Answer plain = search_plainly(std::move(full), log, options, own);
   const bool whole = is_whole(plain.found.tree);
   if (log.channels.empty() || (whole && !leaves_far_more(plain.found.tree))) return plain;
   for (const double allowance : kAllowances) {
-    Answer other = search_with(with_allowance(plain.full, allowance), allowance, log, options);
+    Answer other = search_with(with_allowance(plain.full, allowance), allowance, own.log, options);
     const bool as_many = used_channels(other.found.tree) >= used_channels(plain.found.tree);
     if (as_many && is_whole(other.found.tree)) return other;
   }
   return plain;
+}
+
+// Of columns that tell the same, with those that the markers follow best.
+Answer search(Series full, const JointLog& log, const StructureOptions& options, OwnLog& own) {
+  Answer answer = search_allowing(std::move(full), log, options, own);
+  if (own.groups.empty()) return answer;
+  std::vector<int> chosen =
+      best_copies(answer.found, answer.thin, log, own.groups, own.chosen, options);
+  if (chosen == own.chosen) return answer;
+  own = own_log(log, std::move(own.groups), std::move(chosen));
+  return search_with(std::move(answer.full), answer.allowance, own.log, options);
 }
 
 JointLog shifted(JointLog log, double by_s) {
@@ -213,6 +277,55 @@ void doubt_shared_channels(const JointLog& log, Structure& out) {
   }
 }
 
+// Channels of the log without copies become those of the whole log; copies of such that drive a
+// joint are listed, the others are idle.
+void in_whole_log(const OwnLog& own, Structure& out) {
+  const auto whole = [&](int c) { return own.channels[static_cast<std::size_t>(c)]; };
+  std::vector<int> driving;
+  for (StructureJoint& joint : out.joints) {
+    if (!joint.channel) continue;
+    joint.channel->channel = whole(joint.channel->channel);
+    driving.push_back(joint.channel->channel);
+    for (ChannelTerm& term : joint.couplings) {
+      term.channel = whole(term.channel);
+      driving.push_back(term.channel);
+    }
+  }
+  for (int& c : out.idle_channels) c = whole(c);
+  for (std::size_t g = 0; g < own.groups.size(); ++g) {
+    const bool drives = std::ranges::find(driving, own.chosen[g]) != driving.end();
+    for (const int c : own.groups[g]) {
+      if (c == own.chosen[g]) continue;
+      if (drives) {
+        out.copied_channels.push_back({c, own.chosen[g]});
+      } else {
+        out.idle_channels.push_back(c);
+      }
+    }
+  }
+  std::ranges::sort(out.idle_channels);
+  std::ranges::sort(out.copied_channels, {}, &ChannelCopy::channel);
+}
+
+void doubt_copies(const JointLog& log, Structure& out) {
+  if (out.copied_channels.empty()) return;
+  std::vector<std::string> copies;
+  std::vector<std::string> used;
+  for (const ChannelCopy& copy : out.copied_channels) {
+    copies.push_back(log.channels[static_cast<std::size_t>(copy.channel)]);
+    used.push_back(log.channels[static_cast<std::size_t>(copy.of)]);
+  }
+  const bool one = copies.size() == 1;
+  out.doubts.push_back(
+      {fmt::format("{} '{}' repeat{} '{}' (a command beside its measured value, say): the latter "
+                   "{} used",
+                   one ? "column" : "columns", fmt::join(copies, "', '"), one ? "s" : "",
+                   fmt::join(used, "', '"), one ? "is" : "are"),
+       "if a column belongs to a joint of its own, put a marker on its link and record it moving "
+       "at another time",
+       copies});
+}
+
 Structure nothing(StructureDoubt doubt) {
   Structure out;
   out.status = StructureStatus::kUndetermined;
@@ -252,19 +365,23 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
                     "check that both clocks start together, or give the offset between them",
                     {}});
   }
-  const Answer answer = search(std::move(clean), log, options);
+  OwnLog own;
+  const Answer answer = search(std::move(clean), log, options, own);
   const FoundTree& s = answer.found;
   const Series& full = answer.full;
-  const Verdict verdict = judge(s.tree, answer.thin, s.readings, log, options);
-  const Readings every = readings_like(s.readings, log, full, s.offset.value_s, options.max_gap_s);
+  const Verdict verdict = judge(s.tree, answer.thin, s.readings, own.log, options);
+  const Readings every =
+      readings_like(s.readings, own.log, full, s.offset.value_s, options.max_gap_s);
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
+  in_whole_log(own, out);
   doubt_shared_channels(log, out);
+  doubt_copies(log, out);
   // Whatever else is doubtful may come of it.
   if (answer.allowance > 0.0)
     out.doubts.insert(out.doubts.begin(), allowance_doubt(answer.allowance));
   if (moving_channels(every) > 0 && used_channels(fitted) == 0 && out.links.size() > 1) {
-    doubt_clocks(full, log, options, out);
+    doubt_clocks(full, own.log, options, out);
   }
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;

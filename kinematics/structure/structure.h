@@ -51,6 +51,12 @@ struct StructureLink {
   std::vector<Pose> T_reference_marker;  ///< of each marker, in the reference's frame
 };
 
+/// A channel that tells the same as one that drives a joint (its command, say), and was left aside.
+struct ChannelCopy {
+  int channel = -1;  ///< index into JointLog::channels
+  int of = -1;       ///< the one that is used
+};
+
 enum class StructureStatus { kNotRun, kDetermined, kAmbiguous, kUndetermined };
 
 /// "not_run", "determined", "ambiguous", "undetermined".
@@ -71,10 +77,11 @@ struct Structure {
   std::vector<StructureJoint> joints;  ///< parents stand before children
   std::vector<TagId> free_markers;     ///< markers that move with no joint we know (free bodies)
   std::vector<int> idle_channels;      ///< channels that drive nothing
-  double probability = 0.0;            ///< of the whole answer against all alternatives looked at
-  std::string runner_up;               ///< the next best whole structure, in words
-  double runner_up_log_odds = 0.0;     ///< ln(odds) of the answer against it
-  double time_offset_s = 0.0;          ///< joint-log time = frame time + offset, from the scan
+  std::vector<ChannelCopy> copied_channels;  ///< none of them is idle
+  double probability = 0.0;         ///< of the whole answer against all alternatives looked at
+  std::string runner_up;            ///< the next best whole structure, in words
+  double runner_up_log_odds = 0.0;  ///< ln(odds) of the answer against it
+  double time_offset_s = 0.0;       ///< joint-log time = frame time + offset, from the scan
   double time_offset_sigma_s = 0.0;
   std::vector<StructureDoubt> doubts;
   /// Without a log (or for joints that no channel drives): value of each joint in each frame,

@@ -177,8 +177,9 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
              "channels {} and {} move together: which of them drives which joint cannot be told",
              first, second),
          fmt::format("{}record again with {} and {} moving at different times or speeds",
-                     alike ? "if one column is a copy of the other, remove it; else " : "", first,
-                     second),
+                     alike ? "if one column is a copy of the other, remove it; else "
+                           : "if one column is the command of the other, remove it; else ",
+                     first, second),
          {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
     verdict.status = StructureStatus::kUndetermined;
   }
