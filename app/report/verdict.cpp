@@ -85,6 +85,26 @@ std::string driving_words(const RunSummary& run) {
   return fmt::format("no logged channel drives {}", joined(undriven));
 }
 
+/// " Temp and 7 other channels that move drive nothing.": of channels that stand still nothing is
+/// expected.
+std::string idle_words(const RunSummary& run) {
+  constexpr std::size_t kMostNames = 4;
+  std::vector<std::string> names;
+  for (const int channel : value_of(run.structure).idle_channels) {
+    const auto column = run.log.values.col(channel);
+    if (column.size() > 0 && column.maxCoeff() > column.minCoeff())
+      names.push_back(run.log.channels.at(static_cast<std::size_t>(channel)));
+  }
+  if (names.empty()) return "";
+  if (names.size() == 1) return fmt::format(" The channel {} moves and drives nothing.", names[0]);
+  if (names.size() > kMostNames) {
+    const std::size_t more = names.size() - kMostNames + 1;
+    names.resize(kMostNames - 1);
+    names.push_back(fmt::format("{} more", more));
+  }
+  return fmt::format(" The channels {} move and drive nothing.", joined(names));
+}
+
 std::string certainty_words(const Structure& structure) {
   switch (structure.status) {
     case StructureStatus::kDetermined:
@@ -180,6 +200,7 @@ std::string found_words(const RunSummary& run) {
     text += fmt::format(" {} move{} with no joint of this robot.", joined(names),
                         names.size() == 1 ? "s" : "");
   }
+  text += idle_words(run);
   text += scale_words(tree);
   return text;
 }

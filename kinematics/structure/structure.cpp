@@ -31,6 +31,8 @@ using namespace structure_search;  // NOLINT(google-build-using-namespace): this
 constexpr int kInstants = 240;
 // A body has to be seen this often to take part.
 constexpr int kFewestSightings = 8;
+// Most that an answer is worth in which a joint has no channel and a channel has no joint.
+constexpr double kUnpaired = 0.9;
 
 void check(const PoseTracks& tracks) {
   for (std::size_t f = 1; f < tracks.times_s.size(); ++f) {
@@ -224,29 +226,58 @@ std::optional<double> offset_beyond(const Series& full, const JointLog& log,
   return std::nullopt;
 }
 
-// The markers move, the channels move, but not together.
-void doubt_clocks(const Series& full, const JointLog& log, const StructureOptions& options,
-                  Structure& out) {
-  const auto offset_s =
-      options.scan_time_offset && full.smooth ? offset_beyond(full, log, options) : std::nullopt;
-  if (!offset_s) {
-    out.doubts.insert(out.doubts.begin(),
-                      {"the markers move, but no channel of the log moves with them",
-                       "check that the log belongs to this recording and that its clock agrees "
-                       "with the frames' to a second (video_start in recording.yaml)",
-                       {}});
-    return;
+// A rate of the log's clock against the frames' at which the channels drive a whole robot.
+std::optional<double> rate_apart(const Series& full, const JointLog& log,
+                                 const StructureOptions& options) {
+  if (!options.scan_time_offset || !full.smooth) return std::nullopt;
+  const Readings now = readings_at(log, thinned(full, kInstants), 0.0, options.max_gap_s);
+  const Series part = first_part(full, kRatePart);
+  for (const ClockRate& clock : scan_clock_rates(full, log, offset_step(now),
+                                                 options.max_time_offset_s, options.max_gap_s)) {
+    const Answer other =
+        search_with(part, 0.0, with_clock(log, clock, full.times_s.front()), options);
+    if (is_whole(other.found.tree)) return clock.rate;
   }
-  out.status = StructureStatus::kUndetermined;
-  out.doubts.insert(
-      out.doubts.begin(),
-      {fmt::format(
-           "no channel drives a joint as the clocks are, which is {:.2f} s apart from where "
-           "they do",
-           std::abs(*offset_s)),
-       fmt::format("add {:+.3f} s to the frames' times (of a video: to video_start in "
-                   "recording.yaml), or {:+.3f} s to the log's",
-                   *offset_s, -*offset_s),
+  return std::nullopt;
+}
+
+StructureDoubt offset_doubt(double offset_s) {
+  return {fmt::format("no channel drives a joint as the clocks are, which is {:.2f} s apart from "
+                      "where they do",
+                      std::abs(offset_s)),
+          fmt::format("add {:+.3f} s to the frames' times (of a video: to video_start in "
+                      "recording.yaml), or {:+.3f} s to the log's",
+                      offset_s, -offset_s),
+          {}};
+}
+
+StructureDoubt rate_doubt(double rate) {
+  return {fmt::format(
+              "the log's clock runs about {:.3f} times as fast as the frames': the channels do not "
+              "drive the joints as it is",
+              rate),
+          fmt::format("give the video the frame rate that it was taken with ({:.3f} times the one "
+                      "it has), or divide the log's times by {:.3f}",
+                      1.0 / rate, rate),
+          {}};
+}
+
+// The markers move, the channels move, but not together, or few of them.
+void doubt_clocks(const Series& full, const JointLog& log, const StructureOptions& options,
+                  bool nothing_driven, Structure& out) {
+  const auto put = [&](StructureDoubt doubt) {
+    out.status = StructureStatus::kUndetermined;
+    out.doubts.insert(out.doubts.begin(), std::move(doubt));
+  };
+  const bool scanned = nothing_driven && options.scan_time_offset && full.smooth;
+  if (const auto offset_s = scanned ? offset_beyond(full, log, options) : std::nullopt)
+    return put(offset_doubt(*offset_s));
+  if (const auto rate = rate_apart(full, log, options)) return put(rate_doubt(*rate));
+  if (!nothing_driven) return;
+  put({"the markers move, but no channel of the log moves with them",
+       "check that the log belongs to this recording and that its clock agrees with the frames' to "
+       "a second (video_start in recording.yaml); without joints.csv the joints are found from the "
+       "markers alone",
        {}});
 }
 
@@ -326,6 +357,28 @@ void doubt_copies(const JointLog& log, Structure& out) {
        copies});
 }
 
+// A joint without a channel beside channels without a joint: they may belong together in a way
+// that the model lacks (values that wrap, a channel with a delay of its own).
+void doubt_unpaired(const Readings& readings, const OwnLog& own, Structure& out) {
+  const bool undriven =
+      std::ranges::any_of(out.joints, [](const StructureJoint& j) { return !j.channel; });
+  std::vector<std::string> names;
+  for (int c = 0; c < readings.channels(); ++c) {
+    const int channel = readings.log_channel[static_cast<std::size_t>(c)];
+    const bool idle = std::ranges::find(out.idle_channels, channel) != out.idle_channels.end();
+    if (idle && readings.moves(c))
+      names.push_back(own.log.channels[static_cast<std::size_t>(channel)]);
+  }
+  if (!undriven || names.empty()) return;
+  out.probability = std::min(out.probability, kUnpaired);
+  out.doubts.push_back(
+      {fmt::format("a joint moves without a channel while '{}' move{} without a joint",
+                   fmt::join(names, "', '"), names.size() == 1 ? "s" : ""),
+       "check the values of the channels concerned for jumps and stretches that stand still; right "
+       "where no drive moves that joint",
+       names});
+}
+
 Structure nothing(StructureDoubt doubt) {
   Structure out;
   out.status = StructureStatus::kUndetermined;
@@ -374,14 +427,17 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
       readings_like(s.readings, own.log, full, s.offset.value_s, options.max_gap_s);
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
+  if (used_channels(fitted) > 0) doubt_unpaired(every, own, out);
   in_whole_log(own, out);
   doubt_shared_channels(log, out);
   doubt_copies(log, out);
   // Whatever else is doubtful may come of it.
   if (answer.allowance > 0.0)
     out.doubts.insert(out.doubts.begin(), allowance_doubt(answer.allowance));
-  if (moving_channels(every) > 0 && used_channels(fitted) == 0 && out.links.size() > 1) {
-    doubt_clocks(full, own.log, options, out);
+  const std::size_t used = used_channels(fitted);
+  const auto moving = static_cast<std::size_t>(moving_channels(every));
+  if (out.links.size() > 1 && moving > 0 && 2 * used <= moving && !is_whole(fitted)) {
+    doubt_clocks(full, own.log, options, used == 0, out);
   }
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;

@@ -17,6 +17,12 @@ constexpr int kMostInstants = 160;
 // Minima that get a structure of their own.
 constexpr std::size_t kMostLikely = 4;
 constexpr double kDeep = 0.5;  // of the deepest, below the median
+// Neighbouring rates, and neighbours of those that are likely. Over the part that is looked at half
+// a step moves its ends by a fraction of the time in which joints turn back.
+constexpr double kRateStep = 0.01;
+constexpr double kFineRateStep = 0.002;
+constexpr int kRateSteps = 22;
+constexpr std::size_t kMostRates = 3;
 
 // Local minima by cost, down to half as deep below the usual cost as the best; the middle one (no
 // offset) is always among them.
@@ -45,6 +51,27 @@ double vertex(const std::vector<double>& cost, int s) {
   return s + std::clamp(0.5 * (cost[at - 1] - cost[at + 1]) / curvature, -0.5, 0.5);
 }
 
+// -2 ln likelihood of the best tree of pairs at every offset from -steps to steps.
+std::vector<double> costs_by_offset(const Series& thin, const std::vector<BodyPair>& pairs,
+                                    const JointLog& log, double step_s, int steps,
+                                    double max_gap_s) {
+  std::vector<double> cost;
+  for (int s = -steps; s <= steps; ++s) {
+    const Readings readings = readings_at(log, thin, s * step_s, max_gap_s);
+    cost.push_back(-pair_tree(pairs, thin.bodies.size(), readings).gain);
+  }
+  return cost;
+}
+
+int steps_to(double half_width_s, double step_s) {
+  return std::max(1, static_cast<int>(std::floor(half_width_s / step_s)));
+}
+
+struct LikelyClock {
+  ClockRate clock;
+  double cost = 0.0;
+};
+
 }  // namespace
 
 double offset_step(const Readings& readings) {
@@ -61,15 +88,62 @@ std::vector<double> scan_time_offsets(const Series& series, const JointLog& log,
                                       double half_width_s, double max_gap_s) {
   const Series thin = thinned(series, kMostInstants);
   const std::vector<BodyPair> pairs = body_pairs(thin, thin.size());
-  const int steps = std::max(1, static_cast<int>(std::floor(half_width_s / step_s)));
-  std::vector<double> cost;
-  for (int s = -steps; s <= steps; ++s) {
-    const Readings readings = readings_at(log, thin, s * step_s, max_gap_s);
-    cost.push_back(-pair_tree(pairs, thin.bodies.size(), readings).gain);
-  }
+  const int steps = steps_to(half_width_s, step_s);
+  const std::vector<double> cost = costs_by_offset(thin, pairs, log, step_s, steps, max_gap_s);
   std::vector<double> likely;
   for (const int s : minima_of(cost)) likely.push_back((vertex(cost, s) - steps) * step_s);
   return likely;
+}
+
+std::vector<ClockRate> scan_clock_rates(const Series& series, const JointLog& log, double step_s,
+                                        double half_width_s, double max_gap_s) {
+  const Series thin = thinned(first_part(series, kRatePart), kMostInstants);
+  const std::vector<BodyPair> pairs = body_pairs(thin, thin.size());
+  const int steps = steps_to(half_width_s, step_s);
+  const auto at = [&](double rate) {
+    const JointLog same = with_clock(log, {rate, 0.0}, series.times_s.front());
+    const std::vector<double> cost = costs_by_offset(thin, pairs, same, step_s, steps, max_gap_s);
+    const auto best = std::ranges::min_element(cost);
+    const double offset_s = (static_cast<double>(best - cost.begin()) - steps) * step_s;
+    return LikelyClock{{rate, offset_s}, *best};
+  };
+  std::vector<LikelyClock> coarse;
+  for (int k = -kRateSteps; k <= kRateSteps; ++k) {
+    if (k != 0) coarse.push_back(at(std::pow(1.0 + kRateStep, k)));
+  }
+  std::ranges::stable_sort(coarse, {}, &LikelyClock::cost);
+  std::vector<ClockRate> out;
+  for (const LikelyClock& start : coarse) {
+    const bool known = std::ranges::any_of(out, [&](const ClockRate& c) {
+      return std::abs(c.rate - start.clock.rate) < 2.5 * kRateStep;
+    });
+    if (known) continue;
+    LikelyClock best = start;
+    for (double by = -kRateStep; by < kRateStep; by += kFineRateStep) {
+      const LikelyClock other = at(start.clock.rate + by);
+      if (other.cost < best.cost) best = other;
+    }
+    out.push_back(best.clock);
+    if (out.size() == kMostRates) break;
+  }
+  return out;
+}
+
+JointLog with_clock(JointLog log, const ClockRate& clock, double first_frame_s) {
+  for (double& t : log.times_s)
+    t = first_frame_s + (t - first_frame_s - clock.offset_s) / clock.rate;
+  return log;
+}
+
+Series first_part(const Series& series, double length_s) {
+  Series out = series;
+  const auto end = std::ranges::upper_bound(out.times_s, out.times_s.front() + length_s);
+  const auto count = static_cast<std::size_t>(end - out.times_s.begin());
+  out.times_s.resize(count);
+  out.frames.resize(count);
+  for (Body& body : out.bodies) body.at.resize(count);
+  count_seen(out);
+  return out;
 }
 
 }  // namespace kinescope::structure_search

@@ -19,4 +19,25 @@ namespace kinescope::structure_search {
                                                     double step_s, double half_width_s,
                                                     double max_gap_s);
 
+/// A clock that runs fast or slow against the other.
+struct ClockRate {
+  double rate = 1.0;  ///< joint-log time = first frame + rate * (frame time - first frame) + offset
+  double offset_s = 0.0;
+};
+
+/// Over so long, from the first instant, rates are looked for, s.
+inline constexpr double kRatePart = 40.0;
+
+/// Likely rates between 0.8 and 1.25 but for those near 1, most likely first; from the first
+/// kRatePart of the series.
+[[nodiscard]] std::vector<ClockRate> scan_clock_rates(const Series& series, const JointLog& log,
+                                                      double step_s, double half_width_s,
+                                                      double max_gap_s);
+
+/// The log by a clock that runs so: rate and offset 1 and 0 against the frames'.
+[[nodiscard]] JointLog with_clock(JointLog log, const ClockRate& clock, double first_frame_s);
+
+/// The series up to so long after its first instant.
+[[nodiscard]] Series first_part(const Series& series, double length_s);
+
 }  // namespace kinescope::structure_search

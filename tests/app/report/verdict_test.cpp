@@ -149,6 +149,15 @@ TEST(Verdict, WithoutALogTheValuesAreEstimates) {
   EXPECT_FALSE(has(verdict.accurate, "frame time")) << verdict.accurate;
 }
 
+TEST(Verdict, ChannelsThatMoveAndDriveNothingAreNamed) {
+  RunSummary run = synthetic_run();
+  // The battery's voltage never changes.
+  EXPECT_FALSE(has(make_verdict(run).found, "battery")) << make_verdict(run).found;
+  run.log.values(1, 3) += 0.1;
+  const Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.found, "The channel battery moves and drives nothing.")) << verdict.found;
+}
+
 TEST(Verdict, AnUndeterminedStructureStandsFirst) {
   RunSummary run = synthetic_run();
   run.structure->status = StructureStatus::kUndetermined;

@@ -74,5 +74,40 @@ TEST(ClockOffsetBeyondTheScan, IsNamedWithItsRemedy) {
   EXPECT_TRUE(s.doubts.front().remedy.starts_with("add -1.")) << s.doubts.front().remedy;
 }
 
+// A video written with another frame rate than it was taken with.
+TEST(ClockRate, IsNamedWithItsRemedy) {
+  const Scene scene = make_scene("RateApart", {.joints = 3}, noisy());
+  PoseTracks tracks = scene.recording.tracks;
+  for (double& t : tracks.times_s) t *= 1.1;
+  const Structure s = find_structure(tracks, scene.recording.log);
+  EXPECT_EQ(s.status, StructureStatus::kUndetermined);
+  ASSERT_FALSE(s.doubts.empty());
+  EXPECT_NE(s.doubts.front().what.find("0.909 times as fast"), std::string::npos)
+      << s.doubts.front().what;
+}
+
+TEST(ALogOfAnotherRecording, IsNoAnswer) {
+  const Scene scene = make_scene("Mine", {.joints = 3}, noisy());
+  const Scene other = make_scene("Another", {.joints = 3}, noisy());
+  const Structure s = find_structure(scene.recording.tracks, other.recording.log);
+  EXPECT_EQ(s.status, StructureStatus::kUndetermined);
+  ASSERT_FALSE(s.doubts.empty());
+  EXPECT_NE(s.doubts.front().remedy.find("without joints.csv"), std::string::npos)
+      << s.doubts.front().remedy;
+}
+
+// Its channel wraps at a turn, say: the answer is not sure while both stand alone.
+TEST(AJointWithoutAChannel, CastsDoubtBesideAChannelWithoutAJoint) {
+  Scene scene = make_scene("Unpaired", {.joints = 4, .prismatic_share = 0.0}, noisy());
+  const int channel = scene.recording.channel_of_joint[3];
+  const Scene other = make_scene("Another", {.joints = 4}, noisy());
+  scene.recording.log.values.col(channel) =
+      other.recording.log.values.col(0).head(scene.recording.log.values.rows());
+  const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_EQ(s.idle_channels, std::vector<int>{channel});
+  EXPECT_EQ(s.joints.size(), 4U);
+  EXPECT_LE(s.probability, 0.9);
+}
+
 }  // namespace
 }  // namespace kinescope
