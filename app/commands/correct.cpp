@@ -96,9 +96,10 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   }
   if (console.quiet) return ExitCode::kDone;
   for (const std::string& warning : log.warnings) fmt::print("{}\n", warning);
-  fmt::print("{}\n", corrected.undone.empty()
-                         ? std::string("The run found no effect that a joint log shows: nothing to undo.")
-                         : "Undone: " + names_of(corrected.undone) + ".");
+  fmt::print("{}\n",
+             corrected.undone.empty()
+                 ? std::string("The run found no effect that a joint log shows: nothing to undo.")
+                 : "Undone: " + names_of(corrected.undone) + ".");
   if (!corrected.left.empty()) {
     fmt::print("A joint log cannot show: {}.\n", names_of(corrected.left));
   }

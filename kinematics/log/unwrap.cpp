@@ -17,6 +17,7 @@ constexpr double kUsual = 0.9;           // quantile of the steps, and of their 
 constexpr double kOfRoughness = 5.0;     // how far a jump may be from the velocity's prediction ..
 constexpr double kLeastOfPeriod = 0.01;  // .. or this share of the period ..
 constexpr double kMostOfPeriod = 0.1;    // .. and never more than this one
+constexpr double kMotion = 3.0;          // times the noise that the channel moves at least
 constexpr double kTurnDegrees = 360.0;
 constexpr int kSmallestPower = 8;  // encoders of 8 to 32 bits
 constexpr int kLargestPower = 32;
@@ -119,6 +120,7 @@ std::optional<Unwrapped> unwrap_with(const Channel& channel, double period, bool
   if (tolerance > kMostOfPeriod * period + quantum) return std::nullopt;
   if (kManyTimes * quantile(sizes, kUsual) > period) return std::nullopt;
 
+  const double noise = kOfRoughness * rough + quantum;
   std::size_t alive = 0;  // jumps that no move from rest to rest makes
   for (std::size_t n = 0; n < jumps.size(); ++n) {
     const std::size_t i = jumps[n];
@@ -126,7 +128,7 @@ std::optional<Unwrapped> unwrap_with(const Channel& channel, double period, bool
     if (!expected || std::abs(steps[i] - *expected) > tolerance) return std::nullopt;
     const bool flickers = known && ((n > 0 && turns_back(channel, jumps[n - 1], i)) ||
                                     (n + 1 < jumps.size() && turns_back(channel, i, jumps[n + 1])));
-    if (flickers || passes_through(channel, steps, i, kOfRoughness * rough + quantum)) ++alive;
+    if (flickers || passes_through(channel, steps, i, noise)) ++alive;
   }
   if (2 * alive < jumps.size()) return std::nullopt;
 
@@ -142,6 +144,8 @@ std::optional<Unwrapped> unwrap_with(const Channel& channel, double period, bool
       out.values.tail(rest).array() -= turns * period;
     }
   }
+  // What knows two places only is a switch, however often it is used.
+  if (out.values.maxCoeff() - out.values.minCoeff() <= kMotion * noise) return std::nullopt;
   return out;
 }
 

@@ -83,6 +83,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Encoder{"radians_from_zero", 2.0 * std::numbers::pi, 0.0, 1000.0, 1e-4, false},
                     Encoder{"degrees", 360.0, 0.0, 100.0, 0.0, false},
                     Encoder{"degrees_at_video_rate", 360.0, -180.0, 30.0, 0.0, false},
+                    Encoder{"degrees_at_10_hz", 360.0, 0.0, 10.0, 0.0, false},
+                    Encoder{"degrees_at_5_hz", 360.0, 0.0, 5.0, 0.0, false},
                     Encoder{"whole_degrees", 360.0, 0.0, 50.0, 0.0, true},
                     Encoder{"ticks_12_bit", 4096.0, 0.0, 100.0, 0.0, true},
                     Encoder{"ticks_12_bit_noisy", 4096.0, 0.0, 200.0, 5e-4, true},
@@ -125,6 +127,7 @@ TEST(Unwrap, RealMovesStay) {
   // Grippers and valves that switch over their whole range within a sample.
   for (const double full : {255.0, 256.0, 1023.0, 4095.0, 4096.0, 65535.0, 360.0, 1.0, 100.0}) {
     const auto toggle = [&](double s) { return std::fmod(s, 5.0) < 2.5 ? 0.0 : full; };
+    EXPECT_FALSE(unwrap(t, sampled(t, [&](double s) { return toggle(10.0 * s); }))) << full;
     EXPECT_FALSE(unwrap(t, sampled(t, toggle))) << full;
     EXPECT_FALSE(
         unwrap(t, sampled(t, [&](double s) { return toggle(s) + 1e-4 * full * rng.normal(); })))
