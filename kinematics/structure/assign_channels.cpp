@@ -5,11 +5,15 @@
 #include <limits>
 
 #include "kinematics/structure/move_bodies.h"
+#include "kinematics/structure/natural_units.h"
 
 namespace kinescope::structure_search {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// What a joint has to lose without a channel (-2 ln likelihood) to share it: drives of two joints
+// are rare.
+constexpr double kRare = 25.0;
 
 // Largest matching of joints and channels they depend on (Kuhn 1955, by augmenting paths); terms
 // that move a joint more come first.
@@ -94,11 +98,17 @@ Replacement without_channel(const GrowthState& state, int link, int channel) {
   return {best, best->cost(correlation) - now.cost(correlation)};
 }
 
-// Of two joints with one main channel, replaces the one that loses least; false when neither can.
+// Of two joints with one main channel, replaces the one that loses least; false when neither can,
+// or when both have it rightly.
 bool resolve(GrowthState& state, int l, int m, int channel) {
   const Replacement of_l = without_channel(state, l, channel);
   const Replacement of_m = without_channel(state, m, channel);
   if (of_l.attachment == nullptr && of_m.attachment == nullptr) return false;
+  if (std::min(of_l.loss, of_m.loss) > kRare &&
+      share_a_channel(state.tree.link(l).attachment, state.tree.link(m).attachment,
+                      state.readings)) {
+    return false;
+  }
   const bool take_l =
       of_m.attachment == nullptr || (of_l.attachment != nullptr && of_l.loss < of_m.loss);
   move_body(state, state.tree.founder_of(take_l ? l : m),

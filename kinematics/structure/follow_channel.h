@@ -11,8 +11,9 @@
 
 namespace kinescope::structure_search {
 
-/// A joint with free coordinates as its best channel would drive it; nothing when none goes with
-/// them. Angles between few and fast samples may have been counted a turn off.
+/// A joint with free coordinates as its best channel would drive it, or two together where none
+/// does alone; nothing when none go with them. Angles between few and fast samples may have been
+/// counted a turn off.
 [[nodiscard]] std::optional<Candidate> driven_by_best_channel(const ChainModel& free,
                                                               const Motion& motion,
                                                               const Readings& readings,

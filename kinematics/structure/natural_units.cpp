@@ -59,7 +59,26 @@ bool is_odd(const Attachment& attachment, const Readings& readings) {
          !is_natural(attachment.fit.model.joints.front().type, scale_of(attachment.fit, readings));
 }
 
+bool leaves_noise_only(const Attachment& a) {
+  constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
+  return a.fit.variance < kNoiseOnly && a.fit.axis_variance < kNoiseOnly;
+}
+
 }  // namespace
+
+bool share_a_channel(const Attachment& a, const Attachment& b, const Readings& readings) {
+  for (const Attachment* one : {&a, &b}) {
+    if (!one->driven() || one->fit.model.joints.size() != 1 || !leaves_noise_only(*one))
+      return false;
+  }
+  if (a.channel() != b.channel()) return false;
+  const JointType type_a = a.fit.model.joints.front().type;
+  const JointType type_b = b.fit.model.joints.front().type;
+  const double scale_a = std::abs(scale_of(a.fit, readings));
+  const double scale_b = std::abs(scale_of(b.fit, readings));
+  return (is_natural(type_a, scale_a) && is_natural(type_b, scale_b)) ||
+         (type_a == type_b && std::abs(scale_a - scale_b) < kClose * scale_b);
+}
 
 GrownTree in_natural_units(GrownTree tree, const Series& series, const Readings& readings) {
   for (std::size_t l = 1; l < tree.links.size(); ++l) {

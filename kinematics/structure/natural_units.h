@@ -15,4 +15,10 @@ namespace kinescope::structure_search {
 [[nodiscard]] GrownTree in_natural_units(GrownTree tree, const Series& series,
                                          const Readings& readings);
 
+/// Whether one channel drives both single joints (fingers of a gripper, a link kept level): both
+/// leave nothing but noise, and its unit is a usual one for both, or the same for both. A marker of
+/// another size, one that slips or a bent lens looks like a second joint too, but in an odd unit.
+[[nodiscard]] bool share_a_channel(const Attachment& a, const Attachment& b,
+                                   const Readings& readings);
+
 }  // namespace kinescope::structure_search

@@ -110,15 +110,33 @@ std::vector<int> driving_channels(const GrownTree& tree) {
   return channels;
 }
 
-// Every body hangs by joints that channels drive, no channel drives two of them.
-bool is_whole(const GrownTree& tree) {
+bool shares_channels(const GrownTree& tree) {
+  const std::vector<int> channels = driving_channels(tree);
+  return std::ranges::adjacent_find(channels) != channels.end();
+}
+
+// No channel drives two joints, but for those that plainly do.
+bool shares_rightly(const GrownTree& tree, const Readings& readings) {
+  if (!shares_channels(tree)) return true;
+  for (std::size_t l = 1; l < tree.links.size(); ++l) {
+    for (std::size_t m = l + 1; m < tree.links.size(); ++m) {
+      const Attachment& a = tree.links[l].attachment;
+      const Attachment& b = tree.links[m].attachment;
+      const bool several = a.fit.model.joints.size() > 1 || b.fit.model.joints.size() > 1;
+      if (several || (a.channel() == b.channel() && !share_a_channel(a, b, readings))) return false;
+    }
+  }
+  return true;
+}
+
+// Every body hangs by joints that channels drive, each by its own or one that plainly drives
+// several.
+bool is_whole(const GrownTree& tree, const Readings& readings) {
   const bool driven = std::ranges::all_of(tree.links, [](const GrownLink& link) {
     return link.founder < 0 || link.attachment.driven();
   });
   const bool free = std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
-  const std::vector<int> channels = driving_channels(tree);
-  return driven && !free && !channels.empty() &&
-         std::ranges::adjacent_find(channels) == channels.end();
+  return driven && !free && tree.links.size() > 1 && shares_rightly(tree, readings);
 }
 
 bool leaves_far_more(const GrownTree& tree) {
@@ -161,7 +179,9 @@ Answer search_plainly(Series full, const JointLog& log, const StructureOptions& 
                       OwnLog& own) {
   own = own_log(log, same_quantities(log));
   Answer plain = search_with(std::move(full), 0.0, own.log, options);
-  if (own.groups.empty() || is_whole(plain.found.tree)) return plain;
+  const bool enough =
+      is_whole(plain.found.tree, plain.found.readings) && !shares_channels(plain.found.tree);
+  if (own.groups.empty() || enough) return plain;
   Answer every = search_with(plain.full, 0.0, log, options);
   std::vector<SameQuantity> copies = copies_only(own.groups, every);
   if (copies.size() == own.groups.size()) return plain;
@@ -175,12 +195,12 @@ Answer search_plainly(Series full, const JointLog& log, const StructureOptions& 
 Answer search_allowing(Series full, const JointLog& log, const StructureOptions& options,
                        OwnLog& own) {
   Answer plain = search_plainly(std::move(full), log, options, own);
-  const bool whole = is_whole(plain.found.tree);
+  const bool whole = is_whole(plain.found.tree, plain.found.readings);
   if (log.channels.empty() || (whole && !leaves_far_more(plain.found.tree))) return plain;
   for (const double allowance : kAllowances) {
     Answer other = search_with(with_allowance(plain.full, allowance), allowance, own.log, options);
     const bool as_many = used_channels(other.found.tree) >= used_channels(plain.found.tree);
-    if (as_many && is_whole(other.found.tree)) return other;
+    if (as_many && is_whole(other.found.tree, other.found.readings)) return other;
   }
   return plain;
 }
@@ -236,7 +256,7 @@ std::optional<double> rate_apart(const Series& full, const JointLog& log,
                                                  options.max_time_offset_s, options.max_gap_s)) {
     const Answer other =
         search_with(part, 0.0, with_clock(log, clock, full.times_s.front()), options);
-    if (is_whole(other.found.tree)) return clock.rate;
+    if (is_whole(other.found.tree, other.found.readings)) return clock.rate;
   }
   return std::nullopt;
 }
@@ -436,7 +456,7 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
     out.doubts.insert(out.doubts.begin(), allowance_doubt(answer.allowance));
   const std::size_t used = used_channels(fitted);
   const auto moving = static_cast<std::size_t>(moving_channels(every));
-  if (out.links.size() > 1 && moving > 0 && 2 * used <= moving && !is_whole(fitted)) {
+  if (out.links.size() > 1 && moving > 0 && 2 * used <= moving && !is_whole(fitted, every)) {
     doubt_clocks(full, own.log, options, used == 0, out);
   }
   out.time_offset_s = s.offset.value_s;

@@ -23,6 +23,9 @@ constexpr double kRateStep = 0.01;
 constexpr double kFineRateStep = 0.002;
 constexpr int kRateSteps = 22;
 constexpr std::size_t kMostRates = 3;
+// How much more than with clocks of one rate the pairs have to be explained: channels that go with
+// nothing gain a few per cent at some rate.
+constexpr double kClearGain = 1.1;
 
 // Local minima by cost, down to half as deep below the usual cost as the best; the middle one (no
 // offset) is always among them.
@@ -113,7 +116,9 @@ std::vector<ClockRate> scan_clock_rates(const Series& series, const JointLog& lo
   }
   std::ranges::stable_sort(coarse, {}, &LikelyClock::cost);
   std::vector<ClockRate> out;
+  const double now = at(1.0).cost;
   for (const LikelyClock& start : coarse) {
+    if (start.cost > kClearGain * now) break;
     const bool known = std::ranges::any_of(out, [&](const ClockRate& c) {
       return std::abs(c.rate - start.clock.rate) < 2.5 * kRateStep;
     });

@@ -28,8 +28,8 @@ struct ClockRate {
 /// Over so long, from the first instant, rates are looked for, s.
 inline constexpr double kRatePart = 40.0;
 
-/// Likely rates between 0.8 and 1.25 but for those near 1, most likely first; from the first
-/// kRatePart of the series.
+/// Rates between 0.8 and 1.25, but for those near 1, that are clearly likelier than 1, most likely
+/// first; from the first kRatePart of the series.
 [[nodiscard]] std::vector<ClockRate> scan_clock_rates(const Series& series, const JointLog& log,
                                                       double step_s, double half_width_s,
                                                       double max_gap_s);

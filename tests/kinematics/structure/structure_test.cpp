@@ -73,6 +73,31 @@ TEST(FindStructure, AChannelThatDrivesTwoJointsIsADoubt) {
   EXPECT_EQ(doubt->names, std::vector<std::string>{motor});
 }
 
+// One motor moves both fingers by a few millimetres: two joints, none of them at rest.
+TEST(FindStructure, SmallFingersOfOneMotorAreTwoJoints) {
+  RecordingOptions o;
+  o.sigma_m = 2e-4;
+  o.sigma_rad = 0.05 * kDegree;
+  o.shuffle_channels = false;
+  o.prismatic_m_per_rad = 0.01;
+  o.together = {{2, 3}};
+  Rng rng = Rng::from_name("Fingers");
+  Scene scene;
+  scene.robot = random_robot({.joints = 4, .prismatic_share = 0.0}, rng);
+  // Both fingers slide on the second link.
+  for (const std::size_t k : {2U, 3U}) {
+    scene.robot.tree.joints[k].type = JointType::kPrismatic;
+    scene.robot.tree.joints[k].parent = scene.robot.tree.joints[1].child;
+  }
+  scene.recording = record(scene.robot, o, rng);
+  JointLog& log = scene.recording.log;
+  log.channels.pop_back();
+  log.values.conservativeResize(Eigen::NoChange, 3);
+  scene.recording.channel_of_joint[3] = scene.recording.channel_of_joint[2];
+  const Structure s = find_structure(scene.recording.tracks, log);
+  expect_right(s, scene);
+}
+
 TEST(FindStructure, IdleChannelsAreNamed) {
   RecordingOptions o = noisy();
   o.idle_channels = 2;
