@@ -129,7 +129,8 @@ void add_run(CLI::App& app, CommandLine& line) {
   add_estimation_options(run, line);
   add_detection_options(run, line.run.detect);
   run.add_option("--fail-on", line.run.fail_on,
-                 "Limit that turns the exit code to 5, such as held_out_px>0.2; may be given again")
+                 "Limit that turns the exit code to 5, such as \"held_out_px>0.2\" (in quotes: a "
+                 "shell takes > for itself); may be given again")
       ->type_name("LIMIT")
       ->allow_extra_args(false);
   run.add_flag("!--no-trace", line.run.trace,

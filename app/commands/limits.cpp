@@ -73,7 +73,7 @@ std::vector<Limit> parse_limits(const std::vector<std::string>& texts) {
         sign == std::string::npos ? std::nullopt : parse_number(text.substr(sign + 1));
     if (!number || !(*number == *number)) {
       throw bad_request("--fail-on", fmt::format("'{}' is no limit", text),
-                        "write it as held_out_px>0.2");
+                        "write it as \"held_out_px>0.2\", in quotes: a shell takes > for itself");
     }
     const std::string name = text.substr(0, sign);
     if (std::ranges::find(kQuantities, name, &Quantity::name) == kQuantities.end()) {

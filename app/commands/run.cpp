@@ -73,7 +73,10 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
     for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
   }
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
-  if (report == kReport) fmt::print("urdf    {}\n", folder.file("robot.urdf").string());
+  if (report == kReport) {
+    fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(),
+               is_answer(run) ? "" : " (not determined: see below)");
+  }
   fmt::print("report  {}\n", folder.file(report).string());
 }
 

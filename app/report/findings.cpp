@@ -10,6 +10,7 @@
 #include "app/report/facts.h"
 #include "app/report/numbers.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope::report {
 namespace {
@@ -25,6 +26,7 @@ constexpr double kAdvice = 10.0;
 constexpr double kFewIndependentFrames = 30.0;
 constexpr double kNoiseLimit = 1.5;
 constexpr double kSmallTurn = 0.35;     ///< rad: below, an axis is poorly placed by its own motion
+constexpr double kMovedLess = 0.7;      // of what the other joints of its type move
 constexpr double kRarelySeen = 0.3;     ///< share of the frames
 constexpr double kSmallMarker = 25.0;   ///< px: below, tilt and depth are poorly seen
 constexpr double kOftenRejected = 0.1;  ///< share of the sightings of one marker
@@ -134,6 +136,18 @@ void add_weak_directions(const RunSummary& run, std::vector<Finding>& findings) 
   }
 }
 
+// Median over the joints of this type.
+double typical_travel(const Calibration& calibration, JointType type) {
+  std::vector<double> travels;
+  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+       ++j) {
+    if (calibration.tree.joints[j].type != type) continue;
+    const JointLimits& range = calibration.joints[j].range;
+    travels.push_back(range.upper - range.lower);
+  }
+  return median_of(std::move(travels));
+}
+
 void add_small_travel(const RunSummary& run, std::vector<Finding>& findings) {
   const Calibration& calibration = run.calibration;
   const Joint* weakest = nullptr;
@@ -154,12 +168,18 @@ void add_small_travel(const RunSummary& run, std::vector<Finding>& findings) {
   const bool slides = weakest->type == JointType::kPrismatic;
   const std::string moved = text_with_unit(travel, slides ? Quantity::kLength : Quantity::kAngle);
   const bool small = !slides && travel < kSmallTurn;
+  // An axis at the end of the chain is the least certain however far it moves.
+  const bool moved_less = travel < kMovedLess * typical_travel(calibration, weakest->type);
   const std::string uncertainty = uncertainty_text(kCoverageFactor * worst, Quantity::kAngle);
   findings.push_back(
       {small ? kModelError * 0.5 : kAdvice,
        fmt::format("The axis of {} is the least certain ({}°, k = 2); it moved through {}.",
                    weakest->name, uncertainty, moved),
-       fmt::format("Move {} further than the {} seen here.", weakest->name, moved)});
+       small || moved_less
+           ? fmt::format("Move {} further than the {} seen here.", weakest->name, moved)
+           : std::string(
+                 "More postures, all over the range of every joint: uncertainties fall with "
+                 "the root of their number.")});
 }
 
 void add_poor_markers(const RunSummary& run, std::vector<Finding>& findings) {

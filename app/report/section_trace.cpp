@@ -247,8 +247,7 @@ std::string trace_section(const Trace& trace) {
           trace.stretches, 100.0 * trace.false_alarm_rate,
           trace.held_out_after.unit == "px"
               ? "Sightings that contradict those before and after them are left out here, more of "
-                "them than in the fit, so that this error is a little smaller than that of the "
-                "calibration. "
+                "them than in the fit, so that this error is not quite that of the calibration. "
               : ""),
       "note");
   out += not_found_table(trace) + steps_list(trace);

@@ -219,7 +219,7 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
         "{} parameters are not moved by this motion ({}, ..): record a richer one. ",
         found.undetermined.size(), found.names[static_cast<std::size_t>(found.undetermined[0])]);
   }
-  if (out.limits.empty()) out.limits = "No joint stands out; the noise limits the accuracy.";
+  if (out.limits.empty()) out.limits = "No joint stands out.";
   return out;
 }
 

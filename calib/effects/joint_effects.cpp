@@ -132,20 +132,30 @@ CameraEffect eccentricity(const Suspect& s) {
   return out;
 }
 
+// How far apart the joint's values stand: a wave shorter than twice that cannot be followed, it
+// looks like a longer one. From one frame to the next; of postures, between those that differ.
+double sampling_step(const EffectWorld& world, const Suspect& s) {
+  std::vector<double> values(s.value.begin(), s.value.end());
+  if (world.postures) std::ranges::sort(values);
+  // Encoders at rest tremble.
+  const double least = world.postures ? 1e-3 * (values.back() - values.front()) : -1.0;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double step = std::abs(values[i] - values[i - 1]);
+    if (step > least) steps.push_back(step);
+  }
+  return steps.empty() ? 0.0 : median_of(std::move(steps));
+}
+
 // Periods a turn (or a metre) whose waves the recording can tell from slow drifts and from noise.
 std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
   const double range = s.value.maxCoeff() - s.value.minCoeff();
   if (!(range > 0.0)) return {};
   const double turns = s.turns ? range / kTurn : range;
-  // A frame's motion, typically: a wave shorter than twice that cannot be followed.
-  std::vector<double> steps;
-  for (Eigen::Index i = 1; i < s.value.size(); ++i) {
-    steps.push_back(std::abs(s.value[i] - s.value[i - 1]));
-  }
-  const double step = median_of(std::move(steps)) / (s.turns ? kTurn : 1.0);
+  const double step = sampling_step(world, s) / (s.turns ? kTurn : 1.0);
   const double fewest = s.turns ? std::max(kFewestPeriods, 1.0 / turns) : 1.0 / turns;
   double most = s.turns ? kMostPeriods : kMostPeriods / range;
-  if (!world.postures && step > 0.0) most = std::min(most, 0.5 / step);
+  if (step > 0.0) most = std::min(most, 0.5 / step);
   std::vector<double> out;
   const double spacing = 0.35 / turns;
   for (int k = 0; fewest + k * spacing <= most; ++k) out.push_back(fewest + k * spacing);
