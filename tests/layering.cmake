@@ -41,7 +41,7 @@ set(third_parties
     "apriltag: calib/vision"
     "libav: calib/vision"
     "libsw: calib/vision"
-    "ceres/: calib/bundle dynamics/identify dynamics/gp"
+    "ceres/: calib/tracks calib/bundle dynamics/identify dynamics/gp"
     "cblas: dynamics/gp"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"

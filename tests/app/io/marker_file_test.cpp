@@ -76,9 +76,9 @@ TEST_F(TagsYaml, RefusesWrongSizes) {
 }
 
 TEST_F(TagsYaml, RefusesUnknownFamiliesAndKeysWithTheNearest) {
-  const std::string family = refusal("family: tag36h10\ndefault_size: 0.05\n");
+  const std::string family = refusal("family: tag36h12\ndefault_size: 0.05\n");
   EXPECT_TRUE(
-      family.starts_with("tags.yaml:1: family 'tag36h10' is not known (did you mean 'tag36h11'?"))
+      family.starts_with("tags.yaml:1: family 'tag36h12' is not known (did you mean 'tag36h11'?"))
       << family;
   EXPECT_EQ(
       refusal("defaultsize: 0.05\n"),
