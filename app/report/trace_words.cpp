@@ -10,6 +10,7 @@
 
 #include "app/report/findings.h"
 #include "app/report/trace_lines.h"
+#include "calib/trace/stage.h"
 
 namespace kinescope {
 namespace report {
@@ -111,6 +112,24 @@ std::string rest_words(const Rest& rest) {
 
 namespace {
 
+// The model with the effects is the one that is exported; curves stand in the report only.
+std::string unknown_words(const Trace& trace) {
+  const std::string curves = trace.rest.size() > 1 ? "curves" : "a curve";
+  if (trace.accepted.empty()) {
+    return fmt::format("{}. Error on unseen data {} with {} for it, which no product carries.",
+                       trace.reason,
+                       error_change_words(trace.held_out_before, trace.held_out_after), curves);
+  }
+  const HeldOutError& with_effects = trace.rest.front().held_out_before;
+  return fmt::format(
+      "{}; beyond that {}. Error on unseen data {} with the effects, {} with {} for the rest, "
+      "which "
+      "no product carries.",
+      trace::lacked_words(trace.accepted), trace.reason,
+      error_change_words(trace.held_out_before, with_effects),
+      amount_text(trace.held_out_after.value, trace.held_out_after.unit), curves);
+}
+
 // A sentence a finding, the verdict first.
 std::vector<std::string> findings_of(const Trace& trace) {
   switch (trace.verdict) {
@@ -127,8 +146,10 @@ std::vector<std::string> findings_of(const Trace& trace) {
       break;
   }
   std::vector<std::string> out{
-      fmt::format("{}. Error on unseen data {}.", trace.reason,
-                  error_change_words(trace.held_out_before, trace.held_out_after))};
+      trace.verdict == TraceVerdict::kUnknown && !trace.rest.empty()
+          ? unknown_words(trace)
+          : fmt::format("{}. Error on unseen data {}.", trace.reason,
+                        error_change_words(trace.held_out_before, trace.held_out_after))};
   for (const TracedEffect& effect : trace.accepted) {
     out.push_back(fmt::format("{}: {}; {}. Check: {}.", effect_name(effect), size_words(effect),
                               effect.words, effect.check));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "app/report/trace_json.h"
+#include "app/report/trace_lines.h"
 
 namespace kinescope::report {
 namespace {
@@ -53,6 +54,23 @@ TEST(TraceSection, AFieldIsDrawnAsArrowsOverTheImage) {
     rows->conservativeResize(2, Eigen::NoChange);
   EXPECT_EQ(count(html, "<path class=\"line ") - count(trace_section(fewer), "<path class=\"line "),
             1U);
+}
+
+// Curves and fields are drawn in the report and are in no other product.
+TEST(TraceSection, TheHeadOfAnUnknownRestNamesTheEffectsAndTheModelThatIsExported) {
+  Trace trace = trace_with_a_field();
+  const std::string alone = trace_lines(trace).front();
+  EXPECT_NE(alone.find("0.15 px → 0.05 px with a curve for it"), std::string::npos) << alone;
+  TracedEffect scale;
+  scale.id = {"encoder_scale", "q2"};
+  scale.unit = "";
+  trace.accepted = {scale};
+  trace.held_out_before = {0.4, {0.3, 0.5}, "px"};
+  const std::string beside = trace_lines(trace).front();
+  EXPECT_NE(beside.find("the model lacked encoder_scale at q2; beyond that structure is left"),
+            std::string::npos)
+      << beside;
+  EXPECT_NE(beside.find("0.4 px → 0.15 px with the effects, 0.05 px"), std::string::npos) << beside;
 }
 
 TEST(TraceSection, JsonNamesThePlaceAndHoldsTheField) {
