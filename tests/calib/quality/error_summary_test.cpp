@@ -21,6 +21,18 @@ Calibration two_links(MeasurementKind kind) {
   return calibration;
 }
 
+// Between the two links, along z.
+void add_slide(Calibration& calibration) {
+  calibration.tree.joints.push_back({.name = "slide",
+                                     .type = JointType::kPrismatic,
+                                     .parent = LinkId{0},
+                                     .child = LinkId{1},
+                                     .T_parent_joint = {},
+                                     .channel = "",
+                                     .couplings = {},
+                                     .limits = {}});
+}
+
 Vector6d twist(double rx, double ry, double rz, double x, double y, double z) {
   Vector6d v;
   v << rx, ry, rz, x, y, z;
@@ -97,14 +109,7 @@ TEST(SummariseErrors, CornersAreLengthsAndGroupedByLinkAndMarker) {
 TEST(SummariseErrors, CornersAreJudgedAcrossTheirOwnLineOfSight) {
   // A marker at 45 degrees: a displacement along the ray to it is depth, and counts for nothing.
   Calibration calibration = two_links(MeasurementKind::kCorners);
-  calibration.tree.joints.push_back({.name = "slide",
-                                     .type = JointType::kPrismatic,
-                                     .parent = LinkId{0},
-                                     .child = LinkId{1},
-                                     .T_parent_joint = {},
-                                     .channel = "",
-                                     .couplings = {},
-                                     .limits = {}});
+  add_slide(calibration);
   calibration.tree.joints[0].axis = Eigen::Vector3d::UnitX();
   calibration.T_camera_base.translation = {0.0, 0.0, 2.0};
   calibration.joint_values =
@@ -123,14 +128,7 @@ TEST(SummariseErrors, CornersAreJudgedAcrossTheirOwnLineOfSight) {
 // Where the log has nothing the base's markers are where they always are.
 TEST(SummariseErrors, TheBasesLineOfSightNeedsNoJointValue) {
   Calibration calibration = two_links(MeasurementKind::kCorners);
-  calibration.tree.joints.push_back({.name = "slide",
-                                     .type = JointType::kPrismatic,
-                                     .parent = LinkId{0},
-                                     .child = LinkId{1},
-                                     .T_parent_joint = {},
-                                     .channel = "",
-                                     .couplings = {},
-                                     .limits = {}});
+  add_slide(calibration);
   Marker& base = calibration.tree.markers.at(0);
   base.link = LinkId{0};
   base.T_link_marker = {};
