@@ -283,8 +283,12 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   if (summary.trace) {
     for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);
   }
-  fmt::print("urdf    {}\nreport  {}\n", folder.file("robot_dynamics.urdf").string(),
-             folder.file("dynamics.html").string());
+  fmt::print("urdf    {}\n", folder.file("robot_dynamics.urdf").string());
+  if (summary.trace && summary.trace->verdict != TraceVerdict::kNothingToSay) {
+    fmt::print("traced  {} (with what tracing found; contacts left out)\n",
+               folder.file("robot_traced.urdf").string());
+  }
+  fmt::print("report  {}\n", folder.file("dynamics.html").string());
   return ExitCode::kDone;
 }
 
