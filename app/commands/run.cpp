@@ -103,6 +103,22 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   folder.write("result.json", result_json(run).dump(2) + "\n");
 }
 
+/// A recording shows a part of what a robot may do; where it goes beyond the limits, so do they.
+KinematicTree with_nominal_limits(KinematicTree tree, const KinematicTree& nominal) {
+  for (Joint& joint : tree.joints) {
+    const std::optional<JointId> same = nominal.joint(joint.name);
+    if (!same) continue;
+    const std::optional<JointLimits>& drawn = nominal.joints[same->index()].limits;
+    if (joint.limits && drawn) {
+      joint.limits = JointLimits{std::min(joint.limits->lower, drawn->lower),
+                                 std::max(joint.limits->upper, drawn->upper)};
+    } else {
+      joint.limits = drawn;
+    }
+  }
+  return tree;
+}
+
 }  // namespace
 
 ExitCode run_command(const RunOptions& options, const Console& console) {
@@ -170,7 +186,10 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   }
   run.errors = summarise_errors(run.calibration);
 
-  const std::string urdf = write_urdf(run.calibration.tree);
+  const std::string urdf = run.nominal
+                               ? write_urdf(with_nominal_limits(run.calibration.tree, *run.nominal),
+                                            LimitSource::kRobotFile)
+                               : write_urdf(run.calibration.tree);
   if (answered && !is_answer(run)) {
     folder.write(kFailedReport, report_html(run, urdf));
     print_result(run, folder, kFailedReport, console);

@@ -53,6 +53,9 @@ struct Joint {
   /// value = scale * (reading + ratio * its reading + ..) + offset
   std::vector<ChannelShare> couplings;
   std::optional<JointLimits> limits;
+  /// What the drive may do, as the robot's own file says; no recording tells.
+  std::optional<double> effort;    ///< N m (revolute) or N
+  std::optional<double> velocity;  ///< rad/s or m/s
 };
 
 struct Link {

@@ -22,6 +22,7 @@ namespace kinescope {
 /// As write_urdf(tree), with inertias about the centres of mass and joint damping and friction;
 /// both read back to 1e-12. Links of no mass get no <inertial>. Throws bad_request for a link that
 /// has moments but no positive mass, which URDF cannot say.
-[[nodiscard]] std::string write_urdf(const DynamicModel& model);
+[[nodiscard]] std::string write_urdf(const DynamicModel& model,
+                                     LimitSource limits = LimitSource::kRobotFile);
 
 }  // namespace kinescope

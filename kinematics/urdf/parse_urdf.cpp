@@ -113,6 +113,12 @@ Joint to_joint(const urdf::Joint& from, LinkId parent, LinkId child) {
       from.limits->lower < from.limits->upper) {
     joint.limits = JointLimits{from.limits->lower, from.limits->upper};
   }
+  const bool known = from.limits && (from.limits->effort != urdf_document::kAnyEffort ||
+                                     from.limits->velocity != urdf_document::kAnyVelocity);
+  if (joint.type != JointType::kFixed && known) {
+    joint.effort = from.limits->effort;
+    joint.velocity = from.limits->velocity;
+  }
   if (joint.type != JointType::kFixed && from.mimic) {
     joint.channel = from.mimic->joint_name;
     joint.scale = from.mimic->multiplier;

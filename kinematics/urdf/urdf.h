@@ -22,11 +22,15 @@ namespace kinescope {
 [[nodiscard]] KinematicTree parse_urdf(std::string_view text, const std::string& source);
 [[nodiscard]] KinematicTree read_urdf(const std::filesystem::path& path);
 
+/// Where a tree's joint limits come from; a comment of the file says it.
+enum class LimitSource { kRecording, kRobotFile };
+
 /// URDF text: names, origins, axes, limits, simple visuals (cylinders along the links, spheres or
 /// boxes at the joints, thin plates for the markers), markers as fixed links. Deterministic;
 /// numbers with 17 significant digits where needed to read back the same pose to 1e-12. A joint
 /// with a scale other than 1 or an offset keeps its SI value as the joint value. Throws
 /// std::logic_error for an invalid tree.
-[[nodiscard]] std::string write_urdf(const KinematicTree& tree);
+[[nodiscard]] std::string write_urdf(const KinematicTree& tree,
+                                     LimitSource limits = LimitSource::kRecording);
 
 }  // namespace kinescope

@@ -11,6 +11,11 @@
 
 namespace kinescope::urdf_document {
 
+/// URDF asks for both, and where nobody knows them zero would stop every planner: wide enough to
+/// bind nowhere. Both together, read back, are as unknown as when they were written.
+inline constexpr double kAnyEffort = 1000.0;
+inline constexpr double kAnyVelocity = 100.0;
+
 /// A URDF that was checked and cut down to links, joints and the visuals of markers.
 struct KinematicPart {
   std::string text;                      ///< URDF that urdfdom parses

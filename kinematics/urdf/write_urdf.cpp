@@ -13,25 +13,37 @@
 #include "kinematics/core/median.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "kinematics/urdf/urdf.h"
+#include "kinematics/urdf/urdf_document.h"
 #include "kinematics/urdf/urdf_inertia.h"
 
 namespace kinescope {
 namespace {
 
 using tinyxml2::XMLElement;
+using urdf_document::kAnyEffort;
+using urdf_document::kAnyVelocity;
 using urdf_document::number_text;
 
-// Nobody measured how strong or fast the joints are, and URDF asks for both. Zero would stop every
-// planner; these are wide enough to bind nowhere.
-constexpr double kAnyEffort = 1000.0;
-constexpr double kAnyVelocity = 100.0;
-
-constexpr std::string_view kFirstComment =
-    " Learned by Kinescope. SI units. A marker is a fixed link tag_ID: x right, y down, z into the "
-    "tag. "
-    "Limits are the range that was seen; effort and velocity were not measured. Shapes are for the "
-    "eye "
-    "only. ";
+std::string first_comment(const KinematicTree& tree, LimitSource source) {
+  const auto moves = [](const Joint& joint) { return joint.type != JointType::kFixed; };
+  const auto has_drive = [&](const Joint& joint) { return moves(joint) && joint.effort; };
+  const bool all = std::ranges::all_of(
+      tree.joints, [&](const Joint& joint) { return !moves(joint) || joint.effort; });
+  std::string drive = fmt::format("effort {:g} with velocity {:g} stands where neither is known",
+                                  kAnyEffort, kAnyVelocity);
+  if (all && std::ranges::any_of(tree.joints, moves))
+    drive = "effort and velocity are the robot's own";
+  if (std::ranges::none_of(tree.joints, has_drive)) {
+    drive = "effort and velocity were not measured and bind nowhere";
+  }
+  return fmt::format(
+      " Written by Kinescope. SI units. A marker is a fixed link tag_ID: x right, y down, z into "
+      "the tag. Lower and upper limits are {}; {}. Shapes are for the eye only. ",
+      source == LimitSource::kRecording
+          ? "the range that the recording shows"
+          : "those of the robot's own file, wider where the recording went beyond",
+      drive);
+}
 
 // The extension is MuJoCo's: without an inertia it refuses a moving body (also one with several
 // drawn shapes, whose mass is zero), and by default it merges fixed links (the markers) into their
@@ -237,8 +249,8 @@ void add_axis_and_limit(XMLElement& element, const Joint& joint) {
   if (joint.type == JointType::kFixed) return;
   add(element, "axis").SetAttribute("xyz", number_text(joint.axis).c_str());
   XMLElement& limit = add(element, "limit");
-  limit.SetAttribute("effort", number_text(kAnyEffort).c_str());
-  limit.SetAttribute("velocity", number_text(kAnyVelocity).c_str());
+  limit.SetAttribute("effort", number_text(joint.effort.value_or(kAnyEffort)).c_str());
+  limit.SetAttribute("velocity", number_text(joint.velocity.value_or(kAnyVelocity)).c_str());
   if (!joint.limits) return;
   limit.SetAttribute("lower", number_text(joint.limits->lower).c_str());
   limit.SetAttribute("upper", number_text(joint.limits->upper).c_str());
@@ -332,7 +344,7 @@ void add_joints(XMLElement& robot, const DynamicModel& model, const Names& names
 
 }  // namespace
 
-std::string write_urdf(const DynamicModel& model) {
+std::string write_urdf(const DynamicModel& model, LimitSource limits) {
   check_model(model);
   check_numbers(model.tree);
   const Names names = make_names(model.tree);
@@ -341,7 +353,7 @@ std::string write_urdf(const DynamicModel& model) {
   XMLElement& robot = *document.NewElement("robot");
   document.InsertEndChild(&robot);
   robot.SetAttribute("name", names.robot.c_str());
-  robot.InsertNewComment(std::string(kFirstComment).c_str());
+  robot.InsertNewComment(first_comment(model.tree, limits).c_str());
   add_mujoco_extension(robot, !all_moving_links_weigh(model));
   add_materials(robot);
   add_links(robot, model, names);
@@ -351,6 +363,8 @@ std::string write_urdf(const DynamicModel& model) {
   return printer.CStr();
 }
 
-std::string write_urdf(const KinematicTree& tree) { return write_urdf(without_masses(tree)); }
+std::string write_urdf(const KinematicTree& tree, LimitSource limits) {
+  return write_urdf(without_masses(tree), limits);
+}
 
 }  // namespace kinescope

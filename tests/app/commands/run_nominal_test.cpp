@@ -64,6 +64,12 @@ TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   finger.child = LinkId{hand.value + 1};
   finger.limits = JointLimits{0.0, 0.04};
   drawing.joints.push_back(finger);
+  // Wider than what the recording shows, and a drive that nobody can film.
+  std::size_t moving = 0;
+  while (drawing.joints.at(moving).type == JointType::kFixed) ++moving;
+  drawing.joints[moving].limits = JointLimits{-6.0, 6.5};
+  drawing.joints[moving].effort = 200.0;
+  drawing.joints[moving].velocity = 5.0;
   folder.write("drawing.urdf", write_urdf(drawing));
 
   const std::filesystem::path out = folder.path() / "out";
@@ -79,6 +85,11 @@ TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   const auto kept = calibrated.joint("finger");
   ASSERT_TRUE(kept);
   EXPECT_EQ(calibrated.joints[kept->index()].limits, finger.limits);
+  const auto drive = calibrated.joint(drawing.joints[moving].name);
+  ASSERT_TRUE(drive);
+  EXPECT_EQ(calibrated.joints[drive->index()].limits, drawing.joints[moving].limits);
+  EXPECT_EQ(calibrated.joints[drive->index()].effort, 200.0);
+  EXPECT_EQ(calibrated.joints[drive->index()].velocity, 5.0);
   // The hand's markers sit on the hand, not on a finger that might move.
   EXPECT_EQ(calibrated.markers.size(), truth.markers.size());
   for (const Marker& marker : truth.markers) {

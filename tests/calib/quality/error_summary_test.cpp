@@ -30,7 +30,9 @@ void add_slide(Calibration& calibration) {
                                      .T_parent_joint = {},
                                      .channel = "",
                                      .couplings = {},
-                                     .limits = {}});
+                                     .limits = {},
+                                     .effort = {},
+                                     .velocity = {}});
 }
 
 Vector6d twist(double rx, double ry, double rz, double x, double y, double z) {

@@ -125,6 +125,26 @@ TEST(UrdfWrite, NamesAreMadeFitForOthers) {
   EXPECT_EQ(back.markers[0].link, LinkId{1});
 }
 
+TEST(UrdfWrite, TheCommentSaysWhereLimitsComeFrom) {
+  Rng rng = Rng::from_name("UrdfWrite.TheCommentSaysWhereLimitsComeFrom");
+  KinematicTree tree = random_tree(rng, 2, 0);
+  for (Joint& joint : tree.joints) joint.type = JointType::kRevolute;
+  const std::string unknown = write_urdf(tree);
+  EXPECT_NE(unknown.find("the range that the recording shows"), std::string::npos) << unknown;
+  EXPECT_NE(unknown.find("not measured and bind nowhere"), std::string::npos) << unknown;
+  EXPECT_FALSE(parse_urdf(unknown, "memory").joints[0].effort);
+
+  tree.joints[0].effort = 87.0;
+  tree.joints[0].velocity = 2.175;
+  const std::string partly = write_urdf(tree, LimitSource::kRobotFile);
+  EXPECT_NE(partly.find("those of the robot's own file"), std::string::npos) << partly;
+  EXPECT_NE(partly.find("stands where neither is known"), std::string::npos) << partly;
+  const KinematicTree back = parse_urdf(partly, "memory");
+  EXPECT_EQ(back.joints[0].effort, 87.0);
+  EXPECT_EQ(back.joints[0].velocity, 2.175);
+  EXPECT_FALSE(back.joints[1].effort);
+}
+
 TEST(UrdfWrite, RefusesWhatIsNoTree) {
   KinematicTree tree;
   EXPECT_THROW(static_cast<void>(write_urdf(tree)), std::logic_error);
