@@ -65,6 +65,22 @@ int width_of(const std::vector<FreeBlock>& blocks) {
   return width;
 }
 
+std::map<const double*, PoseColumns> pose_columns(const std::vector<FreeBlock>& blocks) {
+  std::map<const double*, PoseColumns> out;
+  int next = 0;
+  for (const FreeBlock& block : blocks) {
+    PoseColumns columns;
+    columns.fill(-1);
+    for (std::size_t i = 0; i < block.components.size(); ++i) {
+      const auto component = static_cast<std::size_t>(block.components[i]);
+      if (component < 6) columns[component] = next + static_cast<int>(i);
+    }
+    out[block.data] = columns;
+    next += static_cast<int>(block.names.size());
+  }
+  return out;
+}
+
 LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& used) {
   BuiltProblem built(spec, state, used, {});
   LinearBundle out;

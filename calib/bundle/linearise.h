@@ -3,6 +3,7 @@
 // The bundle's residuals and their derivatives, frame by frame, at a state.
 #pragma once
 
+#include <array>
 #include <map>
 #include <vector>
 
@@ -24,6 +25,11 @@ struct LinearBundle {
 };
 
 [[nodiscard]] int width_of(const std::vector<FreeBlock>& blocks);
+
+/// Where each component of a pose block stands among the parameters; -1: held.
+using PoseColumns = std::array<int, 6>;
+[[nodiscard]] std::map<const double*, PoseColumns> pose_columns(
+    const std::vector<FreeBlock>& blocks);
 
 [[nodiscard]] LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& used);
 

@@ -6,29 +6,11 @@
 #include <limits>
 #include <map>
 
+#include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
 
 namespace kinescope::bundle {
 namespace {
-
-// Where each component of a pose block stands among the parameters; -1: held.
-using Columns = std::array<int, 6>;
-
-std::map<const double*, Columns> pose_columns(const Uncertainty& uncertainty) {
-  std::map<const double*, Columns> out;
-  int next = 0;
-  for (const FreeBlock& block : uncertainty.blocks) {
-    Columns columns;
-    columns.fill(-1);
-    for (std::size_t i = 0; i < block.components.size(); ++i) {
-      const auto component = static_cast<std::size_t>(block.components[i]);
-      if (component < 6) columns[component] = next + static_cast<int>(i);
-    }
-    out[block.data] = columns;
-    next += static_cast<int>(block.names.size());
-  }
-  return out;
-}
 
 // Half the length that an error of this covariance stays below in 95 of 100 cases, so that twice it
 // is an interval of that kind however the error is spread over directions. The squared length is
@@ -45,7 +27,7 @@ Sigma length_sigma(const Eigen::MatrixXd& covariance) {
   return 0.5 * std::sqrt(quantile);
 }
 
-bool all_seen(const Uncertainty& uncertainty, const Columns& columns, int first, int count) {
+bool all_seen(const Uncertainty& uncertainty, const PoseColumns& columns, int first, int count) {
   for (int i = first; i < first + count; ++i) {
     const int column = columns[static_cast<std::size_t>(i)];
     if (column >= 0 && !uncertainty.parameters[static_cast<std::size_t>(column)].sigma)
@@ -54,7 +36,7 @@ bool all_seen(const Uncertainty& uncertainty, const Columns& columns, int first,
   return true;
 }
 
-Sigma block_sigma(const Uncertainty& uncertainty, const Columns& columns, int first) {
+Sigma block_sigma(const Uncertainty& uncertainty, const PoseColumns& columns, int first) {
   std::vector<int> present;
   for (int i = first; i < first + 3; ++i) {
     if (columns[static_cast<std::size_t>(i)] >= 0) {
@@ -141,7 +123,7 @@ void fill_tree(const Spec& spec, const State& state, Calibration& out) {
 // Uncertainty of each axis in the base frame, all joints at their mean: the frames before it count.
 void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncertainty,
                  Calibration& out) {
-  const auto columns = pose_columns(uncertainty);
+  const auto columns = pose_columns(uncertainty.blocks);
   const Eigen::VectorXd mean = mean_values(out);
   const std::vector<Pose> T_base_link = forward_kinematics(out.tree, mean);
   const auto parameters = uncertainty.covariance.rows();
@@ -212,7 +194,7 @@ void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncer
 
 void fill_markers(const Spec& spec, const State& state, const RobustSolution& robust,
                   const Uncertainty& uncertainty, Calibration& out) {
-  const auto columns = pose_columns(uncertainty);
+  const auto columns = pose_columns(uncertainty.blocks);
   out.markers.resize(spec.tree.markers.size());
   for (std::size_t m = 0; m < out.markers.size(); ++m) {
     const auto found = columns.find(state.mounts[m].data());

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/bundle/gauge.h"
 #include "calib/bundle/linearise.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/stretch_widening.h"
@@ -127,7 +128,8 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
 }  // namespace
 
 Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vector<int>& used) {
-  const LinearBundle linear = linearise(spec, state, used);
+  LinearBundle linear = linearise(spec, state, used);
+  if (spec.prior) linear = with_frames_held(spec, state, std::move(linear));
   Uncertainty out;
   out.blocks = linear.blocks;
   const int n = width_of(out.blocks);

@@ -23,7 +23,7 @@ struct Uncertainty {
 /// Covariance of the global parameters at a solution: inverse of J'J (joint values per frame
 /// eliminated, priors included), then widened by a block-wise sandwich (White 1980; Cameron and
 /// Miller 2015) over stretches of time longer than the residuals' correlation (postures: one
-/// stretch each).
+/// stretch each). A nominal robot's choice of frames is held first (gauge.h): it is no ignorance.
 [[nodiscard]] Uncertainty estimate_uncertainty(const Spec& spec, State& state,
                                                const std::vector<int>& used);
 

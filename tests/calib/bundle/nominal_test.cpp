@@ -254,6 +254,45 @@ TEST(CheckNominal, RefusesColumnsThatNoMendingExplains) {
   }
 }
 
+// The frames of a nominal robot are a choice: what is known of its axes is what is known without
+// it.
+TEST(Nominal, AxesAreAsCertainAsWithoutTheDrawing) {
+  const Lab lab = make_lab("nominal and not", 0.01, 0.003);
+  Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  // A marker on the base and one in the middle, beside that of the flange.
+  Rng rng = Rng::from_name("more markers");
+  for (const int link : {0, 3}) {
+    PoseTrack track = measurements.poses.tracks.front();
+    track.id = TagId{10 + link};
+    const Pose mount = random_pose(rng, 1.0, 0.1);
+    for (PoseSample& sample : track.samples) {
+      const auto poses = forward_kinematics(lab.real, lab.values.row(sample.frame));
+      Vector6d noise;
+      noise << rng.normal3(2e-4), rng.normal3(1e-4);
+      sample.T_camera_marker =
+          lab.T_tracker_base * poses[static_cast<std::size_t>(link)] * mount * exp_pose(noise);
+    }
+    measurements.poses.tracks.push_back(std::move(track));
+  }
+  const Placement placement = place_markers(lab.nominal, lab.values, measurements.poses);
+  const Calibration nominal = run(lab, measurements, placement, FreeGeometry::kGeometry);
+  CalibrationStart start;
+  start.tree = nominal.tree;  // its axes are z, and its frames stay where they are
+  start.T_camera_base = nominal.T_camera_base;
+  start.camera = nominal.camera;
+  const Calibration plain = calibrate(measurements, {}, lab.log, start);
+  for (std::size_t j = 0; j < lab.real.joints.size(); ++j) {
+    const JointEstimate &with = nominal.joints[j], &without = plain.joints[j];
+    ASSERT_TRUE(with.direction_sigma_rad && with.position_sigma_m) << j;
+    EXPECT_NEAR(*with.direction_sigma_rad / *without.direction_sigma_rad, 1.0, 0.05) << j;
+    EXPECT_NEAR(*with.position_sigma_m / *without.position_sigma_m, 1.0, 0.05) << j;
+  }
+  EXPECT_EQ(nominal.parameters.size(), plain.parameters.size());
+  EXPECT_TRUE(nominal.observability.weak.empty());
+  EXPECT_NEAR(nominal.observability.condition_number / plain.observability.condition_number, 1.0,
+              0.5);
+}
+
 TEST(Nominal, PointsOfATracker) {
   constexpr double kSigma = 5e-5;
   const Lab lab = make_lab("tracker points", 0.01, 0.002);

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/gauge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kinematics/core/dense_algebra.h"
+
+namespace kinescope::bundle {
+namespace {
+
+/// A change of all parameters that moves one link's frame and no prediction.
+struct Freedom {
+  Eigen::VectorXd direction;
+  int held = -1;  ///< the parameter that stands still instead
+};
+
+class Frames {
+ public:
+  Frames(const Spec& spec, const State& state, const LinearBundle& linear)
+      : spec_(spec),
+        state_(state),
+        columns_(pose_columns(linear.blocks)),
+        width_(width_of(linear.blocks)) {}
+
+  [[nodiscard]] std::vector<Freedom> freedoms() const {
+    std::vector<Freedom> out;
+    add_base(out);
+    for (std::size_t j = 0; j < spec_.tree.joints.size(); ++j) add_joint(j, out);
+    return out;
+  }
+
+ private:
+  /// T <- T exp(step) of a block that is estimated; false where it is not.
+  [[nodiscard]] bool move(const double* block, const Vector6d& step, bool point,
+                          Eigen::VectorXd& direction) const {
+    const auto found = columns_.find(block);
+    if (found == columns_.end()) return false;
+    for (int i = 0; i < 6; ++i) {
+      const int column = found->second[static_cast<std::size_t>(i)];
+      if (column >= 0) direction[column] += step[i];
+      if (column < 0 && !(point && i < 3)) return false;
+    }
+    return true;
+  }
+
+  /// Everything on a link stays in place when the link's frame takes the step g.
+  [[nodiscard]] bool stay(LinkId link, const Vector6d& g, Eigen::VectorXd& direction) const {
+    for (std::size_t m = 0; m < spec_.tree.markers.size(); ++m) {
+      if (spec_.tree.markers[m].link != link || !is_seen(m)) continue;
+      const Pose mount = from_block(state_.mounts[m].data());
+      const bool point = spec_.kind == MeasurementKind::kPoint;
+      if (!move(state_.mounts[m].data(), -adjoint(mount.inverse()) * g, point, direction))
+        return false;
+    }
+    for (std::size_t j = 0; j < spec_.tree.joints.size(); ++j) {
+      const Joint& joint = spec_.tree.joints[j];
+      if (joint.parent != link || !leads_to_a_sighting(joint.child)) continue;
+      const Vector6d step = -adjoint(from_block(state_.joint_frames[j].data()).inverse()) * g;
+      if (move(state_.joint_frames[j].data(), step, false, direction)) continue;
+      // A frame that is held moves with its parent's, as far as nothing turns in between.
+      if (joint.type != JointType::kFixed || !stay(joint.child, -step, direction)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool is_seen(std::size_t marker) const {
+    return std::ranges::any_of(spec_.sightings, [&](const Sighting& sighting) {
+      return sighting.marker == static_cast<int>(marker);
+    });
+  }
+
+  [[nodiscard]] bool leads_to_a_sighting(LinkId link) const {
+    for (std::size_t m = 0; m < spec_.tree.markers.size(); ++m) {
+      if (!is_seen(m)) continue;
+      for (LinkId at = spec_.tree.markers[m].link;;) {
+        if (at == link) return true;
+        const auto up = spec_.tree.parent_joint(at);
+        if (!up) break;
+        at = spec_.tree.joints[up->index()].parent;
+      }
+    }
+    return false;
+  }
+
+  void add_base(std::vector<Freedom>& out) const {
+    const double* holder = state_.camera_base.data();
+    for (std::size_t m = spec_.tree.markers.size(); m-- > 0;) {
+      if (spec_.tree.markers[m].link == LinkId{0} && is_seen(m)) holder = state_.mounts[m].data();
+    }
+    const auto held = columns_.find(holder);
+    if (held == columns_.end()) return;
+    for (int i = 0; i < 6; ++i) {
+      const Vector6d g = Vector6d::Unit(i);
+      add(held->second[static_cast<std::size_t>(i)], state_.camera_base.data(), LinkId{0}, g, out);
+    }
+  }
+
+  void add_joint(std::size_t j, std::vector<Freedom>& out) const {
+    const Joint& joint = spec_.tree.joints[j];
+    const auto found = columns_.find(state_.joint_frames[j].data());
+    if (joint.type == JointType::kFixed || found == columns_.end()) return;
+    Eigen::Index along = 0;
+    joint.axis.cwiseAbs().maxCoeff(&along);
+    const auto& columns = found->second;
+    Vector6d turn = Vector6d::Zero(), slide = Vector6d::Zero();
+    turn.head<3>() = joint.axis;
+    slide.tail<3>() = joint.axis;
+    const double* block = state_.joint_frames[j].data();
+    add(columns[static_cast<std::size_t>(along)], block, joint.child, turn, out);
+    if (joint.type == JointType::kRevolute) {
+      add(columns[static_cast<std::size_t>(along + 3)], block, joint.child, slide, out);
+      return;
+    }
+    // What slides has no place of its own.
+    for (int i = 3; i < 6; ++i)
+      add(columns[static_cast<std::size_t>(i)], block, joint.child, Vector6d::Unit(i), out);
+  }
+
+  void add(int held, const double* frame, LinkId link, const Vector6d& g,
+           std::vector<Freedom>& out) const {
+    if (held < 0) return;
+    Freedom freedom{Eigen::VectorXd::Zero(width_), held};
+    if (move(frame, g, false, freedom.direction) && stay(link, g, freedom.direction))
+      out.push_back(std::move(freedom));
+  }
+
+  const Spec& spec_;
+  const State& state_;
+  std::map<const double*, PoseColumns> columns_;
+  int width_;
+};
+
+std::vector<FreeBlock> without(const std::vector<FreeBlock>& blocks,
+                               const std::vector<bool>& held) {
+  std::vector<FreeBlock> out;
+  std::size_t next = 0;
+  for (const FreeBlock& block : blocks) {
+    FreeBlock rest{block.data, block.block, {}, {}, {}, block.local_frame};
+    for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
+      if (held[next]) continue;
+      rest.names.push_back(block.names[i]);
+      rest.units.push_back(block.units[i]);
+      rest.components.push_back(block.components[i]);
+    }
+    if (!rest.names.empty()) out.push_back(std::move(rest));
+  }
+  return out;
+}
+
+}  // namespace
+
+LinearBundle with_frames_held(const Spec& spec, const State& state, LinearBundle linear) {
+  const std::vector<Freedom> freedoms = Frames(spec, state, linear).freedoms();
+  if (freedoms.empty()) return linear;
+  const auto n = static_cast<Eigen::Index>(width_of(linear.blocks));
+  const auto k = static_cast<Eigen::Index>(freedoms.size());
+  Eigen::MatrixXd G(n, k), held_part(k, k);
+  std::vector<bool> held(static_cast<std::size_t>(n), false);
+  for (Eigen::Index c = 0; c < k; ++c) {
+    const Freedom& freedom = freedoms[static_cast<std::size_t>(c)];
+    G.col(c) = freedom.direction;
+    held[static_cast<std::size_t>(freedom.held)] = true;
+  }
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!held[static_cast<std::size_t>(i)]) kept.push_back(i);
+  }
+
+  const Eigen::MatrixXd& P = linear.prior_information;
+  const Eigen::MatrixXd PG = P * G;
+  const LdltFactor factor(Eigen::MatrixXd(G.transpose() * PG));
+  const Eigen::MatrixXd marginal = P - PG * factor.solve(Eigen::MatrixXd(PG.transpose()));
+  LinearBundle out;
+  out.blocks = without(linear.blocks, held);
+  out.prior_information = marginal(kept, kept);
+  for (auto& [frame, rows] : linear.frames) {
+    out.frames.emplace(frame, FrameRows{Eigen::MatrixXd(rows.J(Eigen::all, kept)), rows.r});
+  }
+  return out;
+}
+
+}  // namespace kinescope::bundle
