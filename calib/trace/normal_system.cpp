@@ -172,6 +172,11 @@ double NormalSystem::shift_of(double gain, const std::vector<EffectColumn>& colu
   return sum > 0.0 ? std::sqrt(std::max(0.0, gain) / sum) : 0.0;
 }
 
+double NormalSystem::noise_share_of(double gain, const std::vector<EffectColumn>& columns) const {
+  const double rows = touched(columns, linear_->residual).rows;
+  return rows > 0.0 ? std::sqrt(std::max(0.0, gain) / rows) : 0.0;
+}
+
 Eigen::VectorXd NormalSystem::residual_after(const Eigen::VectorXd& delta,
                                              const std::vector<EffectColumn>& columns,
                                              const Eigen::VectorXd& theta) const {

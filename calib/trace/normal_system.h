@@ -51,6 +51,9 @@ class NormalSystem {
   /// squares: the same shift of every row they touch would take as much; in the residual's unit.
   [[nodiscard]] double shift_of(double gain, const std::vector<EffectColumn>& columns) const;
 
+  /// The same as a share of each row's own noise.
+  [[nodiscard]] double noise_share_of(double gain, const std::vector<EffectColumn>& columns) const;
+
   /// The residual where the model's parameters moved by `delta` and the columns have the size
   /// `theta`.
   [[nodiscard]] Eigen::VectorXd residual_after(const Eigen::VectorXd& delta,

@@ -199,7 +199,7 @@ bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain)
 std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector<RestPlace>& places,
                                    const std::vector<Covariate>& covariates,
                                    const std::vector<FoundRest>& known, double level,
-                                   double floor) {
+                                   const TraceOptions& options) {
   const double tests = static_cast<double>(places.size() * covariates.size());
   const std::size_t test_knots = std::clamp<std::size_t>(
       static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
@@ -215,7 +215,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
       const std::vector<EffectColumn> columns =
           hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
       const Score score = score_test(system, columns);
-      if (score.hidden() || score.p_value * tests > level || score.rms < floor) continue;
+      if (score.hidden() || score.p_value * tests > level || !is_large(score, options)) continue;
       if (best_place != nullptr && score.gain <= best.gain) continue;
       const Score confirmed = jackknife_test(system, columns);
       if (confirmed.p_value * tests > level) continue;
@@ -235,7 +235,10 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   out.rest.p_value = std::min(1.0, best.p_value * tests);
   double gain = 0.0;
   if (!earns_its_place(system, out, gain)) return std::nullopt;
-  if (system.shift_of(gain, out.columns) < floor) return std::nullopt;
+  if (system.shift_of(gain, out.columns) < options.floor ||
+      system.noise_share_of(gain, out.columns) < options.noise_floor) {
+    return std::nullopt;
+  }
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/trace/stage.h"
+#include "calib/trace/trace.h"
 
 namespace kinescope::trace {
 
@@ -29,12 +30,13 @@ struct FoundRest {
 [[nodiscard]] bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain);
 
 /// The place and covariate that explain most, where that is significant at `level` over all pairs
-/// of them, moves the prediction by more than `floor`, makes at least a hundredth of the residual's
-/// sum of squares, and helps to predict what is held out. `known`: those that are in `system`.
+/// of them, moves the prediction by more than the floors of `options`, makes at least a hundredth
+/// of the residual's sum of squares, and helps to predict what is held out. `known`: those that are
+/// in `system`.
 [[nodiscard]] std::optional<FoundRest> find_rest(const NormalSystem& system,
                                                  const std::vector<RestPlace>& places,
                                                  const std::vector<Covariate>& covariates,
                                                  const std::vector<FoundRest>& known, double level,
-                                                 double floor);
+                                                 const TraceOptions& options);
 
 }  // namespace kinescope::trace

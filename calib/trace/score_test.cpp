@@ -127,7 +127,9 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.theta = p.T * p.theta;
   out.covariance = p.T * covariance * p.T.transpose();
   out.gain = p.gain;
-  out.rms = system.shift_of(p.theta.dot(p.S * p.theta), columns);
+  const double taken = p.theta.dot(p.S * p.theta);
+  out.rms = system.shift_of(taken, columns);
+  out.noise_share = system.noise_share_of(taken, columns);
   out.freedom = effective - k;
   if (effective < kFewestStretches) return;
   const bool few = out.freedom < kFewStretches;
@@ -174,6 +176,10 @@ Eigen::MatrixXd leave_out(const NormalSystem& system, const std::vector<NormalEq
 }
 
 }  // namespace
+
+bool is_large(const Score& score, const TraceOptions& options) {
+  return score.rms >= options.floor && score.noise_share >= options.noise_floor;
+}
 
 double gain_of(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
   return project(system, system.sums(columns)).gain;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/trace/normal_system.h"
+#include "calib/trace/trace.h"
 
 namespace kinescope::trace {
 
@@ -23,8 +24,12 @@ struct Score {
   double gain = 0.0;       ///< by how much the sum of squares falls
   double rms = 0.0;  ///< of what the effect does to the rows it touches, freed of the model's own
                      ///< parameters, in the residual's unit
+  double noise_share = 0.0;  ///< the same over each row's own noise, without a unit
   [[nodiscard]] bool hidden() const { return rank == 0; }
 };
+
+/// It moves the rows that it touches by the floors of `options` or more.
+[[nodiscard]] bool is_large(const Score& score, const TraceOptions& options);
 
 /// Fall of the sum of squares, without judging it: for scans.
 [[nodiscard]] double gain_of(const NormalSystem& system, const std::vector<EffectColumn>& columns);

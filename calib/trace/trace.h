@@ -24,6 +24,9 @@ struct TraceOptions {
   /// Effects that move the prediction by less than this (over the rows that they touch, in the
   /// residual's unit) are below what the sensor itself gets wrong and are not looked for.
   double floor = 0.0;
+  /// The same as a share of every row's own noise, where one floor does not suit all rows (torques
+  /// of large joints and of small ones).
+  double noise_floor = 0.0;
   /// Effects that the model has already: they stay if they earn their place.
   std::vector<AddedEffect> start = {};
   int fewest_stretches = 12;  ///< of time; with fewer nothing is said

@@ -155,7 +155,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
 }
 
 bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
-  return score.rms >= std::max(options_.floor, candidate.floor);
+  return score.rms >= candidate.floor && trace::is_large(score, options_);
 }
 
 bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {

@@ -42,7 +42,7 @@ void Tracer::replace_waves_by_a_curve() {
     std::erase_if(others, [&](const AddedEffect& effect) { return effect.id == id; });
     StagePtr stage = stage_of(std::move(others));
     const auto curve = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
-                                 rest_level(), options_.floor);
+                                 rest_level(), options_);
     if (!curve || !same_place(curve->rest.place, id.place) ||
         predicts_clearly_worse(curve->held_out, now_->held_out.whitened)) {
       continue;
@@ -75,7 +75,7 @@ void Tracer::look_for_curves() {
     const Linearisation linear = with_rests(now_->fit.linear, rests_);
     const NormalSystem system(linear, now_->system.partition());
     std::optional<FoundRest> found = find_rest(system, now_->fit.rest_places, now_->fit.covariates,
-                                               rests_, rest_level(), options_.floor);
+                                               rests_, rest_level(), options_);
     if (!found) break;
     if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
     add_step(
@@ -162,7 +162,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     const auto alone = found.rest.is_field()
                            ? find_field(stage->system, stage->fit.rest_fields, rest_level())
                            : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
-                                       {}, rest_level(), options_.floor);
+                                       {}, rest_level(), options_);
     if (!alone || alone->rest.place != found.rest.place ||
         predicts_clearly_worse(alone->held_out, found.held_out)) {
       continue;
@@ -284,7 +284,8 @@ void Tracer::list_not_found() {
       const double size = std::abs(size_of(candidate, score.theta));
       if (score.rms > 0.0) {
         const double floor = std::max(options_.floor, candidate.floor);
-        missing.smallest_size = std::max(missing.smallest_size, size * floor / score.rms);
+        missing.smallest_size = std::max({missing.smallest_size, size * floor / score.rms,
+                                          size * options_.noise_floor / score.noise_share});
       }
     }
     trace_.not_found.push_back(std::move(missing));

@@ -15,11 +15,6 @@ namespace {
 
 constexpr int kMostPasses = 4;  // of a trace, with the contact spans that the last one shows
 
-double rms(const Eigen::VectorXd& values) {
-  return std::sqrt(values.squaredNorm() /
-                   static_cast<double>(std::max<Eigen::Index>(1, values.size())));
-}
-
 /// Spans of a trajectory that touch are one.
 std::vector<ContactSpan> merged(std::vector<ContactSpan> spans, double gap_s) {
   std::ranges::sort(spans, {}, &ContactSpan::from_s);
@@ -46,7 +41,7 @@ std::vector<ContactSpan> merged(std::vector<ContactSpan> spans, double gap_s) {
 Trace trace_with(const TorqueTracedModel& model, const TorqueTraceOptions& options,
                  const Progress& progress) {
   TraceOptions trace = options.trace;
-  trace.floor = std::max(trace.floor, options.noise_share * rms(model.base().sigma));
+  trace.noise_floor = std::max(trace.noise_floor, options.noise_share);
   return trace_effects(model, trace, progress);
 }
 
