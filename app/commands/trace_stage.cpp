@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/trace_stage.h"
 
+#include "kinematics/core/error.h"
+
 namespace kinescope {
 namespace {
 
@@ -24,6 +26,23 @@ CalibrationStart continued(const CalibrationStart& start, const Calibration& pla
   if (!start.joint_values.size()) return out;
   out.joint_values = plain.joint_values;
   return out;
+}
+
+// What is exported is fitted once more, without the curves of a rest: its numbers hold together.
+void take_values(const Calibration& calibration, std::vector<FittedEffect>& effects) {
+  std::vector<double> values;
+  for (const Parameter& parameter : calibration.parameters) {
+    if (parameter.block == "effects") values.push_back(parameter.value);
+  }
+  std::size_t next = 0;
+  for (FittedEffect& effect : effects) {
+    if (effect.id == EffectId{"time_offset", "clock"}) {
+      effect.values[0] = calibration.time_offset_s;
+      continue;
+    }
+    for (double& value : effect.values) value = values.at(next++);
+  }
+  KINESCOPE_CHECK(next == values.size(), "a value for each number of the effects");
 }
 
 }  // namespace
@@ -55,6 +74,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   from.corrections = found.corrections;
   out.calibration =
       calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
+  take_values(out.calibration, out.effects);
   return out;
 }
 

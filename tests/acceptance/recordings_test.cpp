@@ -81,6 +81,23 @@ class Recordings : public testing::TestWithParam<Case> {
     EXPECT_LT(after, kLeftOver * before);
   }
 
+  // What `correct` undoes is what the parameters beside it were fitted with.
+  static void check_effects_are_those_of_the_fit(const json& calibration) {
+    std::vector<json> fitted, exported;
+    for (const json& parameter : calibration.at("parameters")) {
+      if (parameter.at("block") == "effects") fitted.push_back(parameter.at("value"));
+    }
+    for (const json& effect : calibration.at("effects")) {
+      if (effect.at("effect") == "time_offset" && effect.at("place") == "clock") {
+        EXPECT_EQ(effect.at("parameters").at(0).at("value"), calibration.at("time_offset_s"));
+        continue;
+      }
+      for (const json& parameter : effect.at("parameters"))
+        exported.push_back(parameter.at("value"));
+    }
+    EXPECT_EQ(exported, fitted);
+  }
+
   fs::path recording_;
   fs::path output_;
 };
@@ -101,6 +118,7 @@ TEST_P(Recordings, AgreesWithTheTruth) {
   }
   const json calibration = json::parse(read_text_file(output_ / "calibration.json"));
   check_trace(json::parse(read_text_file(output_ / "trace.json")));
+  check_effects_are_those_of_the_fit(calibration);
 
   const TruthComparison error = compare_with_truth(truth, learned);
   EXPECT_LT(error.median_direction_rad, kMedianDirection);
