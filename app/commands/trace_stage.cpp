@@ -70,10 +70,11 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
                                                    recording.log, from, trace_options, progress);
   TracedCalibration out{found.trace, plain, found.effects, trace_options.gravity_base,
                         found.stamp_jitter_s};
-  if (found.corrections.empty()) return out;
-  from.corrections = found.corrections;
-  out.calibration =
-      calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
+  if (!found.corrections.empty()) {
+    from.corrections = found.corrections;
+    out.calibration =
+        calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
+  }
   take_values(out.calibration, out.effects);
   return out;
 }
