@@ -8,23 +8,22 @@
 
 #include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
+#include "kinematics/core/chi_square.h"
 
 namespace kinescope::bundle {
 namespace {
 
 // Half the length that an error of this covariance stays below in 95 of 100 cases, so that twice it
 // is an interval of that kind however the error is spread over directions. The squared length is
-// taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946), its quantile
-// after Wilson and Hilferty (1931). Nothing when a parameter is unseen.
+// taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946). Nothing when a
+// parameter is unseen.
 Sigma length_sigma(const Eigen::MatrixXd& covariance) {
   constexpr double kNormal95 = 1.6449;  // 95 % quantile of the normal distribution
   const double mean = covariance.trace();
   const double square = covariance.squaredNorm();
   if (!(mean > 0.0) || !std::isfinite(square)) return std::nullopt;
   const double freedom = mean * mean / square;
-  const double shrink = 2.0 / (9.0 * freedom);
-  const double quantile = mean * std::pow(1.0 - shrink + kNormal95 * std::sqrt(shrink), 3);
-  return 0.5 * std::sqrt(quantile);
+  return 0.5 * std::sqrt(mean / freedom * chi_square_quantile(freedom, kNormal95));
 }
 
 bool all_seen(const Uncertainty& uncertainty, const PoseColumns& columns, int first, int count) {

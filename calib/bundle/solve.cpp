@@ -8,6 +8,7 @@
 #include <ceres/solver.h>
 #include <glog/logging.h>
 
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope::bundle {
@@ -28,13 +29,6 @@ constexpr double kFirstRadius = 1e6;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
 constexpr double kPlainTolerance = 1e-10;
-
-// Quantile of chi-square with k degrees of freedom at z standard deviations. Wilson and Hilferty
-// 1931.
-double chi_square_at(double k, double z) {
-  const double a = 2.0 / (9.0 * k);
-  return k * std::pow(std::max(0.0, 1.0 - a + z * std::sqrt(a)), 3.0);
-}
 
 // Ceres reports failed evaluations through glog to standard error; the summary says the same.
 void silence_glog() { FLAGS_minloglevel = google::GLOG_FATAL; }
@@ -67,7 +61,7 @@ std::vector<Misfit> misfits(const Spec& spec, const State& state, const std::vec
 
 double robust_scale(const std::vector<double>& chi_squares, double freedom, double shrink) {
   if (chi_squares.empty()) return 1.0;
-  const double ratio = median_of(chi_squares) / chi_square_at(freedom, 0.0) * shrink;
+  const double ratio = median_of(chi_squares) / chi_square_quantile(freedom, 0.0) * shrink;
   return std::sqrt(std::max(ratio, 1e-12));
 }
 
@@ -137,7 +131,7 @@ std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfi
   std::vector<int> kept;
   for (const Misfit& misfit : misfits) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
-    if (misfit.chi_square <= chi_square_at(sighting.dimension(), reject_sigma)) {
+    if (misfit.chi_square <= chi_square_quantile(sighting.dimension(), reject_sigma)) {
       kept.push_back(misfit.sighting);
     }
   }

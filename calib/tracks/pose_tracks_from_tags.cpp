@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/tracks/planar_pose.h"
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -43,12 +44,6 @@ PlanarPose with_own_misfit(PlanarPose pose) {
   return pose;
 }
 
-// The median of chi-square with that many degrees of freedom (Wilson and Hilferty 1931).
-double median_chi_square(double freedom) {
-  const double root = 1.0 - 2.0 / (9.0 * freedom);
-  return freedom * root * root * root;
-}
-
 struct Candidate {
   int frame = 0;
   PlanarPose pose;
@@ -72,7 +67,7 @@ double variance_of_corners(const std::map<TagId, std::vector<Candidate>>& candid
   std::vector<double> shares;
   for (const auto& [id, list] : candidates) {
     for (const Candidate& c : list) {
-      shares.push_back(c.pose.best.chi_square / median_chi_square(c.freedom));
+      shares.push_back(c.pose.best.chi_square / chi_square_quantile(c.freedom, 0.0));
     }
   }
   return std::max(1.0, median_of(std::move(shares)));

@@ -9,6 +9,7 @@
 #include "dynamics/contact/contact.h"
 #include "dynamics/contact/onset_bank.h"
 #include "dynamics/contact/statistic_log.h"
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -71,8 +72,7 @@ void set_first_thresholds(const std::vector<BalanceSample>& samples,
   calibration.thresholds.setConstant(std::numeric_limits<double>::max());
   const contact::StatisticLog log = contact::log_statistics(calibration, samples);
   const std::vector<char> all(samples.size(), 1);
-  const double least =
-      3.0 * contact::chi_square_quantile(static_cast<int>(calibration.joints()), 5.2);
+  const double least = 3.0 * chi_square_quantile(static_cast<double>(calibration.joints()), 5.2);
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
     calibration.thresholds[o] =
         std::max(least, kFirstMedians * median_of_finite(octave_values(log, o, all)));

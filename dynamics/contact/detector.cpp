@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dynamics/contact/hinge.h"
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
@@ -43,7 +44,7 @@ ContactDetector::ContactDetector(ContactCalibration calibration)
   covariance_ = Eigen::MatrixXd::Zero(n, n);
   bend_t_.reserve(record_capacity(calibration_));
   bend_y_.reserve(record_capacity(calibration_));
-  quiet_level_ = contact::chi_square_quantile(static_cast<int>(n), kQuietZ);
+  quiet_level_ = chi_square_quantile(static_cast<double>(n), kQuietZ);
 }
 
 ContactDecision ContactDetector::update(const BalanceSample& sample) {

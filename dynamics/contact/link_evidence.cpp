@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 
@@ -31,14 +32,6 @@ double log_answer_ratio(double squares, int count) {
     logs.push_back(0.5 * squares * (1.0 - 1.0 / variance) - 0.5 * count * std::log(variance));
   }
   return log_mean_exp(logs);
-}
-
-/// Probability that a chi-square variable of k degrees of freedom exceeds x. Wilson and Hilferty
-/// 1931.
-double chi_square_tail(double x, int k) {
-  const double c = 2.0 / (9.0 * k);
-  const double z = (std::cbrt(x / k) - (1.0 - c)) / std::sqrt(c);
-  return 0.5 * std::erfc(z / std::sqrt(2.0));
 }
 
 /// The joints between base and link, link included.

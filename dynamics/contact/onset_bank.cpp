@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "kinematics/core/chi_square.h"
+
 namespace kinescope::contact {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr int kGrowingPerOctave = 1;
 int octave_of(int age) { return static_cast<int>(std::bit_width(static_cast<unsigned>(age))) - 1; }
 
 }  // namespace
-
-double chi_square_quantile(int k, double z) {
-  const double c = 2.0 / (9.0 * k);
-  const double root = 1.0 - c + z * std::sqrt(c);
-  return k * root * root * root;
-}
 
 OnsetBank::OnsetBank(Eigen::Index joints, int longest_age)
     : n_(joints), longest_age_(std::max(1, longest_age)) {

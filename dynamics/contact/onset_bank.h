@@ -59,8 +59,4 @@ class OnsetBank {
   std::vector<OctaveBest> best_;
 };
 
-/// The value that a chi-square variable of k degrees of freedom passes with the probability that a
-/// standard normal one passes z. Wilson and Hilferty 1931.
-[[nodiscard]] double chi_square_quantile(int k, double z);
-
 }  // namespace kinescope::contact

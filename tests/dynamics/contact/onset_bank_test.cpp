@@ -96,11 +96,5 @@ TEST(OnsetBank, AgreesWithTheWholeCovariance) {
   }
 }
 
-/// Quantiles from tables, Wilson and Hilferty's form being good to three per cent.
-TEST(OnsetBank, ChiSquareQuantiles) {
-  EXPECT_NEAR(chi_square_quantile(1, 3.0902), 10.83, 0.35);
-  EXPECT_NEAR(chi_square_quantile(6, 3.0902), 22.46, 0.35);
-}
-
 }  // namespace
 }  // namespace kinescope::contact
