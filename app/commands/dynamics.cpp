@@ -149,6 +149,8 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
              const TorqueModelOptions& options, const Progress& progress, TorqueSummary& summary) {
   std::vector<FittedTorqueModel> fitted(kinds.size());
   for (std::size_t k = 0; k < kinds.size(); ++k) {
+    // A line for each: some take minutes.
+    report_progress(progress, fmt::format("{} model", to_string(kinds[k])), 0, 0);
     TorqueScore score;
     score.kind = kinds[k];
     try {
@@ -160,7 +162,6 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
       score.failure = error.what();
     }
     summary.scores.push_back(std::move(score));
-    report_progress(progress, "models", static_cast<int>(k) + 1, static_cast<int>(kinds.size()));
   }
   summary.best = best_of(summary.scores);
   const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];
@@ -237,31 +238,37 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), options.models_options);
   clock.lap("read", summary.times);
 
+  report_progress(progress, "identify", 0, 0);
   summary.identification = identify_dynamics(model, summary.train, options.models_options.identify);
   summary.consistent = consistent_model(summary.identification);
   summary.drives = drives_of(summary);
   clock.lap("identify", summary.times);
-  compare(kinds, model, options.models_options, progress, summary);
-  clock.lap("models", summary.times);
-  if (options.learning_curve) {
-    add_learning_curves(kinds, model, options.models_options, summary);
-    clock.lap("learning curve", summary.times);
-  }
-
-  if (options.robust) {
-    add_robust_regressions(model, options.models_options, summary);
-    clock.lap("robust regression", summary.times);
-  }
-  if (options.payload || !options.unloaded_logs.empty()) {
-    add_payload(options, model, summary);
-    clock.lap("payload", summary.times);
-  }
+  // What the model lacks stands in the folder before the slow models begin.
   if (options.trace) {
     add_trace(options, model, log, folder, progress, summary);
     clock.lap("trace", summary.times);
   } else {
     remove_torque_trace(options.trace_file, folder);
   }
+  compare(kinds, model, options.models_options, progress, summary);
+  clock.lap("models", summary.times);
+  if (options.learning_curve) {
+    report_progress(progress, "learning curve", 0, 0);
+    add_learning_curves(kinds, model, options.models_options, summary);
+    clock.lap("learning curve", summary.times);
+  }
+
+  if (options.robust) {
+    report_progress(progress, "robust regression", 0, 0);
+    add_robust_regressions(model, options.models_options, summary);
+    clock.lap("robust regression", summary.times);
+  }
+  if (options.payload || !options.unloaded_logs.empty()) {
+    report_progress(progress, "payload", 0, 0);
+    add_payload(options, model, summary);
+    clock.lap("payload", summary.times);
+  }
+  report_progress(progress, "", 0, 0);
   folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
   folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));
   folder.write("dynamics.html", torque_report_html(summary));

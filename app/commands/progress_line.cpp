@@ -45,6 +45,7 @@ void ProgressLine::update(std::string_view stage, int done, int total) {
   }
   done_ = done;
   total_ = total;
+  if (stage_.empty()) return;
   if (total_ > 0 && done_ >= total_) {
     end_stage();
   } else if (terminal_ && clock_() - shown_s_ >= kSecondsBetweenRewrites) {

@@ -39,6 +39,17 @@ TEST_F(ProgressTest, PlainLinesAtStageEnds) {
   EXPECT_EQ(text(), "");
 }
 
+TEST_F(ProgressTest, NoStageEndsTheLastOne) {
+  ProgressLine line(out, true, clock);
+  line.update("gip model", 0, 0);
+  EXPECT_EQ(text(), "\r\033[Kgip model");
+  now_s += 3.0;
+  line.update("", 0, 0);
+  EXPECT_EQ(text(), "\r\033[Kgip model: 3.0 s\n");
+  line.finish();
+  EXPECT_EQ(text(), "");
+}
+
 TEST_F(ProgressTest, OneLineRewrittenOnATerminal) {
   ProgressLine line(out, true, clock);
   line.update("detect", 0, 100);
