@@ -4,10 +4,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/QR>
+
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::bundle {
 namespace {
+
+// Against a target's coordinates: a joint's are held where no target is left to hold.
+constexpr double kLastChoice = 1e-3;
 
 /// A change of all parameters that moves one link's frame and no prediction.
 struct Freedom {
@@ -89,11 +94,45 @@ class Frames {
       if (spec_.tree.markers[m].link == LinkId{0} && is_seen(m)) holder = state_.mounts[m].data();
     }
     const auto held = columns_.find(holder);
-    if (held == columns_.end()) return;
+    if (held == columns_.end()) return add_base_by_targets(out);
     for (int i = 0; i < 6; ++i) {
       const Vector6d g = Vector6d::Unit(i);
       add(held->second[static_cast<std::size_t>(i)], state_.camera_base.data(), LinkId{0}, g, out);
     }
+  }
+
+  /// Where only targets are measured, the camera's (tracker's) frame is nobody's: they move with
+  /// the robot, and six of their coordinates are held; of the joints' frames where they are too
+  /// few.
+  void add_base_by_targets(std::vector<Freedom>& out) const {
+    if (state_.targets.empty()) return;
+    const Pose T_camera_base = from_block(state_.camera_base.data());
+    Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(width_, 6);
+    Eigen::MatrixXd choice = Eigen::MatrixXd::Zero(6, width_);
+    for (int i = 0; i < 6; ++i) {
+      const Vector6d g = Vector6d::Unit(i);
+      Eigen::VectorXd direction = Eigen::VectorXd::Zero(width_);
+      if (!stay(LinkId{0}, g, direction)) return;
+      choice.row(i) = kLastChoice * direction.transpose();
+      for (const std::array<double, 3>& target : state_.targets) {
+        const auto found = columns_.find(target.data());
+        if (found == columns_.end()) continue;
+        const Eigen::Vector3d in_base =
+            T_camera_base.inverse() * Eigen::Vector3d(target[0], target[1], target[2]);
+        const Eigen::Vector3d moved =
+            -(T_camera_base.rotation * (g.head<3>().cross(in_base) + g.tail<3>()));
+        for (int k = 0; k < 3; ++k) {
+          const int column = found->second[static_cast<std::size_t>(k)];
+          direction[column] += moved[k];
+          choice(i, column) = moved[k];
+        }
+      }
+      directions.col(i) = direction;
+    }
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(choice);
+    if (qr.rank() < 6) return;
+    for (int i = 0; i < 6; ++i)
+      out.push_back({directions.col(i), static_cast<int>(qr.colsPermutation().indices()[i])});
   }
 
   void add_joint(std::size_t j, std::vector<Freedom>& out) const {

@@ -2,8 +2,9 @@
 //
 // Takes   a linearised bundle in which every link's frame is free (a nominal robot with a prior).
 // Gives   the same bundle in which the choice of frames is held: base frame to the first marker of
-//         the base (or to the camera), a joint's frame neither turning about its axis nor sliding
-//         along it. What remains has a meaning of its own, as without a nominal robot.
+//         the base (or to the camera, or to targets), a joint's frame neither turning about its
+//         axis nor sliding along it. What remains has a meaning of its own, as without a nominal
+//         robot.
 // Not here: the choice that a fit without a nominal robot makes from the start (make_spec.h).
 #pragma once
 

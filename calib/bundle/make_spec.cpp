@@ -270,7 +270,7 @@ std::string gauge_in_words(const Spec& spec) {
   words +=
       spec.prior
           ? "joint frames stay near the nominal ones by a weak prior where the data are silent. "
-            "Uncertainties hold the base frame to its first marker (or the camera) and turn no "
+            "Uncertainties hold the base frame to its first marker (or the camera, or the targets) and turn no "
             "frame about its own axis: that is a choice, not a thing to know."
           : "joint frames keep their z axis on the joint's axis and neither turn about nor slide "
             "along it: the markers' and next joints' places take that up, so nothing is lost.";

@@ -372,6 +372,13 @@ TEST(Nominal, BallInSocketsWithTheirDistance) {
   const Calibration after = run(wrong, measurements, placement, FreeGeometry::kOffsets);
   EXPECT_GT(before.final_rms, 1e-4);
   EXPECT_LT(after.final_rms, 1e-6);
+  // Where the sockets stand is nobody's to know; the prior of 5 mm is not the axes' uncertainty.
+  const Calibration whole = run(wrong, measurements, placement, FreeGeometry::kGeometry);
+  for (const JointEstimate& joint : whole.joints) {
+    ASSERT_TRUE(joint.position_sigma_m && joint.direction_sigma_rad);
+    EXPECT_LT(*joint.position_sigma_m, 1e-6);
+    EXPECT_LT(*joint.direction_sigma_rad, 1e-6);
+  }
 }
 
 }  // namespace
