@@ -63,10 +63,25 @@ class Frames {
       if (joint.parent != link || !leads_to_a_sighting(joint.child)) continue;
       const Vector6d step = -adjoint(from_block(state_.joint_frames[j].data()).inverse()) * g;
       if (move(state_.joint_frames[j].data(), step, false, direction)) continue;
-      // A frame that is held moves with its parent's, as far as nothing turns in between.
-      if (joint.type != JointType::kFixed || !stay(joint.child, -step, direction)) return false;
+      // A frame that is held, of a fixed joint or of one that stands still, moves with its
+      // parent's.
+      if (!is_held(j)) return false;
+      const Vector6d carried = adjoint(held_motion(j).inverse()) * -step;
+      if (!stay(joint.child, carried, direction)) return false;
     }
     return true;
+  }
+
+  [[nodiscard]] bool is_held(std::size_t j) const {
+    return std::ranges::none_of(spec_.free_joint[j], [](bool free) { return free; });
+  }
+
+  [[nodiscard]] Pose held_motion(std::size_t j) const {
+    const int channel = spec_.channel[j];
+    const double reading = channel < 0 ? 0.0 : spec_.log.values(0, channel);
+    const auto& [scale, offset] = state_.joint_maps[j];
+    return joint_motion(spec_.tree.joints[j].type, spec_.tree.joints[j].axis,
+                        scale * reading + offset);
   }
 
   [[nodiscard]] bool is_seen(std::size_t marker) const {

@@ -2,6 +2,7 @@
 #include "calib/bundle/make_spec.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -120,14 +121,27 @@ bool is_unit_scale(double scale) {
   return scale == 1.0 || scale == kRadPerDegree || scale == kMetrePerMillimetre;
 }
 
+// A joint that moves by less shows nothing of its axis that the prior of its frame leaves open.
+constexpr double kStillRad = 1e-3;
+constexpr double kStillM = 1e-4;
+
+bool stands_still(const Spec& spec, std::size_t joint) {
+  if (spec.channel[joint] < 0 || !spec.couplings[joint].empty()) return false;
+  const auto readings = spec.log.values.col(spec.channel[joint]);
+  const double travel =
+      (readings.maxCoeff() - readings.minCoeff()) * std::abs(spec.tree.joints[joint].scale);
+  return travel < (spec.tree.joints[joint].type == JointType::kRevolute ? kStillRad : kStillM);
+}
+
 void free_joints(const CalibrationStart& start, const CalibrateOptions& options, Spec& spec) {
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
     TangentMask mask = kHeld;
     if (options.free == FreeGeometry::kGeometry && joint.type != JointType::kFixed) {
       if (start.nominal) {
-        // Zeros belong to a nominal robot's frames; a prior holds what the data leave open.
-        mask = kAllFree;
+        // Zeros belong to a nominal robot's frames; a prior holds what the data leave open. The
+        // frame of a joint that stands still is a part of its neighbours'.
+        mask = stands_still(spec, j) ? kHeld : kAllFree;
       } else {
         mask = joint.type == JointType::kRevolute ? kRevoluteAxis : kPrismaticAxis;
       }
@@ -270,7 +284,8 @@ std::string gauge_in_words(const Spec& spec) {
   words +=
       spec.prior
           ? "joint frames stay near the nominal ones by a weak prior where the data are silent. "
-            "Uncertainties hold the base frame to its first marker (or the camera, or the targets) and turn no "
+            "Uncertainties hold the base frame to its first marker (or the camera, or the targets) "
+            "and turn no "
             "frame about its own axis: that is a choice, not a thing to know."
           : "joint frames keep their z axis on the joint's axis and neither turn about nor slide "
             "along it: the markers' and next joints' places take that up, so nothing is lost.";

@@ -293,6 +293,21 @@ TEST(Nominal, AxesAreAsCertainAsWithoutTheDrawing) {
               0.5);
 }
 
+TEST(Nominal, AJointThatStandsStillIsAPartOfItsNeighbours) {
+  Lab lab = make_lab("a joint that rests", 0.01, 0.003);
+  lab.values.col(1).setConstant(0.3);
+  lab.log.values = lab.values;
+  const Measurements measurements = tracked_poses(lab, {}, 2e-4, 1e-4);
+  const Placement placement = place_markers(lab.nominal, lab.values, measurements.poses);
+  const Calibration found = run(lab, measurements, placement, FreeGeometry::kGeometry);
+  EXPECT_TRUE(found.observability.weak.empty());
+  EXPECT_LT(found.held_out_rms, 1.2 * kDistance * 1e-4);
+  for (const std::size_t j : {0U, 2U, 3U, 4U, 5U}) {
+    ASSERT_TRUE(found.joints[j].direction_sigma_rad) << j;
+    EXPECT_LT(*found.joints[j].direction_sigma_rad, 1e-3) << j;
+  }
+}
+
 TEST(Nominal, PointsOfATracker) {
   constexpr double kSigma = 5e-5;
   const Lab lab = make_lab("tracker points", 0.01, 0.002);
