@@ -218,21 +218,50 @@ std::string error_words(const ErrorStatistics& px, const ErrorStatistics& m,
   return text;
 }
 
+bool all_of_one_size(const std::vector<Marker>& markers) {
+  return std::ranges::all_of(
+      markers, [&](const Marker& marker) { return marker.size_m == markers.front().size_m; });
+}
+
+/// What no residual shows: the lengths are as right as the declared marker size and lens.
+std::string declared_words(const Calibration& calibration) {
+  const std::vector<Marker>& markers = calibration.tree.markers;
+  if (calibration.kind != MeasurementKind::kCorners || markers.empty()) return "";
+  constexpr double kRulerError = 1e-4;  // m: what a ruler leaves
+  const double size = markers.front().size_m;
+  std::string text;
+  if (size > 0.0 && all_of_one_size(markers)) {
+    text = fmt::format(
+        " All this is for markers of exactly {:.1f} mm: each 0.1 mm changes all lengths by {:.2g} "
+        "%",
+        1e3 * size, 100.0 * kRulerError / size);
+  } else {
+    text = " All this is for markers of exactly the declared sizes: lengths change as they do";
+  }
+  return text + (calibration.intrinsics_estimated
+                     ? "."
+                     : ", and what the declared intrinsics are wrong by comes on top.");
+}
+
 std::string prediction_words(const RunSummary& run) {
   const ErrorRow& all = run.errors.all;
   const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
   const std::string training = error_words(all.training_px, all.training_m, all.training_rad);
   const std::string before = error_words(all.before_px, all.before_m, all.before_rad);
+  // Depth is seen far worse, and is in no figure in mm.
+  const std::string_view direction =
+      run.calibration.kind == MeasurementKind::kCorners ? " across the line of sight" : "";
   const std::string_view what =
       run.calibration.kind == MeasurementKind::kPoint ? "Points" : "Markers";
   std::string text;
   if (!held_out.empty()) {
-    text = fmt::format("{} {} that the fit has not seen are predicted to {} (rms)", what,
-                       run.log.empty() ? "in stretches of the recording" : "at postures", held_out);
+    text = fmt::format("{} {} that the fit has not seen are predicted to {}{} (rms)", what,
+                       run.log.empty() ? "in stretches of the recording" : "at postures", held_out,
+                       direction);
     if (!training.empty()) text += fmt::format("; those it has seen to {}", training);
   } else if (!training.empty()) {
-    text =
-        fmt::format("{} are reproduced to {} (rms), on the data of the fit itself", what, training);
+    text = fmt::format("{} are reproduced to {}{} (rms), on the data of the fit itself", what,
+                       training, direction);
   } else {
     return "No error can be given: nothing was fitted.";
   }
@@ -319,7 +348,8 @@ std::string clock_words(const RunSummary& run) {
 Verdict make_verdict(const RunSummary& run, const Analysis& analysis) {
   Verdict verdict;
   verdict.found = found_words(run);
-  verdict.accurate = prediction_words(run) + axis_words(run.calibration) + clock_words(run);
+  verdict.accurate = prediction_words(run) + axis_words(run.calibration) +
+                     declared_words(run.calibration) + clock_words(run);
   constexpr std::size_t kMostFindings = 3;
   std::vector<Finding> findings = find_limits(run, analysis);
   if (findings.size() > kMostFindings) findings.resize(kMostFindings);

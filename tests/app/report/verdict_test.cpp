@@ -27,6 +27,24 @@ TEST(Verdict, OfAVideoWithALog) {
   EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;
 }
 
+TEST(Verdict, SaysWhatTheDeclaredSizesAndIntrinsicsAdd) {
+  RunSummary run = synthetic_run();
+  for (Marker& marker : run.calibration.tree.markers) marker.size_m = 0.048;
+  std::string accurate = make_verdict(run).accurate;
+  EXPECT_TRUE(has(accurate, " mm across the line of sight (rms)")) << accurate;
+  EXPECT_TRUE(has(accurate, "exactly 48.0 mm: each 0.1 mm changes all lengths by 0.21 %"))
+      << accurate;
+  EXPECT_TRUE(has(accurate, "declared intrinsics")) << accurate;
+  run.calibration.intrinsics_estimated = true;
+  run.calibration.tree.markers[1].size_m = 0.06;
+  accurate = make_verdict(run).accurate;
+  EXPECT_TRUE(has(accurate, "exactly the declared sizes")) << accurate;
+  EXPECT_FALSE(has(accurate, "declared intrinsics")) << accurate;
+  accurate = make_verdict(synthetic_run({.kind = MeasurementKind::kPoint})).accurate;
+  EXPECT_FALSE(has(accurate, "markers of exactly")) << accurate;
+  EXPECT_FALSE(has(accurate, "line of sight")) << accurate;
+}
+
 TEST(Verdict, NamesAChannelThatDrivesTwoJoints) {
   RunSummary run = synthetic_run();
   KinematicTree& tree = run.calibration.tree;
