@@ -208,6 +208,17 @@ CameraModel choose_camera(const Recording& recording, const TagObservations& tag
                          recording.camera_file.string());
 }
 
+std::string model_remedy(RecordingEntry entry, bool camera_declared) {
+  if (entry == RecordingEntry::kPoses) {
+    return "check that all poses are in one frame that stood still, in m and rad, that no marker "
+           "has slipped and that each reading of joints.csv belongs to its pose";
+  }
+  return std::string(camera_declared ? "check that camera.yaml is this camera's, "
+                                     : "calibrate the camera (kinescope camera); check ") +
+         "that tags.yaml has every marker's size, that no marker has slipped and that the camera "
+         "stood still";
+}
+
 Structure find_robot(const Recording& recording, const PoseTracks& tracks,
                      const CalibrateOptions& options) {
   if (recording.entry == RecordingEntry::kPoints) {
@@ -217,6 +228,9 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset;
   Structure structure = find_structure(tracks, recording.log, structure_options);
+  for (StructureDoubt& doubt : structure.doubts) {
+    if (doubt.of_model) doubt.remedy = model_remedy(recording.entry, recording.camera.has_value());
+  }
   require_declared_units(recording, structure);
   require_fixed_tags(recording, structure);
   return structure;

@@ -38,6 +38,9 @@ struct Observed {
 [[nodiscard]] CameraModel camera_from_motion(const Recording& recording, const Observed& observed,
                                              const CameraModel& camera, CalibrateOptions options);
 
+/// What to look at where the markers do not move as any robot does: files that the recording has.
+[[nodiscard]] std::string model_remedy(RecordingEntry entry, bool camera_declared);
+
 /// The structure, with the clocks' offset scanned for unless they are trusted to agree. Throws
 /// bad_request for points, which show no structure, and what declared.h throws.
 [[nodiscard]] Structure find_robot(const Recording& recording, const PoseTracks& tracks,

@@ -26,6 +26,7 @@ constexpr double kAdvice = 10.0;
 constexpr double kFewIndependentFrames = 30.0;
 constexpr double kNoiseLimit = 1.5;
 constexpr double kSmallTurn = 0.35;     ///< rad: below, an axis is poorly placed by its own motion
+constexpr double kWholeTurn = 5.2;      ///< rad: from here on further motion shows nothing new
 constexpr double kMovedLess = 0.7;      // of what the other joints of its type move
 constexpr double kRarelySeen = 0.3;     ///< share of the frames
 constexpr double kSmallMarker = 25.0;   ///< px: below, tilt and depth are poorly seen
@@ -148,17 +149,18 @@ double typical_travel(const Calibration& calibration, JointType type) {
   return median_of(std::move(travels));
 }
 
-void add_small_travel(const RunSummary& run, std::vector<Finding>& findings) {
+void add_small_travel(const RunSummary& run, const Analysis& analysis,
+                      std::vector<Finding>& findings) {
   const Calibration& calibration = run.calibration;
   const Joint* weakest = nullptr;
   double travel = 0.0, worst = 0.0;
+  int moving = 0;
   for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
        ++j) {
     const JointEstimate& estimate = calibration.joints[j];
-    if (calibration.tree.joints[j].type == JointType::kFixed || !estimate.direction_sigma_rad) {
-      continue;
-    }
-    if (*estimate.direction_sigma_rad > worst) {
+    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
+    ++moving;
+    if (estimate.direction_sigma_rad && *estimate.direction_sigma_rad > worst) {
       worst = *estimate.direction_sigma_rad;
       weakest = &calibration.tree.joints[j];
       travel = estimate.range.upper - estimate.range.lower;
@@ -168,18 +170,22 @@ void add_small_travel(const RunSummary& run, std::vector<Finding>& findings) {
   const bool slides = weakest->type == JointType::kPrismatic;
   const std::string moved = text_with_unit(travel, slides ? Quantity::kLength : Quantity::kAngle);
   const bool small = !slides && travel < kSmallTurn;
+  if (moving == 1 && !small) return;  // the accuracy's sentence is about it
   // An axis at the end of the chain is the least certain however far it moves.
-  const bool moved_less = travel < kMovedLess * typical_travel(calibration, weakest->type);
+  const bool moved_less = travel < kMovedLess * typical_travel(calibration, weakest->type) &&
+                          (slides || travel < kWholeTurn);
   const std::string uncertainty = uncertainty_text(kCoverageFactor * worst, Quantity::kAngle);
-  findings.push_back(
-      {small ? kModelError * 0.5 : kAdvice,
-       fmt::format("The axis of {} is the least certain ({}°, k = 2); it moved through {}.",
-                   weakest->name, uncertainty, moved),
-       small || moved_less
-           ? fmt::format("Move {} further than the {} seen here.", weakest->name, moved)
-           : std::string(
-                 "More postures, all over the range of every joint: uncertainties fall with "
-                 "the root of their number.")});
+  const std::string what =
+      fmt::format("The axis of {} is {} ({}°, k = 2); it moved through {}.", weakest->name,
+                  moving == 1 ? "uncertain" : "the least certain", uncertainty, moved);
+  std::string remedy = fmt::format("Move {} further than the {} seen here.", weakest->name, moved);
+  if (!small && !moved_less) {
+    remedy = fmt::format(
+        "More postures, all over the range of every joint: uncertainties fall with the root of the "
+        "number of independent frames ({} now).",
+        analysis.independent_frames);
+  }
+  findings.push_back({small ? kModelError * 0.5 : kAdvice, what, remedy});
 }
 
 void add_poor_markers(const RunSummary& run, std::vector<Finding>& findings) {
@@ -306,7 +312,7 @@ std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis
   add_dependence(run, analysis, findings);
   add_noise(run, analysis, findings);
   add_weak_directions(run, findings);
-  add_small_travel(run, findings);
+  add_small_travel(run, analysis, findings);
   add_poor_markers(run, findings);
   add_camera(run, findings);
   add_noise_floor(run, findings);

@@ -159,6 +159,25 @@ std::string scale_words(const KinematicTree& tree) {
   return text;
 }
 
+/// " The scale of q3 is estimated, too: 0.956 rad a unit of its channel.": near a usual unit, but
+/// not held at it.
+std::string free_scale_words(const Calibration& calibration) {
+  std::vector<std::string> words;
+  const std::vector<Joint>& joints = calibration.tree.joints;
+  for (std::size_t j = 0; j < joints.size() && j < calibration.joints.size(); ++j) {
+    const Joint& joint = joints[j];
+    if (joint.type == JointType::kFixed || joint.channel.empty()) continue;
+    const bool slides = joint.type == JointType::kPrismatic;
+    const double scale = std::abs(joint.scale);
+    const bool usual =
+        is_about(scale, 1.0) || is_about(scale, slides ? kMetrePerMillimetre : kRadPerDegree);
+    if (!usual || !calibration.joints[j].scale_sigma) continue;
+    words.push_back(fmt::format("{} ({:.4g} {})", joint.channel, scale, slides ? "m" : "rad"));
+  }
+  if (words.empty()) return "";
+  return fmt::format(" What a unit of {} is was estimated, too.", joined(words));
+}
+
 /// " No column is named like these joints: ch3 drives joint1." of a nominal robot.
 std::string column_words(const KinematicTree& tree, const JointLog& log) {
   std::vector<std::string> words;
@@ -201,7 +220,7 @@ std::string found_words(const RunSummary& run) {
                         names.size() == 1 ? "s" : "");
   }
   text += idle_words(run);
-  text += scale_words(tree);
+  text += scale_words(tree) + free_scale_words(run.calibration);
   return text;
 }
 

@@ -224,9 +224,8 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
                             std::move(parameters), s.unit);
   out.candidate.check = "stiffness of the gear and the link; weight of tool and payload";
   out.candidate.record = fmt::format(
-      "the same readings of {} with the arm stretched out and folded; declare the direction of "
-      "gravity in recording.yaml",
-      s.name);
+      "the same readings of {} with {}; declare the direction of gravity in recording.yaml", s.name,
+      s.turns ? "the arm stretched out and folded" : "different loads on it");
   std::vector<Correction> corrections;
   Eigen::MatrixXd shares(s.value.size(), static_cast<Eigen::Index>(loads.size()));
   for (std::size_t k = 0; k < loads.size(); ++k) {

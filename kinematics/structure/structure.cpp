@@ -303,11 +303,11 @@ void doubt_clocks(const Series& full, const JointLog& log, const StructureOption
 
 StructureDoubt allowance_doubt(double allowance) {
   return {
-      fmt::format("the markers move as the joints say to {:.1f} % of their distance from the "
-                  "camera only, which is more than their noise",
+      fmt::format("predicted and measured motion of the markers differ by {:.1f} % of their "
+                  "distance, which is more than their noise",
                   100.0 * allowance),
-      "check that camera.yaml is this camera's, that tags.yaml has every marker's size, that no "
-      "marker has slipped and that the camera stood still",
+      "check the camera's intrinsics and the markers' sizes, that no marker has slipped and that "
+      "the camera stood still",
       {},
       true};
 }

@@ -159,6 +159,15 @@ TEST(Verdict, AnOddScaleIsSaidWithTheTagSizeAsACause) {
       << found;
 }
 
+TEST(Verdict, ScalesThatWereEstimatedNearAUnitAreNamed) {
+  RunSummary run = synthetic_run();
+  EXPECT_FALSE(has(make_verdict(run).found, "estimated, too")) << make_verdict(run).found;
+  run.calibration.tree.joints[1].scale = 0.956;
+  run.calibration.joints[1].scale_sigma = 0.01;
+  const std::string found = make_verdict(run).found;
+  EXPECT_TRUE(has(found, "What a unit of q2 (0.956 rad) is was estimated, too.")) << found;
+}
+
 TEST(Verdict, WithoutALogTheValuesAreEstimates) {
   const Verdict verdict = make_verdict(synthetic_run({.log = false}));
   EXPECT_TRUE(has(verdict.found, "the joint values are estimates from the markers"))
@@ -184,6 +193,29 @@ TEST(Verdict, AnUndeterminedStructureStandsFirst) {
   EXPECT_TRUE(has(verdict.found, "cannot determine the structure")) << verdict.found;
   EXPECT_EQ(verdict.limits.find("Q2 and q3 move together."), 0U) << verdict.limits;
   EXPECT_EQ(verdict.next.find("Move q3 while q2 rests."), 0U) << verdict.next;
+}
+
+TEST(Verdict, AdviceSaysSomething) {
+  RunSummary run = synthetic_run();
+  const auto turn = [&](std::size_t joint, double range) {
+    run.calibration.joints[joint].range = {.lower = 0.0, .upper = range};
+    run.calibration.joints[joint].direction_sigma_rad = joint == 1 ? 2e-3 : 1e-3;
+  };
+  turn(0, 20.0);
+  turn(1, 6.0);
+  turn(2, 0.1);
+  Verdict verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.limits, "The axis of q2 is the least certain")) << verdict.limits;
+  EXPECT_FALSE(has(verdict.next, "further")) << verdict.next;
+  EXPECT_TRUE(has(verdict.next, "independent frames (")) << verdict.next;
+  turn(1, 2.0);
+  verdict = make_verdict(run);
+  EXPECT_TRUE(has(verdict.next, "Move q2 further than the 115°")) << verdict.next;
+  // Of one joint the line on accuracy has said it.
+  run.calibration.tree.joints[0].type = JointType::kFixed;
+  run.calibration.tree.joints[2].type = JointType::kFixed;
+  verdict = make_verdict(run);
+  EXPECT_FALSE(has(verdict.limits, "The axis of q2")) << verdict.limits;
 }
 
 TEST(Verdict, AFailedSolveIsSaidFirst) {
