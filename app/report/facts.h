@@ -29,6 +29,8 @@ inline constexpr double kCoverageFactor = 2.0;
 inline constexpr double kStrongCorrelation = 0.9;
 /// A held-out error above this many times the training error is called a limit of the model.
 inline constexpr double kRatioLimit = 1.1;
+/// Noise found over noise declared from which the report speaks of it.
+inline constexpr double kNoiseLimit = 1.5;
 /// Share of the residual that follows one variable from which the report speaks of it.
 inline constexpr double kDependenceLimit = 0.15;
 

@@ -24,7 +24,6 @@ constexpr double kModelError = 50.0;
 constexpr double kAdvice = 10.0;
 
 constexpr double kFewIndependentFrames = 30.0;
-constexpr double kNoiseLimit = 1.5;
 constexpr double kSmallTurn = 0.35;     ///< rad: below, an axis is poorly placed by its own motion
 constexpr double kWholeTurn = 5.2;      ///< rad: from here on further motion shows nothing new
 constexpr double kMovedLess = 0.7;      // of what the other joints of its type move

@@ -41,7 +41,7 @@ struct State {
 };
 
 std::vector<State> states(const RunSummary& run) {
-  return {{"before", run.nominal ? "before (nominal robot)" : "before (structure, no refinement)"},
+  return {{"before", run.nominal ? "before (nominal geometry)" : "before (structure, no refinement)"},
           {"training", "after, training"},
           {"held_out", "after, held out"}};
 }

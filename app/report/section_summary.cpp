@@ -84,12 +84,21 @@ std::string_view trace_word(TraceVerdict verdict) {
   return "not traced: too little to tell";
 }
 
-std::string residual_light(const Trace& trace) {
-  return light("Residual", trace.verdict == TraceVerdict::kClean ? "good" : "fair",
-               trace_word(trace.verdict),
-               fmt::format("searched for known effects of camera, encoders and joints; noise alone "
-                           "names one in {:.0f} of 100 recordings",
-                           100.0 * trace.false_alarm_rate));
+std::string residual_light(const Trace& trace, double sigma_scale) {
+  const std::string rule = fmt::format(
+      "searched for known effects of camera, encoders and joints; of 100 recordings with noise "
+      "alone "
+      "{:.0f} would be told one",
+      100.0 * trace.false_alarm_rate);
+  if (trace.verdict != TraceVerdict::kClean)
+    return light("Residual", "fair", trace_word(trace.verdict), rule);
+  if (sigma_scale > kNoiseLimit) {
+    return light(
+        "Residual", "fair",
+        fmt::format("nothing known is left, but {:.1f} times the declared noise", sigma_scale),
+        rule);
+  }
+  return light("Residual", "good", trace_word(trace.verdict), rule);
 }
 
 std::string verdict_line(std::string_view label, std::string_view words) {
@@ -107,7 +116,8 @@ std::string verdict_section(const Facts& facts) {
   const auto& trace = facts.run.trace;
   const bool traced = trace && trace->verdict != TraceVerdict::kNotRun;
   out += "<ul class=\"lights\">\n" + structure_light(facts.run) + geometry_light(facts) +
-         (traced ? residual_light(*trace) : "") + "</ul>\n<dl class=\"verdict\">\n";
+         (traced ? residual_light(*trace, facts.run.calibration.sigma_scale) : "") +
+         "</ul>\n<dl class=\"verdict\">\n";
   out += verdict_line("Found", facts.verdict.found);
   out += verdict_line("Accuracy", facts.verdict.accurate);
   if (traced) out += verdict_line("What the model lacked", trace_paragraph(*trace));

@@ -217,7 +217,8 @@ std::string not_found_table(const Trace& trace) {
 std::string steps_list(const Trace& trace) {
   std::string items;
   for (const TraceStep& step : trace.steps) {
-    items += fmt::format("<li>{}: error on unseen data {}</li>", escaped(step.words),
+    items += fmt::format("<li>{}{}: error on unseen data {}</li>", escaped(step.words),
+                         items.empty() ? start_words(trace) : "",
                          escaped(amount_text(step.held_out.value, step.held_out.unit)));
   }
   return fmt::format("<details><summary>How the search went</summary><ol>{}</ol></details>", items);

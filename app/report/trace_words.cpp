@@ -112,21 +112,32 @@ std::string rest_words(const Rest& rest) {
 
 namespace {
 
+bool holds_clock(const Trace& trace) {
+  return std::ranges::any_of(trace.accepted, [](const TracedEffect& effect) {
+    return effect.id == EffectId{"time_offset", "clock"};
+  });
+}
+
+// The calibration always estimates the clocks' offset; tracing begins without it.
+std::string whole_change_words(const Trace& trace, const HeldOutError& after) {
+  return fmt::format("{}{} → {}",
+                     amount_text(trace.held_out_before.value, trace.held_out_before.unit),
+                     start_words(trace), amount_text(after.value, after.unit));
+}
+
 // The model with the effects is the one that is exported; curves stand in the report only.
 std::string unknown_words(const Trace& trace) {
   const std::string curves = trace.rest.size() > 1 ? "curves" : "a curve";
   if (trace.accepted.empty()) {
     return fmt::format("{}. Error on unseen data {} with {} for it, which no product carries.",
-                       trace.reason,
-                       error_change_words(trace.held_out_before, trace.held_out_after), curves);
+                       trace.reason, whole_change_words(trace, trace.held_out_after), curves);
   }
   const HeldOutError& with_effects = trace.rest.front().held_out_before;
   return fmt::format(
       "{}; beyond that {}. Error on unseen data {} with the effects, {} with {} for the rest, "
       "which "
       "no product carries.",
-      trace::lacked_words(trace.accepted), trace.reason,
-      error_change_words(trace.held_out_before, with_effects),
+      trace::lacked_words(trace.accepted), trace.reason, whole_change_words(trace, with_effects),
       amount_text(trace.held_out_after.value, trace.held_out_after.unit), curves);
 }
 
@@ -138,18 +149,17 @@ std::vector<std::string> findings_of(const Trace& trace) {
     case TraceVerdict::kNothingToSay:
       return {fmt::format("nothing can be said: {}.", trace.reason)};
     case TraceVerdict::kClean:
-      return {fmt::format("nothing is left to explain; the residual is noise of {}.",
-                          amount_text(trace.noise, trace.held_out_after.unit))};
+      return {fmt::format("nothing is left to explain; the error on unseen data, {}, is noise.",
+                          amount_text(trace.held_out_after.value, trace.held_out_after.unit))};
     case TraceVerdict::kEffects:
     case TraceVerdict::kAmbiguous:
     case TraceVerdict::kUnknown:
       break;
   }
-  std::vector<std::string> out{
-      trace.verdict == TraceVerdict::kUnknown && !trace.rest.empty()
-          ? unknown_words(trace)
-          : fmt::format("{}. Error on unseen data {}.", trace.reason,
-                        error_change_words(trace.held_out_before, trace.held_out_after))};
+  std::vector<std::string> out{trace.verdict == TraceVerdict::kUnknown && !trace.rest.empty()
+                                   ? unknown_words(trace)
+                                   : fmt::format("{}. Error on unseen data {}.", trace.reason,
+                                                 whole_change_words(trace, trace.held_out_after))};
   for (const TracedEffect& effect : trace.accepted) {
     out.push_back(fmt::format("{}: {}; {}. Check: {}.", effect_name(effect), size_words(effect),
                               effect.words, effect.check));
@@ -160,6 +170,10 @@ std::vector<std::string> findings_of(const Trace& trace) {
 }
 
 }  // namespace
+
+std::string start_words(const Trace& trace) {
+  return holds_clock(trace) ? " (clock offset held at 0)" : "";
+}
 
 std::string trace_paragraph(const Trace& trace) {
   constexpr std::size_t kMost = 4;  // sentences; the others stand in their own section

@@ -24,6 +24,8 @@ struct AmountUnit {
 [[nodiscard]] std::string error_change_words(const HeldOutError& before, const HeldOutError& after);
 [[nodiscard]] std::string ambiguity_words(const Ambiguity& ambiguity);
 [[nodiscard]] std::string rest_words(const Rest& rest);
+/// " (clock offset held at 0)" where that is how tracing began; else nothing.
+[[nodiscard]] std::string start_words(const Trace& trace);
 /// What was found, for the head of a report; empty where nothing was traced.
 [[nodiscard]] std::string trace_paragraph(const Trace& trace);
 

@@ -285,8 +285,11 @@ std::string prediction_words(const RunSummary& run) {
     return "No error can be given: nothing was fitted.";
   }
   if (run.nominal && !before.empty()) {
-    text += fmt::format("; with the nominal robot{} it was {}",
-                        run.nominal_faults.empty() ? "" : ", so mended,", before);
+    // All but the geometry is fitted for this figure, too.
+    text += fmt::format(
+        "; with the nominal geometry{}{}, but markers, camera and clock placed anew, it was {}",
+        run.nominal_faults.empty() ? "" : ", so mended,",
+        run.effects.empty() ? "" : " and the effects found", before);
   }
   return text + ".";
 }

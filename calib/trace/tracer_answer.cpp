@@ -310,8 +310,8 @@ void Tracer::conclude() {
     trace_.reason = lacked_words(trace_.accepted);
   } else {
     trace_.verdict = TraceVerdict::kClean;
-    trace_.reason =
-        fmt::format("the residual is noise of {:.3g} {}", trace_.noise, trace_.held_out_after.unit);
+    trace_.reason = fmt::format("the error on unseen data, {:.3g} {}, is noise",
+                                trace_.held_out_after.value, trace_.held_out_after.unit);
   }
 }
 

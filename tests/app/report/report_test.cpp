@@ -270,5 +270,17 @@ TEST(Report, AnEmptyRunIsAReportToo) {
   EXPECT_NE(page.find("No error can be given"), std::string::npos);
 }
 
+TEST(Report, NoiseBeyondTheDeclaredOneIsNoGreenLight) {
+  RunSummary run = synthetic_run();
+  run.trace = Trace{};
+  run.trace->verdict = TraceVerdict::kClean;
+  EXPECT_NE(report_html(run, "").find("noise, nothing else"), std::string::npos);
+  run.calibration.sigma_scale = 2.2;
+  const std::string html = report_html(run, "");
+  EXPECT_EQ(html.find("noise, nothing else"), std::string::npos);
+  EXPECT_NE(html.find("nothing known is left, but 2.2 times the declared noise"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace kinescope

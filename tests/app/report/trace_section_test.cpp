@@ -73,6 +73,34 @@ TEST(TraceSection, TheHeadOfAnUnknownRestNamesTheEffectsAndTheModelThatIsExporte
   EXPECT_NE(beside.find("0.4 px → 0.15 px with the effects, 0.05 px"), std::string::npos) << beside;
 }
 
+TEST(TraceSection, SaysThatTracingBeginsWithoutTheClocksOffset) {
+  Trace trace = trace_with_a_field();
+  EXPECT_EQ(trace_lines(trace).front().find("held at 0"), std::string::npos);
+  TracedEffect late;
+  late.id = {"time_offset", "clock"};
+  late.unit = "s";
+  trace.accepted = {late};
+  trace.rest.clear();
+  trace.verdict = TraceVerdict::kEffects;
+  trace.steps = {{0, "the model as it is", 0.0, trace.held_out_before},
+                 {1, "time_offset at clock", 0.0, trace.held_out_after}};
+  const std::string line = trace_lines(trace).front();
+  EXPECT_NE(line.find("0.15 px (clock offset held at 0) → 0.05 px"), std::string::npos) << line;
+  const std::string html = trace_section(trace);
+  EXPECT_NE(html.find("the model as it is (clock offset held at 0): error"), std::string::npos);
+  EXPECT_EQ(html.find("time_offset at clock (clock offset"), std::string::npos);
+}
+
+TEST(TraceSection, ACleanTraceGivesTheErrorOnUnseenDataAndNoOther) {
+  Trace trace = trace_with_a_field();
+  trace.verdict = TraceVerdict::kClean;
+  trace.rest.clear();
+  trace.noise = 0.0493;
+  const std::string line = trace_lines(trace).front();
+  EXPECT_NE(line.find("the error on unseen data, 0.05 px, is noise"), std::string::npos) << line;
+  EXPECT_EQ(line.find("0.0493"), std::string::npos) << line;
+}
+
 TEST(TraceSection, JsonNamesThePlaceAndHoldsTheField) {
   const auto written = trace_json(trace_with_a_field());
   const auto& rest = written.at("unexplained").at(0);

@@ -112,7 +112,9 @@ TEST(Verdict, OfPointsWithANominalRobot) {
       make_verdict(synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true}));
   EXPECT_TRUE(has(verdict.found, "Nominal robot bench_arm: 3 joints (R R P), 4 points calibrated"))
       << verdict.found;
-  EXPECT_TRUE(has(verdict.accurate, "with the nominal robot it was")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate,
+                  "with the nominal geometry, but markers, camera and clock placed anew, it was"))
+      << verdict.accurate;
   EXPECT_FALSE(has(verdict.accurate, "px")) << verdict.accurate;
   EXPECT_FALSE(has(verdict.found, "probability")) << verdict.found;
 }
@@ -132,8 +134,7 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
                   "Q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
                   "(typical error of tag_4 in a first fit 20.0 mm → 1.00 mm)."))
       << verdict.found;
-  EXPECT_TRUE(has(verdict.accurate, "with the nominal robot, so mended, it was"))
-      << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, "with the nominal geometry, so mended,")) << verdict.accurate;
   EXPECT_TRUE(has(verdict.found, "The channels of q2 and q3 are exchanged; taken so"))
       << verdict.found;
 }
