@@ -326,17 +326,14 @@ CameraEffect curved_slider(const Suspect& s) {
 // crooked link; n = 0 likewise is a crooked axis.
 CameraEffect axis_wobble(const Suspect& s) {
   CameraEffect out =
-      effect(s, "axis_wobble", fmt::format("the axis of {} tilts as it turns", s.name),
-             {{"tilt, real", "rad"},
-              {"tilt, imaginary", "rad"},
-              {"shift, real", "m"},
-              {"shift, imaginary", "m"}},
-             "rad");
+      effect(s, "axis_wobble",
+             fmt::format("the axis of {} wobbles: it tilts and runs out as it turns", s.name),
+             {{"tilt x", "rad"}, {"tilt y", "rad"}, {"run-out x", "m"}, {"run-out y", "m"}}, "rad");
   // Where the bearing sits along the axis is not known: seen from elsewhere the tilt shifts, too.
   out.candidate.size_weights.tail<2>().setZero();
   out.candidate.scan = {-2.0, 1.0, -3.0};
   out.candidate.scan_listed = true;
-  out.candidate.scan_name = "turns of the tilt, seen from the link";
+  out.candidate.scan_name = "wobbles";
   out.candidate.scan_words = [](double turns) {
     return std::string(turns == -2.0 ? "once a turn" : "twice a turn");
   };
@@ -347,18 +344,18 @@ CameraEffect axis_wobble(const Suspect& s) {
     const Eigen::ArrayXd angle = turns * s.value.array();
     std::vector<Correction> corrections;
     for (const auto& [what, unit, column] :
-         {std::tuple{"tilt", "rad", 0}, std::tuple{"shift", "m", 3}}) {
-      Correction real = turn(s, fmt::format("wobble, {}, real", what), unit, {});
-      Correction imaginary = turn(s, fmt::format("wobble, {}, imaginary", what), unit, {});
-      for (Correction* part : {&real, &imaginary}) part->twists.setZero(s.value.size(), 6);
+         {std::tuple{"tilt", "rad", 0}, std::tuple{"run-out", "m", 3}}) {
+      Correction x = turn(s, fmt::format("wobble, {} x", what), unit, {});
+      Correction y = turn(s, fmt::format("wobble, {} y", what), unit, {});
+      for (Correction* part : {&x, &y}) part->twists.setZero(s.value.size(), 6);
       for (Eigen::Index i = 0; i < s.value.size(); ++i) {
         const double c = std::cos(angle[i]);
         const double d = std::sin(angle[i]);
-        real.twists.row(i).segment<3>(column) = (c * sides[0] + d * sides[1]).transpose();
-        imaginary.twists.row(i).segment<3>(column) = (c * sides[1] - d * sides[0]).transpose();
+        x.twists.row(i).segment<3>(column) = (c * sides[0] + d * sides[1]).transpose();
+        y.twists.row(i).segment<3>(column) = (c * sides[1] - d * sides[0]).transpose();
       }
-      corrections.push_back(std::move(real));
-      corrections.push_back(std::move(imaginary));
+      corrections.push_back(std::move(x));
+      corrections.push_back(std::move(y));
     }
     return corrections;
   };
