@@ -132,7 +132,8 @@ std::string field_figure(const Rest& rest) {
   return figure(plot.str(),
                 fmt::format("What is left at {} as a function of the {}: where corners are seen "
                             "less where the model expects them (Gaussian process).",
-                            rest.place, rest.covariate));
+                            rest.place, rest.covariate),
+                "half");
 }
 
 std::string rest_figure(const Rest& rest) {
@@ -162,8 +163,10 @@ std::string rest_figure(const Rest& rest) {
   plot.band(at, lower, upper, series_class(0));
   plot.line(mean, series_class(0));
   plot.legend("Gaussian process, k = 2", series_class(0));
-  return figure(plot.str(), fmt::format("What is left at {}, as a function of the {}.", rest.place,
-                                        rest.covariate));
+  return figure(
+      plot.str(),
+      fmt::format("What is left at {}, as a function of the {}.", rest.place, rest.covariate),
+      "half");
 }
 
 std::string effects_table(const Trace& trace) {
@@ -171,8 +174,8 @@ std::string effects_table(const Trace& trace) {
   for (const TracedEffect& effect : trace.accepted) {
     rows += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{}</td><td>{}</td></tr>",
-        escaped(effect_name(effect)), escaped(effect.words), escaped(size_words(effect)),
-        100.0 * effect.explained,
+        escaped(effect_name(effect)), escaped(effect.words),
+        escaped(size_words(effect) + other_sizes_words(effect)), 100.0 * effect.explained,
         escaped(error_change_words(effect.held_out_before, effect.held_out_after)),
         escaped(effect.check));
   }
@@ -197,17 +200,18 @@ std::string not_found_table(const Trace& trace) {
       continue;
     }
     rows += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>", escaped(missing.id.effect),
-                        escaped(missing.id.place),
-                        escaped(amount_text(missing.smallest_size, missing.unit)));
+                        escaped(missing.id.place), escaped(limit_text(missing)));
   }
   std::string out = fmt::format(
-      "<details><summary>Looked for and not found: {} effects</summary><div class=\"scroll\">"
+      "<details class=\"tests\"><summary>Looked for and not found: {} effects</summary><div "
+      "class=\"scroll\">"
       "<table><thead><tr><th>Effect</th><th>Place</th><th>Would have been found from</th></tr>"
       "</thead><tbody>{}</tbody></table></div></details>",
       trace.not_found.size(), rows);
   if (!hidden.empty()) {
     out += fmt::format(
-        "<details><summary>Cannot show in this recording, whatever their size</summary><ul>{}</ul>"
+        "<details class=\"tests\"><summary>Cannot show in this recording, at no size that anybody "
+        "would overlook</summary><ul>{}</ul>"
         "</details>",
         hidden);
   }
@@ -221,7 +225,9 @@ std::string steps_list(const Trace& trace) {
                          items.empty() ? start_words(trace) : "",
                          escaped(amount_text(step.held_out.value, step.held_out.unit)));
   }
-  return fmt::format("<details><summary>How the search went</summary><ol>{}</ol></details>", items);
+  return fmt::format(
+      "<details class=\"tests\"><summary>How the search went</summary><ol>{}</ol></details>",
+      items);
 }
 
 }  // namespace

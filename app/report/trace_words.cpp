@@ -18,11 +18,17 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-// Significant digits that an interval of this width deserves, between 2 and 6.
+// Significant digits down to the second one of the interval's half, between 2 and 6.
 int digits_for(double value, double half_width) {
   if (!(half_width > 0.0) || !(std::abs(value) > 0.0)) return 3;
-  const double digits = std::log10(std::abs(value) / half_width) + 2.0;
-  return static_cast<int>(std::clamp(std::ceil(digits), 2.0, 6.0));
+  const double digits =
+      std::floor(std::log10(std::abs(value))) - std::floor(std::log10(half_width)) + 2.0;
+  return static_cast<int>(std::clamp(digits, 2.0, 6.0));
+}
+
+// "0.0034", "64", "420": two digits, and no power of ten for what is large.
+std::string two_digits(double value) {
+  return std::abs(value) < 10.0 ? fmt::format("{:.2g}", value) : fmt::format("{:.0f}", value);
 }
 
 }  // namespace
@@ -55,6 +61,22 @@ std::string amount_text(double si_value, const std::string& si_unit) {
   return fmt::format("{:.4g}{}{}", value, tight ? "" : " ", unit.text);
 }
 
+std::string limit_text(const NotFoundEffect& missing) {
+  const AmountUnit unit = amount_unit(missing.unit);
+  const double value = missing.smallest_size * unit.factor;
+  if (!missing.unit.empty()) {
+    const bool micro = missing.unit == "s" && std::abs(value) < 0.1;
+    return fmt::format("{}{}{}", two_digits(micro ? 1e3 * value : value),
+                       unit.text == "°" ? "" : " ", micro ? "µs" : unit.text);
+  }
+  // Of numbers without a unit: coefficients of the lens, ratios of two motions; else shares.
+  if (missing.id.effect == "lens_distortion")
+    return two_digits(missing.smallest_size) + " (coefficient)";
+  if (missing.id.effect == "coupling")
+    return two_digits(missing.smallest_size) + " of the other joint's motion";
+  return two_digits(100.0 * missing.smallest_size) + " %";
+}
+
 std::string effect_name(const TracedEffect& effect) {
   std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
   if (effect.scan_name.empty()) return name;
@@ -76,11 +98,27 @@ std::string size_words(const TracedEffect& effect) {
   const double half = 0.5 * (effect.interval.high - effect.interval.low);
   const bool small_time = effect.unit == "s" && std::abs(effect.size) < 1e-4;
   const double factor = unit.factor * (small_time ? 1e3 : 1.0);
-  const int digits = digits_for(effect.size, half);
+  const int digits = digits_for(effect.size * factor, half * factor);
   const std::string words =
       fmt::format("{:.{}g} ({:.{}g} to {:.{}g})", effect.size * factor, digits,
                   effect.interval.low * factor, digits, effect.interval.high * factor, digits);
   return fmt::format("{} {}", words, small_time ? "µs" : unit.text);
+}
+
+std::string other_sizes_words(const TracedEffect& effect) {
+  std::map<std::string, std::pair<double, std::string>> squares;  // by quantity; its unit
+  for (const EffectValue& value : effect.values) {
+    const std::string& name = value.parameter.name;
+    const bool part = name.ends_with(" x") || name.ends_with(" y");
+    if (!part || value.parameter.unit == effect.unit) continue;
+    auto& [square, unit] = squares[name.substr(0, name.size() - 2)];
+    square += value.value * value.value;
+    unit = value.parameter.unit;
+  }
+  std::string out;
+  for (const auto& [quantity, sum] : squares)
+    out += fmt::format(", {} {}", quantity, amount_text(std::sqrt(sum.first), sum.second));
+  return out;
 }
 
 std::string error_change_words(const HeldOutError& before, const HeldOutError& after) {
@@ -161,8 +199,8 @@ std::vector<std::string> findings_of(const Trace& trace) {
                                    : fmt::format("{}. Error on unseen data {}.", trace.reason,
                                                  whole_change_words(trace, trace.held_out_after))};
   for (const TracedEffect& effect : trace.accepted) {
-    out.push_back(fmt::format("{}: {}; {}. Check: {}.", effect_name(effect), size_words(effect),
-                              effect.words, effect.check));
+    out.push_back(fmt::format("{}: {}{}; {}. Check: {}.", effect_name(effect), size_words(effect),
+                              other_sizes_words(effect), effect.words, effect.check));
   }
   for (const Ambiguity& ambiguity : trace.ambiguities) out.push_back(ambiguity_words(ambiguity));
   for (const Rest& rest : trace.rest) out.push_back(rest_words(rest));

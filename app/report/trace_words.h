@@ -9,14 +9,18 @@
 
 namespace kinescope::report {
 
-/// "0.598°", "-39.99 ms", "0.0021 1/m": in the units people use.
-[[nodiscard]] std::string amount_text(double si_value, const std::string& si_unit);
+/// "0.598°", "-39.99 ms", "0.0021 1/m": of SI units, in those people use.
+[[nodiscard]] std::string amount_text(double value, const std::string& unit);
 /// The unit alone, and the factor to it.
 struct AmountUnit {
   double factor = 1.0;
   std::string text;
 };
-[[nodiscard]] AmountUnit amount_unit(const std::string& si_unit);
+[[nodiscard]] AmountUnit amount_unit(const std::string& unit);
+/// "0.25 %", "0.062 mm": from where on an effect that was not found would have been.
+[[nodiscard]] std::string limit_text(const NotFoundEffect& missing);
+/// ", run-out 0.26 mm": quantities beside the one that is the effect's size.
+[[nodiscard]] std::string other_sizes_words(const TracedEffect& effect);
 /// "eccentricity at ch0"; with the value of its scan: ", 1 per turn".
 [[nodiscard]] std::string effect_name(const TracedEffect& effect);
 /// "0.598° (0.596° to 0.600°)".

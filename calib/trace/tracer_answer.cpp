@@ -258,6 +258,18 @@ void Tracer::summarise() {
   }
 }
 
+namespace {
+
+// Nobody overlooks an effect that large: from here on the recording is no test of it.
+bool beyond_possible(const Candidate& candidate, const Score& score, double smallest_size) {
+  const double size = std::abs(size_of(candidate, score.theta));
+  if (!candidate.possible || !(size > 0.0)) return false;
+  const Eigen::VectorXd theta = score.theta * (smallest_size / size);
+  return !candidate.possible(theta) && !candidate.possible(-theta);
+}
+
+}  // namespace
+
 void Tracer::list_not_found() {
   for (const TestedMember& member : test_family(now_->system, now_->fit.candidates)) {
     const Candidate& candidate = now_->fit.candidates[member.index];
@@ -287,6 +299,8 @@ void Tracer::list_not_found() {
         missing.smallest_size = std::max({missing.smallest_size, size * floor / score.rms,
                                           size * options_.noise_floor / score.noise_share});
       }
+      if (beyond_possible(candidate, score, missing.smallest_size))
+        missing = {candidate.id, true, 0.0, candidate.size_unit, candidate.record};
     }
     trace_.not_found.push_back(std::move(missing));
   }

@@ -5,6 +5,7 @@
 
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
+#include "app/report/trace_words.h"
 
 namespace kinescope::report {
 namespace {
@@ -99,6 +100,51 @@ TEST(TraceSection, ACleanTraceGivesTheErrorOnUnseenDataAndNoOther) {
   const std::string line = trace_lines(trace).front();
   EXPECT_NE(line.find("the error on unseen data, 0.05 px, is noise"), std::string::npos) << line;
   EXPECT_EQ(line.find("0.0493"), std::string::npos) << line;
+}
+
+TEST(TraceSection, LimitsHaveAUnitAndTwoDigits) {
+  const auto limit = [](const char* effect, double size, const char* unit) {
+    return limit_text(
+        {.id = {effect, "q1"}, .hidden = false, .smallest_size = size, .unit = unit, .record = ""});
+  };
+  EXPECT_EQ(limit("encoder_scale", 0.0025266, ""), "0.25 %");
+  EXPECT_EQ(limit("lens_distortion", 0.0033905, ""), "0.0034 (coefficient)");
+  EXPECT_EQ(limit("coupling", 0.00064971, ""), "0.00065 of the other joint's motion");
+  EXPECT_EQ(limit("tag_slip", 6.204e-5, "m"), "0.062 mm");
+  EXPECT_EQ(limit("helical", 0.1213, "m/turn"), "121 mm/turn");
+  EXPECT_EQ(limit("rolling_shutter", 6.677e-7, "s"), "0.67 µs");
+}
+
+TEST(TraceSection, AWobbleIsToldWithItsRunOut) {
+  Trace trace = trace_with_a_field();
+  TracedEffect wobble;
+  wobble.id = {"axis_wobble", "q2"};
+  wobble.unit = "rad";
+  wobble.size = 1e-3;
+  wobble.interval = {0.9e-3, 1.1e-3};
+  wobble.values = {{{"tilt x", "rad"}, 1e-3, 0.0},
+                   {{"tilt y", "rad"}, 0.0, 0.0},
+                   {{"run-out x", "m"}, 3e-4, 0.0},
+                   {{"run-out y", "m"}, 4e-4, 0.0}};
+  trace.accepted = {wobble};
+  EXPECT_NE(trace_lines(trace).at(1).find("°, run-out 0.5 mm;"), std::string::npos)
+      << trace_lines(trace).at(1);
+}
+
+TEST(TraceSection, SizesGoToTheSecondDigitOfTheirInterval) {
+  TracedEffect effect;
+  effect.unit = "s";
+  effect.size = -0.0399928;
+  effect.interval = {-0.0400081, -0.0399775};
+  EXPECT_EQ(size_words(effect), "-39.993 (-40.008 to -39.977) ms");
+}
+
+// Curves are no wider than the other plots, and paper has the tests.
+TEST(TraceSection, CurvesAreHalfAPageWideAndTestsArePrinted) {
+  const std::string html = trace_section(trace_with_a_field());
+  EXPECT_NE(html.find("<figure class=\"half\">"), std::string::npos);
+  EXPECT_NE(html.find("<details class=\"tests\">"), std::string::npos);
+  EXPECT_EQ(html.find("<details>"), std::string::npos);
 }
 
 TEST(TraceSection, JsonNamesThePlaceAndHoldsTheField) {
