@@ -112,19 +112,18 @@ json contact_json(const ContactSummary& summary) {
 }
 
 std::string contact_verdict(const ContactSummary& summary) {
-  const double declared = summary.calibration.options.false_alarms_per_hour;
-  if (summary.events.empty()) {
-    return fmt::format("No contact in {:.1f} s; declared false alarms an hour: {:g}.",
-                       3600.0 * summary.check.hours, declared);
-  }
-  std::string out =
-      fmt::format("{} contact{} (declared false alarms an hour: {:g}):", summary.events.size(),
-                  summary.events.size() == 1 ? "" : "s", declared);
+  const std::string rate = fmt::format("false alarms: {:g} an hour asked for, {:.2g} estimated",
+                                       summary.calibration.options.false_alarms_per_hour,
+                                       summary.check.extrapolated_per_hour);
+  if (summary.events.empty())
+    return fmt::format("No contact in {:.1f} s ({}).", 3600.0 * summary.check.hours, rate);
+  std::string out = fmt::format("{} contact{} ({}):", summary.events.size(),
+                                summary.events.size() == 1 ? "" : "s", rate);
   for (const ContactEvent& event : summary.events) {
     const std::string of = summary.clock.names.size() > 1
                                ? fmt::format(" of {}", summary.clock.trajectory(event.onset_s))
                                : "";
-    out += fmt::format(" {:.3f} to {:.3f} s{} at {};", summary.clock.time_s(event.onset_s),
+    out += fmt::format(" {:.2f} to {:.2f} s{} at {};", summary.clock.time_s(event.onset_s),
                        summary.clock.time_s(event.end_s), of, link_name(summary, event.link));
   }
   out.back() = '.';

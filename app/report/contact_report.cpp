@@ -29,11 +29,12 @@ constexpr std::array<ContentsEntry, 4> kContents = {{
 std::string contact_table(const ContactSummary& summary, const nlohmann::json& document) {
   if (summary.events.empty()) return "";
   Table table("contacts-table",
-              fmt::format("Contacts; external torque in {}",
+              fmt::format("Contacts; mean external torque from onset to end, in {} (k = 2; grey: "
+                          "not beyond its uncertainty)",
                           common_unit(summary.torque_unit, summary.types)),
               document);
   std::vector<std::string> head = {"Onset, s", "End, s", "Known after, ms", "Link",
-                                   "Probability, %"};
+                                   "Probability of the link, %"};
   const bool several = summary.clock.names.size() > 1;
   if (several) head.insert(head.begin(), "Log");
   head.insert(head.end(), summary.joints.begin(), summary.joints.end());
@@ -43,13 +44,18 @@ std::string contact_table(const ContactSummary& summary, const nlohmann::json& d
     const std::string at = fmt::format("/contacts/{}", k);
     table.begin_row();
     if (several) table.text(document.at("contacts")[k].at("trajectory").get<std::string>());
-    table.number(at + "/onset_s", Quantity::kTime);
-    table.number(at + "/end_s", Quantity::kTime);
+    table.text(fmt::format("{:.2f}", summary.clock.time_s(event.onset_s)));
+    table.text(fmt::format("{:.2f}", summary.clock.time_s(event.end_s)));
     table.text(fmt::format("{:.0f}", 1e3 * (event.alarm_s - event.onset_s)));
     table.text(document.at("contacts")[k].at("link").get<std::string>());
     table.number(at + "/probability", Quantity::kPercent);
     for (Eigen::Index j = 0; j < event.torque.size(); ++j) {
-      table.number(fmt::format("{}/torque/{}", at, j), Quantity::kPlain);
+      const double expanded =
+          kCoverageFactor * std::sqrt(std::max(0.0, event.torque_covariance(j, j)));
+      const std::string value = value_and_uncertainty(event.torque[j], expanded, Quantity::kPlain);
+      table.html(std::abs(event.torque[j]) > expanded
+                     ? value
+                     : fmt::format("<span class=\"note\">{}</span>", value));
     }
   }
   return table.str();
