@@ -84,12 +84,39 @@ std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
   return figure(plot.str(), fmt::format("Friction profile of {}.", name));
 }
 
+// "motor_inertia" of "motor_inertia(joint2) + ..".
+std::string_view first_name(std::string_view combination) {
+  return combination.substr(0, combination.find('('));
+}
+
+// Of a parameter of a joint (drives) or of a link, by its first name. Slides count in m.
+std::string parameter_unit(std::string_view name, const std::string& torque_unit, bool slides) {
+  const std::string torque =
+      joint_unit(torque_unit, slides ? JointType::kPrismatic : JointType::kRevolute);
+  if (name == "coulomb" || name == "offset") return torque;
+  if (name == "viscous") return torque + (slides ? " s/m" : " s/rad");
+  const bool mass = name == "m" || (name == "motor_inertia" && slides);
+  const std::string inertia = mass ? "kg" : name.starts_with("mc") ? "kg m" : "kg m²";
+  return torque_unit == "Nm" ? inertia : fmt::format("{} × {}/(N m)", inertia, torque);
+}
+
+bool is_slide(const TorqueSummary& summary, std::string_view joint) {
+  const auto found = std::ranges::find(summary.joints, joint);
+  return found != summary.joints.end() &&
+         summary.types[static_cast<std::size_t>(found - summary.joints.begin())] ==
+             JointType::kPrismatic;
+}
+
+// "joint2" of "motor_inertia(joint2) + ..".
+std::string_view first_place(std::string_view combination) {
+  const std::size_t open = combination.find('(');
+  if (open == std::string_view::npos) return {};
+  return combination.substr(open + 1, combination.find(')') - open - 1);
+}
+
 std::string drive_table(const TorqueFacts& facts) {
-  Table table("drives-table",
-              fmt::format("Drives, in {} per SI (expanded uncertainty, k = 2)",
-                          common_unit(facts.summary.train.torque_unit, facts.summary.types)),
-              facts.result);
-  table.header({"Joint", "Term", "Value", "U"});
+  Table table("drives-table", "Drives (expanded uncertainty, k = 2)", facts.result);
+  table.header({"Joint", "Term", "Value", "U", "Unit"});
   for (std::size_t k = 0; k < facts.summary.drives.size(); ++k) {
     const DriveEstimate& estimate = facts.summary.drives[k];
     table.begin_row();
@@ -98,13 +125,15 @@ std::string drive_table(const TorqueFacts& facts) {
     table.number(fmt::format("/drives/{}/value", k), Quantity::kPlain);
     table.text(std::isfinite(estimate.sigma) ? fmt::format("{:.2g}", 2.0 * estimate.sigma)
                                              : "not determined");
+    table.text(parameter_unit(estimate.term, facts.summary.train.torque_unit,
+                              is_slide(facts.summary, estimate.joint)));
   }
   return table.str();
 }
 
 std::string parameter_table(const TorqueFacts& facts) {
   Table table("parameters-table", "Base parameters: all that this torque can tell", facts.result);
-  table.header({"Combination of inertial parameters", "Value", "U (k = 2)"});
+  table.header({"Combination of inertial parameters", "Value", "U (k = 2)", "Unit of the first"});
   const Identification& found = facts.summary.identification;
   const auto count = std::min<std::size_t>(kMostParameters, found.names.size());
   for (std::size_t k = 0; k < count; ++k) {
@@ -113,6 +142,8 @@ std::string parameter_table(const TorqueFacts& facts) {
     table.number(fmt::format("/parameters/{}/value", k), Quantity::kPlain);
     const double sigma = found.sigma_of(static_cast<Eigen::Index>(k));
     table.text(std::isfinite(sigma) ? fmt::format("{:.2g}", 2.0 * sigma) : "not determined");
+    table.text(parameter_unit(first_name(found.names[k]), facts.summary.train.torque_unit,
+                              is_slide(facts.summary, first_place(found.names[k]))));
   }
   return table.str();
 }

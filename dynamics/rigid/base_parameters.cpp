@@ -143,9 +143,11 @@ std::vector<std::string> body_parameter_names(const RigidModel& model) {
 
 std::string combination_name(const Eigen::VectorXd& row, const std::vector<std::string>& names,
                              int kept, int digits) {
+  constexpr double kRounding = 1e-7;  // what a decomposition leaves where there is nothing
+  const double largest = row.cwiseAbs().maxCoeff();
   std::string out = names[static_cast<std::size_t>(kept)];
   for (Eigen::Index c = 0; c < row.size(); ++c) {
-    if (c == kept || row[c] == 0.0) continue;
+    if (c == kept || std::abs(row[c]) <= kRounding * largest) continue;
     const std::string size = fmt::format("{:.{}g}", std::abs(row[c]), digits);
     out += fmt::format(" {} {}{}", row[c] < 0.0 ? '-' : '+', size == "1" ? "" : size + " ",
                        names[static_cast<std::size_t>(c)]);
