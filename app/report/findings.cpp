@@ -118,7 +118,7 @@ void add_noise(const RunSummary& run, const Analysis& analysis, std::vector<Find
   if (frames > 0 && frames < kFewIndependentFrames) {
     std::string what = fmt::format("The frames count as about {} independent ones", frames);
     if (calibration.correlation_time_s > 0.0) {
-      what += fmt::format(" (residuals stay alike for {})",
+      what += fmt::format(" (residuals are correlated over {})",
                           text_with_unit(calibration.correlation_time_s, Quantity::kTime));
     }
     findings.push_back(

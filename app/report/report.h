@@ -42,7 +42,8 @@ struct Verdict {
 ///                  (share of an 8 x 6 grid; corners only), camera_declared,
 ///                  markers [id, link, size_m, frames_seen, share_seen, median_edge_px,
 ///                  median_sigma_px], rejected [reason, count], channels [name, samples, min, max,
-///                  joint, idle], warnings
+///                  filmed_min, filmed_max (of the samples while frames were taken), joint, idle],
+///                  warnings
 ///   structure      null for a nominal robot; else status (determined, ambiguous, undetermined),
 ///   probability, runner_up,
 ///                  runner_up_log_odds, links [name, markers], free_markers, idle_channels,

@@ -52,17 +52,32 @@ std::string joint_of_channel(const RunSummary& run, const std::string& channel) 
   return "";
 }
 
+// Samples of the log while frames were taken.
+std::pair<Eigen::Index, Eigen::Index> filmed_samples(const RunSummary& run) {
+  const std::vector<double>& frames = run.calibration.times_s;
+  if (frames.empty()) return {0, 0};
+  const std::vector<double>& log = run.log.times_s;
+  const double offset = run.calibration.time_offset_s;
+  return {std::ranges::lower_bound(log, frames.front() + offset) - log.begin(),
+          std::ranges::upper_bound(log, frames.back() + offset) - log.begin()};
+}
+
 json channels_json(const RunSummary& run) {
   json list = json::array();
+  const auto [first, last] = filmed_samples(run);
   for (std::size_t c = 0; c < run.log.channels.size(); ++c) {
     const auto column = static_cast<Eigen::Index>(c);
     const bool filled = column < run.log.values.cols() && run.log.values.rows() > 0;
+    const bool filmed = filled && first < last;
+    const auto while_filmed = run.log.values.col(column).segment(first, filmed ? last - first : 0);
     const bool idle =
         run.structure && std::ranges::count(run.structure->idle_channels, static_cast<int>(c)) > 0;
     list.push_back({{"name", text(run.log.channels[c])},
                     {"samples", run.log.size()},
                     {"min", filled ? number(run.log.values.col(column).minCoeff()) : json(nullptr)},
                     {"max", filled ? number(run.log.values.col(column).maxCoeff()) : json(nullptr)},
+                    {"filmed_min", filmed ? number(while_filmed.minCoeff()) : json(nullptr)},
+                    {"filmed_max", filmed ? number(while_filmed.maxCoeff()) : json(nullptr)},
                     {"joint", text(joint_of_channel(run, run.log.channels[c]))},
                     {"idle", idle}});
   }

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kViewSize = 310.0;
 constexpr double kViewMargin = 26.0;
+constexpr double kLetter = 6.0;  ///< width of one, about
+constexpr double kLetterHeight = 10.0;
 constexpr double kAxisShare = 0.09;  ///< half length of a joint's axis, of the robot's extent
 constexpr double kFrustumShare = 0.16;
 
@@ -196,8 +198,12 @@ class Sheet {
     }
     for (const Label& label : drawing.labels) {
       const Eigen::Vector2d p = place(label.at);
-      out += fmt::format("<text class=\"{}\" x=\"{}\" y=\"{}\">{}</text>", label.css_class,
-                         drawn(p.x() + 4.0), drawn(p.y() - 3.0), escaped(label.text));
+      // Left of its point where it would run over the edge.
+      const bool left = p.x() + 4.0 + kLetter * static_cast<double>(label.text.size()) > kViewSize;
+      out += fmt::format("<text class=\"{}\" x=\"{}\" y=\"{}\"{}>{}</text>", label.css_class,
+                         drawn(p.x() + (left ? -4.0 : 4.0)),
+                         drawn(std::max(p.y() - 3.0, kLetterHeight)),
+                         left ? " text-anchor=\"end\"" : "", escaped(label.text));
     }
     return out;
   }

@@ -93,7 +93,7 @@ std::string marker_table(const Facts& facts) {
   std::vector<std::string> head = {"Marker", "On link", "Frames seen", "Seen, %"};
   if (corners) {
     head.insert(head.end(),
-                {"Edge, mm", "Edge in the image, px (median)", "Corner noise declared, px"});
+                {"Edge, mm", "Edge in the image, px (median)", "Corner noise expected, px"});
   }
   head.insert(head.end(), {"Sightings used", "Left out"});
   table.header(head);
@@ -124,7 +124,8 @@ std::string channel_table(const Facts& facts) {
     return paragraph("The recording holds no joint log.", "note");
   }
   Table table("channels-table", "Channels of the joint log, in their own units", facts.result);
-  table.header({"Channel", "Samples", "Lowest", "Highest", "Drives"});
+  table.header({"Channel", "Samples", "Lowest", "Highest", "Lowest while filmed",
+                "Highest while filmed", "Drives"});
   for (std::size_t k = 0; k < facts.run.log.channels.size(); ++k) {
     const std::string at = fmt::format("/data/channels/{}", k);
     const nlohmann::json& channel = facts.result.at(nlohmann::json::json_pointer(at));
@@ -133,6 +134,8 @@ std::string channel_table(const Facts& facts) {
     table.number(at + "/samples", Quantity::kCount);
     table.number(at + "/min", Quantity::kChannel);
     table.number(at + "/max", Quantity::kChannel);
+    table.number(at + "/filmed_min", Quantity::kChannel);
+    table.number(at + "/filmed_max", Quantity::kChannel);
     const auto joint = channel.at("joint").get<std::string>();
     const bool idle = channel.at("idle").get<bool>();
     table.text(!joint.empty() ? joint : idle ? "nothing (idle)" : "–");
@@ -154,15 +157,21 @@ std::string rejected_table(const Facts& facts) {
   return table.str();
 }
 
+/// Nothing where every frame counts.
+std::string independent_words(const Facts& facts) {
+  if (facts.analysis.independent_frames >= facts.run.frames) return "";
+  return "; because residuals are correlated in time they count as about " +
+         inline_number(facts.result, "/data/independent_frames", Quantity::kCount) +
+         " independent ones";
+}
+
 }  // namespace
 
 std::string data_section(const Facts& facts) {
   std::string out = section_head("data", "Data quality");
   out += "<p>" + inline_number(facts.result, "/data/frames", Quantity::kCount) + " frames over " +
          inline_number(facts.result, "/data/duration_s", Quantity::kTime) +
-         "; because residuals are correlated in time they count as about " +
-         inline_number(facts.result, "/data/independent_frames", Quantity::kCount) +
-         " independent ones.";
+         independent_words(facts) + ".";
   if (facts.run.calibration.kind == MeasurementKind::kCorners) {
     out += " The corners cover " +
            inline_number(facts.result, "/data/image_coverage", Quantity::kPercent) +

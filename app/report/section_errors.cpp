@@ -41,9 +41,10 @@ struct State {
 };
 
 std::vector<State> states(const RunSummary& run) {
-  return {{"before", run.nominal ? "before (nominal geometry)" : "before (structure, no refinement)"},
-          {"training", "after, training"},
-          {"held_out", "after, held out"}};
+  return {
+      {"before", run.nominal ? "before (nominal geometry)" : "before (structure, no refinement)"},
+      {"training", "after, training"},
+      {"held_out", "after, held out"}};
 }
 
 std::string overall_table(const Facts& facts) {

@@ -161,7 +161,8 @@ std::string observability_section(const Facts& facts) {
       section_head("observability", "What the data see, and what they cannot tell apart");
   out += "<p>Condition number of the scaled Jacobian: " +
          inline_number(facts.result, "/observability/condition_number", Quantity::kPlain) +
-         " (below 100 is usually called well posed).</p>\n";
+         ": so many times less well than the best determined combination of parameters is the "
+         "worst determined one known.</p>\n";
   out += weak_list(facts) + "<div class=\"figures\">";
   const std::string steps = ladder(calibration.observability.singular_values);
   if (!steps.empty()) {

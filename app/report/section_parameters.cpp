@@ -179,9 +179,9 @@ std::string clock_and_lens(const Facts& facts) {
 
 std::string all_parameters_table(const Facts& facts) {
   Table table("parameters-table",
-              "All parameters of the fit, in the order of the covariance. Tilts and shifts are "
-              "changes against "
-              "the start.",
+              "All parameters of the fit, in the order of the covariance. Turns and shifts are "
+              "counted from the result, in the frame that they move: U says how far it may be "
+              "off.",
               facts.result);
   table.header({"Parameter", "Block", "Unit", "Value", "U (k = 2)", "u, noise independent"});
   const auto& parameters = facts.run.calibration.parameters;
@@ -193,7 +193,13 @@ std::string all_parameters_table(const Facts& facts) {
     table.text(parameters[k].name);
     table.text(parameters[k].block);
     table.text(unit.empty() ? std::string_view(parameters[k].unit) : unit);
-    table.value(at + "/value", at + "/expanded", quantity);
+    const bool of_result =
+        parameters[k].value == 0.0 && (parameters[k].unit == "rad" || parameters[k].unit == "m");
+    if (of_result) {
+      table.text("–");
+    } else {
+      table.value(at + "/value", at + "/expanded", quantity);
+    }
     table.uncertainty(at + "/expanded", quantity);
     table.uncertainty(at + "/sigma_white", quantity);
   }

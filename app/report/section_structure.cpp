@@ -17,7 +17,10 @@ Quantity joint_quantity(JointType type) {
 }
 
 std::string evidence_table(const Facts& facts, const Structure& structure) {
-  Table table("structure-table", "Joints and the evidence for each", facts.result);
+  Table table("structure-table",
+              "Joints and the evidence for each (scale and travel: first estimates; the final ones "
+              "stand under Parameters and Data quality)",
+              facts.result);
   table.header({"Joint", "Type", "Parent", "Child", "Channel", "Scale, rad or m per unit", "Travel",
                 "Left over, °", "Left over, mm", "Runner-up", "Odds over it"});
   const KinematicTree& tree = facts.run.calibration.tree;
@@ -37,8 +40,12 @@ std::string evidence_table(const Facts& facts, const Structure& structure) {
                  ? facts.run.log.channels[index]
                  : std::string("?");
     };
-    if (joint.channel) channel = name(*joint.channel);
-    for (const ChannelTerm& term : joint.couplings) channel += " + " + name(term);
+    if (joint.channel) {
+      channel = name(*joint.channel);
+      for (const ChannelTerm& term : joint.couplings) {
+        channel += fmt::format(" {:+.2g} {}", term.scale / joint.channel->scale, name(term));
+      }
+    }
     table.text(channel);
     table.number(at + "/driven_by/scale", Quantity::kChannel);
     table.number_with_unit(at + "/travel", joint_quantity(joint.type));

@@ -219,7 +219,7 @@ std::string method_section(const Facts& facts) {
   row("Noise found / noise declared", "/calibration/sigma_scale", Quantity::kPlain);
   row("Sightings used", "/calibration/sightings_used", Quantity::kCount);
   row("Sightings left out", "/calibration/sightings_rejected", Quantity::kCount);
-  row("Residuals stay alike for, s", "/calibration/correlation_time_s", Quantity::kTime);
+  row("Correlation time of the residuals, s", "/calibration/correlation_time_s", Quantity::kTime);
   out += solver.str();
   if (!calibration.warnings.empty()) {
     out += "<h3>Warnings of the calibration</h3><ul id=\"calibration-warnings\">";

@@ -282,5 +282,25 @@ TEST(Report, NoiseBeyondTheDeclaredOneIsNoGreenLight) {
             std::string::npos);
 }
 
+TEST(Report, ParametersOfPosesShowNoZeros) {
+  RunSummary run = synthetic_run();
+  run.calibration.parameters.front().unit = "rad";
+  run.calibration.parameters.front().value = 0.0;
+  const std::string html = report_html(run, "");
+  EXPECT_EQ(html.find("/calibration/parameters/0/value"), std::string::npos);
+  EXPECT_NE(html.find("/calibration/parameters/0/expanded"), std::string::npos);
+}
+
+TEST(Report, ChannelsHaveTheRangeWhileFilmed) {
+  RunSummary run = synthetic_run();
+  run.log.times_s.push_back(run.calibration.times_s.back() + 100.0);
+  run.log.values.conservativeResize(run.log.values.rows() + 1, Eigen::NoChange);
+  run.log.values.bottomRows(1).setConstant(77.0);
+  const nlohmann::json channel = result_json(run).at("data").at("channels").at(0);
+  EXPECT_EQ(channel.at("max"), 77.0);
+  EXPECT_LT(channel.at("filmed_max"), 77.0);
+  EXPECT_EQ(channel.at("filmed_min"), channel.at("min"));
+}
+
 }  // namespace
 }  // namespace kinescope
