@@ -176,5 +176,11 @@ TEST(IndependentColumns, HoldWhatTheySay) {
   EXPECT_EQ(other.kept, (std::vector<int>{1, 2, 4}));
 }
 
+TEST(BaseParameters, ANameHasNoRoundingErrors) {
+  const Eigen::Vector3d row(1.0, 1.32e-9, -1e-4);
+  EXPECT_EQ(combination_name(row, {"coulomb(j1)", "mcy(l3)", "m(l2)"}, 0),
+            "coulomb(j1) - 0.0001 m(l2)");
+}
+
 }  // namespace
 }  // namespace kinescope
