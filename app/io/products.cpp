@@ -48,6 +48,8 @@ json structure_joint_json(const StructureJoint& joint, const std::string& name,
            {"travel", number(joint.travel)},
            {"rotation_rms_rad", number(joint.rotation_rms_rad)},
            {"translation_rms_m", number(joint.translation_rms_m)},
+           {"unexplained", number(joint.unexplained)},
+           {"unexplained_across", number(joint.unexplained_across)},
            {"log_odds", number(joint.log_odds)},
            {"runner_up", joint.runner_up},
            {"couplings", json::array()}};

@@ -49,8 +49,9 @@ struct Verdict {
 ///                  runner_up_log_odds, links [name, markers], free_markers, idle_channels,
 ///                  copied_channels [channel, of], doubts [what, remedy, names],
 ///                  joints [type, parent, child, driven_by {channel, scale, scale_sigma},
-///                  couplings, offset, travel, rotation_rms_rad, translation_rms_m, log_odds,
-///                  runner_up]
+///                  couplings, offset, travel, rotation_rms_rad, translation_rms_m,
+///                  unexplained, unexplained_across (shares of its link's squared motion),
+///                  log_odds, runner_up]
 ///   calibration    status, reason, gauge, time_offset_s (joint-log time = frame time + offset) and
 ///                  time_offset_expanded_s, sightings_used, sightings_rejected, sigma_scale (noise
 ///                  found over declared), before_rms, training_rms, held_out_rms, final_rms (one

@@ -110,6 +110,10 @@ std::string certainty_words(const Structure& structure) {
     case StructureStatus::kDetermined:
       return fmt::format("probability of the whole {}", probability_text(structure.probability));
     case StructureStatus::kAmbiguous:
+      if (structure.runner_up_log_odds > StructureOptions{}.min_log_odds) {
+        return fmt::format("but the markers contradict it (probability of the whole {})",
+                           probability_text(structure.probability));
+      }
       return fmt::format("but this recording does not settle it (odds {} against: {})",
                          odds_text(structure.runner_up_log_odds), structure.runner_up);
     case StructureStatus::kUndetermined:

@@ -19,6 +19,7 @@
 #include "kinematics/structure/search.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/time_offset.h"
+#include "kinematics/structure/unexplained.h"
 #include "kinematics/structure/verdict.h"
 
 namespace kinescope {
@@ -52,6 +53,11 @@ PoseTracks without_rare(const PoseTracks& tracks) {
 constexpr std::array kAllowances{0.003, 0.01};
 // Variance across a joint over the declared one.
 constexpr double kFarMore = 10.0;
+
+// RMS share of a link's motion that its joint leaves: worth a word, and so much of what no value of
+// the joint makes that it may be another joint, or several.
+constexpr double kNoticed = 0.1;
+constexpr double kOfAnotherKind = 0.25;
 
 struct Answer {
   FoundTree found;
@@ -399,6 +405,65 @@ void doubt_unpaired(const Readings& readings, const OwnLog& own, Structure& out)
        names});
 }
 
+std::string joint_words(const StructureJoint& joint, const JointLog& log) {
+  const std::string type = joint.type == JointType::kRevolute ? "turning" : "sliding";
+  if (!joint.channel) return fmt::format("the {} joint without a channel", type);
+  return fmt::format("the {} joint of '{}'", type,
+                     log.channels[static_cast<std::size_t>(joint.channel->channel)]);
+}
+
+StructureDoubt misfit_doubt(const StructureJoint& joint, TagId founder, const JointLog& log,
+                            bool of_another_kind) {
+  const std::string name = fmt::format("tag {}", founder.value);
+  const double share = of_another_kind ? joint.unexplained_across : joint.unexplained;
+  std::string what = fmt::format(
+      "{} leaves {:.0f} % of the motion of {} unexplained, which is far more than the "
+      "noise",
+      joint_words(joint, log), 100.0 * std::sqrt(share), name);
+  if (of_another_kind) what += ": it may be another joint, or several";
+  return {
+      std::move(what),
+      fmt::format("check that every link on the way to {} carries a marker, that {} sits firmly "
+                  "and has the size that tags.yaml says, and that the log has every channel",
+                  name, name),
+      {fmt::format("tag_{}", founder.value)},
+      !of_another_kind};
+}
+
+// The likelihoods compare answers with each other. How far the data are from the best of them is
+// judged with the sightings' own noise; a wrong answer is worth no more than what it explains.
+void judge_fit(const FoundTree& found, const Series& thin, const JointLog& log, const OwnLog& own,
+               const StructureOptions& options, Structure& out) {
+  const Readings readings =
+      readings_like(found.readings, own.log, thin, found.offset.value_s, options.max_gap_s);
+  const GrownTree tree = refit_tree(found.tree, thin, readings);
+  std::size_t next = 0;
+  const StructureJoint* worst = nullptr;
+  TagId founder;
+  for (std::size_t l = 1; l < tree.links.size(); ++l) {
+    const Unexplained left = unexplained_motion(tree.links[l].attachment);
+    for (std::size_t k = 0; k < tree.links[l].attachment.fit.model.joints.size(); ++k) {
+      StructureJoint& joint = out.joints[next++];
+      joint.unexplained = left.all();
+      joint.unexplained_across = left.across;
+      if (worst != nullptr && joint.unexplained <= worst->unexplained) continue;
+      worst = &joint;
+      founder = thin.bodies[static_cast<std::size_t>(tree.links[l].founder)].id;
+    }
+  }
+  if (worst == nullptr) return;
+  out.probability = std::min(out.probability, 1.0 - worst->unexplained);
+  if (worst->unexplained < kNoticed * kNoticed) return;
+  const bool of_another_kind = worst->unexplained_across > kOfAnotherKind * kOfAnotherKind;
+  StructureDoubt doubt = misfit_doubt(*worst, founder, log, of_another_kind);
+  if (!of_another_kind) {
+    out.doubts.push_back(std::move(doubt));
+    return;
+  }
+  out.doubts.insert(out.doubts.begin(), std::move(doubt));
+  if (out.status == StructureStatus::kDetermined) out.status = StructureStatus::kAmbiguous;
+}
+
 Structure nothing(StructureDoubt doubt) {
   Structure out;
   out.status = StructureStatus::kUndetermined;
@@ -432,7 +497,8 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
         {"no marker was seen often enough", "record with the markers in view of the camera", {}});
   }
   Series clean = clean_series(seen);
-  const Readings overlap = readings_at(log, thinned(clean, kInstants), 0.0, options.max_gap_s);
+  const Series plain = thinned(clean, kInstants);
+  const Readings overlap = readings_at(log, plain, 0.0, options.max_gap_s);
   if (!log.channels.empty() && std::ranges::count(overlap.valid, 1) < kFewestSightings) {
     return nothing({"the joint log and the frames share no time",
                     "check that both clocks start together, or give the offset between them",
@@ -454,6 +520,7 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   // Whatever else is doubtful may come of it.
   if (answer.allowance > 0.0)
     out.doubts.insert(out.doubts.begin(), allowance_doubt(answer.allowance));
+  judge_fit(s, plain, log, own, options, out);
   const std::size_t used = used_channels(fitted);
   const auto moving = static_cast<std::size_t>(moving_channels(every));
   if (out.links.size() > 1 && moving > 0 && 2 * used <= moving && !is_whole(fitted, every)) {

@@ -41,6 +41,10 @@ struct StructureJoint {
   double travel = 0.0;  ///< range of the value seen, rad or m
   double rotation_rms_rad = 0.0;  ///< what the joint leaves of the relative motion
   double translation_rms_m = 0.0;
+  /// Of its link's squared motion, beyond the noise: what the joint leaves, and what of that no
+  /// value of the joint could make. 0 to 1.
+  double unexplained = 0.0;
+  double unexplained_across = 0.0;
   double log_odds = 0.0;  ///< ln of the odds of this joint's hypothesis against its runner-up
   std::string runner_up;  ///< the next best hypothesis for this joint, in words
 };
@@ -78,8 +82,9 @@ struct Structure {
   std::vector<TagId> free_markers;     ///< markers that move with no joint we know (free bodies)
   std::vector<int> idle_channels;      ///< channels that drive nothing
   std::vector<ChannelCopy> copied_channels;  ///< none of them is idle
-  double probability = 0.0;         ///< of the whole answer against all alternatives looked at
-  std::string runner_up;            ///< the next best whole structure, in words
+  double probability = 0.0;  ///< of the whole answer against all alternatives looked at; at most
+                             ///< the share of each joint's squared motion that it explains
+  std::string runner_up;     ///< the next best whole structure, in words
   double runner_up_log_odds = 0.0;  ///< ln(odds) of the answer against it
   double time_offset_s = 0.0;       ///< joint-log time = frame time + offset, from the scan
   double time_offset_sigma_s = 0.0;

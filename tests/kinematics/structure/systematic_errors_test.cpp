@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Errors that are no noise must not break a robot apart: they are what tracing looks for later.
+#include <cmath>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -68,6 +69,43 @@ TEST_P(SystematicErrors, ACameraThatIsBumped) {
     }
   }
   expect_right(s, "bump");
+}
+
+// A link that rocks while its joint moves, as one does that a second joint carries without a
+// channel or a marker of its own.
+Structure rocking(int robot, double rad) {
+  Scene s = make_scene("Rocking " + std::to_string(robot), {.joints = 3, .prismatic_share = 0.0},
+                       exact());
+  PoseTrack& tip = track_on(s, 3);
+  for (PoseSample& sample : tip.samples) {
+    const double phase = 0.11 * sample.frame;
+    const Pose rock{exp_rotation({rad * std::sin(phase), rad * std::sin(1.7 * phase), 0.0}),
+                    {0.3 * rad * std::sin(phase), 0.0, 0.3 * rad * std::sin(1.7 * phase)}};
+    sample.T_camera_marker = sample.T_camera_marker * rock;
+  }
+  return find_structure(s.recording.tracks, s.recording.log);
+}
+
+TEST(Misfit, ASmallShareOfTheMotionLeavesTheStructureSure) {
+  for (const int robot : {0, 1, 3, 4}) {
+    const Structure s = rocking(robot, 0.01);
+    EXPECT_EQ(s.status, StructureStatus::kDetermined);
+    EXPECT_GT(s.probability, 0.99) << "20 times the noise, but little of the motion";
+  }
+}
+
+TEST(Misfit, ALargeShareIsInTheProbabilityAndNamed) {
+  for (const int robot : {0, 1, 3, 4}) {
+    const Structure noticed = rocking(robot, 0.03);
+    EXPECT_EQ(noticed.status, StructureStatus::kDetermined);
+    EXPECT_LT(noticed.probability, 0.99);
+    const Structure gross = rocking(robot, 0.1);
+    EXPECT_EQ(gross.status, StructureStatus::kAmbiguous);
+    EXPECT_LT(gross.probability, 0.95);
+    ASSERT_FALSE(gross.doubts.empty());
+    EXPECT_NE(gross.doubts.front().what.find("unexplained"), std::string::npos)
+        << gross.doubts.front().what;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, SystematicErrors, testing::Range(0, kRobots));
