@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/screening.h"
 
 namespace kinescope::structure_search {
@@ -59,6 +60,26 @@ bool is_odd(const Attachment& attachment, const Readings& readings) {
          !is_natural(attachment.fit.model.joints.front().type, scale_of(attachment.fit, readings));
 }
 
+// Channels that agree this well are multiples of each other.
+constexpr double kProportional = 1.0 - 1e-9;
+
+double channel_product(const Readings& r, int a, int b) {
+  const double size = r.value.col(a).norm() * r.value.col(b).norm();
+  return size > 0.0 ? r.value.col(a).dot(r.value.col(b)) / size : 0.0;
+}
+
+bool has_one_channel(const Attachment& a) {
+  return a.driven() && a.fit.model.joints.size() == 1 &&
+         a.fit.model.joints.front().terms.size() == 1;
+}
+
+// The same motion by another channel that is a multiple of its own.
+ChainFit by_channel(ChainFit fit, int channel, double product) {
+  ChainTerm& term = fit.model.joints.front().terms.front();
+  term = {channel, std::copysign(term.scale, term.scale * product)};
+  return fit;
+}
+
 bool leaves_noise_only(const Attachment& a) {
   constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
   return a.fit.variance < kNoiseOnly && a.fit.axis_variance < kNoiseOnly;
@@ -95,6 +116,43 @@ GrownTree in_natural_units(GrownTree tree, const Series& series, const Readings&
     tree = refit_tree(tree, series, readings);
   }
   return tree;
+}
+
+std::vector<Exchange> possible_exchanges(const GrownTree& tree, const Readings& readings) {
+  std::vector<Exchange> out;
+  for (int l = 1; l < static_cast<int>(tree.links.size()); ++l) {
+    for (int m = l + 1; m < static_cast<int>(tree.links.size()); ++m) {
+      const Attachment& a = tree.link(l).attachment;
+      const Attachment& b = tree.link(m).attachment;
+      if (!has_one_channel(a) || !has_one_channel(b) || a.channel() == b.channel()) continue;
+      const double product = channel_product(readings, a.channel(), b.channel());
+      if (std::abs(product) < kProportional) continue;
+      const double now = penalty_of(a.fit, readings) + penalty_of(b.fit, readings);
+      const double then = penalty_of(by_channel(a.fit, b.channel(), product), readings) +
+                          penalty_of(by_channel(b.fit, a.channel(), product), readings);
+      out.push_back({.first_link = l, .second_link = m, .loss = then - now});
+    }
+  }
+  return out;
+}
+
+GrownTree with_likely_exchanges(GrownTree tree, const Readings& readings) {
+  // Every exchange lowers the cost.
+  constexpr double kLeast = -1e-6;
+  while (true) {
+    const std::vector<Exchange> all = possible_exchanges(tree, readings);
+    const auto best = std::ranges::min_element(all, {}, &Exchange::loss);
+    if (best == all.end() || best->loss > kLeast) return tree;
+    Attachment& a = tree.link(best->first_link).attachment;
+    Attachment& b = tree.link(best->second_link).attachment;
+    const int of_a = a.channel();
+    const double product = channel_product(readings, of_a, b.channel());
+    a.fit = by_channel(std::move(a.fit), b.channel(), product);
+    b.fit = by_channel(std::move(b.fit), of_a, product);
+    for (Attachment* changed : {&a, &b}) changed->penalty = penalty_of(changed->fit, readings);
+    tree.bodies[tree.founder_of(best->first_link)].attachment = a;
+    tree.bodies[tree.founder_of(best->second_link)].attachment = b;
+  }
 }
 
 }  // namespace kinescope::structure_search

@@ -8,6 +8,8 @@
 //         that tells a slide's metres to a few per cent does not do so by accident.
 #pragma once
 
+#include <vector>
+
 #include "kinematics/structure/grown_tree.h"
 
 namespace kinescope::structure_search {
@@ -20,5 +22,18 @@ namespace kinescope::structure_search {
 /// another size, one that slips or a bent lens looks like a second joint too, but in an odd unit.
 [[nodiscard]] bool share_a_channel(const Attachment& a, const Attachment& b,
                                    const Readings& readings);
+
+/// Two single joints whose channels are multiples of each other, so that the motion cannot tell
+/// which drives which: the same tree with the channels exchanged.
+struct Exchange {
+  int first_link = 0;
+  int second_link = 0;
+  double loss = 0.0;  ///< -2 ln prior of the exchanged scales over that of the present ones
+};
+[[nodiscard]] std::vector<Exchange> possible_exchanges(const GrownTree& tree,
+                                                       const Readings& readings);
+
+/// Exchanges channels of which only the scales can tell, where usual units speak for it.
+[[nodiscard]] GrownTree with_likely_exchanges(GrownTree tree, const Readings& readings);
 
 }  // namespace kinescope::structure_search

@@ -163,7 +163,9 @@ Answer search_with(Series full, double allowance, const JointLog& log,
   out.thin = thinned(out.full, kInstants);
   out.allowance = allowance;
   out.found = search_tree(out.full, out.thin, log, options);
-  out.found.tree = in_natural_units(std::move(out.found.tree), out.thin, out.found.readings);
+  out.found.tree = with_likely_exchanges(
+      in_natural_units(std::move(out.found.tree), out.thin, out.found.readings),
+      out.found.readings);
   return out;
 }
 

@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/median.h"
+#include "kinematics/structure/natural_units.h"
 
 namespace kinescope::structure_search {
 namespace {
@@ -72,6 +73,7 @@ class Judge {
       add_of_body(b, out);
       add_orders(b, out);
     }
+    add_exchanges(out);
     return out;
   }
 
@@ -135,6 +137,18 @@ class Judge {
     }
   }
 
+  void add_exchanges(std::vector<Alternative>& out) const {
+    for (const Exchange& exchange : possible_exchanges(tree_, readings_)) {
+      const int first = tree_.link(exchange.first_link).attachment.channel();
+      const int second = tree_.link(exchange.second_link).attachment.channel();
+      out.push_back(
+          {std::max(0.0, exchange.loss),
+           fmt::format("channels {} and {} exchanged", channel_words(log_, readings_, first),
+                       channel_words(log_, readings_, second)),
+           first, second, exchange.first_link});
+    }
+  }
+
   std::string words(std::size_t b, const Attachment& a) const {
     std::string text = fmt::format("tag {} on {}, {}", series_.bodies[b].id.value,
                                    link_words(tree_, series_, a.parent), type_words(a));
@@ -182,6 +196,25 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
                      first, second),
          {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
     verdict.status = StructureStatus::kUndetermined;
+  }
+}
+
+// Which of two proportional channels drives which joint is told by their scales alone.
+void add_proportional_doubts(const GrownTree& tree, const Readings& readings, const JointLog& log,
+                             const StructureOptions& options, Verdict& verdict) {
+  for (const Exchange& exchange : possible_exchanges(tree, readings)) {
+    if (exchange.loss <= 2.0 * options.min_log_odds) continue;  // said as moving together
+    const std::string first =
+        channel_words(log, readings, tree.link(exchange.first_link).attachment.channel());
+    const std::string second =
+        channel_words(log, readings, tree.link(exchange.second_link).attachment.channel());
+    verdict.doubts.push_back(
+        {fmt::format("channels {} and {} are multiples of each other: which drives which joint is "
+                     "told by their units only",
+                     first, second),
+         fmt::format("record again with {} and {} moving at different times or speeds", first,
+                     second),
+         {first.substr(1, first.size() - 2), second.substr(1, second.size() - 2)}});
   }
 }
 
@@ -337,6 +370,7 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   add_order_doubts(tree, readings, log, options, verdict);
   add_free_doubts(tree, series, verdict);
   add_together_doubts(all, readings, log, options, verdict);
+  add_proportional_doubts(tree, readings, log, options, verdict);
   add_still_doubts(tree, series, readings, log, verdict);
   if (tree.links.size() < 2) {
     verdict.status = StructureStatus::kUndetermined;

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/structure/verdict.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
+
+#include "kinematics/structure/natural_units.h"
 
 namespace kinescope::structure_search {
 namespace {
@@ -47,6 +51,41 @@ TEST(Verdict, AChannelDoesNotMoveTogetherWithItself) {
   ASSERT_EQ(verdict.doubts.size(), 1U);
   EXPECT_TRUE(verdict.doubts[0].what.starts_with("it could also be: tag 4"))
       << verdict.doubts[0].what;
+}
+
+// Two hinges in series whose channels are multiples: `a` counts 1.5 times as far as `b`.
+TEST(Verdict, OfProportionalChannelsUsualUnitsDecide) {
+  GrownTree tree;
+  tree.links.resize(3);
+  tree.bodies.resize(2);
+  for (int l = 1; l <= 2; ++l) {
+    GrownLink& link = tree.link(l);
+    link.parent = l - 1;
+    link.founder = l - 1;
+    link.attachment = driven_by_the_first(JointType::kRevolute, 0.0);
+    link.attachment.fit.scale_sigma = {1e-4};
+  }
+  Readings readings;
+  readings.value.resize(2, 2);
+  readings.value << -1.0, -1.0, 1.0, 1.0;
+  readings.mean = {0.0, 0.0};
+  readings.rms = {0.9, 0.6};
+  readings.log_channel = {0, 1};
+  const auto term = [&](int l) -> ChainTerm& {
+    return tree.link(l).attachment.fit.model.joints.front().terms.front();
+  };
+  term(1) = {1, 0.9};
+  term(2) = {0, -0.6};
+  ASSERT_EQ(possible_exchanges(tree, readings).size(), 1U);
+  tree = with_likely_exchanges(tree, readings);
+  EXPECT_EQ(term(1).channel, 0);
+  EXPECT_EQ(term(2).channel, 1);
+  EXPECT_DOUBLE_EQ(term(2).scale, -0.6);
+  EXPECT_GT(possible_exchanges(tree, readings).front().loss, 9.2) << "the answer is clear";
+  term(1).scale = 0.9 * 1.3;
+  term(2).scale = 0.6 * 1.1;
+  EXPECT_LT(std::abs(possible_exchanges(tree, readings).front().loss), 9.2)
+      << "neither way is in usual units";
 }
 
 }  // namespace
