@@ -23,8 +23,8 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// What kinematics/core/progress.h asks for; total 0: not known; no stage: the last one has ended.
-  /// Any thread.
+  /// What kinematics/core/progress.h asks for; total 0: not known; no stage: the last one has
+  /// ended. Any thread.
   void update(std::string_view stage, int done, int total);
   /// Ends the stage that is shown; what is printed next begins at the left edge.
   void finish();
