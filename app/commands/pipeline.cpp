@@ -266,11 +266,11 @@ CameraModel camera_from_motion(const Recording& recording, const Observed& obser
     const Calibration calibration =
         calibrate(observed.measurements, recording.markers, recording.log,
                   start_from_structure(structure, recording, camera), options);
-    if (calibration.status != CalibrationStatus::kUndetermined) return calibration.camera;
+    return calibration.status == CalibrationStatus::kUndetermined ? camera : calibration.camera;
   } catch (const Error&) {
     // What is wrong will be said of the answer, not of this first look.
+    return camera;
   }
-  return camera;
 }
 
 CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,
