@@ -91,7 +91,7 @@ std::string_view first_name(std::string_view combination) {
 
 // Of a parameter of a joint (drives) or of a link, by its first name. Slides count in m.
 std::string parameter_unit(std::string_view name, const std::string& torque_unit, bool slides) {
-  const std::string torque =
+  std::string torque =
       joint_unit(torque_unit, slides ? JointType::kPrismatic : JointType::kRevolute);
   if (name == "coulomb" || name == "offset") return torque;
   if (name == "viscous") return torque + (slides ? " s/m" : " s/rad");
