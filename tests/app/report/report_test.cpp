@@ -43,7 +43,7 @@ void collect_bad_numbers(const nlohmann::json& value, const std::string& place,
   if (value.is_number_float() && !std::isfinite(value.get<double>())) bad.push_back(place);
   if (value.is_structured()) {
     for (const auto& [key, inner] : value.items()) {
-      collect_bad_numbers(inner, place + "/" + key, bad);
+      collect_bad_numbers(inner, fmt::format("{}/{}", place, key), bad);
     }
   }
 }
