@@ -19,6 +19,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMostLogOdds = 1000.0;
 // Channels that agree this well hold the same numbers, perhaps in another unit.
 constexpr double kAlike = 1.0 - 1e-9;
+// -2 ln odds (1 : 20) that usual units alone may give an answer that the motion does not: less than
+// an answer needs.
+constexpr double kUnitsAlone = 6.0;
 // Channels that agree this well move together.
 constexpr double kTogether = 0.995;
 // A channel that moves less than this many times what a marker could show is one that hardly moves.
@@ -141,11 +144,14 @@ class Judge {
     for (const Exchange& exchange : possible_exchanges(tree_, readings_)) {
       const int first = tree_.link(exchange.first_link).attachment.channel();
       const int second = tree_.link(exchange.second_link).attachment.channel();
-      out.push_back(
-          {std::max(0.0, exchange.loss),
-           fmt::format("channels {} and {} exchanged", channel_words(log_, readings_, first),
-                       channel_words(log_, readings_, second)),
-           first, second, exchange.first_link});
+      const std::string words =
+          fmt::format("channels {} and {} exchanged", channel_words(log_, readings_, first),
+                      channel_words(log_, readings_, second));
+      if (exchange.loss > kUnitsAlone) {
+        out.push_back({kUnitsAlone, words, -1, -1, exchange.first_link});
+      } else {
+        out.push_back({std::max(0.0, exchange.loss), words, first, second, exchange.first_link});
+      }
     }
   }
 
@@ -201,9 +207,9 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
 
 // Which of two proportional channels drives which joint is told by their scales alone.
 void add_proportional_doubts(const GrownTree& tree, const Readings& readings, const JointLog& log,
-                             const StructureOptions& options, Verdict& verdict) {
+                             Verdict& verdict) {
   for (const Exchange& exchange : possible_exchanges(tree, readings)) {
-    if (exchange.loss <= 2.0 * options.min_log_odds) continue;  // said as moving together
+    if (exchange.loss <= kUnitsAlone) continue;  // said as moving together
     const std::string first =
         channel_words(log, readings, tree.link(exchange.first_link).attachment.channel());
     const std::string second =
@@ -370,7 +376,7 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   add_order_doubts(tree, readings, log, options, verdict);
   add_free_doubts(tree, series, verdict);
   add_together_doubts(all, readings, log, options, verdict);
-  add_proportional_doubts(tree, readings, log, options, verdict);
+  add_proportional_doubts(tree, readings, log, verdict);
   add_still_doubts(tree, series, readings, log, verdict);
   if (tree.links.size() < 2) {
     verdict.status = StructureStatus::kUndetermined;

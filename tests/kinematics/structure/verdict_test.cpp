@@ -82,6 +82,23 @@ TEST(Verdict, OfProportionalChannelsUsualUnitsDecide) {
   EXPECT_EQ(term(2).channel, 1);
   EXPECT_DOUBLE_EQ(term(2).scale, -0.6);
   EXPECT_GT(possible_exchanges(tree, readings).front().loss, 9.2) << "the answer is clear";
+
+  // Clear by the units, which is no more than a custom: the motion says nothing.
+  for (std::size_t b = 0; b < 2; ++b) {
+    tree.bodies[b].link = static_cast<int>(b) + 1;
+    tree.bodies[b].attachment = tree.link(static_cast<int>(b) + 1).attachment;
+    tree.bodies[b].everywhere_cost = 1e3;
+  }
+  Series series;
+  series.times_s = {0.0, 1.0};
+  series.bodies.resize(2);
+  JointLog log;
+  log.channels = {"a", "b"};
+  const Verdict verdict = judge(tree, series, readings, log, {});
+  EXPECT_EQ(verdict.status, StructureStatus::kAmbiguous);
+  EXPECT_NEAR(verdict.probability, 0.95, 0.01);
+  ASSERT_FALSE(verdict.doubts.empty());
+  EXPECT_EQ(verdict.doubts.front().names, (std::vector<std::string>{"a", "b"}));
   term(1).scale = 0.9 * 1.3;
   term(2).scale = 0.6 * 1.1;
   EXPECT_LT(std::abs(possible_exchanges(tree, readings).front().loss), 9.2)
