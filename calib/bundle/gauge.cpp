@@ -2,10 +2,10 @@
 #include "calib/bundle/gauge.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/QR>
 
+#include "calib/bundle/make_spec.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::bundle {
@@ -60,7 +60,7 @@ class Frames {
     }
     for (std::size_t j = 0; j < spec_.tree.joints.size(); ++j) {
       const Joint& joint = spec_.tree.joints[j];
-      if (joint.parent != link || !leads_to_a_sighting(joint.child)) continue;
+      if (joint.parent != link || !leads_to_a_sighting(j)) continue;
       const Vector6d step = -adjoint(from_block(state_.joint_frames[j].data()).inverse()) * g;
       if (move(state_.joint_frames[j].data(), step, false, direction)) continue;
       // A frame that is held, of a fixed joint or of one that stands still, moves with its
@@ -90,25 +90,18 @@ class Frames {
     });
   }
 
-  [[nodiscard]] bool leads_to_a_sighting(LinkId link) const {
-    for (std::size_t m = 0; m < spec_.tree.markers.size(); ++m) {
-      if (!is_seen(m)) continue;
-      for (LinkId at = spec_.tree.markers[m].link;;) {
-        if (at == link) return true;
-        const auto up = spec_.tree.parent_joint(at);
-        if (!up) break;
-        at = spec_.tree.joints[up->index()].parent;
-      }
-    }
-    return false;
+  [[nodiscard]] bool leads_to_a_sighting(std::size_t joint) const {
+    return std::ranges::any_of(spec_.sightings, [&](const Sighting& sighting) {
+      const Marker& marker = spec_.tree.markers[static_cast<std::size_t>(sighting.marker)];
+      const std::vector<int>& path = spec_.path[marker.link.index()];
+      return std::ranges::find(path, static_cast<int>(joint)) != path.end();
+    });
   }
 
   void add_base(std::vector<Freedom>& out) const {
-    const double* holder = state_.camera_base.data();
-    for (std::size_t m = spec_.tree.markers.size(); m-- > 0;) {
-      if (spec_.tree.markers[m].link == LinkId{0} && is_seen(m)) holder = state_.mounts[m].data();
-    }
-    const auto held = columns_.find(holder);
+    const auto anchor = first_seen_base_marker(spec_);
+    const auto held =
+        columns_.find(anchor ? state_.mounts[*anchor].data() : state_.camera_base.data());
     if (held == columns_.end()) return add_base_by_targets(out);
     for (int i = 0; i < 6; ++i) {
       const Vector6d g = Vector6d::Unit(i);

@@ -106,15 +106,6 @@ bool only_targets(const Spec& spec) {
          std::ranges::all_of(spec.sightings, [](const Sighting& s) { return s.target >= 0; });
 }
 
-std::optional<std::size_t> first_seen_base_marker(const Spec& spec) {
-  std::set<int> seen;
-  for (const Sighting& sighting : spec.sightings) seen.insert(sighting.marker);
-  for (std::size_t m = 0; m < spec.tree.markers.size(); ++m) {
-    if (spec.tree.markers[m].link == LinkId{0} && seen.contains(static_cast<int>(m))) return m;
-  }
-  return std::nullopt;
-}
-
 // Readings in rad or m, deg, mm: the unit is known, and a scale beside it would be an effect of the
 // robot.
 bool is_unit_scale(double scale) {
@@ -271,6 +262,15 @@ int count_frames(const Spec& spec, const std::vector<int>& sightings) {
     frames.insert(spec.sightings[static_cast<std::size_t>(index)].frame);
   }
   return static_cast<int>(frames.size());
+}
+
+std::optional<std::size_t> first_seen_base_marker(const Spec& spec) {
+  std::set<int> seen;
+  for (const Sighting& sighting : spec.sightings) seen.insert(sighting.marker);
+  for (std::size_t m = 0; m < spec.tree.markers.size(); ++m) {
+    if (spec.tree.markers[m].link == LinkId{0} && seen.contains(static_cast<int>(m))) return m;
+  }
+  return std::nullopt;
 }
 
 std::string gauge_in_words(const Spec& spec) {

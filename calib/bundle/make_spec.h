@@ -16,6 +16,9 @@ void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& s
 
 [[nodiscard]] int count_frames(const Spec& spec, const std::vector<int>& sightings);
 
+/// The marker that holds the base frame where it can be held: the first that was seen on the base.
+[[nodiscard]] std::optional<std::size_t> first_seen_base_marker(const Spec& spec);
+
 /// In words: what is held so that the answer is unique.
 [[nodiscard]] std::string gauge_in_words(const Spec& spec);
 
