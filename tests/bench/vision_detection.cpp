@@ -25,6 +25,7 @@ const std::filesystem::path kRecording =
     std::filesystem::path(KINESCOPE_SOURCE_DIR) / "sample_videos" / "ur6_none" / "video.mp4";
 constexpr const char* kFamily = "tag36h11";
 constexpr std::size_t kFrames = 60;
+constexpr double kDetectorSigmaPx = 0.3;
 
 const std::vector<GreyImage>& frames() {
   static const std::vector<GreyImage> kAll = [] {
@@ -116,7 +117,8 @@ void BM_Refine(benchmark::State& state) {
         const RefinedCorners refined = refine_corners(frames()[f].view(), start, layout);
         benchmark::DoNotOptimize(refined);
         if (look_for_covers) {
-          benchmark::DoNotOptimize(is_partly_hidden(frames()[f].view(), refined, layout));
+          benchmark::DoNotOptimize(
+              is_partly_hidden(frames()[f].view(), refined, layout, kDetectorSigmaPx));
         }
       }
     }
