@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/vision/follow_tag.h"
 #include "calib/vision/frame_workers.h"
 #include "calib/vision/pattern_shift.h"
 #include "calib/vision/refine_corners.h"
@@ -66,11 +67,10 @@ class Detecting {
         *reader, searchers_.size(), follows ? static_cast<std::size_t>(every) : 1,
         [&](std::size_t worker, const std::vector<VideoFrame>& run) {
           FrameTags found;
-          for (const VideoFrame& frame : run) {
-            const bool full = frame.index % every == 0;
-            found.push_back(finish(
-                found.empty() ? search_whole(worker, frame, full) : follow(worker, frame, found),
-                frame));
+          for (std::size_t i = 0; i < run.size(); ++i) {
+            const bool full = run[i].index % every == 0;
+            found.push_back(found.empty() ? finish(search_whole(worker, run[i], full), run[i])
+                                          : follow(worker, run[i], run[i - 1].image.view(), found));
           }
           return found;
         },
@@ -124,51 +124,87 @@ class Detecting {
     return (full ? fine(worker) : searchers_[worker].coarse.get())->detect(frame.image.view());
   }
 
-  // The markers of the frame before, looked for where they should be; the whole frame where one of
-  // them is not there any more.
+  // The markers of the frame before, each where it should be: by its edges alone where its motion
+  // is known, else by a search nearby; the whole frame where one of them is not there any more.
   std::vector<TagObservation> follow(std::size_t worker, const VideoFrame& frame,
-                                     const FrameTags& before) const {
+                                     const ImageView& image_before, const FrameTags& before) const {
     const std::vector<TagObservation> none;
-    std::vector<TagWindow> windows =
-        windows_after(before.back(), before.size() > 1 ? before[before.size() - 2] : none,
-                      frame.image.width, frame.image.height);
-    const auto large = std::ranges::partition(
-        windows, [](const TagWindow& window) { return window.edge < kSeenReduced; });
-    const std::vector<TagWindow> reduced(large.begin(), large.end());
-    windows.erase(large.begin(), large.end());
-    std::vector<TagObservation> found =
-        search_windows(*fine(worker), frame.image.view(), windows, false);
-    std::ranges::move(
-        search_windows(*searchers_[worker].coarse, frame.image.view(), reduced, false),
-        std::back_inserter(found));
-    if (!found.empty() && found.size() >= before.back().size()) return found;
-    for (TagObservation& tag : search_whole(worker, frame, false)) {
-      const bool known = std::ranges::any_of(found, [&](const TagObservation& other) {
-        return other.id == tag.id && is_same_place(other.corners_px, tag.corners_px);
+    const std::vector<TagObservation>& before_last =
+        before.size() > 1 ? before[before.size() - 2] : none;
+    std::vector<TagObservation> found;
+    std::vector<TagWindow> windows;
+    std::vector<TagWindow> reduced;
+    for (const TagObservation& tag : before.back()) {
+      const TagPrediction expected = predict_tag(tag, before_last);
+      if (auto followed = follow_edges(tag, expected, image_before, frame)) {
+        found.push_back(std::move(*followed));
+      } else if (const auto window = window_around(tag.id, expected.corners_px, expected.reach,
+                                                   frame.image.width, frame.image.height)) {
+        (window->edge < kSeenReduced ? windows : reduced).push_back(*window);
+      }
+    }
+    const ImageView image = frame.image.view();
+    const auto add = [&](std::vector<TagObservation> tags) {
+      std::ranges::move(finish(std::move(tags), frame), std::back_inserter(found));
+    };
+    add(search_windows(*fine(worker), image, windows, false));
+    add(search_windows(*searchers_[worker].coarse, image, reduced, false));
+    if (found.empty() || found.size() < before.back().size()) {
+      std::vector<TagObservation> others = search_whole(worker, frame, false);
+      std::erase_if(others, [&](const TagObservation& tag) {
+        return std::ranges::any_of(found, [&](const TagObservation& known) {
+          return known.id == tag.id && is_same_place(known.corners_px, tag.corners_px);
+        });
       });
-      if (!known) found.push_back(std::move(tag));
+      add(std::move(others));
     }
     sort_detections(found);
     return found;
+  }
+
+  // Without a search; only from corners that were themselves refined and belong to all of it.
+  std::optional<TagObservation> follow_edges(const TagObservation& last,
+                                             const TagPrediction& expected,
+                                             const ImageView& image_before,
+                                             const VideoFrame& frame) const {
+    if (!expected.motion_known || last.partly_hidden || !(last.sigma_px < detector_sigma_))
+      return std::nullopt;
+    const Corners start = as_corners(expected.corners_px);
+    const Corners seen = as_corners(last.corners_px);
+    const auto refined = follow_tag(frame.image.view(), start, {image_before, seen}, layout_);
+    if (!refined) return std::nullopt;
+    TagObservation tag = last;
+    take(tag, *refined, frame);
+    return tag;
   }
 
   // Refined corners, sigma and frame number.
   std::vector<TagObservation> finish(std::vector<TagObservation> tags,
                                      const VideoFrame& frame) const {
     for (TagObservation& tag : tags) {
-      tag.frame = frame.index;
-      tag.sigma_px = detector_sigma_;
-      if (!options_.refine_corners) continue;
-      Corners start;
-      std::ranges::copy(tag.corners_px, start.begin());
-      const RefinedCorners refined = refine_corners(frame.image.view(), start, layout_);
-      if (refined.status == RefineStatus::kDone) {
-        std::ranges::copy(refined.corners_px, tag.corners_px.begin());
-        tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+      if (options_.refine_corners) {
+        take(tag, refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_), frame);
+      } else {
+        take(tag, {}, frame);
       }
-      tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
     }
     return tags;
+  }
+
+  static Corners as_corners(const std::vector<Eigen::Vector2d>& corners_px) {
+    Corners out;
+    std::ranges::copy(corners_px, out.begin());
+    return out;
+  }
+
+  void take(TagObservation& tag, const RefinedCorners& refined, const VideoFrame& frame) const {
+    tag.frame = frame.index;
+    tag.sigma_px = detector_sigma_;
+    if (refined.status == RefineStatus::kDone) {
+      std::ranges::copy(refined.corners_px, tag.corners_px.begin());
+      tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+    }
+    tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
   }
 
   // Where to look again: markers that are there before or after a frame, and not in it.

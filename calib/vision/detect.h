@@ -5,11 +5,11 @@
 // with a
 //         reason.
 // Method  whole frames at full resolution now and then, so that markers that enter are noticed;
-//         between them markers are followed in windows, and the whole frame is searched at reduced
-//         resolution where one of them is lost. Markers lost on the way are looked for again where
-//         their neighbours in time say they are; refine_corners() gives corners and sigma,
-//         pattern_shift.h finds what is covered, sightings.h decides what is believed. Pictures
-//         taken one by one are searched whole.
+//         between them markers are followed by their edges alone (follow_tag.h), else in windows,
+//         and the whole frame is searched at reduced resolution where one of them is lost. Markers
+//         lost on the way are looked for again where their neighbours in time say they are;
+//         refine_corners() gives corners and sigma, pattern_shift.h finds what is covered,
+//         sightings.h decides what is believed. Pictures taken one by one are searched whole.
 #pragma once
 
 #include <filesystem>

@@ -11,13 +11,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "calib/vision/marker_cells.h"
 #include "calib/vision/marker_edges.h"
 
 namespace kinescope {
 namespace {
 
-constexpr double kMiddle = 0.2;          // of a cell: how far from its middle its grey is looked at
-constexpr double kMinContrast = 12.0;    // grey levels between dark and bright cells
 constexpr std::size_t kFewestSteps = 8;  // in each direction, for the four numbers of the warp
 // What else moves cells against corners, measured on pictures of whole markers: pixels, blur from
 // cells further on, noise (over contrast), and the lens, which bends edges by up to this, 1/px.
@@ -38,34 +37,26 @@ struct Step {
   double shift = 0.0;  // across
 };
 
-// The marker's cells as the image shows them where H puts them.
+// The marker's cells as the image shows them where H puts them, and the steps between them.
 class Code {
  public:
   Code(const ImageView& image, const Eigen::Matrix3d& H, int cells)
-      : image_(image), H_(H), cells_(cells), width_(2.0 / cells), level_(cells, cells) {
-    for (int i = 0; i < cells; ++i) {
-      for (int j = 0; j < cells; ++j) {
-        double sum = 0.0;
-        for (const double dx : {-kMiddle, 0.0, kMiddle}) {
-          for (const double dy : {-kMiddle, 0.0, kMiddle})
-            sum += grey({middle(i) + dx * width_, middle(j) + dy * width_});
-        }
-        level_(i, j) = sum / 9.0;
-      }
-    }
-    contrast_ = level_.maxCoeff() - level_.minCoeff();
-  }
+      : image_(image),
+        H_(H),
+        count_(cells),
+        width_(2.0 / cells),
+        cells_(read_cells(image, H, cells)) {}
 
-  [[nodiscard]] bool is_readable() const { return contrast_ > kMinContrast; }
+  [[nodiscard]] bool is_readable() const { return cells_.is_readable(); }
 
   // Steps across direction 0 (x) or 1 (y).
   [[nodiscard]] std::vector<Step> steps(int direction) const {
     std::vector<Step> out;
-    for (int i = 0; i + 1 < cells_; ++i) {
-      for (int j = 0; j < cells_; ++j) {
-        const double before = direction == 0 ? level_(i, j) : level_(j, i);
-        const double after = direction == 0 ? level_(i + 1, j) : level_(j, i + 1);
-        if (std::abs(after - before) < 0.5 * contrast_) continue;
+    for (int i = 0; i + 1 < count_; ++i) {
+      for (int j = 0; j < count_; ++j) {
+        const double before = direction == 0 ? cells_.level(i, j) : cells_.level(j, i);
+        const double after = direction == 0 ? cells_.level(i + 1, j) : cells_.level(j, i + 1);
+        if (std::abs(after - before) < 0.5 * cells_.contrast) continue;
         const double across = middle(i) + 0.5 * width_;
         Step step{{across, middle(j)}, shift(direction, across, middle(j), before, after)};
         if (direction == 1) std::swap(step.at.x(), step.at.y());
@@ -78,18 +69,8 @@ class Code {
  private:
   [[nodiscard]] double middle(int i) const { return -1.0 + (i + 0.5) * width_; }
 
-  // Between pixels; beyond the image's rim what is at the rim.
   [[nodiscard]] double grey(const Eigen::Vector2d& at) const {
-    const Eigen::Vector2d p = (H_ * at.homogeneous()).hnormalized();
-    const double x = std::clamp(p.x(), 0.0, image_.width - 1.001);
-    const double y = std::clamp(p.y(), 0.0, image_.height - 1.001);
-    const int left = static_cast<int>(x);
-    const int top = static_cast<int>(y);
-    const std::uint8_t* row = image_.data + static_cast<std::ptrdiff_t>(image_.stride) * top + left;
-    const std::uint8_t* next = row + image_.stride;
-    const double a = x - left;
-    return (1.0 - (y - top)) * ((1.0 - a) * row[0] + a * row[1]) +
-           (y - top) * ((1.0 - a) * next[0] + a * next[1]);
+    return grey_at(image_, (H_ * at.homogeneous()).hnormalized());
   }
 
   // Where the step is by how much of the way between the two middles is like the first one.
@@ -99,7 +80,7 @@ class Code {
     double sum = 0.0;
     for (int k = 0; k < kSamples; ++k) {
       const double u = across + ((k + 0.5) / kSamples - 0.5) * width_;
-      for (const double d : {-kMiddle, 0.0, kMiddle}) {
+      for (const double d : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
         const double v = along + d * width_;
         sum += direction == 0 ? grey({u, v}) : grey({v, u});
       }
@@ -110,10 +91,9 @@ class Code {
 
   const ImageView& image_;
   Eigen::Matrix3d H_;
-  int cells_;
+  int count_;  // of cells along an edge
   double width_;
-  Eigen::MatrixXd level_;
-  double contrast_ = 0.0;
+  MarkerCells cells_;
 };
 
 Eigen::Vector4d bilinear(const Eigen::Vector2d& at) {

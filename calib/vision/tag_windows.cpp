@@ -56,22 +56,15 @@ std::optional<TagWindow> window_around(TagId id, const std::vector<Eigen::Vector
   return window;
 }
 
-std::vector<TagWindow> windows_after(const std::vector<TagObservation>& last,
-                                     const std::vector<TagObservation>& before_last, int width,
-                                     int height) {
-  std::vector<TagWindow> out;
-  for (const TagObservation& tag : last) {
-    std::vector<Eigen::Vector2d> expected = tag.corners_px;
-    double reach = 0.0;
-    const auto before = std::ranges::find(before_last, tag.id, &TagObservation::id);
-    if (before != before_last.end()) {
-      for (std::size_t c = 0; c < expected.size(); ++c)
-        expected[c] += tag.corners_px[c] - before->corners_px[c];
-      reach = kChangeOfMotion * corner_distance_px(tag.corners_px, before->corners_px);
-    }
-    if (const auto window = window_around(tag.id, expected, reach, width, height))
-      out.push_back(*window);
-  }
+TagPrediction predict_tag(const TagObservation& last,
+                          const std::vector<TagObservation>& before_last) {
+  TagPrediction out{last.corners_px, 0.0, false};
+  const auto before = std::ranges::find(before_last, last.id, &TagObservation::id);
+  if (before == before_last.end()) return out;
+  for (std::size_t c = 0; c < out.corners_px.size(); ++c)
+    out.corners_px[c] += last.corners_px[c] - before->corners_px[c];
+  out.reach = kChangeOfMotion * corner_distance_px(last.corners_px, before->corners_px);
+  out.motion_known = true;
   return out;
 }
 

@@ -25,11 +25,16 @@ struct TagWindow {
                                                      const std::vector<Eigen::Vector2d>& corners_px,
                                                      double reach, int width, int height);
 
-/// Windows for the markers of a frame from those of the frame before it and, for their motion, of
-/// the one before that (empty: unknown).
-[[nodiscard]] std::vector<TagWindow> windows_after(const std::vector<TagObservation>& last,
-                                                   const std::vector<TagObservation>& before_last,
-                                                   int width, int height);
+/// Where a marker should be in the next frame.
+struct TagPrediction {
+  std::vector<Eigen::Vector2d> corners_px;
+  double reach = 0.0;         ///< px around them, for what its motion may change by
+  bool motion_known = false;  ///< it was also seen in the frame before
+};
+
+/// From its sighting in a frame and, for its motion, those of the frame before that.
+[[nodiscard]] TagPrediction predict_tag(const TagObservation& last,
+                                        const std::vector<TagObservation>& before_last);
 
 /// In each window the marker that it was made for. `dimmed`: where it is not seen, brightness is
 /// cut off, step by step: a glint beside a marker hides it from a detector that thresholds by the

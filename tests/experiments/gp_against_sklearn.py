@@ -16,10 +16,16 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 
 import numpy as np
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+
+# Length scales that end at their bound belong to inputs that do not matter.
+warnings.simplefilter("ignore", ConvergenceWarning)
 
 
 def scikit_learn(data):

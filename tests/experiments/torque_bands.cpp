@@ -2,7 +2,8 @@
 //
 // What the 90 and 95 % bands of torque models hold on motion that no fit has seen: measured logs of
 // others and simulated ones (white noise, noise with memory, friction that the model lacks). Beside
-// the calibrated bands those of the normal distribution, from the sigma that the model claims.
+// the calibrated bands those of the normal distribution, from the sigma that the model claims; and
+// the error (nMSE, %) of every model on the same samples.
 //   build/test/torque_bands [--sets ur10e,..] [--models parametric,gip] [--samples 1000]
 //   build/test/torque_bands --rotate 5 --samples 400 --search 250   # less scatter of one hold-out
 #include <string>
@@ -85,11 +86,13 @@ Covered rotated(TorqueModelKind kind, const TorqueSet& set, int folds,
   const auto add = [&](TorqueScore& sum, const TorqueScore& one) {
     const Eigen::Index joints = one.coverage_90.size();
     if (sum.coverage_90.size() == 0) {
-      sum.coverage_90 = sum.coverage_95 = sum.extrapolated = Eigen::VectorXd::Zero(joints);
+      sum.coverage_90 = sum.coverage_95 = sum.extrapolated = sum.nmse_percent =
+          Eigen::VectorXd::Zero(joints);
     }
     sum.coverage_90 += one.coverage_90 / count;
     sum.coverage_95 += one.coverage_95 / count;
     sum.extrapolated += one.extrapolated / count;
+    sum.nmse_percent += one.nmse_percent / count;
   };
   for (const Fold& fold : outer.folds) {
     const Covered one = covered(kind, set, select_rows(set.train, fold.train),
@@ -111,6 +114,7 @@ void judge(const TorqueSet& set, const Options& options) {
   fmt::print("\n{}: {}; {} training and {} test samples\n", set.name,
              options.rotate > 1 ? "folds of the training part" : set.split, set.train.size(),
              set.test.size());
+  if (!set.first_fit.empty()) fmt::print("{:>16} nMSE {}\n", "first fit", set.first_fit);
   for (const std::string& name : options.models) {
     const TorqueModelKind kind = torque_model_kind(name).value();
     const Covered found = options.rotate > 1 ? rotated(kind, set, options.rotate, models)
@@ -120,6 +124,9 @@ void judge(const TorqueSet& set, const Options& options) {
                fmt::format("{} folds", found.folds), per_cent(found.calibrated.coverage_95),
                per_cent(found.claimed.coverage_95));
     fmt::print("{:>16} extrapolated {}\n", "", per_cent(found.calibrated.extrapolated));
+    fmt::print("{:>16} nMSE", "");
+    for (const double error : found.calibrated.nmse_percent) fmt::print(" {:.3g}", error);
+    fmt::print("\n");
     std::fflush(stdout);
   }
 }

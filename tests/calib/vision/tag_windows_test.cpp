@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/tag_windows.h"
 
-#include <algorithm>
 
 #include <gtest/gtest.h>
 
@@ -20,12 +19,6 @@ TagObservation marker(int id, const Eigen::Vector2d& centre, double edge) {
     out.corners_px.emplace_back(centre + d);
   }
   return out;
-}
-
-bool holds(const TagWindow& window, const TagObservation& tag) {
-  return std::ranges::all_of(tag.corners_px, [&](const Eigen::Vector2d& c) {
-    return c.x() > window.x0 && c.x() < window.x1 && c.y() > window.y0 && c.y() < window.y1;
-  });
 }
 
 TEST(TagWindows, HoldTheMarkerAndItsMarginInsideTheImage) {
@@ -54,13 +47,13 @@ TEST(TagWindows, FollowTheMotion) {
   const TagObservation before = marker(7, {100.0, 100.0}, 20.0);
   const TagObservation last = marker(7, {160.0, 110.0}, 20.0);
   const TagObservation next = marker(7, {220.0, 120.0}, 20.0);
-  const auto followed = windows_after({last}, {before}, kWidth, kHeight);
-  ASSERT_EQ(followed.size(), 1U);
-  EXPECT_TRUE(holds(followed[0], next));
-  const auto unknown = windows_after({last}, {}, kWidth, kHeight);
-  ASSERT_EQ(unknown.size(), 1U);
-  EXPECT_TRUE(holds(unknown[0], last));
-  EXPECT_FALSE(holds(unknown[0], next));
+  const TagPrediction followed = predict_tag(last, {before});
+  EXPECT_TRUE(followed.motion_known);
+  EXPECT_EQ(followed.corners_px, next.corners_px);
+  EXPECT_GT(followed.reach, 0.0);
+  const TagPrediction unknown = predict_tag(last, {});
+  EXPECT_FALSE(unknown.motion_known);
+  EXPECT_EQ(unknown.corners_px, last.corners_px);
 }
 
 }  // namespace

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/vision/marker_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/Geometry>
+
+namespace kinescope {
+namespace {
+
+constexpr double kMinContrast = 12.0;  // grey levels between dark and bright cells
+constexpr double kClear = 0.15;        // of the contrast, away from half way: dark or bright
+constexpr double kMostUnclear = 0.25;  // of the cells
+
+}  // namespace
+
+double grey_at(const ImageView& image, const Eigen::Vector2d& px) {
+  const double x = std::clamp(px.x(), 0.0, image.width - 1.001);
+  const double y = std::clamp(px.y(), 0.0, image.height - 1.001);
+  const int left = static_cast<int>(x);
+  const int top = static_cast<int>(y);
+  const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * top + left;
+  const std::uint8_t* next = row + image.stride;
+  const double a = x - left;
+  return (1.0 - (y - top)) * ((1.0 - a) * row[0] + a * row[1]) +
+         (y - top) * ((1.0 - a) * next[0] + a * next[1]);
+}
+
+bool MarkerCells::is_readable() const { return contrast > kMinContrast; }
+
+MarkerCells read_cells(const ImageView& image, const Eigen::Matrix3d& H, int cells) {
+  const double width = 2.0 / cells;
+  const auto middle = [&](int i) { return -1.0 + (i + 0.5) * width; };
+  MarkerCells out{Eigen::MatrixXd(cells, cells), 0.0};
+  for (int i = 0; i < cells; ++i) {
+    for (int j = 0; j < cells; ++j) {
+      double sum = 0.0;
+      for (const double dx : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
+        for (const double dy : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
+          const Eigen::Vector2d at(middle(i) + dx * width, middle(j) + dy * width);
+          sum += grey_at(image, (H * at.homogeneous()).hnormalized());
+        }
+      }
+      out.level(i, j) = sum / 9.0;
+    }
+  }
+  out.contrast = out.level.maxCoeff() - out.level.minCoeff();
+  return out;
+}
+
+bool is_same_code(const MarkerCells& a, const MarkerCells& b) {
+  if (!a.is_readable() || !b.is_readable() || a.level.size() != b.level.size()) return false;
+  // -0.5 (darkest) to 0.5 (brightest)
+  const auto place = [](const MarkerCells& cells, Eigen::Index k) {
+    return (cells.level(k) - cells.level.minCoeff()) / cells.contrast - 0.5;
+  };
+  Eigen::Index unclear = 0;
+  for (Eigen::Index k = 0; k < a.level.size(); ++k) {
+    const double in_a = place(a, k);
+    const double in_b = place(b, k);
+    if (std::min(std::abs(in_a), std::abs(in_b)) < kClear) {
+      ++unclear;
+    } else if ((in_a < 0.0) != (in_b < 0.0)) {
+      return false;
+    }
+  }
+  return static_cast<double>(unclear) <= kMostUnclear * static_cast<double>(a.level.size());
+}
+
+}  // namespace kinescope
