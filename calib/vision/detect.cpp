@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -31,6 +32,10 @@ constexpr double kCompressionSigma = 0.025;
 // A gap in a track is searched where sightings on both sides, or one of them, are this near.
 constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
+constexpr std::size_t kMostWaitingBytes = 512U << 20U;  // frames that wait for what later ones tell
+constexpr std::size_t kRunsTogether = 6;  // runs of frames read between two gap searches
+constexpr int kLookEvery = 10;  // frames: the whole of one is searched at reduced resolution
+constexpr const char* kStage = "finding markers";
 constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
 constexpr double kSeenReduced = 50.0;  // px; markers as large are followed at reduced resolution
 
@@ -43,7 +48,9 @@ struct Searcher {
 class Detecting {
  public:
   Detecting(const MarkerSet& markers, const DetectOptions& options)
-      : options_(options), layout_(tag_layout(markers.family)) {
+      : options_(options),
+        layout_(tag_layout(markers.family)),
+        every_(std::max(1, options.full_search_every)) {
     detector_sigma_ = markers.family.starts_with("DICT") ? kArucoSigma : kAprilTagSigma;
     DetectorOptions fine = options.detector;
     fine.decimate = 1.0;
@@ -54,56 +61,55 @@ class Detecting {
     }
   }
 
-  Detection search_frames(const std::filesystem::path& video, const Progress& progress) {
+  Detection run(const std::filesystem::path& video, const MarkerSet& markers,
+                const Progress& progress) {
     const std::unique_ptr<VideoReader> reader = open_video(video);
-    lossy_ = is_lossy(reader->info().codec);
-    Detection out;
-    out.observations.width = reader->info().width;
-    out.observations.height = reader->info().height;
+    const VideoInfo& info = reader->info();
+    lossy_ = is_lossy(info.codec);
     // Pictures that were taken one by one need not follow from one another.
-    const bool follows = reader->info().codec != "images";
-    const int every = std::max(1, options_.full_search_every);
-    out.observations.times_s = for_each_run(
-        *reader, searchers_.size(), follows ? static_cast<std::size_t>(every) : 1,
-        [&](std::size_t worker, const std::vector<VideoFrame>& run) {
-          FrameTags found;
-          for (std::size_t i = 0; i < run.size(); ++i) {
-            const bool full = run[i].index % every == 0;
-            found.push_back(found.empty() ? finish(search_whole(worker, run[i], full), run[i])
-                                          : follow(worker, run[i], run[i - 1].image.view(), found));
-          }
-          return found;
-        },
-        tags_, progress, "finding markers");
-    out.warnings = reader->warnings();
-    return out;
-  }
-
-  // Once more through the video, only where a marker was lost.
-  void search_gaps(const std::filesystem::path& video, const Detection& so_far,
-                   const Progress& progress) {
-    const std::map<int, std::vector<TagWindow>> windows = find_gaps(so_far.observations);
-    if (windows.empty()) return;
-    const std::unique_ptr<VideoReader> reader = open_video(video);
-    FrameTags more;
-    for_each_run(
-        *reader, searchers_.size(), 1,
-        [&](std::size_t worker, const std::vector<VideoFrame>& run) {
-          const VideoFrame& frame = run.front();
-          const auto found = windows.find(frame.index);
-          if (found == windows.end()) return FrameTags(1);
-          return FrameTags{finish(
-              search_windows(*fine(worker), frame.image.view(), found->second, true), frame)};
-        },
-        more, progress, "searching gaps");
-    for (std::size_t f = 0; f < std::min(more.size(), tags_.size()); ++f) {
-      tags_[f].insert(tags_[f].end(), more[f].begin(), more[f].end());
+    const bool follows = info.codec != "images";
+    const std::size_t run_length = follows ? static_cast<std::size_t>(every_) : 1;
+    Detection out;
+    TagObservations& found = out.observations;
+    found.width = info.width;
+    found.height = info.height;
+    std::vector<SearchedFrame> waiting;  // searched, not yet for gaps
+    const std::size_t most = most_frames(info);
+    const auto every = static_cast<std::size_t>(every_);
+    const std::size_t block = every * std::clamp<std::size_t>(most / every, 1, kRunsTogether);
+    const auto read = [&](SearchedFrame& next) {
+      std::optional<VideoFrame> frame = reader->next();
+      if (!frame) return false;
+      next = {std::move(*frame), {}};
+      report_progress(progress, kStage, next.frame.index + 1, info.frame_count);
+      return true;
+    };
+    for (bool ended = false; !ended;) {
+      const std::size_t begin = waiting.size();
+      waiting.resize(begin + block);
+      const std::size_t count = for_each_run(
+          std::span(waiting).subspan(begin), run_length, searchers_.size(), read,
+          [&](std::size_t worker, std::span<SearchedFrame> run) { search_run(worker, run); });
+      ended = begin + count < waiting.size();
+      waiting.resize(begin + count);
+      for (std::size_t i = begin; i < waiting.size(); ++i) {
+        found.times_s.push_back(waiting[i].frame.time_s);
+        std::ranges::copy(waiting[i].tags, std::back_inserter(found.observations));
+        std::ranges::copy(waiting[i].tags, std::back_inserter(recent_));
+      }
+      const std::size_t due = ended ? waiting.size() : count_due(waiting, most);
+      if (looks_for_gaps()) {
+        search_gaps(std::span(waiting).first(due), found, markers);
+        for (std::size_t i = 0; i < due; ++i) {
+          std::ranges::move(waiting[i].tags, std::back_inserter(found.observations));
+        }
+      }
+      waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(due));
     }
-  }
-
-  [[nodiscard]] std::vector<TagObservation> all() const {
-    std::vector<TagObservation> out;
-    for (const auto& frame : tags_) out.insert(out.end(), frame.begin(), frame.end());
+    out.warnings = reader->warnings();
+    // A file that ends early, or does not say how long it is.
+    const int frames = static_cast<int>(found.times_s.size());
+    if (frames != info.frame_count) report_progress(progress, kStage, frames, frames);
     return out;
   }
 
@@ -119,22 +125,91 @@ class Detecting {
     return (searcher.fine ? searcher.fine : searcher.coarse).get();
   }
 
+  // Consecutive frames: the first one whole, from there on the markers are followed.
+  void search_run(std::size_t worker, std::span<SearchedFrame> run) const {
+    for (std::size_t i = 0; i < run.size(); ++i) {
+      const bool full = run[i].frame.index % every_ == 0;
+      run[i].tags = i == 0 ? finish(search_whole(worker, run[i].frame, full), run[i].frame)
+                           : follow(worker, run.first(i + 1));
+    }
+  }
+
+  [[nodiscard]] bool looks_for_gaps() const {
+    return options_.fill_gaps && options_.detector.decimate > 1.0;
+  }
+
+  static std::size_t most_frames(const VideoInfo& info) {
+    const std::size_t pixels =
+        static_cast<std::size_t>(info.width) * static_cast<std::size_t>(info.height);
+    return kMostWaitingBytes / std::max<std::size_t>(1, pixels);
+  }
+
+  // The frames about which nothing more will be learned from later ones, or that are more than may
+  // wait.
+  [[nodiscard]] static std::size_t count_due(const std::vector<SearchedFrame>& waiting,
+                                             std::size_t most) {
+    if (waiting.empty()) return 0;
+    const double newest = waiting.back().frame.time_s;
+    const auto later = std::ranges::find_if(waiting, [&](const SearchedFrame& searched) {
+      return newest - searched.frame.time_s < kGapBothSides_s;
+    });
+    return std::max(static_cast<std::size_t>(later - waiting.begin()),
+                    waiting.size() - std::min(most, waiting.size()));
+  }
+
+  // Frames once more, only where a marker was lost; their tags are then those found so.
+  void search_gaps(std::span<SearchedFrame> frames, const TagObservations& all,
+                   const MarkerSet& markers) {
+    if (frames.empty()) return;
+    // What may tell of these frames, with frames counted from the first of them.
+    const double oldest = frames.front().frame.time_s - kGapBothSides_s;
+    const int own = frames.front().frame.index;
+    const auto known_from = std::ranges::lower_bound(all.times_s, oldest);
+    const int first = std::min(own, static_cast<int>(known_from - all.times_s.begin()));
+    std::erase_if(recent_, [&](const TagObservation& tag) { return tag.frame < first; });
+    TagObservations near;
+    near.times_s.assign(all.times_s.begin() + first, all.times_s.end());
+    near.width = all.width;
+    near.height = all.height;
+    near.observations = recent_;
+    for (TagObservation& tag : near.observations) tag.frame -= first;
+    (void)sort_out_sightings(near, markers, std::min(2, options_.min_sightings));
+    const int begin = own - first;
+    const std::map<int, std::vector<TagWindow>> windows =
+        find_gaps(near, begin, begin + static_cast<int>(frames.size()));
+    for_each_run(
+        frames, 1, searchers_.size(), [](SearchedFrame&) { return true; },
+        [&](std::size_t worker, std::span<SearchedFrame> run) {
+          SearchedFrame& searched = run.front();
+          searched.tags.clear();
+          const auto found = windows.find(searched.frame.index - first);
+          if (found == windows.end()) return;
+          searched.tags = finish(
+              search_windows(*fine(worker), searched.frame.image.view(), found->second, true),
+              searched.frame);
+        });
+  }
+
   std::vector<TagObservation> search_whole(std::size_t worker, const VideoFrame& frame,
                                            bool full) const {
     return (full ? fine(worker) : searchers_[worker].coarse.get())->detect(frame.image.view());
   }
 
   // The markers of the frame before, each where it should be: by its edges alone where its motion
-  // is known, else by a search nearby; the whole frame where one of them is not there any more.
-  std::vector<TagObservation> follow(std::size_t worker, const VideoFrame& frame,
-                                     const ImageView& image_before, const FrameTags& before) const {
+  // is known, else by a search nearby; the whole frame where one of them is not there any more, and
+  // now and then for those that enter.
+  // `run` ends with the frame to search.
+  std::vector<TagObservation> follow(std::size_t worker, std::span<const SearchedFrame> run) const {
+    const VideoFrame& frame = run.back().frame;
+    const SearchedFrame& before = run[run.size() - 2];
+    const ImageView image_before = before.frame.image.view();
     const std::vector<TagObservation> none;
     const std::vector<TagObservation>& before_last =
-        before.size() > 1 ? before[before.size() - 2] : none;
+        run.size() > 2 ? run[run.size() - 3].tags : none;
     std::vector<TagObservation> found;
     std::vector<TagWindow> windows;
     std::vector<TagWindow> reduced;
-    for (const TagObservation& tag : before.back()) {
+    for (const TagObservation& tag : before.tags) {
       const TagPrediction expected = predict_tag(tag, before_last);
       if (auto followed = follow_edges(tag, expected, image_before, frame)) {
         found.push_back(std::move(*followed));
@@ -149,7 +224,7 @@ class Detecting {
     };
     add(search_windows(*fine(worker), image, windows, false));
     add(search_windows(*searchers_[worker].coarse, image, reduced, false));
-    if (found.empty() || found.size() < before.back().size()) {
+    if (found.empty() || found.size() < before.tags.size() || frame.index % kLookEvery == 0) {
       std::vector<TagObservation> others = search_whole(worker, frame, false);
       std::erase_if(others, [&](const TagObservation& tag) {
         return std::ranges::any_of(found, [&](const TagObservation& known) {
@@ -207,15 +282,17 @@ class Detecting {
     tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
   }
 
-  // Where to look again: markers that are there before or after a frame, and not in it.
-  std::map<int, std::vector<TagWindow>> find_gaps(const TagObservations& so_far) const {
+  // Where to look again in frames from `begin` to `end`: markers that are there before or after a
+  // frame, and not in it.
+  static std::map<int, std::vector<TagWindow>> find_gaps(const TagObservations& so_far, int begin,
+                                                         int end) {
     std::map<TagId, std::vector<const TagObservation*>> tracks;
     for (const TagObservation& tag : so_far.observations) tracks[tag.id].push_back(&tag);
     std::map<int, std::vector<TagWindow>> out;
     const auto& times = so_far.times_s;
     for (const auto& [id, track] : tracks) {
       std::size_t next = 0;
-      for (int f = 0; f < static_cast<int>(times.size()); ++f) {
+      for (int f = begin; f < end; ++f) {
         while (next < track.size() && track[next]->frame < f) ++next;
         if (next < track.size() && track[next]->frame == f) continue;
         const TagObservation* before = next > 0 ? track[next - 1] : nullptr;
@@ -254,8 +331,9 @@ class Detecting {
   TagLayout layout_;
   double detector_sigma_ = kAprilTagSigma;
   bool lossy_ = true;
+  int every_;
   std::vector<Searcher> searchers_;
-  FrameTags tags_;
+  std::vector<TagObservation> recent_;  // found without gaps, of frames that may tell of others
 };
 
 }  // namespace
@@ -263,14 +341,7 @@ class Detecting {
 Detection detect_tags(const std::filesystem::path& video, const MarkerSet& markers,
                       const DetectOptions& options, const Progress& progress) {
   Detecting detecting(markers, options);
-  Detection out = detecting.search_frames(video, progress);
-  if (options.fill_gaps && options.detector.decimate > 1.0) {
-    Detection first = out;
-    first.observations.observations = detecting.all();
-    (void)sort_out_sightings(first.observations, markers, std::min(2, options.min_sightings));
-    detecting.search_gaps(video, first, progress);
-  }
-  out.observations.observations = detecting.all();
+  Detection out = detecting.run(video, markers, progress);
   for (std::string& warning :
        sort_out_sightings(out.observations, markers, options.min_sightings)) {
     out.warnings.push_back(std::move(warning));

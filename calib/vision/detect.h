@@ -29,7 +29,7 @@ struct DetectOptions {
   int min_sightings =
       5;  ///< markers seen in fewer frames (or a tenth of a short recording) are ghosts
   int full_search_every =
-      10;                 ///< every so many frames the whole of one is searched at full resolution
+      30;                 ///< every so many frames the whole of one is searched at full resolution
   bool fill_gaps = true;  ///< look again, at full resolution, where a marker should be
   bool refine_corners = true;  ///< false keeps the detector's corners
 };

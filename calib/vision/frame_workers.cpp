@@ -5,13 +5,13 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
-#include <utility>
 
 namespace kinescope {
 namespace {
 
-using Run = std::vector<VideoFrame>;
+using Run = std::span<SearchedFrame>;
 
 // Runs on their way from the reader to the workers; holds a few, so that memory stays small.
 class RunQueue {
@@ -23,7 +23,7 @@ class RunQueue {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || runs_.size() < capacity_; });
     if (closed_) return false;
-    runs_.push_back(std::move(run));
+    runs_.push_back(run);
     changed_.notify_all();
     return true;
   }
@@ -32,7 +32,7 @@ class RunQueue {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || !runs_.empty(); });
     if (runs_.empty()) return std::nullopt;
-    Run run = std::move(runs_.front());
+    const Run run = runs_.front();
     runs_.pop_front();
     changed_.notify_all();
     return run;
@@ -61,56 +61,43 @@ class RunQueue {
 
 }  // namespace
 
-std::vector<double> for_each_run(VideoReader& reader, std::size_t workers, std::size_t run_length,
-                                 const FrameWork& work, FrameTags& results,
-                                 const Progress& progress, std::string_view stage) {
-  results.clear();
+std::size_t for_each_run(std::span<SearchedFrame> frames, std::size_t run_length,
+                         std::size_t workers, const FillFrame& fill, const RunWork& work) {
   RunQueue queue(workers);
   std::mutex mutex;
   std::exception_ptr failure;
+  const auto fail = [&] {
+    const std::lock_guard lock(mutex);
+    if (!failure) failure = std::current_exception();
+  };
   const auto work_off = [&](std::size_t worker) {
     try {
-      while (const std::optional<Run> run = queue.pop()) {
-        FrameTags found = work(worker, *run);
-        const std::lock_guard lock(mutex);
-        for (std::size_t i = 0; i < run->size(); ++i) {
-          const auto index = static_cast<std::size_t>((*run)[i].index);
-          if (results.size() <= index) results.resize(index + 1);
-          results[index] = std::move(found[i]);
-        }
-      }
+      while (const std::optional<Run> run = queue.pop()) work(worker, *run);
     } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
+      fail();
       queue.close_and_drop();
     }
   };
-  std::vector<double> times;
+  std::size_t filled = 0;
   {
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < workers; ++i) threads.emplace_back(work_off, i);
     try {
-      Run run;
-      while (std::optional<VideoFrame> frame = reader.next()) {
-        times.push_back(frame->time_s);
-        run.push_back(std::move(*frame));
-        report_progress(progress, stage, static_cast<int>(times.size()), reader.info().frame_count);
-        if (run.size() < run_length) continue;
-        if (!queue.push(std::exchange(run, {}))) break;
+      std::size_t begin = 0;
+      while (filled < frames.size() && fill(frames[filled])) {
+        ++filled;
+        if (filled - begin < run_length) continue;
+        if (!queue.push(frames.subspan(begin, run_length))) break;
+        begin = filled;
       }
-      if (!run.empty()) (void)queue.push(std::move(run));
+      if (filled > begin) (void)queue.push(frames.subspan(begin, filled - begin));
     } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
+      fail();
     }
     queue.close();
   }  // threads join
   if (failure) std::rethrow_exception(failure);
-  // A file that ends early, or does not say how long it is.
-  const int frames = static_cast<int>(times.size());
-  if (frames != reader.info().frame_count) report_progress(progress, stage, frames, frames);
-  results.resize(times.size());
-  return times;
+  return filled;
 }
 
 }  // namespace kinescope

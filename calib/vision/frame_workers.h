@@ -1,30 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs of frames as the unit of parallel work: one thread reads, others work, results stand in the
-// order of the frames.
+// Runs of frames as the unit of parallel work: one thread fills them, others work on them in place.
 #pragma once
 
 #include <functional>
-#include <string_view>
+#include <span>
 #include <vector>
 
 #include "calib/camera/tag_observations.h"
 #include "calib/vision/video.h"
-#include "kinematics/core/progress.h"
 
 namespace kinescope {
 
-/// The markers in each frame, in the order of the frames.
-using FrameTags = std::vector<std::vector<TagObservation>>;
+/// A frame with the markers found in it.
+struct SearchedFrame {
+  VideoFrame frame;
+  std::vector<TagObservation> tags;
+};
+
+/// Makes the next frame of a span ready; false where there is none any more.
+using FillFrame = std::function<bool(SearchedFrame& frame)>;
 
 /// Called on a worker thread with consecutive frames; `worker` counts from 0.
-using FrameWork = std::function<FrameTags(std::size_t worker, const std::vector<VideoFrame>& run)>;
+using RunWork = std::function<void(std::size_t worker, std::span<SearchedFrame> run)>;
 
-/// Reads to the end, in runs of `run_length` frames from the first one on (the last one may be
-/// shorter); results[i] is what `work` gave for frame i. Returns the frames' times. The first
-/// exception of a worker is thrown again here.
-std::vector<double> for_each_run(VideoReader& reader, std::size_t workers, std::size_t run_length,
-                                 const FrameWork& work, FrameTags& results,
-                                 const Progress& progress, std::string_view stage);
+/// Fills `frames` in their order and has runs of `run_length` of them worked on (the last one may
+/// be shorter) while further ones are filled. Returns how many were filled. The first exception of
+/// `fill` or of a worker is thrown again here.
+std::size_t for_each_run(std::span<SearchedFrame> frames, std::size_t run_length,
+                         std::size_t workers, const FillFrame& fill, const RunWork& work);
 
 }  // namespace kinescope

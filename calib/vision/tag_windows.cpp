@@ -15,7 +15,7 @@ constexpr double kMarginOfEdge = 0.6;
 constexpr double kMargin = 8.0;  // px
 constexpr int kSmallest = 16;    // px
 // Grey levels at which brightness is cut off.
-constexpr std::array<int, 5> kCeilings = {255, 200, 150, 110, 80};
+constexpr std::array<int, 3> kCeilings = {255, 150, 90};
 // Of the motion from frame to frame, what it may change by until the next one.
 constexpr double kChangeOfMotion = 0.5;
 
