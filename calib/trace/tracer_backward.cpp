@@ -27,6 +27,16 @@ constexpr double kClearlyLess = 4.0;
 constexpr double kImperfection = 1e-5;
 constexpr double kBeyondDoubt = 1e-4;  // of the level
 
+// How far an effect moves the prediction, by what the fit lost without it.
+Score refitted_score(const Stage& without, const Stage& with,
+                     const std::vector<EffectColumn>& columns) {
+  const double gain = without.system.total().rr - with.system.total().rr;
+  Score out;
+  out.rms = without.system.shift_of(gain, columns);
+  out.noise_share = without.system.noise_share_of(gain, columns);
+  return out;
+}
+
 }  // namespace
 
 // Several effects at one place may stand for a single one that the search passed by.
@@ -136,8 +146,10 @@ bool Tracer::check(std::size_t index) {
   const bool shown =
       slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
   const bool possible = is_possible(*candidate, now_->fit.values[index]);
-  if (!possible || !is_large(*candidate, own.score) || !shown ||
-      stage->held_out_sum() < now_->held_out_sum()) {
+  // What it does beside the others as they are, or once they have been fitted without it.
+  const bool large = is_large(*candidate, own.score) ||
+                     (needed && is_large(*candidate, refitted_score(*stage, *now_, own.columns)));
+  if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
     now_ = stage_of(kinescope::trace::without(now_->added, index));

@@ -128,6 +128,19 @@ TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
   EXPECT_GE(right, 9);
 }
 
+// Waves are what any function is made of: after three at one place the rest is left as it is.
+TEST(TraceTest, NamesAtMostThreeWavesAtAPlace) {
+  const Trace trace = trace_of(1, {{0, "gear", 2.0, 6.0},
+                                   {0, "gear", 2.0, 11.0},
+                                   {0, "gear", 2.0, 17.0},
+                                   {0, "gear", 2.0, 23.0},
+                                   {0, "gear", 2.0, 29.0}});
+  const auto waves = std::ranges::count_if(
+      trace.added, [](const AddedEffect& effect) { return effect.id.effect == "gear"; });
+  EXPECT_GE(waves, 1);
+  EXPECT_LE(waves, 3);
+}
+
 TEST(TraceTest, TwoEffectsAtOnceAreBothFound) {
   constexpr int kRuns = 10;
   int right = 0;
