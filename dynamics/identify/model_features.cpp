@@ -40,7 +40,7 @@ ModelFeatures model_features(const DynamicModel& model, const TorqueSamples& sam
   out.map.input_columns = static_cast<int>(3 * n);
   out.map.map = [rigid, drives, kept, at, n](const gp::Inputs& inputs, gp::Features features) {
     features = term_columns(*rigid, drives, kept, inputs.leftCols(n), inputs.middleCols(n, n),
-                            inputs.rightCols(n))[at];
+                            inputs.middleCols(2 * n, n))[at];
   };
   return out;
 }

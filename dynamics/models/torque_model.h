@@ -29,7 +29,8 @@ enum class TorqueModelKind {
   kRbf,             ///< squared exponential of (q, dq, ddq), one length each, each joint by itself
   kGip,             ///< geometrically inspired polynomial and friction, each joint by itself
   kModelBased,      ///< features of the parametric model, each joint by itself
-  kSemiParametric,  ///< the same plus a squared exponential for what they lack
+  kSemiParametric,  ///< the parametric model, its features and a squared exponential for what it
+                    ///< lacks, noise with a memory
   kLip,             ///< Lagrangian-inspired polynomial of all joints together, and friction
   kSupportVectors,  ///< epsilon-SVR with a Gaussian kernel, each joint by itself
   kNeuralNetwork    ///< two hidden layers of 400 sigmoids, all joints together
@@ -84,8 +85,8 @@ struct FittedTorqueModel {
                                  const Eigen::MatrixXd& ddq)>
       claim = {};
   SigmaParts parts = {};  ///< that make `predict` of `claim`
-  /// Joints at which a semi-parametric model is the model-based one: its squared exponential
-  /// predicted motion left out worse.
+  /// Joints at which a semi-parametric model is the parametric one up to a constant: what it
+  /// learned beside that predicted motion left out worse.
   std::vector<int> plainer_joints = {};
 };
 

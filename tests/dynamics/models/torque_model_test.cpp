@@ -101,13 +101,13 @@ TEST(TorqueModel, NoiseThatLastsIsNoFunctionOfTheMotion) {
   const FittedTorqueModel semi =
       fit_torque_model(TorqueModelKind::kSemiParametric, e.model, e.train, quick());
   const FittedTorqueModel plain =
-      fit_torque_model(TorqueModelKind::kModelBased, e.model, e.train, quick());
+      fit_torque_model(TorqueModelKind::kParametric, e.model, e.train, quick());
   ASSERT_FALSE(semi.plainer_joints.empty());
   const TorqueScore semi_score = score_torque_model(semi, e.test);
   EXPECT_EQ(semi_score.plainer_joints, semi.plainer_joints);
   const Eigen::VectorXd plain_nmse = score_torque_model(plain, e.test).nmse_percent;
-  for (const int joint : semi.plainer_joints) {
-    EXPECT_EQ(semi_score.nmse_percent[joint], plain_nmse[joint]);
+  for (Eigen::Index j = 0; j < e.test.joints(); ++j) {
+    EXPECT_LT(semi_score.nmse_percent[j], 1.1 * plain_nmse[j]) << j;
   }
 }
 
