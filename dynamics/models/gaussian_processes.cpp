@@ -21,8 +21,10 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-// Of normalised torques, to begin with.
+// Variance of the noise to begin with, of normalised torques, and of what an identified model
+// leaves.
 constexpr double kNoiseStart = 1e-3;
+constexpr double kNoiseStartOfRest = 0.5;
 // Predictions that bands are read from: neighbours in time say the same.
 constexpr Eigen::Index kBandRows = 3000;
 // Processes of the folds are kept for their sigma up to here; five of seven joints and 1500 samples
@@ -128,7 +130,8 @@ gp::FittedGp fit_gp(const gp::Kernel& kernel, const gp::Dataset& data, bool phys
                                           : physical_inputs       ? gp::standardise_targets(data)
                                                                   : gp::standardise(data);
   const bool several = data.targets.cols() > 1;
-  gp::GpModel start = gp::make_model(kernel, kNoiseStart, normalisation, several);
+  gp::GpModel start = gp::make_model(
+      kernel, data.prior_mean.size() > 0 ? kNoiseStartOfRest : kNoiseStart, normalisation, several);
   if (known != nullptr) start = gp::with_log_values(start, gp::log_values_of(known->model));
   const auto few = evenly_chosen(data.samples(), options.hyperparameter_samples);
   gp::EstimateOptions estimate;
