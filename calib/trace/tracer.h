@@ -74,6 +74,8 @@ class Tracer {
   void add_step(int round, std::string words, const Stage& stage);
   void summarise();
   void list_not_found();
+  /// The answer need not be `unknown` for it.
+  [[nodiscard]] bool is_slight(const Rest& rest) const;
   void conclude();
 
   const TracedModel* model_;

@@ -18,6 +18,8 @@ constexpr std::size_t kMostRests = 3;
 // A rest that explains this much of what a named effect at its place explains puts that name in
 // doubt.
 constexpr double kDoubtfulShare = 0.1;
+// Less than this of what named effects explain at its place is the imperfection of their shapes.
+constexpr double kSlightShare = 1e-3;
 
 Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRest>& rests) {
   Linearisation out = linear;
@@ -306,8 +308,19 @@ void Tracer::list_not_found() {
   }
 }
 
+bool Tracer::is_slight(const Rest& rest) const {
+  double named = 0.0;
+  for (const TracedEffect& effect : trace_.accepted) {
+    if (same_place(rest.place, effect.id.place)) named += effect.explained;
+  }
+  return rest.explained * now_->system.total().rr < kSlightShare * named * base_->system.total().rr;
+}
+
 void Tracer::conclude() {
-  if (!trace_.rest.empty()) {
+  const bool slight =
+      std::ranges::all_of(trace_.rest, [&](const Rest& rest) { return is_slight(rest); });
+  if (slight) trace_.held_out_after = now_->error;  // without curves
+  if (!slight) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
                                 trace_.rest.front().place, trace_.rest.front().covariate);
@@ -322,6 +335,11 @@ void Tracer::conclude() {
   } else if (!trace_.accepted.empty()) {
     trace_.verdict = TraceVerdict::kEffects;
     trace_.reason = lacked_words(trace_.accepted);
+    for (const Rest& rest : trace_.rest) {
+      trace_.reason += fmt::format(
+          "; what is left at {} over {} is less than a thousandth of what they explain there",
+          rest.place, rest.covariate);
+    }
   } else {
     trace_.verdict = TraceVerdict::kClean;
     trace_.reason = fmt::format("the error on unseen data, {:.3g} {}, is noise",

@@ -128,6 +128,15 @@ TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
   EXPECT_GE(right, 9);
 }
 
+TEST(TraceTest, AThousandthOfWhatIsNamedDoesNotMakeItUnknown) {
+  const Trace slight = trace_of(1, {{0, "scale", 60.0}, {0, "tanh_other", 1.0}});
+  ASSERT_FALSE(slight.rest.empty());
+  EXPECT_EQ(slight.verdict, TraceVerdict::kEffects);
+  EXPECT_NE(slight.reason.find("less than a thousandth"), std::string::npos) << slight.reason;
+  const Trace plain = trace_of(1, {{0, "scale", 3.0}, {0, "tanh_other", 1.0}});
+  EXPECT_EQ(plain.verdict, TraceVerdict::kUnknown);
+}
+
 // Waves are what any function is made of: after three at one place the rest is left as it is.
 TEST(TraceTest, NamesAtMostThreeWavesAtAPlace) {
   const Trace trace = trace_of(1, {{0, "gear", 2.0, 6.0},
