@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,6 +17,7 @@
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/file.h"
 #include "kinematics/core/rng.h"
+#include "tests/truth/h264_writer.h"
 #include "tests/truth/render.h"
 
 namespace kinescope::truth {
@@ -245,35 +244,6 @@ class Film {
   cv::Mat light_;
 };
 
-// Grey frames through the ffmpeg program.
-class Encoder {
- public:
-  Encoder(const std::filesystem::path& file, const CameraModel& camera, const FilmOptions& options)
-      : file_(file) {
-    const std::string command = fmt::format(
-        "ffmpeg -y -v error -f rawvideo -pix_fmt gray -s {}x{} -r {} -i - -c:v libx264 -crf {} "
-        "-pix_fmt yuv420p '{}'",
-        camera.width, camera.height, options.frame_rate_hz, options.crf, file.string());
-    pipe_.reset(popen(command.c_str(), "w"));  // NOLINT(cert-env33-c): its own arguments only
-    if (!pipe_) throw std::runtime_error("cannot start ffmpeg");
-  }
-  void add(const std::vector<std::uint8_t>& grey) {
-    if (std::fwrite(grey.data(), 1, grey.size(), pipe_.get()) != grey.size())
-      throw std::runtime_error("ffmpeg does not take the frames: is it installed?");
-  }
-  void finish() {
-    if (pclose(pipe_.release()) != 0)
-      throw std::runtime_error("ffmpeg cannot write " + file_.string());
-  }
-
- private:
-  struct Close {
-    void operator()(std::FILE* pipe) const { static_cast<void>(pclose(pipe)); }
-  };
-  std::filesystem::path file_;
-  std::unique_ptr<std::FILE, Close> pipe_;
-};
-
 std::string joints_csv(const JointLog& log) {
   std::string out = "t";
   for (const std::string& channel : log.channels) out += "," + channel;
@@ -304,7 +274,8 @@ void write_recording(const std::filesystem::path& folder, const World& world,
   write_file_atomically(folder / "joints.csv", joints_csv(world.log));
   write_file_atomically(folder / "camera.yaml", write_camera_info(world.camera));
   write_file_atomically(folder / "tags.yaml", tags_yaml(world));
-  Encoder encoder(folder / "video.mp4", world.camera, options);
+  H264Writer encoder(folder / "video.mp4", world.camera.width, world.camera.height,
+                     options.frame_rate_hz, options.crf);
   Film film(world, options);
   for (std::size_t f = 0; f < world.measurements.times_s.size(); ++f)
     encoder.add(film.frame(static_cast<int>(f)));

@@ -21,12 +21,15 @@ std::size_t at(int x, int y, int width) {
          static_cast<std::size_t>(x);
 }
 
-// The sharp scene in one direction: the marker's grey level, or nothing beside it.
+// The scene in one direction, averaged over a small square of directions: an edge that crosses a
+// subsample counts by the share on either side, so that few samples place it exactly.
 class Plane {
  public:
-  Plane(const PlacedMarker& marker, const ImageOptions& options)
+  /// `footprint`: side of that square in the image plane at unit distance.
+  Plane(const PlacedMarker& marker, const ImageOptions& options, double footprint)
       : art_(marker.art),
         options_(options),
+        footprint_(footprint),
         T_tag_camera_(marker.T_camera_tag.inverse()),
         R_(T_tag_camera_.matrix3()),
         cell_m_(marker.size_m / marker.art.border_cells) {}
@@ -36,18 +39,44 @@ class Plane {
     const double depth = -T_tag_camera_.translation.z() / direction.z();
     if (!(depth > 0.0)) return options_.background;
     const Eigen::Vector3d p = T_tag_camera_.translation + depth * direction;
-    const double half = 0.5 * art_.total_cells;
-    const int column = static_cast<int>(std::floor(p.x() / cell_m_ + half));
-    const int row = static_cast<int>(std::floor(p.y() / cell_m_ + half));
-    if (column < 0 || row < 0 || column >= art_.total_cells || row >= art_.total_cells) {
-      return options_.background;
-    }
-    return art_.at(column, row) ? options_.white : options_.black;
+    // How far the point moves for a step of the ray to the right, and down.
+    const Eigen::Vector3d right = depth * (R_.col(0) - direction * (R_(2, 0) / direction.z()));
+    const Eigen::Vector3d down = depth * (R_.col(1) - direction * (R_(2, 1) / direction.z()));
+    const Share column = share(p.x(), std::abs(right.x()) + std::abs(down.x()));
+    const Share row = share(p.y(), std::abs(right.y()) + std::abs(down.y()));
+    const auto along = [&](int r) {
+      const double after = column.after > 0.0 ? cell(column.boundary, r) : 0.0;
+      const double before = column.after < 1.0 ? cell(column.boundary - 1, r) : 0.0;
+      return column.after * after + (1.0 - column.after) * before;
+    };
+    const double after = row.after > 0.0 ? along(row.boundary) : 0.0;
+    const double before = row.after < 1.0 ? along(row.boundary - 1) : 0.0;
+    return row.after * after + (1.0 - row.after) * before;
   }
 
  private:
+  struct Share {
+    int boundary = 0;    // the nearest one between two cells
+    double after = 0.0;  // share behind it
+  };
+
+  // `place_m` from the tag's centre; `slope_m`: of the place per unit in the image plane.
+  [[nodiscard]] Share share(double place_m, double slope_m) const {
+    const double at = place_m / cell_m_ + 0.5 * art_.total_cells;
+    const double width = slope_m * footprint_ / cell_m_;
+    const double nearest = std::round(at);
+    return {static_cast<int>(nearest), std::clamp((at - nearest) / width + 0.5, 0.0, 1.0)};
+  }
+
+  [[nodiscard]] double cell(int column, int row) const {
+    if (column < 0 || row < 0 || column >= art_.total_cells || row >= art_.total_cells)
+      return options_.background;
+    return art_.at(column, row) ? options_.white : options_.black;
+  }
+
   const MarkerArt& art_;
   const ImageOptions& options_;
+  double footprint_;
   Pose T_tag_camera_;
   Eigen::Matrix3d R_;
   double cell_m_;
@@ -94,17 +123,19 @@ Box bounding_box(const CameraModel& camera, const PlacedMarker& marker, int bord
           std::min(camera.height - 1, static_cast<int>(high.y()) + border)};
 }
 
+// Adds `weight` times what the marker, moved by `shift` px, changes of the background.
 void paint(const CameraModel& camera, const PlacedMarker& marker, const ImageOptions& options,
-           std::vector<double>& image) {
+           const Eigen::Vector2d& shift, double weight, std::vector<double>& image) {
   const std::vector<double> kernel = make_kernel(options);
   const int taps = static_cast<int>(kernel.size());
   const int s = options.supersample;
   const int margin = taps / 2;  // subsamples beside the pixel's centre
-  const Box box = bounding_box(camera, marker, margin / s + 2);
+  const int moved = static_cast<int>(std::ceil(shift.cwiseAbs().maxCoeff()));
+  const Box box = bounding_box(camera, marker, margin / s + 2 + moved);
   const int columns = box.x1 - box.x0 + 1;
   const int rows = box.y1 - box.y0 + 1;
   if (columns <= 0 || rows <= 0) return;
-  const Plane plane(marker, options);
+  const Plane plane(marker, options, 1.0 / (s * camera.fx));
   // Subsample i lies at pixel x0 + (i + 0.5 - margin) / s: pixel x's kernel begins at subsample (x
   // - x0) s.
   const int sub_columns = (columns - 1) * s + taps;
@@ -121,8 +152,8 @@ void paint(const CameraModel& camera, const PlacedMarker& marker, const ImageOpt
   };
   for (int j = 0; j < sub_rows; ++j) {
     for (int i = 0; i < sub_columns; ++i) {
-      const double x = box.x0 + (i + jitter(j) - margin) / s;
-      const double y = box.y0 + (j + jitter(i) - margin) / s;
+      const double x = box.x0 + (i + jitter(j) - margin) / s - shift.x();
+      const double y = box.y0 + (j + jitter(i) - margin) / s - shift.y();
       const auto ray = unproject(camera, {x, y});
       line[static_cast<std::size_t>(i)] = ray ? plane.grey(*ray) : options.background;
     }
@@ -140,8 +171,25 @@ void paint(const CameraModel& camera, const PlacedMarker& marker, const ImageOpt
       for (int k = 0; k < taps; ++k) {
         sum += kernel[static_cast<std::size_t>(k)] * across[at(c, r * s + k, columns)];
       }
-      image[at(box.x0 + c, box.y0 + r, camera.width)] += sum - options.background;
+      image[at(box.x0 + c, box.y0 + r, camera.width)] += weight * (sum - options.background);
     }
+  }
+}
+
+// What lens and camera make of the light.
+void develop(const CameraModel& camera, const ImageOptions& options, std::vector<double>& image) {
+  if (options.vignetting > 0.0) {
+    const double corner = 0.5 * std::hypot(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const double r = std::hypot(x - 0.5 * camera.width, y - 0.5 * camera.height) / corner;
+        image[at(x, y, camera.width)] *= 1.0 - options.vignetting * r * r;
+      }
+    }
+  }
+  if (options.gamma != 1.0) {
+    for (double& grey : image)
+      grey = 255.0 * std::pow(std::max(0.0, grey) / 255.0, 1.0 / options.gamma);
   }
 }
 
@@ -181,7 +229,15 @@ GreyImage render_markers(const CameraModel& camera, const std::vector<PlacedMark
   std::vector<double> image(
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height),
       options.background);
-  for (const PlacedMarker& marker : markers) paint(camera, marker, options, image);
+  // Instants of the exposure, nearer to one another than the blur.
+  const int instants = 1 + static_cast<int>(std::ceil(2.0 * options.motion_px.norm()));
+  for (const PlacedMarker& marker : markers) {
+    for (int i = 0; i < instants; ++i) {
+      const double t = (i + 0.5) / instants - 0.5;
+      paint(camera, marker, options, t * options.motion_px, 1.0 / instants, image);
+    }
+  }
+  develop(camera, options, image);
   GreyImage out{camera.width, camera.height, {}};
   out.pixels.reserve(image.size());
   for (const double grey : image) {

@@ -45,6 +45,9 @@ struct ImageOptions {
   double blur_px = 0.7;  ///< standard deviation, without the pixel's own integration
   double noise = 2.0;    ///< standard deviation
   int supersample = 12;  ///< in each direction
+  Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();  ///< while the shutter is open
+  double gamma = 1.0;       ///< grey = 255 (light / 255)^(1 / gamma), after the blur
+  double vignetting = 0.0;  ///< share of the light that the image's corners lack
 };
 
 /// Markers must not cover one another.
@@ -52,7 +55,8 @@ struct ImageOptions {
                                        const std::vector<PlacedMarker>& markers,
                                        const ImageOptions& options, Rng& rng);
 
-/// Pixels of the corners: left bottom, right bottom, right top, left top.
+/// Pixels of the corners in the middle of the exposure: left bottom, right bottom, right top, left
+/// top.
 [[nodiscard]] std::array<Eigen::Vector2d, 4> true_corners(const CameraModel& camera,
                                                           const PlacedMarker& marker);
 
