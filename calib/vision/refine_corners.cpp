@@ -25,7 +25,7 @@ constexpr double kCurvatureSigma =
     2e-4;  // 1/px: what lenses bend lines by, opposite edges alike ..
 constexpr double kCurvatureScale = 400.0;  // px over which that bending changes by its own size
 constexpr double kMinStep =
-    0.004;  // of the contrast: how levels differ from knot to knot, at least ..
+    0.001;  // of the contrast: how levels differ from knot to knot, at least ..
 constexpr double kMaxStep = 0.3;    // .. and at most
 constexpr double kBlurSigma = 0.6;  // px: what blurs are like, for tags too small to show their own
 constexpr double kConverged = 2e-3;  // px; the next step would be far smaller
@@ -33,7 +33,7 @@ constexpr int kMaxRounds = 24;
 constexpr int kFullSteps = 6;          // rounds before steps are halved
 constexpr double kMinContrast = 12.0;  // grey levels
 constexpr double kMaxResidual = 0.12;  // noise over contrast
-constexpr double kFloorSigma = 0.006;  // px, measured: tests/experiments, corners on renders
+constexpr double kFloorSigma = 0.002;  // px, measured: tests/experiments/corners.cpp
 constexpr double kMaxMove = 5.0;       // px in one round
 constexpr int kMinPixels = 40;
 

@@ -84,6 +84,27 @@ TEST(RefineCorners, ReachesItsGoalsWithAnHonestSigma) {
   }
 }
 
+TEST(RefineCorners, ItsEllipsesHoldTheTruth) {
+  constexpr double kSquare95 = 5.991;  // of chi square with two degrees of freedom
+  int inside = 0;
+  int corners = 0;
+  for (const double side : {60.0, 90.0}) {
+    for (std::uint64_t salt = 0; salt < 30; ++salt) {
+      const Scene scene = make_scene(side, salt, {.supersample = 4});
+      const RefinedCorners found =
+          refine_corners(scene.image.view(), disturbed(scene.truth, 0.3, salt), {8, true});
+      ASSERT_EQ(found.status, RefineStatus::kDone);
+      for (std::size_t i = 0; i < 4; ++i, ++corners) {
+        const double error = (found.corners_px[i] - scene.truth[i]).squaredNorm();
+        inside += error < kSquare95 * found.sigma_px * found.sigma_px ? 1 : 0;
+      }
+    }
+  }
+  // 240 corners, four of a tag not independent: 2 % either way is chance.
+  EXPECT_GT(inside, 0.925 * corners);
+  EXPECT_LT(inside, 0.985 * corners);
+}
+
 TEST(RefineCorners, DoesNotDependOnTheStart) {
   constexpr double kSame = 0.004;  // px, a fraction of sigma
   for (std::uint64_t salt = 0; salt < 10; ++salt) {
