@@ -63,11 +63,6 @@ bool is_odd(const Attachment& attachment, const Readings& readings) {
 // Channels that agree this well are multiples of each other.
 constexpr double kProportional = 1.0 - 1e-9;
 
-double channel_product(const Readings& r, int a, int b) {
-  const double size = r.value.col(a).norm() * r.value.col(b).norm();
-  return size > 0.0 ? r.value.col(a).dot(r.value.col(b)) / size : 0.0;
-}
-
 bool has_one_channel(const Attachment& a) {
   return a.driven() && a.fit.model.joints.size() == 1 &&
          a.fit.model.joints.front().terms.size() == 1;
@@ -125,7 +120,7 @@ std::vector<Exchange> possible_exchanges(const GrownTree& tree, const Readings& 
       const Attachment& a = tree.link(l).attachment;
       const Attachment& b = tree.link(m).attachment;
       if (!has_one_channel(a) || !has_one_channel(b) || a.channel() == b.channel()) continue;
-      const double product = channel_product(readings, a.channel(), b.channel());
+      const double product = channel_correlation(readings, a.channel(), b.channel());
       if (std::abs(product) < kProportional) continue;
       const double now = penalty_of(a.fit, readings) + penalty_of(b.fit, readings);
       const double then = penalty_of(by_channel(a.fit, b.channel(), product), readings) +
@@ -146,7 +141,7 @@ GrownTree with_likely_exchanges(GrownTree tree, const Readings& readings) {
     Attachment& a = tree.link(best->first_link).attachment;
     Attachment& b = tree.link(best->second_link).attachment;
     const int of_a = a.channel();
-    const double product = channel_product(readings, of_a, b.channel());
+    const double product = channel_correlation(readings, of_a, b.channel());
     a.fit = by_channel(std::move(a.fit), b.channel(), product);
     b.fit = by_channel(std::move(b.fit), of_a, product);
     for (Attachment* changed : {&a, &b}) changed->penalty = penalty_of(changed->fit, readings);

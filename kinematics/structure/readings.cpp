@@ -79,6 +79,11 @@ Readings readings_at(const JointLog& log, const Series& series, double time_offs
   return r;
 }
 
+double channel_correlation(const Readings& readings, int a, int b) {
+  const double size = readings.value.col(a).norm() * readings.value.col(b).norm();
+  return size > 0.0 ? readings.value.col(a).dot(readings.value.col(b)) / size : 0.0;
+}
+
 Readings readings_like(const Readings& other, const JointLog& log, const Series& series,
                        double time_offset_s, double max_gap_s) {
   Readings r = raw_readings(log, series, time_offset_s, max_gap_s);

@@ -34,6 +34,9 @@ struct Readings {
 
 [[nodiscard]] Readings readings_at(const JointLog& log, const Series& series, double time_offset_s,
                                    double max_gap_s);
+/// Of two channels, -1 to 1; 0 where one stands still.
+[[nodiscard]] double channel_correlation(const Readings& readings, int a, int b);
+
 /// With the centre and scale of other readings, so that models carry over.
 [[nodiscard]] Readings readings_like(const Readings& other, const JointLog& log,
                                      const Series& series, double time_offset_s, double max_gap_s);

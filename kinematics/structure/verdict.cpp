@@ -171,13 +171,6 @@ class Judge {
   const JointLog& log_;
 };
 
-double channel_correlation(const Readings& r, int a, int b) {
-  const double aa = r.value.col(a).squaredNorm();
-  const double bb = r.value.col(b).squaredNorm();
-  return aa > 0.0 && bb > 0.0 ? std::abs(r.value.col(a).dot(r.value.col(b))) / std::sqrt(aa * bb)
-                              : 0.0;
-}
-
 void add_together_doubts(const std::vector<Alternative>& alternatives, const Readings& readings,
                          const JointLog& log, const StructureOptions& options, Verdict& verdict) {
   std::vector<std::pair<int, int>> told;
@@ -187,11 +180,12 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
       continue;
     const std::pair<int, int> pair = std::minmax(a.first_channel, a.second_channel);
     if (std::ranges::find(told, pair) != told.end()) continue;
-    if (channel_correlation(readings, pair.first, pair.second) < kTogether) continue;
+    const double together = std::abs(channel_correlation(readings, pair.first, pair.second));
+    if (together < kTogether) continue;
     told.push_back(pair);
     const std::string first = channel_words(log, readings, pair.first);
     const std::string second = channel_words(log, readings, pair.second);
-    const bool alike = channel_correlation(readings, pair.first, pair.second) > kAlike;
+    const bool alike = together > kAlike;
     verdict.doubts.push_back(
         {fmt::format(
              "channels {} and {} move together: which of them drives which joint cannot be told",

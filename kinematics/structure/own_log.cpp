@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/structure/own_log.h"
+
+#include <algorithm>
+
+namespace kinescope::structure_search {
+
+OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups, std::vector<int> chosen) {
+  OwnLog out;
+  out.channels = channels_with(log, groups, chosen);
+  out.log = with_channels(log, out.channels);
+  out.groups = std::move(groups);
+  out.chosen = std::move(chosen);
+  return out;
+}
+
+OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups) {
+  std::vector<int> first;
+  for (const SameQuantity& group : groups) first.push_back(group.front());
+  return own_log(log, std::move(groups), std::move(first));
+}
+
+void in_whole_log(const OwnLog& own, Structure& out) {
+  const auto whole = [&](int c) { return own.channels[static_cast<std::size_t>(c)]; };
+  std::vector<int> driving;
+  for (StructureJoint& joint : out.joints) {
+    if (!joint.channel) continue;
+    joint.channel->channel = whole(joint.channel->channel);
+    driving.push_back(joint.channel->channel);
+    for (ChannelTerm& term : joint.couplings) {
+      term.channel = whole(term.channel);
+      driving.push_back(term.channel);
+    }
+  }
+  for (int& c : out.idle_channels) c = whole(c);
+  for (std::size_t g = 0; g < own.groups.size(); ++g) {
+    const bool drives = std::ranges::find(driving, own.chosen[g]) != driving.end();
+    for (const int c : own.groups[g]) {
+      if (c == own.chosen[g]) continue;
+      if (drives) {
+        out.copied_channels.push_back({c, own.chosen[g]});
+      } else {
+        out.idle_channels.push_back(c);
+      }
+    }
+  }
+  std::ranges::sort(out.idle_channels);
+  std::ranges::sort(out.copied_channels, {}, &ChannelCopy::channel);
+}
+
+}  // namespace kinescope::structure_search
