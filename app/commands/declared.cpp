@@ -85,6 +85,17 @@ bool is_declared_in_si(const Recording& recording, const Joint& joint) {
          times_as_far(joint.type, declared->second, joint.scale).has_value();
 }
 
+std::map<std::string, ChannelUnit> declared_units(const Recording& recording) {
+  std::map<std::string, ChannelUnit> units;
+  // The reader has brought deg and mm to rad and m.
+  for (const auto& [channel, unit] : recording.settings.units) {
+    units[channel] = unit == "rad" ? ChannelUnit::kRadian
+                     : unit == "m" ? ChannelUnit::kMetre
+                                   : ChannelUnit::kTicks;
+  }
+  return units;
+}
+
 void require_declared_units(const Recording& recording, const Structure& structure) {
   if (!has_answer(structure)) return;
   for (const StructureJoint& joint : structure.joints) {

@@ -3,6 +3,9 @@
 // What recording.yaml declares against what the markers show.
 #pragma once
 
+#include <map>
+#include <string>
+
 #include "app/io/recording.h"
 #include "kinematics/structure/structure.h"
 
@@ -11,6 +14,9 @@ namespace kinescope {
 /// True when the joint's channel is declared in rad, deg, m or mm, as suits the joint: its readings
 /// are rad or m, and what the joint does beyond them is an effect.
 [[nodiscard]] bool is_declared_in_si(const Recording& recording, const Joint& joint);
+
+/// The units of the channels for the search, which weighs them.
+[[nodiscard]] std::map<std::string, ChannelUnit> declared_units(const Recording& recording);
 
 /// Throws undetermined when a channel that is declared in rad, deg, m or mm moves a joint of that
 /// kind clearly (four standard deviations, and 5 % of a slide, 25 % of a turn) more or less far

@@ -227,6 +227,7 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   }
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset;
+  structure_options.units = declared_units(recording);
   Structure structure = find_structure(tracks, recording.log, structure_options);
   for (StructureDoubt& doubt : structure.doubts) {
     if (doubt.of_model) doubt.remedy = model_remedy(recording.entry, recording.camera.has_value());
@@ -278,7 +279,9 @@ CheckedNominal start_from_nominal(const Recording& recording, const Measurements
                                   std::vector<std::string>& warnings) {
   NominalChannels matched = match_channels(recording);
   if (matched.in_order && !tracks.tracks.empty()) {
-    const Structure structure = find_structure(tracks, recording.log);
+    StructureOptions structure_options;
+    structure_options.units = declared_units(recording);
+    const Structure structure = find_structure(tracks, recording.log, structure_options);
     matched = by_motion(std::move(matched), structure, recording.log);
   }
   const KinematicTree& nominal = matched.tree;

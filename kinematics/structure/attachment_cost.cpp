@@ -49,10 +49,32 @@ double axis_distance(const ChainModel& model) {
   return p.head<2>().norm();
 }
 
-// -2 ln of prior odds and Occam factor for a scale (rad or m per unit of the channel): most logs
-// are in rad or m, some in degrees or millimetres; else any. `si_share`: how likely rad and m are;
-// `rms`: of the readings, since degrees and millimetres come in large numbers.
-double scale_penalty(double scale, double sigma, double si_share, double rms) {
+// How likely a channel counts rad or m, degrees, millimetres, or something of its own (a gear
+// between, ticks): together 1.
+struct UnitShares {
+  double si = 0.0;
+  double degree = 0.0;
+  double millimetre = 0.0;
+  double own = 1.0;
+};
+
+// Most logs are in rad or m, some in degrees or millimetres: of those that nobody declared,
+// `si_share` in rad or m. Declared ones are in SI by now, and their joints rarely have a gear.
+UnitShares unit_shares(ChannelUnit unit, JointType type, double si_share) {
+  constexpr double kGeared = 0.02;
+  if (unit == ChannelUnit::kUnknown) {
+    const double other = 0.25 * (1.0 - si_share);
+    return {.si = si_share, .degree = other, .millimetre = other, .own = 2.0 * other};
+  }
+  if (unit == ChannelUnit::kTicks) return {};
+  // What turns a motor and slides a joint has a spindle between, of any pitch.
+  const bool alike = (unit == ChannelUnit::kRadian) == (type == JointType::kRevolute);
+  return {.si = alike ? 1.0 - kGeared : 0.0, .degree = 0.0, .millimetre = 0.0, .own = kGeared};
+}
+
+// -2 ln of prior odds and Occam factor for a scale (rad or m per unit of the channel). `rms`: of
+// the readings, since degrees and millimetres come in large numbers.
+double scale_penalty(double scale, double sigma, const UnitShares& shares, double rms) {
   constexpr double kLogRange = 25.0;  // natural logarithms that any scale may lie within
   constexpr double kDegree = std::numbers::pi / 180.0;
   constexpr double kMillimetre = 1e-3;
@@ -60,15 +82,15 @@ double scale_penalty(double scale, double sigma, double si_share, double rms) {
   const double s = std::max(sigma, 1e-12);
   const double width =
       std::min(1.0, s * std::sqrt(2.0 * std::numbers::pi) / std::max(size, 1e-300) / kLogRange);
-  const double other = 0.25 * (1.0 - si_share);
-  double best = -2.0 * std::log(2.0 * other * width);
+  double best = -2.0 * std::log(shares.own * width);
   const auto consider = [&](double unit, double share) {
+    if (share == 0.0) return;
     const double z = (size - unit) / std::hypot(s, 0.004 * unit);
     best = std::min(best, z * z - 2.0 * std::log(share));
   };
-  consider(1.0, si_share);
-  if (rms > 0.3) consider(kDegree, other);
-  if (rms > 1.0) consider(kMillimetre, other);
+  consider(1.0, shares.si);
+  if (rms > 0.3) consider(kDegree, shares.degree);
+  if (rms > 1.0) consider(kMillimetre, shares.millimetre);
   return best;
 }
 
@@ -106,9 +128,11 @@ double penalty_of(const ChainFit& fit, const Readings& readings) {
       const ChainTerm& term = joint.terms[k];
       const double rms = readings.rms[static_cast<std::size_t>(term.channel)];
       --free_parameters;
+      // How much of another joint's motion couples is no matter of units.
+      const ChannelUnit unit = k == 0 ? readings.unit(term.channel) : ChannelUnit::kUnknown;
       penalty +=
           scale_penalty(term.scale / rms, fit.scale_sigma[t] * std::sqrt(fit.correlation) / rms,
-                        readings.si_share, rms);
+                        unit_shares(unit, joint.type, readings.si_share), rms);
       // Which channel drives the joint is one choice of many.
       if (k == 0) penalty += 2.0 * std::log(std::max(1, readings.channels()));
       // Couplings are rare (1 joint in 100), and which channel couples is one choice of many.

@@ -19,13 +19,19 @@ constexpr double kClose = 0.05;
 constexpr double kRotation = 0.03;     // rad
 constexpr double kTranslation = 0.01;  // of the distance to the camera
 
-// The channel is in rad or degrees, m or millimetres.
-bool is_natural(JointType type, double scale) {
+// The channel is in rad or degrees, m or millimetres; one that is declared, in what it is declared
+// in.
+bool is_natural(JointType type, double scale, ChannelUnit unit) {
+  if (unit != ChannelUnit::kUnknown) {
+    const ChannelUnit natural =
+        type == JointType::kRevolute ? ChannelUnit::kRadian : ChannelUnit::kMetre;
+    return unit == natural && std::abs(std::abs(scale) - 1.0) < kClose;
+  }
   const std::array<double, 2> units = type == JointType::kRevolute
                                           ? std::array{1.0, std::numbers::pi / 180.0}
                                           : std::array{1.0, 1e-3};
   return std::ranges::any_of(
-      units, [&](double unit) { return std::abs(std::abs(scale) - unit) < kClose * unit; });
+      units, [&](double usual) { return std::abs(std::abs(scale) - usual) < kClose * usual; });
 }
 
 // rad or m per unit of the channel.
@@ -49,7 +55,8 @@ std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
     ChainFit fit = fit_chain(relative.motion, readings.value, candidate.start);
     const bool fits = fit.rotation_rms < kRotation &&
                       fit.translation_rms < kTranslation * distance_of({&body, 1});
-    if (!fits || !is_natural(other, scale_of(fit, readings))) continue;
+    if (!fits || !is_natural(other, scale_of(fit, readings), readings.unit(now.channel())))
+      continue;
     return attachment_from(std::move(fit), now.parent, relative, body, readings);
   }
   return std::nullopt;
@@ -57,7 +64,8 @@ std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
 
 bool is_odd(const Attachment& attachment, const Readings& readings) {
   return attachment.driven() && attachment.fit.model.joints.size() == 1 &&
-         !is_natural(attachment.fit.model.joints.front().type, scale_of(attachment.fit, readings));
+         !is_natural(attachment.fit.model.joints.front().type, scale_of(attachment.fit, readings),
+                     readings.unit(attachment.channel()));
 }
 
 // Channels that agree this well are multiples of each other.
@@ -75,6 +83,11 @@ ChainFit by_channel(ChainFit fit, int channel, double product) {
   return fit;
 }
 
+bool is_declared(const Readings& readings, const Attachment& a) {
+  const ChannelUnit unit = readings.unit(a.channel());
+  return unit == ChannelUnit::kRadian || unit == ChannelUnit::kMetre;
+}
+
 bool leaves_noise_only(const Attachment& a) {
   constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
   return a.fit.variance < kNoiseOnly && a.fit.axis_variance < kNoiseOnly;
@@ -88,11 +101,12 @@ bool share_a_channel(const Attachment& a, const Attachment& b, const Readings& r
       return false;
   }
   if (a.channel() != b.channel()) return false;
+  const ChannelUnit unit = readings.unit(a.channel());
   const JointType type_a = a.fit.model.joints.front().type;
   const JointType type_b = b.fit.model.joints.front().type;
   const double scale_a = std::abs(scale_of(a.fit, readings));
   const double scale_b = std::abs(scale_of(b.fit, readings));
-  return (is_natural(type_a, scale_a) && is_natural(type_b, scale_b)) ||
+  return (is_natural(type_a, scale_a, unit) && is_natural(type_b, scale_b, unit)) ||
          (type_a == type_b && std::abs(scale_a - scale_b) < kClose * scale_b);
 }
 
@@ -125,7 +139,10 @@ std::vector<Exchange> possible_exchanges(const GrownTree& tree, const Readings& 
       const double now = penalty_of(a.fit, readings) + penalty_of(b.fit, readings);
       const double then = penalty_of(by_channel(a.fit, b.channel(), product), readings) +
                           penalty_of(by_channel(b.fit, a.channel(), product), readings);
-      out.push_back({.first_link = l, .second_link = m, .loss = then - now});
+      out.push_back({.first_link = l,
+                     .second_link = m,
+                     .loss = then - now,
+                     .declared = is_declared(readings, a) && is_declared(readings, b)});
     }
   }
   return out;

@@ -28,7 +28,8 @@ namespace kinescope::structure_search {
 struct Exchange {
   int first_link = 0;
   int second_link = 0;
-  double loss = 0.0;  ///< -2 ln prior of the exchanged scales over that of the present ones
+  double loss = 0.0;      ///< -2 ln prior of the exchanged scales over that of the present ones
+  bool declared = false;  ///< the units of both, so that the loss is no matter of custom
 };
 [[nodiscard]] std::vector<Exchange> possible_exchanges(const GrownTree& tree,
                                                        const Readings& readings);

@@ -79,6 +79,16 @@ Readings readings_at(const JointLog& log, const Series& series, double time_offs
   return r;
 }
 
+std::vector<ChannelUnit> units_of(const JointLog& log,
+                                  const std::map<std::string, ChannelUnit>& declared) {
+  std::vector<ChannelUnit> units;
+  for (const int c : channel_order(log)) {
+    const auto unit = declared.find(log.channels[static_cast<std::size_t>(c)]);
+    units.push_back(unit == declared.end() ? ChannelUnit::kUnknown : unit->second);
+  }
+  return units;
+}
+
 double channel_correlation(const Readings& readings, int a, int b) {
   const double size = readings.value.col(a).norm() * readings.value.col(b).norm();
   return size > 0.0 ? readings.value.col(a).dot(readings.value.col(b)) / size : 0.0;
@@ -89,6 +99,7 @@ Readings readings_like(const Readings& other, const JointLog& log, const Series&
   Readings r = raw_readings(log, series, time_offset_s, max_gap_s);
   r.mean = other.mean;
   r.rms = other.rms;
+  r.units = other.units;
   r.si_share = other.si_share;
   normalise(r);
   return r;

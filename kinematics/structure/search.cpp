@@ -108,6 +108,7 @@ class Search {
     FoundTree found;
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
+    found.readings.units = units_of(log_, options_.units);
     found.readings.si_share = std::max(si_share, found.readings.si_share);
     found.tree = grow_tree(series, found.readings, growth, likely_costs_at(offset_s));
     return found;

@@ -10,6 +10,7 @@
 // Not here: images, corners, refinement (calib/bundle).
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +18,7 @@
 
 #include "kinematics/log/joint_log.h"
 #include "kinematics/model/kinematic_tree.h"
+#include "kinematics/structure/channel_unit.h"
 #include "kinematics/structure/pose_tracks.h"
 
 namespace kinescope {
@@ -99,6 +101,9 @@ struct StructureOptions {
   double min_log_odds = 4.6;       ///< below this (1:100) an answer is called ambiguous
   double max_gap_s = 0.5;          ///< gaps of the log longer than this are not bridged
   bool scan_time_offset = true;    ///< off for postures measured at rest
+  /// Declared, by channel: a turn by one in rad or a slide by one in m moves as far as its channel
+  /// says, unless the motion clearly says otherwise. Channels that are absent: any unit.
+  std::map<std::string, ChannelUnit> units = {};
 };
 
 /// Cost O(bodies^2 * channels * frames). Deterministic; independent of the order of markers and

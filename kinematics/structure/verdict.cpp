@@ -148,7 +148,8 @@ class Judge {
           fmt::format("channels {} and {} exchanged", channel_words(log_, readings_, first),
                       channel_words(log_, readings_, second));
       if (exchange.loss > kUnitsAlone) {
-        out.push_back({kUnitsAlone, words, -1, -1, exchange.first_link});
+        const double loss = exchange.declared ? exchange.loss : kUnitsAlone;
+        out.push_back({loss, words, -1, -1, exchange.first_link});
       } else {
         out.push_back({std::max(0.0, exchange.loss), words, first, second, exchange.first_link});
       }
@@ -203,7 +204,8 @@ void add_together_doubts(const std::vector<Alternative>& alternatives, const Rea
 void add_proportional_doubts(const GrownTree& tree, const Readings& readings, const JointLog& log,
                              Verdict& verdict) {
   for (const Exchange& exchange : possible_exchanges(tree, readings)) {
-    if (exchange.loss <= kUnitsAlone) continue;  // said as moving together
+    // Declared units settle it; a small loss is said as moving together.
+    if (exchange.declared || exchange.loss <= kUnitsAlone) continue;
     const std::string first =
         channel_words(log, readings, tree.link(exchange.first_link).attachment.channel());
     const std::string second =

@@ -54,28 +54,48 @@ TEST(Verdict, AChannelDoesNotMoveTogetherWithItself) {
 }
 
 // Two hinges in series whose channels are multiples: `a` counts 1.5 times as far as `b`.
-TEST(Verdict, OfProportionalChannelsUsualUnitsDecide) {
-  GrownTree tree;
-  tree.links.resize(3);
-  tree.bodies.resize(2);
-  for (int l = 1; l <= 2; ++l) {
-    GrownLink& link = tree.link(l);
-    link.parent = l - 1;
-    link.founder = l - 1;
-    link.attachment = driven_by_the_first(JointType::kRevolute, 0.0);
-    link.attachment.fit.scale_sigma = {1e-4};
+class ProportionalChannels : public testing::Test {
+ protected:
+  ProportionalChannels() {
+    tree.links.resize(3);
+    tree.bodies.resize(2);
+    for (int l = 1; l <= 2; ++l) {
+      GrownLink& link = tree.link(l);
+      link.parent = l - 1;
+      link.founder = l - 1;
+      link.attachment = driven_by_the_first(JointType::kRevolute, 0.0);
+      link.attachment.fit.scale_sigma = {1e-4};
+    }
+    readings.value.resize(2, 2);
+    readings.value << -1.0, -1.0, 1.0, 1.0;
+    readings.mean = {0.0, 0.0};
+    readings.rms = {0.9, 0.6};
+    readings.log_channel = {0, 1};
+    series.times_s = {0.0, 1.0};
+    series.bodies.resize(2);
+    log.channels = {"a", "b"};
+    term(1) = {1, 0.9};
+    term(2) = {0, -0.6};
   }
+
+  ChainTerm& term(int l) { return tree.link(l).attachment.fit.model.joints.front().terms.front(); }
+
+  Verdict verdict() {
+    for (std::size_t b = 0; b < 2; ++b) {
+      tree.bodies[b].link = static_cast<int>(b) + 1;
+      tree.bodies[b].attachment = tree.link(static_cast<int>(b) + 1).attachment;
+      tree.bodies[b].everywhere_cost = 1e3;
+    }
+    return judge(tree, series, readings, log, {});
+  }
+
+  GrownTree tree;
   Readings readings;
-  readings.value.resize(2, 2);
-  readings.value << -1.0, -1.0, 1.0, 1.0;
-  readings.mean = {0.0, 0.0};
-  readings.rms = {0.9, 0.6};
-  readings.log_channel = {0, 1};
-  const auto term = [&](int l) -> ChainTerm& {
-    return tree.link(l).attachment.fit.model.joints.front().terms.front();
-  };
-  term(1) = {1, 0.9};
-  term(2) = {0, -0.6};
+  Series series;
+  JointLog log;
+};
+
+TEST_F(ProportionalChannels, UsualUnitsDecide) {
   ASSERT_EQ(possible_exchanges(tree, readings).size(), 1U);
   tree = with_likely_exchanges(tree, readings);
   EXPECT_EQ(term(1).channel, 0);
@@ -84,25 +104,31 @@ TEST(Verdict, OfProportionalChannelsUsualUnitsDecide) {
   EXPECT_GT(possible_exchanges(tree, readings).front().loss, 9.2) << "the answer is clear";
 
   // Clear by the units, which is no more than a custom: the motion says nothing.
-  for (std::size_t b = 0; b < 2; ++b) {
-    tree.bodies[b].link = static_cast<int>(b) + 1;
-    tree.bodies[b].attachment = tree.link(static_cast<int>(b) + 1).attachment;
-    tree.bodies[b].everywhere_cost = 1e3;
-  }
-  Series series;
-  series.times_s = {0.0, 1.0};
-  series.bodies.resize(2);
-  JointLog log;
-  log.channels = {"a", "b"};
-  const Verdict verdict = judge(tree, series, readings, log, {});
-  EXPECT_EQ(verdict.status, StructureStatus::kAmbiguous);
-  EXPECT_NEAR(verdict.probability, 0.95, 0.01);
-  ASSERT_FALSE(verdict.doubts.empty());
-  EXPECT_EQ(verdict.doubts.front().names, (std::vector<std::string>{"a", "b"}));
+  const Verdict judged = verdict();
+  EXPECT_EQ(judged.status, StructureStatus::kAmbiguous);
+  EXPECT_NEAR(judged.probability, 0.95, 0.01);
+  ASSERT_FALSE(judged.doubts.empty());
+  EXPECT_EQ(judged.doubts.front().names, (std::vector<std::string>{"a", "b"}));
   term(1).scale = 0.9 * 1.3;
   term(2).scale = 0.6 * 1.1;
   EXPECT_LT(std::abs(possible_exchanges(tree, readings).front().loss), 9.2)
       << "neither way is in usual units";
+}
+
+TEST_F(ProportionalChannels, DeclaredUnitsSettleIt) {
+  readings.units = {ChannelUnit::kRadian, ChannelUnit::kRadian};
+  tree = with_likely_exchanges(tree, readings);
+  EXPECT_EQ(term(1).channel, 0);
+  EXPECT_EQ(term(2).channel, 1);
+  const Verdict judged = verdict();
+  EXPECT_EQ(judged.status, StructureStatus::kDetermined);
+  EXPECT_GT(judged.probability, 0.999);
+  EXPECT_TRUE(judged.doubts.empty());
+}
+
+TEST_F(ProportionalChannels, TicksSettleNothing) {
+  readings.units = {ChannelUnit::kTicks, ChannelUnit::kTicks};
+  EXPECT_LT(std::abs(possible_exchanges(tree, readings).front().loss), 1.0);
 }
 
 }  // namespace
