@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "kinematics/structure/attachment_path.h"
+#include "kinematics/structure/idle_channels.h"
+#include "kinematics/structure/move_bodies.h"
 #include "kinematics/structure/several_joints.h"
 
 namespace kinescope::structure_search {
@@ -104,6 +106,33 @@ bool attach_through_unseen_links(GrowthState& state) {
     if (!found || !is_acceptable(state, c.body, *found)) continue;
     state.tree.bodies[c.body].alternatives.push_back(*found);
     place(state, c.body, std::move(*found));
+    return true;
+  }
+  return false;
+}
+
+bool is_coarse(const Attachment& attachment) {
+  constexpr double kCoarse = 4.0;  // variance across the joint over the declared one
+  return attachment.driven() && attachment.fit.model.joints.size() == 1 &&
+         attachment.fit.model.joints.front().terms.size() > 1 && attachment.fit.variance > kCoarse;
+}
+
+bool unfold_coupled_joint(GrowthState& state) {
+  for (int l = 1; l < static_cast<int>(state.tree.links.size()); ++l) {
+    const GrownLink& link = state.tree.link(l);
+    if (!is_coarse(link.attachment)) continue;
+    std::vector<char> channels = unused_channels(state);
+    channels[static_cast<std::size_t>(link.attachment.channel())] = 1;
+    const std::size_t body = state.tree.founder_of(l);
+    auto found =
+        find_serial_attachment(state.series.bodies[body], link.parent,
+                               state.tree.link(link.parent).path, state.readings, channels);
+    if (!found || !is_acceptable(state, body, *found)) continue;
+    const double correlation = std::min(found->fit.correlation, link.attachment.fit.correlation);
+    const double change = found->cost(correlation) - link.attachment.cost(correlation) +
+                          idle_change(state.tree, state.readings, body, *found);
+    if (change >= 0.0) continue;
+    move_body(state, body, std::move(*found));
     return true;
   }
   return false;

@@ -17,4 +17,11 @@ void attach_all(GrowthState& state);
 /// acceptable.
 bool attach_through_unseen_links(GrowthState& state);
 
+/// A single joint that several channels move, and that leaves far more than noise, may be several
+/// joints in series with no marker between. True when one was replaced.
+bool unfold_coupled_joint(GrowthState& state);
+
+/// Such a joint.
+[[nodiscard]] bool is_coarse(const Attachment& attachment);
+
 }  // namespace kinescope::structure_search

@@ -26,9 +26,16 @@ struct GrownBody {
   int rests_on = -1;                     ///< link on which it plainly rests; -1: on none
 };
 
+/// Another whole tree that was looked at, in which a body hangs elsewhere, and others with it.
+struct RivalTree {
+  std::size_t body = 0;
+  double loss = 0.0;  ///< -2 ln odds against this tree
+};
+
 struct GrownTree {
   std::vector<GrownLink> links;   ///< parents before children
   std::vector<GrownBody> bodies;  ///< as in the series
+  std::vector<RivalTree> rivals;
 
   [[nodiscard]] GrownLink& link(int l) { return links[static_cast<std::size_t>(l)]; }
   [[nodiscard]] const GrownLink& link(int l) const { return links[static_cast<std::size_t>(l)]; }

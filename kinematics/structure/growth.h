@@ -6,7 +6,7 @@
 // Method  from the camera outward: the body that hangs on a known link best is attached next; its
 //         link's path then follows from the channels alone, so that noise does not pile up along
 //         the chain. Afterwards every body may change its place while that helps, and channels are
-//         given out once each.
+//         given out once each (rearrange.h).
 #pragma once
 
 #include <vector>

@@ -58,6 +58,17 @@ GrowthState start_growth(const Series& series, const Readings& readings,
   return state;
 }
 
+GrowthState continued_growth(GrownTree tree, const Series& series, const Readings& readings,
+                             const GrowthOptions& options) {
+  return {.series = series,
+          .readings = readings,
+          .options = options,
+          .usable = moving_channels(readings),
+          .likely_cost = std::vector<double>(series.bodies.size(), kInfinity),
+          .moves_freely = std::vector<char>(series.bodies.size(), 0),
+          .tree = std::move(tree)};
+}
+
 void add_link(GrowthState& state, GrownLink link) {
   state.tree.links.push_back(std::move(link));
   const int index = static_cast<int>(state.tree.links.size()) - 1;

@@ -25,6 +25,10 @@ struct GrowthState {
                                        const GrowthOptions& options,
                                        const std::vector<double>& likely_cost);
 
+/// A tree that has grown, to be changed.
+[[nodiscard]] GrowthState continued_growth(GrownTree tree, const Series& series,
+                                           const Readings& readings, const GrowthOptions& options);
+
 /// Appends a link and lists the ways in which the bodies may hang on it.
 void add_link(GrowthState& state, GrownLink link);
 

@@ -6,6 +6,7 @@
 #include "kinematics/structure/attach_bodies.h"
 #include "kinematics/structure/attachment_path.h"
 #include "kinematics/structure/find_attachments.h"
+#include "kinematics/structure/idle_channels.h"
 #include "kinematics/structure/rest.h"
 
 namespace kinescope::structure_search {
@@ -52,6 +53,25 @@ void release(GrownTree& tree, std::size_t founder) {
   for (GrownBody& body : tree.bodies) {
     if (is_below(tree, body.link, founder)) body.link = -1;
   }
+}
+
+// Takes out the links without founder. What is known of the others stays, since their paths do.
+std::vector<int> remove_released(GrownTree& tree) {
+  std::vector<std::vector<Attachment>> known;
+  for (GrownBody& body : tree.bodies) known.push_back(std::move(body.alternatives));
+  std::vector<int> renamed = remove_links_without_founder(tree);
+  const auto now = [&](int link) {
+    return link < 0 ? -1 : renamed[static_cast<std::size_t>(link)];
+  };
+  for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
+    GrownBody& body = tree.bodies[b];
+    body.rests_on = now(body.rests_on);
+    for (Attachment& a : known[b]) {
+      a.parent = now(a.parent);
+      if (a.parent >= 0) body.alternatives.push_back(std::move(a));
+    }
+  }
+  return renamed;
 }
 
 // The founder of `own` turns out to rest on another link: everything on `own` is looked at anew.
@@ -106,6 +126,20 @@ void move_body(GrowthState& state, std::size_t body, Attachment attachment) {
   }
 }
 
+int release_link(GrowthState& state, int link) {
+  const int parent = state.tree.link(link).parent;
+  release(state.tree, state.tree.founder_of(link));
+  return remove_released(state.tree)[static_cast<std::size_t>(parent)];
+}
+
+void release_children(GrowthState& state, int link, std::size_t body) {
+  state.tree.bodies[body].link = -1;
+  for (int l = 1; l < static_cast<int>(state.tree.links.size()); ++l) {
+    if (state.tree.link(l).parent == link) release(state.tree, state.tree.founder_of(l));
+  }
+  remove_released(state.tree);
+}
+
 bool improve(GrowthState& state, std::size_t body) {
   constexpr double kGain = 1e-6;  // less is rounding
   const GrownBody& grown = state.tree.bodies[body];
@@ -115,7 +149,7 @@ bool improve(GrowthState& state, std::size_t body) {
   double least = grown.attachment.cost(correlation) - kGain;
   for (const Attachment& a : grown.alternatives) {
     if (is_below(state.tree, a.parent, body) || conflicts(state.tree, body, a)) continue;
-    const double cost = a.cost(correlation);
+    const double cost = a.cost(correlation) + idle_change(state.tree, state.readings, body, a);
     if (cost >= least) continue;
     least = cost;
     best = &a;

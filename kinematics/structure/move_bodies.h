@@ -13,6 +13,12 @@ namespace kinescope::structure_search {
 /// Hangs an attached body elsewhere, with everything on it; what this unsettles is looked at anew.
 void move_body(GrowthState& state, std::size_t body, Attachment attachment);
 
+/// Sets a link with everything on it free; gives the new number of its parent.
+int release_link(GrowthState& state, int link);
+
+/// The same for all that hangs on a link by joints, and for one of the bodies at rest on it.
+void release_children(GrowthState& state, int link, std::size_t body);
+
 /// Moves the body to the best place known; false when it stands there already.
 bool improve(GrowthState& state, std::size_t body);
 

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include "kinematics/structure/attach_bodies.h"
 #include "kinematics/structure/pair_tree.h"
+#include "kinematics/structure/rearrange.h"
 #include "kinematics/structure/time_offset.h"
 
 namespace kinescope::structure_search {
@@ -53,6 +55,13 @@ bool has_driven_joint(const GrownTree& tree) {
 
 bool has_free_body(const GrownTree& tree) {
   return std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
+}
+
+// Something that several joints in series may explain better.
+bool is_unfinished(const GrownTree& tree) {
+  return has_free_body(tree) || std::ranges::any_of(tree.links, [](const GrownLink& l) {
+           return l.founder >= 0 && is_coarse(l.attachment);
+         });
 }
 
 // Penalised cost as if the log covered every instant, so that offsets may be compared.
@@ -150,6 +159,29 @@ class Search {
     return found;
   }
 
+  // With links taken apart where that helps, at the offset that then is best.
+  [[nodiscard]] FoundTree finished(FoundTree found, double step_s,
+                                   const GrowthOptions& options) const {
+    for (int growth = 1;; ++growth) {
+      GrowthState state = continued_growth(std::move(found.tree), thin_, found.readings, options);
+      const bool changed = take_links_apart(state);
+      found.tree = std::move(state.tree);
+      if (!changed || !scans() || growth == kMostGrowths) break;
+      const TimeOffset offset = refined(found, step_s);
+      const double moved = std::abs(offset.value_s - found.offset.value_s);
+      found.offset.sigma_s = offset.sigma_s;
+      if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) break;
+      found = grow_at(offset.value_s, options, found.readings.si_share);
+      found.offset.sigma_s = offset.sigma_s;
+    }
+    return found;
+  }
+
+  // Clocks that may differ, of a motion that is seen as such.
+  [[nodiscard]] bool scans() const {
+    return options_.scan_time_offset && thin_.smooth && !log_.channels.empty();
+  }
+
  private:
   [[nodiscard]] std::vector<double> likely_costs_at(double offset_s) const {
     const std::size_t bodies = rough_.bodies.size();
@@ -174,13 +206,14 @@ class Search {
 FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
                       const StructureOptions& options) {
   const Search search(full, thin, log, options);
-  if (!options.scan_time_offset || !thin.smooth || log.channels.empty()) return search.grow_at(0.0);
+  if (!search.scans()) return search.finished(search.grow_at(0.0), 0.0, {});
   // Joints in series without markers between are a long search: not at every offset.
   const GrowthOptions quick{.paths_of_several_joints = false};
   const double step_s = offset_step(readings_at(log, thin, 0.0, options.max_gap_s));
   std::vector<FoundTree> found;
   found.push_back(search.settle_at(0.0, step_s, quick));
-  if (explains_all(found.back().tree) && uses_all(found.back())) return std::move(found.back());
+  if (explains_all(found.back().tree) && uses_all(found.back()))
+    return search.finished(std::move(found.back()), step_s, quick);
   for (const double start_s :
        scan_time_offsets(full, log, step_s, options.max_time_offset_s, options.max_gap_s)) {
     const bool known = std::ranges::any_of(found, [&](const FoundTree& f) {
@@ -188,7 +221,8 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
     });
     if (known) continue;
     found.push_back(search.settle_at(start_s, step_s, quick));
-    if (explains_all(found.back().tree)) return std::move(found.back());
+    if (explains_all(found.back().tree))
+      return search.finished(std::move(found.back()), step_s, quick);
   }
   std::ranges::stable_sort(found, {},
                            [](const FoundTree& f) { return std::abs(f.offset.value_s); });
@@ -196,8 +230,9 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
   for (std::size_t k = 1; k < found.size(); ++k) {
     if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
   }
-  if (!has_free_body(found[best].tree)) return std::move(found[best]);
-  return search.settle_at(found[best].offset.value_s, step_s, {});
+  if (!is_unfinished(found[best].tree))
+    return search.finished(std::move(found[best]), step_s, quick);
+  return search.finished(search.settle_at(found[best].offset.value_s, step_s, {}), step_s, {});
 }
 
 }  // namespace kinescope::structure_search

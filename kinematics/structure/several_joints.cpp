@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/screening.h"
 #include "kinematics/structure/tangent.h"
 
@@ -297,6 +298,36 @@ ChainFit pruned(const Problem& p, ChainFit fit) {
   return fit;
 }
 
+// The chain with joint k, a turn, as the slide along which it moves the child from where it rests.
+ChainModel with_slide(const ChainModel& model, std::size_t k) {
+  ChainModel out = model;
+  ChainJoint& joint = out.joints[k];
+  const Eigen::Vector3d axis = joint.frame.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d step =
+      axis.cross(Eigen::Vector3d(model.mount.translation - joint.frame.translation));
+  joint.type = JointType::kPrismatic;
+  joint.frame.rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), step);
+  for (ChainTerm& term : joint.terms) term.scale *= step.norm();
+  return out;
+}
+
+// Turns about axes so far away that slides say as much are slides: near one posture the two look
+// alike, and that is where the chain was started.
+ChainFit with_plain_slides(const Problem& p, ChainFit fit, const Readings& readings) {
+  constexpr double kTurned = 0.1;  // rad, RMS: what turns more is no slide
+  for (std::size_t k = 0; k < fit.model.joints.size(); ++k) {
+    const ChainJoint& joint = fit.model.joints[k];
+    if (joint.type == JointType::kPrismatic || std::abs(joint.terms.front().scale) > kTurned)
+      continue;
+    ChainFit slide = fit_chain(p.motion, p.readings, with_slide(fit.model, k),
+                               {.max_iterations = 25, .outlier_cost = kOutlier});
+    const double loss = (slide.cost - fit.cost) / std::min(slide.correlation, fit.correlation) +
+                        penalty_of(slide, readings) - penalty_of(fit, readings);
+    if (loss < 0.0) fit = std::move(slide);
+  }
+  return fit;
+}
+
 std::optional<Problem> make_problem(const RelativeMotion& relative, const Readings& readings,
                                     const std::vector<char>& unused, int skip) {
   std::vector<int> channels;
@@ -345,6 +376,7 @@ std::optional<Attachment> find_serial_attachment(const Body& body, int parent, c
     ChainFit fit = pruned(*p, fit_chain(p->motion, p->readings, ordered.fit.model,
                                         {.max_iterations = 25, .outlier_cost = kOutlier}));
     if (fit.model.joints.size() < 2) continue;
+    fit = with_plain_slides(*p, std::move(fit), readings);
     if (best && best->data_cost <= fit.cost) continue;
     std::vector<OrderDoubt> doubts = order_doubts(*p, fit);
     fit.model = recentred(fit.model, p->reference);

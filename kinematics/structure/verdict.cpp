@@ -9,6 +9,8 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/median.h"
+#include "kinematics/structure/idle_channels.h"
+#include "kinematics/structure/move_bodies.h"
 #include "kinematics/structure/natural_units.h"
 
 namespace kinescope::structure_search {
@@ -77,6 +79,7 @@ class Judge {
       add_orders(b, out);
     }
     add_exchanges(out);
+    add_rivals(out);
     return out;
   }
 
@@ -94,7 +97,8 @@ class Judge {
       if (again) continue;
       listed.push_back(&a);
       Alternative alternative;
-      alternative.loss = std::max(0.0, a.cost(correlation) - now + exchange_loss(b, a));
+      alternative.loss =
+          std::max(0.0, a.cost(correlation) - now + exchange_loss(b, a) + idle_loss(b, a));
       alternative.words = words(b, a);
       alternative.first_channel = body.attachment.channel();
       alternative.second_channel = a.channel();
@@ -105,6 +109,21 @@ class Judge {
     out.push_back({std::max(0.0, free_loss),
                    fmt::format("tag {} moves freely", series_.bodies[b].id.value), -1, -1,
                    own_link(tree_, b)});
+  }
+
+  // What the alternative changes in how many channels drive nothing; those of exchanged channels
+  // change nothing.
+  double idle_loss(std::size_t b, const Attachment& a) const {
+    return conflicts(tree_, b, a) ? 0.0 : idle_change(tree_, readings_, b, a);
+  }
+
+  void add_rivals(std::vector<Alternative>& out) const {
+    for (const RivalTree& rival : tree_.rivals) {
+      out.push_back({std::max(0.0, rival.loss),
+                     fmt::format("tag {} on another link, and others with it",
+                                 series_.bodies[rival.body].id.value),
+                     -1, -1, own_link(tree_, rival.body)});
+    }
   }
 
   // What the joint that has the alternative's channel now would lose by giving it up.

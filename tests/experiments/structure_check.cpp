@@ -24,9 +24,12 @@ std::map<TagId, int> link_of_tags(const RandomRobot& robot) {
   return links;
 }
 
-bool is_right(const Structure& found, const RandomRobot& robot, const RobotRecording& recording) {
+namespace {
+
+// The edges of the truth, but for the names of links.
+bool edges_right(const Structure& found, const RandomRobot& robot,
+                 const RobotRecording& recording) {
   const auto links = link_of_tags(robot);
-  if (!found.free_markers.empty()) return false;
   std::vector<int> true_link(found.links.size(), -1);
   true_link[0] = 0;
   for (std::size_t l = 0; l < found.links.size(); ++l) {
@@ -53,6 +56,27 @@ bool is_right(const Structure& found, const RandomRobot& robot, const RobotRecor
   }
   std::ranges::sort(edges);
   return edges == true_edges(robot, recording);
+}
+
+// With every two slides in series that have no marker between in the other order.
+Structure with_slides_exchanged(Structure found) {
+  for (StructureJoint& first : found.joints) {
+    for (StructureJoint& second : found.joints) {
+      const auto between = static_cast<std::size_t>(first.child_link);
+      if (second.parent_link != first.child_link || !found.links[between].markers.empty()) continue;
+      if (first.type == JointType::kPrismatic && second.type == JointType::kPrismatic)
+        std::swap(first.channel, second.channel);
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+bool is_right(const Structure& found, const RandomRobot& robot, const RobotRecording& recording) {
+  if (!found.free_markers.empty()) return false;
+  return edges_right(found, robot, recording) ||
+         edges_right(with_slides_exchanged(found), robot, recording);
 }
 
 bool is_right(const std::vector<AnchorEdge>& found, const RandomRobot& robot,

@@ -26,7 +26,8 @@ struct TrueEdge {
                                                const RobotRecording& recording);
 [[nodiscard]] std::map<TagId, int> link_of_tags(const RandomRobot& robot);
 
-/// Every marker on its link, every joint with its type, its neighbours and its main channel.
+/// Every marker on its link, every joint with its type, its neighbours and its main channel. Two
+/// slides in series without a marker between are right in either order: they move the same.
 [[nodiscard]] bool is_right(const Structure& found, const RandomRobot& robot,
                             const RobotRecording& recording);
 [[nodiscard]] bool is_right(const std::vector<AnchorEdge>& found, const RandomRobot& robot,
