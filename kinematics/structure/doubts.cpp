@@ -208,11 +208,15 @@ void doubt_unpaired(const Readings& readings, const OwnLog& own, Structure& out)
        names});
 }
 
-void judge_fit(const FoundTree& found, const Series& plain, const JointLog& log, const OwnLog& own,
+void judge_fit(const Answer& answer, const Series& plain, const JointLog& log, const OwnLog& own,
                const StructureOptions& options, Structure& out) {
-  const Readings readings =
-      readings_like(found.readings, own.log, plain, found.offset.value_s, options.max_gap_s);
-  const GrownTree tree = refit_tree(found.tree, plain, readings);
+  const FoundTree& found = answer.found;
+  // Without an allowance it was found with that noise.
+  const GrownTree tree = answer.allowance == 0.0
+                             ? found.tree
+                             : refit_tree(found.tree, plain,
+                                          readings_like(found.readings, own.log, plain,
+                                                        found.offset.value_s, options.max_gap_s));
   std::size_t next = 0;
   const StructureJoint* worst = nullptr;
   TagId founder;

@@ -30,7 +30,7 @@ void doubt_unpaired(const Readings& readings, const OwnLog& own, Structure& out)
 /// The likelihoods compare answers with each other. How far the data are from the best of them is
 /// judged with the sightings' own noise (`plain`); a wrong answer is worth no more than what it
 /// explains.
-void judge_fit(const FoundTree& found, const Series& plain, const JointLog& log, const OwnLog& own,
+void judge_fit(const Answer& answer, const Series& plain, const JointLog& log, const OwnLog& own,
                const StructureOptions& options, Structure& out);
 
 }  // namespace kinescope::structure_search

@@ -14,8 +14,9 @@ namespace {
 Pose median_pose(const Motion& motion) {
   const Pose reference = motion[motion.size() / 2].pose;
   std::array<std::vector<double>, 6> moves;
+  const Pose inverse = reference.inverse();
   for (const MotionSample& sample : motion) {
-    const Pose move = reference.inverse() * sample.pose;
+    const Pose move = inverse * sample.pose;
     const Eigen::Vector3d turn = log_rotation(move.rotation);
     for (std::size_t i = 0; i < 3; ++i) {
       moves[i].push_back(turn[static_cast<Eigen::Index>(i)]);
@@ -31,19 +32,16 @@ Pose median_pose(const Motion& motion) {
 bool hardly_moves(const Motion& motion, const Pose& from, const Body& body, double slack) {
   constexpr double kTurn = 0.01;    // rad
   constexpr double kShift = 0.003;  // of the distance from the camera
+  const Pose inverse = from.inverse();
   std::vector<double> turn;
   std::vector<double> shift;
   for (const MotionSample& sample : motion) {
-    const Pose left = from.inverse() * sample.pose;
+    const Pose left = inverse * sample.pose;
     turn.push_back(log_rotation(left.rotation).norm());
     shift.push_back(left.translation.norm());
   }
-  std::vector<double> distance;
-  for (const Sighting& s : body.at) {
-    if (s.seen) distance.push_back(s.pose.translation.norm());
-  }
-  return median_of(turn) <= slack * kTurn &&
-         median_of(shift) <= slack * kShift * median_of(distance);
+  return median_of(std::move(turn)) <= slack * kTurn &&
+         median_of(std::move(shift)) <= slack * kShift * distance_of({&body, 1});
 }
 
 // The body as if it were a link: where it was seen, as well as it was seen.

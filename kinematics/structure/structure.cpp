@@ -96,7 +96,7 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   doubt_shared_channels(log, out);
   doubt_copies(log, out);
   doubt_allowance(answer, out);
-  judge_fit(s, plain, log, own, options, out);
+  judge_fit(answer, plain, log, own, options, out);
   doubt_clocks(fitted, every, full, own.log, options, out);
   out.time_offset_s = s.offset.value_s;
   out.time_offset_sigma_s = s.offset.sigma_s;
