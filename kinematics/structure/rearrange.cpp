@@ -7,6 +7,7 @@
 
 #include "kinematics/structure/assign_channels.h"
 #include "kinematics/structure/attach_bodies.h"
+#include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/idle_channels.h"
 #include "kinematics/structure/move_bodies.h"
 
@@ -55,6 +56,17 @@ const Attachment* by_channel(const GrowthState& state, std::size_t body, int par
   return best;
 }
 
+// Adds the joints by which channels that drive nothing may hang the body on the link: of a small
+// motion other channels say as much by chance, and only the best few of all are known.
+void list_idle_channels(GrowthState& state, std::size_t body, int link) {
+  const std::vector<char> idle = idle_channels(state.tree, state.readings);
+  if (std::ranges::find(idle, 1) == idle.end()) return;
+  for (Attachment& a : find_attachments(state.series.bodies[body], link, state.tree.link(link).path,
+                                        state.readings, idle, {.coordinate_free = false})) {
+    if (a.driven()) state.tree.bodies[body].alternatives.push_back(std::move(a));
+  }
+}
+
 // What it loses that a body at rest hangs by a joint; nothing where none is known.
 std::optional<double> loss_of_split(const GrowthState& state, std::size_t body) {
   const GrownBody& grown = state.tree.bodies[body];
@@ -66,12 +78,13 @@ std::optional<double> loss_of_split(const GrowthState& state, std::size_t body) 
 }
 
 // Markers that share a link may be of two, while a channel drives nothing.
-void add_shared_links(const GrowthState& state, std::vector<Split>& splits) {
+void add_shared_links(GrowthState& state, std::vector<Split>& splits) {
   const std::vector<char> idle = idle_channels(state.tree, state.readings);
   if (std::ranges::find(idle, 1) == idle.end()) return;
   for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
     const GrownBody& grown = state.tree.bodies[b];
     if (grown.link < 0 || !grown.attachment.at_rest() || own_link(state.tree, b) >= 0) continue;
+    list_idle_channels(state, b, grown.link);
     const std::optional<double> loss = loss_of_split(state, b);
     if (!loss || *loss > kWorthTrying) continue;
     const GrownLink& link = state.tree.link(grown.link);
@@ -105,7 +118,7 @@ void add_passed_over(const GrowthState& state, std::vector<Split>& splits) {
   }
 }
 
-std::vector<Split> likely_splits(const GrowthState& state) {
+std::vector<Split> likely_splits(GrowthState& state) {
   std::vector<Split> splits;
   add_shared_links(state, splits);
   add_passed_over(state, splits);
@@ -127,6 +140,7 @@ bool split_apart(GrowthState& state, const Split& split) {
     place(state, first, Attachment(*stays));
     link = state.tree.bodies[first].link;
   }
+  list_idle_channels(state, split.second, link);
   const Attachment* joint = best_joint(state, split.second, link);
   if (joint == nullptr) return false;
   place(state, split.second, Attachment(*joint));
@@ -144,33 +158,46 @@ int first_body(const GrownTree& tree, int link) {
   return -1;
 }
 
-// Every body on the same link, by the same joint.
+// Where a body hangs, in terms that do not depend on the links' numbers.
+auto place_of(const GrownTree& tree, std::size_t body) {
+  const int l = tree.bodies[body].link;
+  if (l <= 0) return std::tuple(first_body(tree, l), 0, -1, JointType::kFixed);
+  const GrownLink& link = tree.link(l);
+  return std::tuple(first_body(tree, l), first_body(tree, link.parent), link.attachment.channel(),
+                    link.attachment.fit.model.joints.front().type);
+}
+
 bool same_tree(const GrownTree& a, const GrownTree& b) {
-  const auto described = [](const GrownTree& tree, std::size_t body) {
-    const int l = tree.bodies[body].link;
-    if (l <= 0) return std::tuple(first_body(tree, l), 0, -1, JointType::kFixed);
-    const GrownLink& link = tree.link(l);
-    return std::tuple(first_body(tree, l), first_body(tree, link.parent), link.attachment.channel(),
-                      link.attachment.fit.model.joints.front().type);
-  };
   for (std::size_t body = 0; body < a.bodies.size(); ++body) {
-    if (described(a, body) != described(b, body)) return false;
+    if (place_of(a, body) != place_of(b, body)) return false;
   }
   return true;
 }
 
-// Of one tree over another; errors that are alike in neighbouring samples count once, as in the
-// tree that fits the body better.
+// Of a body in one tree over another; errors that are alike in neighbouring samples count once, as
+// in the tree that fits the body better.
+double loss_of(const GrownBody& body, const GrownBody& over) {
+  const double correlation =
+      std::min(body.link < 0 ? over.attachment.fit.correlation : body.attachment.fit.correlation,
+               over.link < 0 ? body.attachment.fit.correlation : over.attachment.fit.correlation);
+  const auto cost = [&](const GrownBody& b) {
+    return b.link < 0 ? b.free_cost / correlation : b.attachment.cost(correlation);
+  };
+  return cost(body) - cost(over);
+}
+
+// Of one tree over another. A body that has the same place in both may still hang on a path of
+// other joints, each as well known as its own marker tells: that error is the same for all bodies
+// further out, and would be counted for each of them.
 double loss_of(const GrownTree& tree, const GrownTree& over, const Readings& readings) {
+  constexpr double kPathError = 10.0;  // -2 ln likelihood: five parameters off by 1.4 sigma
   double loss = idle_cost(tree, readings) - idle_cost(over, readings);
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
-    const GrownBody& x = tree.bodies[b];
-    const GrownBody& y = over.bodies[b];
-    const double correlation =
-        std::min(x.link < 0 ? y.attachment.fit.correlation : x.attachment.fit.correlation,
-                 y.link < 0 ? x.attachment.fit.correlation : y.attachment.fit.correlation);
-    loss += x.link < 0 ? x.free_cost / correlation : x.attachment.cost(correlation);
-    loss -= y.link < 0 ? y.free_cost / correlation : y.attachment.cost(correlation);
+    double own = loss_of(tree.bodies[b], over.bodies[b]);
+    if (place_of(tree, b) == place_of(over, b)) {
+      own -= std::clamp(own, -kPathError, kPathError);
+    }
+    loss += own;
   }
   return loss;
 }

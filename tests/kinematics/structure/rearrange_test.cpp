@@ -46,6 +46,12 @@ TEST(TakeLinksApart, WhereTwoParallelAxesPassForOne) {
       scene_of("stress parallel axes 0.1 rad 6 s", 36, {.parallel_axes = true}, recording));
 }
 
+// Two slides along one axis, of which the second marker could as well hang by both on the base and
+// the first on the second: bodies further out say nothing of which.
+TEST(TakeLinksApart, NotForThePathsErrorsOfBodiesFurtherOut) {
+  expect_right(scene_of("stress parallel axes", 48, {.parallel_axes = true}, noisy()));
+}
+
 // Every joint has the type and the channel of a true one; links without a marker have no name.
 void expect_right_joints(const Scene& scene) {
   const Structure found = find_structure(scene.recording.tracks, scene.recording.log);
