@@ -7,7 +7,6 @@
 
 #include "kinematics/structure/assign_channels.h"
 #include "kinematics/structure/attach_bodies.h"
-#include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/idle_channels.h"
 #include "kinematics/structure/move_bodies.h"
 
@@ -56,17 +55,6 @@ const Attachment* by_channel(const GrowthState& state, std::size_t body, int par
   return best;
 }
 
-// Adds the joints by which channels that drive nothing may hang the body on the link: of a small
-// motion other channels say as much by chance, and only the best few of all are known.
-void list_idle_channels(GrowthState& state, std::size_t body, int link) {
-  const std::vector<char> idle = idle_channels(state.tree, state.readings);
-  if (std::ranges::find(idle, 1) == idle.end()) return;
-  for (Attachment& a : find_attachments(state.series.bodies[body], link, state.tree.link(link).path,
-                                        state.readings, idle, {.coordinate_free = false})) {
-    if (a.driven()) state.tree.bodies[body].alternatives.push_back(std::move(a));
-  }
-}
-
 // What it loses that a body at rest hangs by a joint; nothing where none is known.
 std::optional<double> loss_of_split(const GrowthState& state, std::size_t body) {
   const GrownBody& grown = state.tree.bodies[body];
@@ -78,13 +66,12 @@ std::optional<double> loss_of_split(const GrowthState& state, std::size_t body) 
 }
 
 // Markers that share a link may be of two, while a channel drives nothing.
-void add_shared_links(GrowthState& state, std::vector<Split>& splits) {
+void add_shared_links(const GrowthState& state, std::vector<Split>& splits) {
   const std::vector<char> idle = idle_channels(state.tree, state.readings);
   if (std::ranges::find(idle, 1) == idle.end()) return;
   for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
     const GrownBody& grown = state.tree.bodies[b];
     if (grown.link < 0 || !grown.attachment.at_rest() || own_link(state.tree, b) >= 0) continue;
-    list_idle_channels(state, b, grown.link);
     const std::optional<double> loss = loss_of_split(state, b);
     if (!loss || *loss > kWorthTrying) continue;
     const GrownLink& link = state.tree.link(grown.link);
@@ -118,7 +105,7 @@ void add_passed_over(const GrowthState& state, std::vector<Split>& splits) {
   }
 }
 
-std::vector<Split> likely_splits(GrowthState& state) {
+std::vector<Split> likely_splits(const GrowthState& state) {
   std::vector<Split> splits;
   add_shared_links(state, splits);
   add_passed_over(state, splits);
@@ -140,7 +127,6 @@ bool split_apart(GrowthState& state, const Split& split) {
     place(state, first, Attachment(*stays));
     link = state.tree.bodies[first].link;
   }
-  list_idle_channels(state, split.second, link);
   const Attachment* joint = best_joint(state, split.second, link);
   if (joint == nullptr) return false;
   place(state, split.second, Attachment(*joint));
