@@ -10,10 +10,20 @@ namespace {
 // Of channels that move, those that drive nothing that carries a marker.
 constexpr double kIdleShare = 0.1;
 
-// Takes the attachment's main channels out.
+// Standard deviations by which a joint moves with its channel, or it is as good as at rest.
+constexpr double kMoves = 4.0;
+
+// Takes the main channels out that move the attachment's joints.
 void use(const Attachment& attachment, std::vector<char>& idle) {
-  for (const ChainJoint& joint : attachment.fit.model.joints) {
-    if (!joint.terms.empty()) idle[static_cast<std::size_t>(joint.terms.front().channel)] = 0;
+  const ChainFit& fit = attachment.fit;
+  std::size_t t = 0;
+  for (const ChainJoint& joint : fit.model.joints) {
+    if (joint.terms.empty()) continue;
+    const double sigma =
+        t < fit.scale_sigma.size() ? fit.scale_sigma[t] * std::sqrt(fit.correlation) : 0.0;
+    const ChainTerm& main = joint.terms.front();
+    if (std::abs(main.scale) > kMoves * sigma) idle[static_cast<std::size_t>(main.channel)] = 0;
+    t += joint.terms.size();
   }
 }
 

@@ -89,5 +89,22 @@ TEST(IdleChannels, CostWhatTheyCouldHaveDriven) {
       << "a channel that stands still drives nothing that is seen";
 }
 
+TEST(IdleChannels, DriveNothingByAMotionThatIsAsGoodAsNone) {
+  structure_search::Readings readings;
+  readings.mean = {0.0};
+  readings.rms = {1.0};
+  structure_search::GrownTree tree;
+  tree.links.resize(1);
+  tree.bodies.resize(1);
+  tree.bodies[0].link = 0;
+  structure_search::Attachment slide;
+  slide.fit.model.joints.push_back(
+      {.type = JointType::kPrismatic, .frame = {}, .terms = {{.channel = 0, .scale = 1e-3}}});
+  slide.fit.scale_sigma = {1e-4};
+  EXPECT_LT(structure_search::idle_change(tree, readings, 0, slide), -4.0);
+  slide.fit.scale_sigma = {1e-3};
+  EXPECT_EQ(structure_search::idle_change(tree, readings, 0, slide), 0.0);
+}
+
 }  // namespace
 }  // namespace kinescope
