@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -29,6 +30,30 @@ double strip_width(double cell_px, double blur_px) {
 double faded(double width, double distance) {
   const double t = std::clamp((width - distance) / kTaper, 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
+}
+
+// Calls `visit` for 0 .. `last` in order, but only where a row of pixels is in some edge's strip;
+// `first`: distance outward of every edge at 0.
+template <typename Visit>
+void for_each_in_strips(const std::array<Edge, 4>& edges, const std::array<double, 4>& first,
+                        int last, const Visit& visit) {
+  std::array<std::pair<int, int>, 4> spans;
+  for (std::size_t e = 0; e < 4; ++e) {
+    constexpr double kLevel = 1e-9;  // px a px
+    const double slope = edges[e].outward.x();
+    spans[e] = {0, last};
+    if (std::abs(slope) < kLevel) continue;
+    const double a = (-edges[e].inner_width - first[e]) / slope;
+    const double b = (edges[e].outer_width - first[e]) / slope;
+    const auto inside = [&](double offset) { return std::clamp(offset, -1.0, last + 1.0); };
+    spans[e] = {std::max(0, static_cast<int>(std::floor(inside(std::min(a, b))))),
+                std::min(last, static_cast<int>(std::ceil(inside(std::max(a, b)))))};
+  }
+  std::ranges::sort(spans);
+  int next = 0;
+  for (const auto& [from, to] : spans) {
+    for (next = std::max(next, from); next <= to; ++next) visit(next);
+  }
 }
 
 }  // namespace
@@ -102,12 +127,13 @@ std::vector<Sample> collect_samples(const ImageView& image, const std::array<Edg
   std::vector<Sample> samples;
   for (int y = y0; y <= y1; ++y) {
     const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * y;
-    std::array<double, 4> out{};  // distance outward of every edge
+    std::array<double, 4> first{};  // distance outward of every edge, at x0
     for (std::size_t e = 0; e < 4; ++e)
-      out[e] = edges[e].outward.dot(Eigen::Vector2d(x0, y) - edges[e].middle);
-    for (int x = x0; x <= x1; ++x) {
-      const std::array<double, 4> here = out;
-      for (std::size_t e = 0; e < 4; ++e) out[e] += edges[e].outward.x();
+      first[e] = edges[e].outward.dot(Eigen::Vector2d(x0, y) - edges[e].middle);
+    for_each_in_strips(edges, first, x1 - x0, [&](int offset) {
+      const int x = x0 + offset;
+      std::array<double, 4> here{};
+      for (std::size_t e = 0; e < 4; ++e) here[e] = first[e] + offset * edges[e].outward.x();
       for (std::size_t e = 0; e < 4; ++e) {
         const Edge& edge = edges[e];
         const double width = here[e] > 0.0 ? edge.outer_width : edge.inner_width;
@@ -124,7 +150,7 @@ std::vector<Sample> collect_samples(const ImageView& image, const std::array<Edg
         s.weight = faded(width, std::abs(here[e])) * std::min(1.0, (nearest - clear) / kTaper);
         samples.push_back(s);
       }
-    }
+    });
   }
   return samples;
 }
