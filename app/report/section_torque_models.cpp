@@ -118,7 +118,8 @@ std::string plainer_note(const TorqueScore& score, const std::vector<std::string
   }
   if (names.empty()) return "";
   return fmt::format(
-      "{} is the parametric one at {}: what it learned beside that predicted motion left out of the "
+      "{} is the parametric one at {}: what it learned beside that predicted motion left out of "
+      "the "
       "fit worse.",
       to_string(score.kind), fmt::join(names, ", "));
 }

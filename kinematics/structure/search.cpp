@@ -149,12 +149,7 @@ class Search {
     }
     FoundTree found = grow_at(offset_s, options, si_share);
     for (int growth = 1; growth < kMostGrowths && has_driven_joint(found.tree); ++growth) {
-      const TimeOffset offset = refined(found, step_s);
-      const double moved = std::abs(offset.value_s - found.offset.value_s);
-      found.offset.sigma_s = offset.sigma_s;
-      if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) break;
-      found = grow_at(offset.value_s, options, found.readings.si_share);
-      found.offset.sigma_s = offset.sigma_s;
+      if (!grow_anew(found, step_s, options)) break;
     }
     return found;
   }
@@ -167,12 +162,7 @@ class Search {
       const bool changed = take_links_apart(state);
       found.tree = std::move(state.tree);
       if (!changed || !scans() || growth == kMostGrowths) break;
-      const TimeOffset offset = refined(found, step_s);
-      const double moved = std::abs(offset.value_s - found.offset.value_s);
-      found.offset.sigma_s = offset.sigma_s;
-      if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) break;
-      found = grow_at(offset.value_s, options, found.readings.si_share);
-      found.offset.sigma_s = offset.sigma_s;
+      if (!grow_anew(found, step_s, options)) break;
     }
     return found;
   }
@@ -183,6 +173,17 @@ class Search {
   }
 
  private:
+  // At the offset that the tree shows; false where that hardly moves any more.
+  bool grow_anew(FoundTree& found, double step_s, const GrowthOptions& options) const {
+    const TimeOffset offset = refined(found, step_s);
+    const double moved = std::abs(offset.value_s - found.offset.value_s);
+    found.offset.sigma_s = offset.sigma_s;
+    if (moved < std::min(kOffsetMoved, kSameSigmas * offset.sigma_s)) return false;
+    found = grow_at(offset.value_s, options, found.readings.si_share);
+    found.offset.sigma_s = offset.sigma_s;
+    return true;
+  }
+
   [[nodiscard]] std::vector<double> likely_costs_at(double offset_s) const {
     const std::size_t bodies = rough_.bodies.size();
     const Readings readings = readings_at(log_, rough_, offset_s, options_.max_gap_s);

@@ -138,7 +138,7 @@ Scene make_scene(const Row& row, int trial) {
     camera.cy -= 200.0;
   }
   PlacedMarker marker;
-  const auto id = static_cast<int>(rng.index(30));
+  const int id = rng.index(30);
   marker.art = row.family.starts_with("DICT") ? aruco_art(10, id) : apriltag_art(row.family, id);
   if (row.codec == Codec::kH264) marker.art = apriltag_art(row.family, 7);
   marker.T_camera_tag =

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/tag_windows.h"
 
-
 #include <gtest/gtest.h>
 
 namespace kinescope {
