@@ -37,6 +37,7 @@ double faded(double width, double distance) {
 template <typename Visit>
 void for_each_in_strips(const std::array<Edge, 4>& edges, const std::array<double, 4>& first,
                         int last, const Visit& visit) {
+  if (last < 0) return;  // beside the image
   std::array<std::pair<int, int>, 4> spans;
   for (std::size_t e = 0; e < 4; ++e) {
     constexpr double kLevel = 1e-9;  // px a px
