@@ -98,11 +98,18 @@ std::string effect_figure(const TracedEffect& effect) {
   return "<div class=\"figures pair\">" + drawing + "</div>\n";
 }
 
-// The vector at each node as an arrow over the image; the longest one is as long as two nodes are
-// apart.
+// The vector at each node as an arrow over the image; the longest one that stands out of its doubt
+// is as long as two nodes are apart, and no other longer.
 std::string field_figure(const Rest& rest) {
   const FieldMap& field = rest.field;
-  const double longest = field.mean.rowwise().norm().maxCoeff();
+  const auto is_clear = [&](Eigen::Index i) {
+    return field.mean.row(i).norm() > kCoverageFactor * field.sigma.row(i).norm();
+  };
+  double longest = 0.0;
+  for (Eigen::Index i = 0; i < field.at.rows(); ++i) {
+    if (is_clear(i)) longest = std::max(longest, field.mean.row(i).norm());
+  }
+  if (!(longest > 0.0)) longest = field.mean.rowwise().norm().maxCoeff();
   const Eigen::RowVector2d low = field.at.colwise().minCoeff().array() - field.spacing;
   const Eigen::RowVector2d high = field.at.colwise().maxCoeff().array() + field.spacing;
   constexpr double kWidth = 470.0;
@@ -120,10 +127,11 @@ std::string field_figure(const Rest& rest) {
       {.width = kWidth, .height = 48.0 + (kWidth - 62.0) * aspect});
   const double scale = longest > 0.0 ? 2.0 * field.spacing / longest : 0.0;
   for (Eigen::Index i = 0; i < field.at.rows(); ++i) {
-    const Eigen::Vector2d half = 0.5 * scale * field.mean.row(i).transpose();
+    const double length = field.mean.row(i).norm();
+    const double shortened = length > longest ? longest / length : 1.0;
+    const Eigen::Vector2d half = 0.5 * scale * shortened * field.mean.row(i).transpose();
     const Eigen::Vector2d at = field.at.row(i).transpose();
-    const bool clear = field.mean.row(i).norm() > kCoverageFactor * field.sigma.row(i).norm();
-    plot.arrow(at - half, at + half, clear ? series_class(1) : "faint");
+    plot.arrow(at - half, at + half, is_clear(i) ? series_class(1) : "faint");
   }
   plot.legend(
       fmt::format("longest arrow {}; stands out of its doubt", amount_text(longest, rest.unit)),

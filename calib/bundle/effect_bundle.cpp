@@ -188,15 +188,19 @@ Eigen::VectorXd units_of(const Sighting& sighting) {
   return units;
 }
 
-// Where in the image each row of a sighting was seen.
-Eigen::MatrixX2d places_of(const Spec& spec, const Sighting& sighting) {
+// Where in the image the model expects each row of a sighting: at the place seen, its own error
+// would be among what a field may depend on.
+Eigen::MatrixX2d places_of(const Spec& spec, const Sighting& sighting,
+                           const Eigen::VectorXd& whitened) {
   Eigen::MatrixX2d places =
       Eigen::MatrixX2d::Constant(sighting.dimension(), 2, std::numeric_limits<double>::quiet_NaN());
   const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
   if (spec.path[marker.link.index()].empty()) return places;
   for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(2 * i);
-    places.middleRows<2>(row).rowwise() = sighting.corners_px[i].transpose();
+    const Eigen::Vector2d expected =
+        sighting.corners_px[i] - sighting.sigma * whitened.segment<2>(row);
+    places.middleRows<2>(row).rowwise() = expected.transpose();
   }
   return places;
 }
@@ -300,7 +304,10 @@ BundleFit EffectBundle::fit(const BundleChange& change,
       const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
       const Eigen::VectorXd units = units_of(sighting);
       out.unit.segment(at, units.size()) = units;
-      if (with_places) out.place_px.middleRows(at, units.size()) = places_of(spec, sighting);
+      if (with_places) {
+        out.place_px.middleRows(at, units.size()) =
+            places_of(spec, sighting, out.residual.segment(at, units.size()));
+      }
       at += units.size();
     }
     row += count;

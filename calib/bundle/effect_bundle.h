@@ -50,7 +50,7 @@ struct BundleFit : BundleSolution {
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant
   Eigen::VectorXd unit;                 ///< rows: px or m of a whitened one; 0 for a pose's turn
-  /// Rows: where in the image the corner was seen; NaN where that says nothing of the image (a
+  /// Rows: where in the image the corner is expected; NaN where that says nothing of the image (a
   /// marker at rest is at one place only). Empty: rows are no corners, or were mixed.
   Eigen::MatrixX2d place_px;
   double correlation_time_s = 0.0;

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calib/bundle/effect_bundle.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 #include "tests/truth/camera_effects.h"
@@ -270,6 +271,31 @@ TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
   EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
   ASSERT_FALSE(trace.rest.empty());
   EXPECT_EQ(trace.rest.front().place, "q2");
+}
+
+// At the place seen, a corner's error would be explained by itself, held out or not.
+TEST(TraceCalibration, APlaceInTheImageIsWhereTheCornerIsExpected) {
+  const auto places_of = [](double sigma_px) {
+    EffectWorldOptions options = filmed({}, 60);
+    options.sigma_px = sigma_px;
+    const World world = make_effect_world(options);
+    const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
+    return bundle.fit({}, {}).place_px;
+  };
+  // The same errors, of two sizes.
+  constexpr double kNoise = 0.5;  // px
+  const Eigen::MatrixX2d once = places_of(kNoise);
+  const Eigen::MatrixX2d twice = places_of(2.0 * kNoise);
+  ASSERT_EQ(once.rows(), twice.rows());
+  double sum = 0.0;
+  int count = 0;
+  for (Eigen::Index row = 0; row < once.rows(); ++row) {
+    if (!once.row(row).allFinite()) continue;
+    sum += (once.row(row) - twice.row(row)).squaredNorm();
+    count += 2;
+  }
+  ASSERT_GT(count, 1000);
+  EXPECT_LT(std::sqrt(sum / count), 0.3 * kNoise);
 }
 
 TEST(TraceCalibration, AShiftByPlaceIsUnknownOverThePlaceInTheImage) {
