@@ -34,6 +34,7 @@ constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
 constexpr std::size_t kMostWaitingBytes = 512U << 20U;  // frames that wait for what later ones tell
 constexpr std::size_t kRunsTogether = 6;  // runs of frames read between two gap searches
+constexpr int kTryEvery = 4;    // frames of a gap: one is searched for what hides a marker
 constexpr int kLookEvery = 10;  // frames: the whole of one is searched at reduced resolution
 constexpr const char* kStage = "finding markers";
 constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
@@ -174,20 +175,62 @@ class Detecting {
     near.observations = recent_;
     for (TagObservation& tag : near.observations) tag.frame -= first;
     (void)sort_out_sightings(near, markers, std::min(2, options_.min_sightings));
+    for (SearchedFrame& searched : frames) searched.tags.clear();
     const int begin = own - first;
-    const std::map<int, std::vector<TagWindow>> windows =
-        find_gaps(near, begin, begin + static_cast<int>(frames.size()));
+    GapWindows windows = find_gaps(near, begin, begin + static_cast<int>(frames.size()));
+    search_again(frames, first, windows, Brightness::kAsSeen);
+    // A glint lasts: what hides a marker is looked for in some of its gap, and where it is found in
+    // all of it.
+    GapWindows some = windows;
+    GapWindows rest = windows;
+    for (const auto& [frame, of_frame] : windows) {
+      std::erase_if(some[frame], [&, f = frame](const TagWindow& window) {
+        return !is_tried(windows, f, window.id);
+      });
+    }
+    const std::set<TagId> hidden = search_again(frames, first, some, Brightness::kCutOff);
+    for (const auto& [frame, of_frame] : windows) {
+      std::erase_if(rest[frame], [&, f = frame](const TagWindow& window) {
+        return !hidden.contains(window.id) || is_tried(windows, f, window.id);
+      });
+    }
+    if (!hidden.empty()) search_again(frames, first, rest, Brightness::kCutOff);
+  }
+
+  using GapWindows = std::map<int, std::vector<TagWindow>>;  // by frame
+
+  // The first frame of each gap, and now and then one.
+  static bool is_tried(const GapWindows& windows, int frame, TagId id) {
+    const auto before = windows.find(frame - 1);
+    return frame % kTryEvery == 0 || before == windows.end() ||
+           std::ranges::find(before->second, id, &TagWindow::id) == before->second.end();
+  }
+
+  // Adds what is found in `windows` (frames counted from `first`) to the frames' tags and takes its
+  // windows out. Which markers were found.
+  std::set<TagId> search_again(std::span<SearchedFrame> frames, int first, GapWindows& windows,
+                               Brightness brightness) {
+    std::vector<std::vector<TagId>> ids(frames.size());
     for_each_run(
         frames, 1, searchers_.size(), [](SearchedFrame&) { return true; },
         [&](std::size_t worker, std::span<SearchedFrame> run) {
           SearchedFrame& searched = run.front();
-          searched.tags.clear();
-          const auto found = windows.find(searched.frame.index - first);
-          if (found == windows.end()) return;
-          searched.tags = finish(
-              search_windows(*fine(worker), searched.frame.image.view(), found->second, true),
-              searched.frame);
+          const auto of_frame = windows.find(searched.frame.index - first);
+          if (of_frame == windows.end()) return;
+          std::vector<TagObservation> found =
+              finish(search_windows(*fine(worker), searched.frame.image.view(), of_frame->second,
+                                    brightness),
+                     searched.frame);
+          for (TagObservation& tag : found) {
+            std::erase_if(of_frame->second,
+                          [&](const TagWindow& window) { return window.id == tag.id; });
+            ids[static_cast<std::size_t>(&searched - frames.data())].push_back(tag.id);
+            searched.tags.push_back(std::move(tag));
+          }
         });
+    std::set<TagId> out;
+    for (const std::vector<TagId>& of_frame : ids) out.insert(of_frame.begin(), of_frame.end());
+    return out;
   }
 
   std::vector<TagObservation> search_whole(std::size_t worker, const VideoFrame& frame,
@@ -222,8 +265,8 @@ class Detecting {
     const auto add = [&](std::vector<TagObservation> tags) {
       std::ranges::move(finish(std::move(tags), frame), std::back_inserter(found));
     };
-    add(search_windows(*fine(worker), image, windows, false));
-    add(search_windows(*searchers_[worker].coarse, image, reduced, false));
+    add(search_windows(*fine(worker), image, windows, Brightness::kAsSeen));
+    add(search_windows(*searchers_[worker].coarse, image, reduced, Brightness::kAsSeen));
     if (found.empty() || found.size() < before.tags.size() || frame.index % kLookEvery == 0) {
       std::vector<TagObservation> others = search_whole(worker, frame, false);
       std::erase_if(others, [&](const TagObservation& tag) {
@@ -284,11 +327,10 @@ class Detecting {
 
   // Where to look again in frames from `begin` to `end`: markers that are there before or after a
   // frame, and not in it.
-  static std::map<int, std::vector<TagWindow>> find_gaps(const TagObservations& so_far, int begin,
-                                                         int end) {
+  static GapWindows find_gaps(const TagObservations& so_far, int begin, int end) {
     std::map<TagId, std::vector<const TagObservation*>> tracks;
     for (const TagObservation& tag : so_far.observations) tracks[tag.id].push_back(&tag);
-    std::map<int, std::vector<TagWindow>> out;
+    GapWindows out;
     const auto& times = so_far.times_s;
     for (const auto& [id, track] : tracks) {
       std::size_t next = 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "calib/vision/sightings.h"
 
@@ -15,7 +16,8 @@ constexpr double kMarginOfEdge = 0.6;
 constexpr double kMargin = 8.0;  // px
 constexpr int kSmallest = 16;    // px
 // Grey levels at which brightness is cut off.
-constexpr std::array<int, 3> kCeilings = {255, 150, 90};
+constexpr std::array<int, 1> kNoCeiling = {255};
+constexpr std::array<int, 2> kCeilings = {150, 90};
 // Of the motion from frame to frame, what it may change by until the next one.
 constexpr double kChangeOfMotion = 0.5;
 
@@ -69,10 +71,13 @@ TagPrediction predict_tag(const TagObservation& last,
 }
 
 std::vector<TagObservation> search_windows(TagDetector& detector, const ImageView& image,
-                                           const std::vector<TagWindow>& windows, bool dimmed) {
+                                           const std::vector<TagWindow>& windows,
+                                           Brightness brightness) {
+  const std::span<const int> ceilings =
+      brightness == Brightness::kCutOff ? std::span<const int>(kCeilings) : kNoCeiling;
   std::vector<TagObservation> out;
   for (const TagWindow& window : windows) {
-    for (const int ceiling : kCeilings) {
+    for (const int ceiling : ceilings) {
       const GreyImage part = cut(image, window, ceiling);
       std::vector<TagObservation> found = detector.detect(part.view());
       std::erase_if(found, [&](const TagObservation& tag) { return tag.id != window.id; });
@@ -82,7 +87,7 @@ std::vector<TagObservation> search_windows(TagDetector& detector, const ImageVie
         }
         out.push_back(std::move(tag));
       }
-      if (!found.empty() || !dimmed) break;
+      if (!found.empty()) break;
     }
   }
   return out;

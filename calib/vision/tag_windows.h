@@ -36,12 +36,17 @@ struct TagPrediction {
 [[nodiscard]] TagPrediction predict_tag(const TagObservation& last,
                                         const std::vector<TagObservation>& before_last);
 
-/// In each window the marker that it was made for. `dimmed`: where it is not seen, brightness is
-/// cut off, step by step: a glint beside a marker hides it from a detector that thresholds by the
-/// brightest pixel nearby.
+/// How bright the pixels are taken to be. A glint beside a marker hides it from a detector that
+/// thresholds by the brightest pixel nearby.
+enum class Brightness {
+  kAsSeen,
+  kCutOff,  ///< at one grey level after the other, until the marker is seen
+};
+
+/// In each window the marker that it was made for.
 [[nodiscard]] std::vector<TagObservation> search_windows(TagDetector& detector,
                                                          const ImageView& image,
                                                          const std::vector<TagWindow>& windows,
-                                                         bool dimmed);
+                                                         Brightness brightness);
 
 }  // namespace kinescope
