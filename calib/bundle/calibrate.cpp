@@ -15,6 +15,7 @@
 #include "calib/bundle/uncertainty.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope {
 namespace {
@@ -150,8 +151,8 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
               const Progress& progress) {
   Rms training;
   Rms held_out;
-  const auto keep = [&](const State& state, const std::vector<int>& indices, Rms* rms) {
-    const auto predictions = predict_all(spec, state, indices);
+  const auto keep = [&](const std::vector<int>& indices,
+                        const std::vector<std::optional<Prediction>>& predictions, Rms* rms) {
     for (std::size_t i = 0; i < indices.size(); ++i) {
       if (!predictions[i]) continue;
       SightingResidual& residual = out.residuals[slot.at(indices[i])];
@@ -160,16 +161,25 @@ void validate(const Spec& spec, const State& solution, const RobustSolution& rob
       if (rms != nullptr) rms->add(spec.kind, *predictions[i]);
     }
   };
-  for (int fold = 0; fold < folds; ++fold) {
-    report_progress(progress, "validate", fold, folds);
-    const Split split = split_at(fold, robust, slot, out);
-    if (split.seen.empty() || split.unseen.empty()) continue;
+  struct Fold {
+    Split split;
+    std::vector<std::optional<Prediction>> seen, unseen, rejected;
+  };
+  report_progress(progress, "validate", 0, folds);
+  std::vector<Fold> all(static_cast<std::size_t>(folds));
+  parallel_for(all.size(), [&](std::size_t i) {
+    const Split split = split_at(static_cast<int>(i), robust, slot, out);
+    if (split.seen.empty() || split.unseen.empty()) return;
     const State state = solve_without(spec, solution, split, max_iterations);
-    for (const auto& prediction : predict_all(spec, state, split.seen)) {
+    all[i] = {split, predict_all(spec, state, split.seen), predict_all(spec, state, split.unseen),
+              predict_all(spec, state, split.rejected)};
+  });
+  for (const Fold& fold : all) {
+    for (const auto& prediction : fold.seen) {
       if (prediction) training.add(spec.kind, *prediction);
     }
-    keep(state, split.unseen, &held_out);
-    keep(state, split.rejected, nullptr);
+    keep(fold.split.unseen, fold.unseen, &held_out);
+    keep(fold.split.rejected, fold.rejected, nullptr);
   }
   report_progress(progress, "validate", folds, folds);
   out.folds = folds;

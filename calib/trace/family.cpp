@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "calib/trace/distribution.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::trace {
 namespace {
@@ -118,12 +120,12 @@ double number_of_tests(const std::vector<Candidate>& candidates, const Candidate
 
 std::vector<TestedMember> test_family(const NormalSystem& system,
                                       const std::vector<Candidate>& candidates, double least_gain) {
-  std::vector<TestedMember> out;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
+  std::vector<std::optional<TestedMember>> members(candidates.size());
+  parallel_for(candidates.size(), [&](std::size_t i) {
     const Candidate& candidate = candidates[i];
     const CoarseScan coarse = coarse_scan(system, candidate);
     const bool refined = is_refined(candidate);
-    if ((refined ? kMostRefined : 1.0) * coarse.gain < least_gain) continue;
+    if ((refined ? kMostRefined : 1.0) * coarse.gain < least_gain) return;
     const double tests = number_of_tests(candidates, candidate);
     TestedMember member = tested(system, candidate, coarse.value(candidate));
     if (refined && may_pass(member.score, tests)) {
@@ -133,7 +135,11 @@ std::vector<TestedMember> test_family(const NormalSystem& system,
     member.index = i;
     member.tests = tests;
     member.p_value = std::min(1.0, member.score.p_value * tests);
-    out.push_back(std::move(member));
+    members[i] = std::move(member);
+  });
+  std::vector<TestedMember> out;
+  for (std::optional<TestedMember>& member : members) {
+    if (member) out.push_back(std::move(*member));
   }
   return out;
 }

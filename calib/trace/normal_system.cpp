@@ -62,8 +62,10 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
 }
 
 const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
-  const auto found = carriers_.find(index);
-  if (found != carriers_.end()) return found->second;
+  return carriers_.get(index, [&] { return carrier_sums(index); });
+}
+
+NormalSystem::CarrierSums NormalSystem::carrier_sums(int index) const {
   CarrierSums sums{Eigen::VectorXd::Zero(linear_->instants()),
                    Eigen::MatrixXd::Zero(linear_->instants(), parameters()),
                    Eigen::VectorXd::Zero(linear_->instants())};
@@ -76,17 +78,19 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
     if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
   }
   sums.with_jacobian = with_jacobian;
-  return carriers_.emplace(index, std::move(sums)).first->second;
+  return sums;
 }
 
 const Eigen::VectorXd& NormalSystem::product(int a, int b) const {
   const std::pair<int, int> key = std::minmax(a, b);
-  const auto found = products_.find(key);
-  if (found != products_.end()) return found->second;
+  return products_.get(key, [&] { return products_of(key.first, key.second); });
+}
+
+Eigen::VectorXd NormalSystem::products_of(int a, int b) const {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(linear_->instants());
   using Entries = Eigen::SparseMatrix<double>::InnerIterator;
-  Entries left(linear_->carriers, key.first);
-  Entries right(linear_->carriers, key.second);
+  Entries left(linear_->carriers, a);
+  Entries right(linear_->carriers, b);
   while (left && right) {
     if (left.row() < right.row()) {
       ++left;
@@ -98,7 +102,7 @@ const Eigen::VectorXd& NormalSystem::product(int a, int b) const {
       ++right;
     }
   }
-  return products_.emplace(key, std::move(out)).first->second;
+  return out;
 }
 
 Eigen::VectorXd NormalSystem::share_of(const EffectColumn& column) const {

@@ -3,12 +3,12 @@
 // A linearised model as sums: everything that tests of effects need of thousands of rows, by cell.
 #pragma once
 
-#include <map>
 #include <utility>
 #include <vector>
 
 #include "calib/trace/partition.h"
 #include "calib/trace/traced_model.h"
+#include "kinematics/core/memo.h"
 
 namespace kinescope::trace {
 
@@ -77,7 +77,9 @@ class NormalSystem {
     Eigen::VectorXd weight;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;
+  [[nodiscard]] CarrierSums carrier_sums(int index) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;
+  [[nodiscard]] Eigen::VectorXd products_of(int a, int b) const;
   [[nodiscard]] Eigen::VectorXd share_of(const EffectColumn& column) const;
 
   const Linearisation* linear_;
@@ -86,9 +88,8 @@ class NormalSystem {
   std::vector<CellSums> cells_;
   CellSums total_;
   Eigen::MatrixXd inverse_;
-  // Filled as candidates ask for them.
-  mutable std::map<int, CarrierSums> carriers_;
-  mutable std::map<std::pair<int, int>, Eigen::VectorXd> products_;
+  Memo<int, CarrierSums> carriers_;
+  Memo<std::pair<int, int>, Eigen::VectorXd> products_;
 };
 
 }  // namespace kinescope::trace

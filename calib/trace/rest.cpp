@@ -8,6 +8,7 @@
 
 #include "calib/trace/score_test.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::trace {
 namespace {
@@ -203,26 +204,33 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   const double tests = static_cast<double>(places.size() * covariates.size());
   const std::size_t test_knots = std::clamp<std::size_t>(
       static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
+  const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
+    return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
+  };
+  const auto passes = [&](const Score& score) {
+    return !score.hidden() && score.p_value * tests <= level && is_large(score, options);
+  };
+  std::vector<Score> scores(places.size() * covariates.size());
+  parallel_for(scores.size(), [&](std::size_t i) {
+    const RestPlace& place = places[i / covariates.size()];
+    const Covariate& covariate = covariates[i % covariates.size()];
+    const bool taken = std::ranges::any_of(known, [&](const FoundRest& found) {
+      return found.rest.place == place.name && found.rest.covariate == covariate.name;
+    });
+    if (!taken) scores[i] = score_test(system, columns_of(place, covariate));
+  });
   const RestPlace* best_place = nullptr;
   const Covariate* best_covariate = nullptr;
   Score best;
-  for (const RestPlace& place : places) {
-    for (const Covariate& covariate : covariates) {
-      const bool taken = std::ranges::any_of(known, [&](const FoundRest& found) {
-        return found.rest.place == place.name && found.rest.covariate == covariate.name;
-      });
-      if (taken) continue;
-      const std::vector<EffectColumn> columns =
-          hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
-      const Score score = score_test(system, columns);
-      if (score.hidden() || score.p_value * tests > level || !is_large(score, options)) continue;
-      if (best_place != nullptr && score.gain <= best.gain) continue;
-      const Score confirmed = jackknife_test(system, columns);
-      if (confirmed.p_value * tests > level) continue;
-      best = confirmed;
-      best_place = &place;
-      best_covariate = &covariate;
-    }
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const RestPlace& place = places[i / covariates.size()];
+    const Covariate& covariate = covariates[i % covariates.size()];
+    if (!passes(scores[i]) || (best_place != nullptr && scores[i].gain <= best.gain)) continue;
+    const Score confirmed = jackknife_test(system, columns_of(place, covariate));
+    if (confirmed.p_value * tests > level) continue;
+    best = confirmed;
+    best_place = &place;
+    best_covariate = &covariate;
   }
   if (best_place == nullptr) return std::nullopt;
 

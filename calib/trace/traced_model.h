@@ -96,7 +96,8 @@ struct Candidate {
   std::string scan_name;
   std::string scan_unit;
   std::function<std::string(double scan)> scan_words;  ///< "joint2"; empty: the number says it
-  /// One column a parameter, at a value of the scan (0 where there is none).
+  /// One column a parameter, at a value of the scan (0 where there is none). Threads call it at the
+  /// same time.
   std::function<std::vector<EffectColumn>(double scan)> columns;
 };
 

@@ -28,14 +28,14 @@ Part part_of(const TorqueEffect& effect) {
 /// A log at all of its samples, and its library.
 struct Applied {
   const CorrectedTorqueModel& corrected;
-  EffectMotion motion;
   EffectContext context;
   EffectLibrary library;
 
   Applied(const CorrectedTorqueModel& model, const TorqueSamples& samples,
           const TorqueFilter& filter)
-      : corrected(model), motion(samples, {.filter = filter, .every_sample = true}) {
-    context.motion = std::make_shared<const EffectMotion>(motion);
+      : corrected(model) {
+    context.motion = std::make_shared<const EffectMotion>(
+        samples, EffectMotionOptions{.filter = filter, .every_sample = true});
     context.cache = std::make_shared<ColumnCache>();
     context.torque_unit = samples.torque_unit;
     context.rigid = model.base.rigid;
@@ -67,7 +67,7 @@ struct Applied {
   [[nodiscard]] Eigen::MatrixXd base() const {
     Eigen::MatrixXd out = context.load;
     for (Eigen::Index j = 0; j < out.cols(); ++j) {
-      out.col(j) += corrected.base.viscous[j] * motion.samples().dq.col(j);
+      out.col(j) += corrected.base.viscous[j] * context.motion->samples().dq.col(j);
       if (corrected.base.coulomb[j] == 0.0) continue;
       out.col(j) += corrected.base.coulomb[j] *
                     effects::direction_column(context, static_cast<std::size_t>(j));
@@ -108,7 +108,7 @@ struct Applied {
     for (const TorqueEffect& effect : corrected.effects) {
       if (part_of(effect) != Part::kDelay) continue;
       const Eigen::Index j = joint_of(effect);
-      torque.col(j) = motion.shifted(torque.col(j), later * effect.values[0]);
+      torque.col(j) = context.motion->shifted(torque.col(j), later * effect.values[0]);
     }
     return torque;
   }

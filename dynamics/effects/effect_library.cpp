@@ -165,13 +165,6 @@ std::vector<double> ripple_periods(const EffectContext& context, std::size_t joi
 
 }  // namespace effects
 
-const Eigen::VectorXd& ColumnCache::get(const std::string& name,
-                                        const std::function<Eigen::VectorXd()>& make) {
-  const auto found = columns_.find(name);
-  if (found != columns_.end()) return found->second;
-  return columns_.emplace(name, make()).first->second;
-}
-
 std::string EffectContext::unit(std::size_t joint) const {
   if (torque_unit != "Nm") return torque_unit;
   return turns[joint] != 0 ? "N m" : "N";

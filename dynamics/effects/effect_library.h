@@ -6,7 +6,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "calib/trace/traced_model.h"
 #include "dynamics/effects/effect_motion.h"
 #include "dynamics/rigid/rigid_model.h"
+#include "kinematics/core/memo.h"
 
 namespace kinescope {
 
@@ -43,14 +43,7 @@ struct LogSpan {
 };
 
 /// Columns that were asked for once. Shared by the candidates of all fits of one model.
-class ColumnCache {
- public:
-  /// The column of this name, made where it is not there yet.
-  const Eigen::VectorXd& get(const std::string& name, const std::function<Eigen::VectorXd()>& make);
-
- private:
-  std::map<std::string, Eigen::VectorXd> columns_;
-};
+using ColumnCache = Memo<std::string, Eigen::VectorXd>;
 
 /// What effects are made from. Matrices are instants x joints, in the samples' unit of torque.
 struct EffectContext {

@@ -150,11 +150,9 @@ Eigen::VectorXd EffectMotion::column(
 
 Eigen::VectorXd EffectMotion::column(
     Eigen::Index joint, const std::function<Eigen::ArrayXd(const FinePath&)>& torque) const {
-  const auto found = paths_.find(joint);
-  if (found != paths_.end()) return column_of(found->second, torque);
-  return column_of(
-      paths_.emplace(joint, fine_paths(Eigen::VectorXd::Unit(joints(), joint))).first->second,
-      torque);
+  const std::vector<FinePath>& paths =
+      paths_.get(joint, [&] { return fine_paths(Eigen::VectorXd::Unit(joints(), joint)); });
+  return column_of(paths, torque);
 }
 
 Eigen::VectorXd EffectMotion::at_instants(const Eigen::VectorXd& samples) const {

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "dynamics/data/motion.h"
 #include "dynamics/data/one_clock.h"
 #include "dynamics/data/torque_samples.h"
+#include "kinematics/core/memo.h"
 
 namespace kinescope {
 
@@ -101,7 +101,7 @@ class EffectMotion {
   OneClock clock_;
   int parts_ = 1;  ///< of a step between samples
   // Of each joint, by piece; made when it is first asked for.
-  mutable std::map<Eigen::Index, std::vector<FinePath>> paths_;
+  Memo<Eigen::Index, std::vector<FinePath>> paths_;
 };
 
 }  // namespace kinescope
