@@ -34,7 +34,8 @@ constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
 constexpr std::size_t kMostWaitingBytes = 512U << 20U;  // frames that wait for what later ones tell
 constexpr std::size_t kRunsTogether = 6;  // runs of frames read between two gap searches
-constexpr int kTryEvery = 4;    // frames of a gap: one is searched for what hides a marker
+constexpr int kTryEvery =
+    4;  // frames of a gap: one is searched, and those beside it where it is found
 constexpr int kLookEvery = 10;  // frames: the whole of one is searched at reduced resolution
 constexpr const char* kStage = "finding markers";
 constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
@@ -178,58 +179,65 @@ class Detecting {
     for (SearchedFrame& searched : frames) searched.tags.clear();
     const int begin = own - first;
     GapWindows windows = find_gaps(near, begin, begin + static_cast<int>(frames.size()));
-    search_again(frames, first, windows, Brightness::kAsSeen);
-    // A glint lasts: what hides a marker is looked for in some of its gap, and where it is found in
-    // all of it.
-    GapWindows some = windows;
-    GapWindows rest = windows;
-    for (const auto& [frame, of_frame] : windows) {
-      std::erase_if(some[frame], [&, f = frame](const TagWindow& window) {
-        return !is_tried(windows, f, window.id);
+    for (const Brightness brightness : {Brightness::kAsSeen, Brightness::kCutOff}) {
+      GapWindows tried = windows;
+      std::erase_if(tried, [&](const auto& window) { return !is_tried(windows, window.first); });
+      const std::set<TagAtFrame> found = search_again(frames, first, tried, brightness);
+      GapWindows beside = windows;
+      std::erase_if(beside, [&](const auto& window) {
+        return is_tried(windows, window.first) || !is_beside(found, window.first);
+      });
+      const std::set<TagAtFrame> more = search_again(frames, first, beside, brightness);
+      std::erase_if(windows, [&](const auto& window) {
+        return found.contains(window.first) || more.contains(window.first);
       });
     }
-    const std::set<TagId> hidden = search_again(frames, first, some, Brightness::kCutOff);
-    for (const auto& [frame, of_frame] : windows) {
-      std::erase_if(rest[frame], [&, f = frame](const TagWindow& window) {
-        return !hidden.contains(window.id) || is_tried(windows, f, window.id);
-      });
+  }
+
+  // Frames counted from the first one of which anything is known.
+  using TagAtFrame = std::pair<int, TagId>;
+  using GapWindows = std::map<TagAtFrame, TagWindow>;
+
+  // The ends of each gap, and now and then a frame: what hides a marker lasts.
+  static bool is_tried(const GapWindows& windows, const TagAtFrame& at) {
+    const auto [frame, id] = at;
+    return frame % kTryEvery == 0 || !windows.contains({frame - 1, id}) ||
+           !windows.contains({frame + 1, id});
+  }
+
+  static bool is_beside(const std::set<TagAtFrame>& found, const TagAtFrame& at) {
+    for (int step = 1; step < kTryEvery; ++step) {
+      if (found.contains({at.first - step, at.second}) ||
+          found.contains({at.first + step, at.second})) {
+        return true;
+      }
     }
-    if (!hidden.empty()) search_again(frames, first, rest, Brightness::kCutOff);
+    return false;
   }
 
-  using GapWindows = std::map<int, std::vector<TagWindow>>;  // by frame
-
-  // The first frame of each gap, and now and then one.
-  static bool is_tried(const GapWindows& windows, int frame, TagId id) {
-    const auto before = windows.find(frame - 1);
-    return frame % kTryEvery == 0 || before == windows.end() ||
-           std::ranges::find(before->second, id, &TagWindow::id) == before->second.end();
-  }
-
-  // Adds what is found in `windows` (frames counted from `first`) to the frames' tags and takes its
-  // windows out. Which markers were found.
-  std::set<TagId> search_again(std::span<SearchedFrame> frames, int first, GapWindows& windows,
-                               Brightness brightness) {
-    std::vector<std::vector<TagId>> ids(frames.size());
+  // Adds what is found in `windows` (frames counted from `first`) to the frames' tags. Which.
+  std::set<TagAtFrame> search_again(std::span<SearchedFrame> frames, int first,
+                                    const GapWindows& windows, Brightness brightness) {
+    std::map<int, std::vector<TagWindow>> by_frame;
+    for (const auto& [at, window] : windows) by_frame[at.first].push_back(window);
+    std::vector<std::vector<TagObservation>> found(frames.size());
     for_each_run(
         frames, 1, searchers_.size(), [](SearchedFrame&) { return true; },
         [&](std::size_t worker, std::span<SearchedFrame> run) {
-          SearchedFrame& searched = run.front();
-          const auto of_frame = windows.find(searched.frame.index - first);
-          if (of_frame == windows.end()) return;
-          std::vector<TagObservation> found =
-              finish(search_windows(*fine(worker), searched.frame.image.view(), of_frame->second,
-                                    brightness),
-                     searched.frame);
-          for (TagObservation& tag : found) {
-            std::erase_if(of_frame->second,
-                          [&](const TagWindow& window) { return window.id == tag.id; });
-            ids[static_cast<std::size_t>(&searched - frames.data())].push_back(tag.id);
-            searched.tags.push_back(std::move(tag));
-          }
+          const VideoFrame& frame = run.front().frame;
+          const auto of_frame = by_frame.find(frame.index - first);
+          if (of_frame == by_frame.end()) return;
+          found[static_cast<std::size_t>(&run.front() - frames.data())] = finish(
+              search_windows(*fine(worker), frame.image.view(), of_frame->second, brightness),
+              frame);
         });
-    std::set<TagId> out;
-    for (const std::vector<TagId>& of_frame : ids) out.insert(of_frame.begin(), of_frame.end());
+    std::set<TagAtFrame> out;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      for (TagObservation& tag : found[i]) {
+        out.emplace(tag.frame - first, tag.id);
+        frames[i].tags.push_back(std::move(tag));
+      }
+    }
     return out;
   }
 
@@ -340,7 +348,7 @@ class Detecting {
         const TagObservation* before = next > 0 ? track[next - 1] : nullptr;
         const TagObservation* after = next < track.size() ? track[next] : nullptr;
         if (const auto window = expect(id, before, after, times, f, so_far.width, so_far.height))
-          out[f].push_back(*window);
+          out.emplace(TagAtFrame{f, id}, *window);
       }
     }
     return out;
