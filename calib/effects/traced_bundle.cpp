@@ -285,11 +285,14 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
 }
 
 TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& effects) const {
+  Corrected out;
+  if (effects.empty()) return out;
   std::vector<CameraEffect> library = all_effects(world_at(0.0));
   BundleSolution fit = bundle_->solve(change_of(library, effects));
-  library = all_effects(world_at(fit.time_offset_s));
-  fit = bundle_->solve(change_of(library, effects));
-  Corrected out;
+  if (fit.time_offset_s != 0.0) {
+    library = all_effects(world_at(fit.time_offset_s));
+    fit = bundle_->solve(change_of(library, effects));
+  }
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);
