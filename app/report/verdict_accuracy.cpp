@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/facts.h"
+#include "app/report/numbers.h"
+#include "app/report/verdict_words.h"
+
+namespace kinescope::report {
+namespace {
+
+/// "0.071 px (0.12 mm, 0.02°)": the rms of one state of the model.
+std::string error_words(const ErrorStatistics& px, const ErrorStatistics& m,
+                        const ErrorStatistics& rad) {
+  std::vector<std::string> parts;
+  if (px.count > 0) parts.push_back(text_with_unit(px.rms, Quantity::kPixels));
+  if (m.count > 0) parts.push_back(text_with_unit(m.rms, Quantity::kLength));
+  if (rad.count > 0 && px.count == 0) parts.push_back(text_with_unit(rad.rms, Quantity::kAngle));
+  if (parts.empty()) return "";
+  std::string text = parts.front();
+  for (std::size_t k = 1; k < parts.size(); ++k) text += (px.count > 0 ? ", or " : ", ") + parts[k];
+  return text;
+}
+
+bool all_of_one_size(const std::vector<Marker>& markers) {
+  return std::ranges::all_of(
+      markers, [&](const Marker& marker) { return marker.size_m == markers.front().size_m; });
+}
+
+/// What no residual shows: the lengths are as right as the declared marker size and lens.
+std::string declared_words(const Calibration& calibration) {
+  const std::vector<Marker>& markers = calibration.tree.markers;
+  if (calibration.kind != MeasurementKind::kCorners || markers.empty()) return "";
+  constexpr double kRulerError = 1e-4;  // m: what a ruler leaves
+  const double size = markers.front().size_m;
+  std::string text;
+  if (size > 0.0 && all_of_one_size(markers)) {
+    text = fmt::format(
+        " All this is for markers of exactly {:.1f} mm: each 0.1 mm changes all lengths by {:.2g} "
+        "%",
+        1e3 * size, 100.0 * kRulerError / size);
+  } else {
+    text = " All this is for markers of exactly the declared sizes: lengths change as they do";
+  }
+  return text + (calibration.intrinsics_estimated
+                     ? "."
+                     : ", and what the declared intrinsics are wrong by comes on top.");
+}
+
+std::string prediction_words(const RunSummary& run) {
+  const ErrorRow& all = run.errors.all;
+  const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
+  const std::string training = error_words(all.training_px, all.training_m, all.training_rad);
+  const std::string before = error_words(all.before_px, all.before_m, all.before_rad);
+  // Depth is seen far worse, and is in no figure in mm.
+  const std::string_view direction =
+      run.calibration.kind == MeasurementKind::kCorners ? " across the line of sight" : "";
+  const std::string_view what =
+      run.calibration.kind == MeasurementKind::kPoint ? "Points" : "Markers";
+  std::string text;
+  if (!held_out.empty()) {
+    text = fmt::format("{} {} that the fit has not seen are predicted to {}{} (rms)", what,
+                       run.log.empty() ? "in stretches of the recording" : "at postures", held_out,
+                       direction);
+    if (!training.empty()) text += fmt::format("; those it has seen to {}", training);
+  } else if (!training.empty()) {
+    text = fmt::format("{} are reproduced to {}{} (rms), on the data of the fit itself", what,
+                       training, direction);
+  } else {
+    return "No error can be given: nothing was fitted.";
+  }
+  if (run.nominal && !before.empty()) {
+    // All but the geometry is fitted for this figure, too.
+    text += fmt::format(
+        "; with the nominal geometry{}{}, but markers, camera and clock placed anew, it was {}",
+        run.nominal_faults.empty() ? "" : ", so mended,",
+        run.effects.empty() ? "" : " and the effects found", before);
+  }
+  return text + ".";
+}
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+/// "0.028° in direction and 0.080 mm in position" of two standard uncertainties.
+std::string axis_uncertainty(double direction, std::optional<double> position) {
+  std::string text =
+      uncertainty_text(kCoverageFactor * direction, Quantity::kAngle) + "° in direction";
+  if (position) {
+    text += fmt::format(" and {} mm in position",
+                        uncertainty_text(kCoverageFactor * *position, Quantity::kLength));
+  }
+  return text;
+}
+
+std::string axis_words(const Calibration& calibration) {
+  std::vector<double> directions, positions;
+  std::vector<std::string> unknown;
+  double worst = -1.0;
+  std::optional<double> worst_position;
+  std::string worst_name;
+  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+       ++j) {
+    const JointEstimate& estimate = calibration.joints[j];
+    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
+    if (!estimate.direction_sigma_rad) {
+      unknown.push_back(calibration.tree.joints[j].name);
+      continue;
+    }
+    const double direction = *estimate.direction_sigma_rad;
+    directions.push_back(direction);
+    if (estimate.position_sigma_m) positions.push_back(*estimate.position_sigma_m);
+    if (direction > worst) {
+      worst = direction;
+      worst_position = estimate.position_sigma_m;
+      worst_name = calibration.tree.joints[j].name;
+    }
+  }
+  std::string text;
+  if (directions.size() == 1) {
+    text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).", worst_name,
+                       axis_uncertainty(worst, worst_position));
+  } else if (!directions.empty()) {
+    std::optional<double> position;
+    if (!positions.empty()) position.emplace(median(positions));
+    text = fmt::format(
+        " Joint axes are known to {} (median, expanded uncertainty, k = 2); least certain is {} "
+        "with {}.",
+        axis_uncertainty(median(directions), position), worst_name,
+        axis_uncertainty(worst, worst_position));
+  }
+  if (!unknown.empty()) {
+    text += fmt::format(
+        " No uncertainty can be given for the axis of {}: it was held, or the data do not "
+        "determine it.",
+        joined(unknown));
+  }
+  return text;
+}
+
+std::string clock_words(const RunSummary& run) {
+  const Calibration& calibration = run.calibration;
+  if (run.log.empty() || !calibration.time_offset_sigma_s) return "";
+  return fmt::format(
+      " Joint log time = frame time {} ({}) ms.", calibration.time_offset_s < 0.0 ? "-" : "+",
+      value_and_uncertainty(std::abs(calibration.time_offset_s),
+                            kCoverageFactor * *calibration.time_offset_sigma_s, Quantity::kDelay));
+}
+
+}  // namespace
+
+std::string accuracy_words(const RunSummary& run) {
+  return prediction_words(run) + axis_words(run.calibration) + declared_words(run.calibration) +
+         clock_words(run);
+}
+
+}  // namespace kinescope::report

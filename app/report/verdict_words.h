@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The verdict's sentences, by what they are about.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/report/run_summary.h"
+
+namespace kinescope::report {
+
+/// "a, b and c".
+[[nodiscard]] std::string joined(const std::vector<std::string>& words);
+
+/// The structure: how many joints of which type, what drives them, how certain that is.
+[[nodiscard]] std::string found_words(const RunSummary& run);
+
+/// Errors on data that the fit has not seen, uncertainties of the axes, what all figures take for
+/// granted, the clock.
+[[nodiscard]] std::string accuracy_words(const RunSummary& run);
+
+}  // namespace kinescope::report
