@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/vision/find_tone.h"
 #include "calib/vision/follow_tag.h"
 #include "calib/vision/frame_workers.h"
 #include "calib/vision/pattern_shift.h"
@@ -34,8 +35,9 @@ constexpr double kGapBothSides_s = 2.5;
 constexpr double kGapOneSide_s = 0.35;
 constexpr std::size_t kMostWaitingBytes = 512U << 20U;  // frames that wait for what later ones tell
 constexpr std::size_t kRunsTogether = 6;  // runs of frames read between two gap searches
-constexpr int kTryEvery =
-    4;  // frames of a gap: one is searched, and those beside it where it is found
+constexpr std::size_t kToneViews = 64;    // from which the camera's tone curve is told
+// Frames of a gap: one is searched, and those beside it where it is found.
+constexpr int kTryEvery = 4;
 constexpr int kLookEvery = 10;  // frames: the whole of one is searched at reduced resolution
 constexpr const char* kStage = "finding markers";
 constexpr double kLargeEdge = 150.0;   // px; larger markers are not lost for want of resolution
@@ -94,6 +96,8 @@ class Detecting {
           [&](std::size_t worker, std::span<SearchedFrame> run) { search_run(worker, run); });
       ended = begin + count < waiting.size();
       waiting.resize(begin + count);
+      if (options_.refine_corners && !tone_settled_)
+        settle_tone(std::span(waiting).subspan(begin), markers);
       for (std::size_t i = begin; i < waiting.size(); ++i) {
         found.times_s.push_back(waiting[i].frame.time_s);
         std::ranges::copy(waiting[i].tags, std::back_inserter(found.observations));
@@ -109,6 +113,7 @@ class Detecting {
       waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(due));
     }
     out.warnings = reader->warnings();
+    std::ranges::copy(tone_warnings_, std::back_inserter(out.warnings));
     // A file that ends early, or does not say how long it is.
     const int frames = static_cast<int>(found.times_s.size());
     if (frames != info.frame_count) report_progress(progress, kStage, frames, frames);
@@ -134,6 +139,56 @@ class Detecting {
       run[i].tags = i == 0 ? finish(search_whole(worker, run[i].frame, full), run[i].frame)
                            : follow(worker, run.first(i + 1));
     }
+  }
+
+  // From the first frames that show enough of the markers, which are then refined once more.
+  void settle_tone(std::span<SearchedFrame> frames, const MarkerSet& markers) {
+    const std::vector<ToneView> views = choose_views(frames, markers);
+    if (views.size() < kFewestToneViews) return;
+    tone_settled_ = true;
+    const std::optional<FoundTone> found = find_tone(views, layout_);
+    if (!found) return;
+    if (!found->is_explained()) {
+      tone_warnings_.push_back(fmt::format(
+          "bright cells of the markers spread over dark ones by {:.2f} px, more than a camera's "
+          "tone curve explains: markers look too small, and lengths come out too large; expose "
+          "less and switch sharpening off (corners are left as they are)",
+          found->shift_px));
+      return;
+    }
+    tone_ = found->curve;
+    tone_sigma_ = found->sigma_per_blur;
+    tone_warnings_.push_back(fmt::format(
+        "the camera's tone curve (gamma {:.2f}) moves the markers' edges by {:.2f} px: the corners "
+        "are corrected for it",
+        tone_.gamma(), found->shift_px));
+    for_each_run(
+        frames, 1, searchers_.size(), [](SearchedFrame&) { return true; },
+        [&](std::size_t, std::span<SearchedFrame> run) {
+          run.front().tags = finish(std::move(run.front().tags), run.front().frame);
+        });
+  }
+
+  // As many of each marker, evenly over the frames.
+  std::vector<ToneView> choose_views(std::span<const SearchedFrame> frames,
+                                     const MarkerSet& markers) const {
+    std::map<TagId, std::vector<ToneView>> seen;
+    for (const SearchedFrame& searched : frames) {
+      for (const TagObservation& tag : searched.tags) {
+        const Corners corners = as_corners(tag.corners_px);
+        if (tag.partly_hidden || !(tag.sigma_px < detector_sigma_)) continue;
+        if (!shows_tone(corners, layout_)) continue;
+        seen[tag.id].push_back(
+            {searched.frame.image.view(), tag.id, corners, markers.size_m(tag.id)});
+      }
+    }
+    std::vector<ToneView> out;
+    for (const auto& [id, views] : seen) {
+      const std::size_t most = std::max<std::size_t>(1, kToneViews / seen.size());
+      const std::size_t count = std::min(most, views.size());
+      for (std::size_t i = 0; i < count; ++i) out.push_back(views[i * views.size() / count]);
+    }
+    return out;
   }
 
   [[nodiscard]] bool looks_for_gaps() const {
@@ -297,7 +352,8 @@ class Detecting {
       return std::nullopt;
     const Corners start = as_corners(expected.corners_px);
     const Corners seen = as_corners(last.corners_px);
-    const auto refined = follow_tag(frame.image.view(), start, {image_before, seen}, layout_);
+    const auto refined =
+        follow_tag(frame.image.view(), start, {image_before, seen}, layout_, tone_);
     if (!refined) return std::nullopt;
     TagObservation tag = last;
     take(tag, *refined, frame);
@@ -309,7 +365,8 @@ class Detecting {
                                      const VideoFrame& frame) const {
     for (TagObservation& tag : tags) {
       if (options_.refine_corners) {
-        take(tag, refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_), frame);
+        take(tag, refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_, tone_),
+             frame);
       } else {
         take(tag, {}, frame);
       }
@@ -328,7 +385,8 @@ class Detecting {
     tag.sigma_px = detector_sigma_;
     if (refined.status == RefineStatus::kDone) {
       std::ranges::copy(refined.corners_px, tag.corners_px.begin());
-      tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0);
+      tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0,
+                                tone_sigma_ * refined.blur_px);
     }
     tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
   }
@@ -381,6 +439,10 @@ class Detecting {
   TagLayout layout_;
   double detector_sigma_ = kAprilTagSigma;
   bool lossy_ = true;
+  ToneCurve tone_;
+  double tone_sigma_ = 0.0;  // of what it leaves, px per px of blur
+  bool tone_settled_ = false;
+  std::vector<std::string> tone_warnings_;
   int every_;
   std::vector<Searcher> searchers_;
   std::vector<TagObservation> recent_;  // found without gaps, of frames that may tell of others

@@ -9,7 +9,8 @@
 //         and the whole frame is searched at reduced resolution where one of them is lost. Markers
 //         lost on the way are looked for again where their neighbours in time say they are;
 //         refine_corners() gives corners and sigma, pattern_shift.h finds what is covered,
-//         sightings.h decides what is believed. Pictures taken one by one are searched whole.
+//         find_tone.h the camera's tone curve, sightings.h decides what is believed. Pictures
+//         taken one by one are searched whole.
 #pragma once
 
 #include <filesystem>

@@ -57,6 +57,27 @@ class BlurredStep {
   std::array<Value, 897> entries_;  // 14 units
 };
 
+// The light of the grey levels at the knots, by their place among the unknowns.
+class Levels {
+ public:
+  Levels(const Layout& layout, const Eigen::VectorXd& unknowns, const ToneCurve& tone)
+      : light_(unknowns.tail(layout.size - kLevelsIndex)),
+        per_grey_(Eigen::VectorXd::Ones(light_.size())) {
+    if (tone.is_linear()) return;
+    for (Eigen::Index i = 0; i < light_.size(); ++i) {
+      const double grey = std::max(light_(i), ToneCurve::kDarkest);
+      light_(i) = tone.light(grey);
+      per_grey_(i) = 1.0 / tone.slope(grey, light_(i));
+    }
+  }
+  [[nodiscard]] double light(int index) const { return light_(index - kLevelsIndex); }
+  [[nodiscard]] double per_grey(int index) const { return per_grey_(index - kLevelsIndex); }
+
+ private:
+  Eigen::VectorXd light_;
+  Eigen::VectorXd per_grey_;
+};
+
 const BlurredStep& blurred_step() {
   static const BlurredStep kTable;
   return kTable;
@@ -76,8 +97,9 @@ Layout::Layout(const Corners& corners) {
 }
 
 std::vector<Prediction> predict(const Layout& layout, const Eigen::VectorXd& unknowns,
-                                const std::vector<Sample>& samples) {
+                                const std::vector<Sample>& samples, const ToneCurve& tone) {
   const BlurredStep& table = blurred_step();
+  const Levels levels(layout, unknowns, tone);
   std::array<int, 4> first_piece{};
   for (std::size_t e = 1; e < 4; ++e) first_piece[e] = first_piece[e - 1] + layout.knots[e - 1] - 1;
   std::vector<Prediction> out(samples.size());
@@ -97,14 +119,19 @@ std::vector<Prediction> predict(const Layout& layout, const Eigen::VectorXd& unk
     const double part = place - knot;
     const int in = layout.inside[e] + knot;
     const int on = layout.outside[e] + knot;
-    const double inside = (1.0 - part) * unknowns(in) + part * unknowns(in + 1);
-    const double outside = (1.0 - part) * unknowns(on) + part * unknowns(on + 1);
+    const double inside = (1.0 - part) * levels.light(in) + part * levels.light(in + 1);
+    const double outside = (1.0 - part) * levels.light(on) + part * levels.light(on + 1);
     const double contrast = outside - inside;
-    p.grey = inside + contrast * step;
+    const double light = inside + contrast * step;
+    p.grey = tone.grey(light);
     p.piece = first_piece[e] + knot;
-    const double slope = contrast * bell * per_blur;  // per px of distance
-    p.slope << -slope, -slope * s.u, -slope * sag, -slope * z, (1.0 - step) * (1.0 - part),
-        (1.0 - step) * part, step * (1.0 - part), step * part;
+    const double per_light = tone.is_linear() ? 1.0 : tone.slope(p.grey, light);
+    const double slope = per_light * contrast * bell * per_blur;  // per px of distance
+    const double in_share = per_light * (1.0 - step);
+    const double on_share = per_light * step;
+    p.slope << -slope, -slope * s.u, -slope * sag, -slope * z,
+        in_share * (1.0 - part) * levels.per_grey(in), in_share * part * levels.per_grey(in + 1),
+        on_share * (1.0 - part) * levels.per_grey(on), on_share * part * levels.per_grey(on + 1);
   }
   return out;
 }

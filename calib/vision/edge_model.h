@@ -5,7 +5,8 @@
 //         equations of its unknowns.
 // Units   px, grey levels.
 // Method  a straight edge (shift, turn, sagitta) between two grey levels that change linearly from
-//         knot to knot, blurred by a Gaussian: grey = inside + (outside - inside) Phi(d / blur).
+//         knot to knot, blurred by a Gaussian: light = inside + (outside - inside) Phi(d / blur),
+//         seen through the camera's tone curve.
 #pragma once
 
 #include <array>
@@ -15,6 +16,7 @@
 #include <Eigen/Core>
 
 #include "calib/vision/marker_edges.h"
+#include "calib/vision/tone_curve.h"
 
 namespace kinescope::corner_fit {
 
@@ -45,7 +47,8 @@ struct Prediction {
 };
 
 [[nodiscard]] std::vector<Prediction> predict(const Layout& layout, const Eigen::VectorXd& unknowns,
-                                              const std::vector<Sample>& samples);
+                                              const std::vector<Sample>& samples,
+                                              const ToneCurve& tone);
 
 /// Normal equations of the weighted, robust least squares.
 struct System {

@@ -23,6 +23,7 @@ struct LastSighting {
 [[nodiscard]] std::optional<RefinedCorners> follow_tag(const ImageView& image,
                                                        const Corners& expected,
                                                        const LastSighting& last,
-                                                       const TagLayout& layout);
+                                                       const TagLayout& layout,
+                                                       const ToneCurve& tone = ToneCurve());
 
 }  // namespace kinescope

@@ -16,7 +16,7 @@ constexpr double kMostUnclear = 0.25;  // of the cells
 
 }  // namespace
 
-double grey_at(const ImageView& image, const Eigen::Vector2d& px) {
+double light_at(const ImageView& image, const Eigen::Vector2d& px, const ToneCurve& tone) {
   const double x = std::clamp(px.x(), 0.0, image.width - 1.001);
   const double y = std::clamp(px.y(), 0.0, image.height - 1.001);
   const int left = static_cast<int>(x);
@@ -24,23 +24,28 @@ double grey_at(const ImageView& image, const Eigen::Vector2d& px) {
   const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(image.stride) * top + left;
   const std::uint8_t* next = row + image.stride;
   const double a = x - left;
-  return (1.0 - (y - top)) * ((1.0 - a) * row[0] + a * row[1]) +
-         (y - top) * ((1.0 - a) * next[0] + a * next[1]);
+  const auto between = [&](const auto& light) {
+    return (1.0 - (y - top)) * ((1.0 - a) * light(row[0]) + a * light(row[1])) +
+           (y - top) * ((1.0 - a) * light(next[0]) + a * light(next[1]));
+  };
+  if (tone.is_linear()) return between([](std::uint8_t pixel) -> double { return pixel; });
+  return between([&](std::uint8_t pixel) { return tone.light(pixel); });
 }
 
 bool MarkerCells::is_readable() const { return contrast > kMinContrast; }
 
-MarkerCells read_cells(const ImageView& image, const Eigen::Matrix3d& H, int cells) {
+MarkerCells read_cells(const ImageView& image, const Eigen::Matrix3d& H, int cells,
+                       const ToneCurve& tone, double middle_of_cell) {
   const double width = 2.0 / cells;
   const auto middle = [&](int i) { return -1.0 + (i + 0.5) * width; };
   MarkerCells out{Eigen::MatrixXd(cells, cells), 0.0};
   for (int i = 0; i < cells; ++i) {
     for (int j = 0; j < cells; ++j) {
       double sum = 0.0;
-      for (const double dx : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
-        for (const double dy : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
+      for (const double dx : {-middle_of_cell, 0.0, middle_of_cell}) {
+        for (const double dy : {-middle_of_cell, 0.0, middle_of_cell}) {
           const Eigen::Vector2d at(middle(i) + dx * width, middle(j) + dy * width);
-          sum += grey_at(image, (H * at.homogeneous()).hnormalized());
+          sum += light_at(image, (H * at.homogeneous()).hnormalized(), tone);
         }
       }
       out.level(i, j) = sum / 9.0;

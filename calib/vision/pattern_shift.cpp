@@ -17,7 +17,6 @@
 namespace kinescope {
 namespace {
 
-constexpr std::size_t kFewestSteps = 8;  // in each direction, for the four numbers of the warp
 // What else moves cells against corners, measured on pictures of whole markers: pixels, blur from
 // cells further on, noise (over contrast), and the lens, which bends edges by up to this, 1/px.
 constexpr double kPixels = 0.2;  // px
@@ -30,22 +29,29 @@ constexpr double kClear = 5.0;  // standard deviations of the corners
 constexpr double kClearOfStart = 3.0;
 // Where the blur is more than this share of a cell, steps cannot be told from one another.
 constexpr double kSharp = 0.2;
+// What is read of a cell is this many blurs from the next one, where more than a point is left.
+constexpr double kClearOfBlur = 2.2;
+constexpr double kLeastOfCell = 0.05;
 
 // A step between two cells, placed in the square [-1, 1]^2.
 struct Step {
   Eigen::Vector2d at;
-  double shift = 0.0;  // across
+  double shift = 0.0;    // across
+  double to_dark = 0.0;  // 1 where the cell behind is the dark one, -1 where the one before is
 };
 
 // The marker's cells as the image shows them where H puts them, and the steps between them.
 class Code {
  public:
-  Code(const ImageView& image, const Eigen::Matrix3d& H, int cells)
+  Code(const ImageView& image, const Eigen::Matrix3d& H, int cells, const ToneCurve& tone,
+       double middle_of_cell)
       : image_(image),
+        tone_(tone),
+        middle_of_cell_(middle_of_cell),
         H_(H),
         count_(cells),
         width_(2.0 / cells),
-        cells_(read_cells(image, H, cells)) {}
+        cells_(read_cells(image, H, cells, tone, middle_of_cell)) {}
 
   [[nodiscard]] bool is_readable() const { return cells_.is_readable(); }
 
@@ -58,7 +64,9 @@ class Code {
         const double after = direction == 0 ? cells_.level(i + 1, j) : cells_.level(j, i + 1);
         if (std::abs(after - before) < 0.5 * cells_.contrast) continue;
         const double across = middle(i) + 0.5 * width_;
-        Step step{{across, middle(j)}, shift(direction, across, middle(j), before, after)};
+        Step step{{across, middle(j)},
+                  shift(direction, across, middle(j), before, after),
+                  after < before ? 1.0 : -1.0};
         if (direction == 1) std::swap(step.at.x(), step.at.y());
         out.push_back(step);
       }
@@ -69,8 +77,8 @@ class Code {
  private:
   [[nodiscard]] double middle(int i) const { return -1.0 + (i + 0.5) * width_; }
 
-  [[nodiscard]] double grey(const Eigen::Vector2d& at) const {
-    return grey_at(image_, (H_ * at.homogeneous()).hnormalized());
+  [[nodiscard]] double light(const Eigen::Vector2d& at) const {
+    return light_at(image_, (H_ * at.homogeneous()).hnormalized(), tone_);
   }
 
   // Where the step is by how much of the way between the two middles is like the first one.
@@ -80,9 +88,9 @@ class Code {
     double sum = 0.0;
     for (int k = 0; k < kSamples; ++k) {
       const double u = across + ((k + 0.5) / kSamples - 0.5) * width_;
-      for (const double d : {-kMiddleOfCell, 0.0, kMiddleOfCell}) {
+      for (const double d : {-middle_of_cell_, 0.0, middle_of_cell_}) {
         const double v = along + d * width_;
-        sum += direction == 0 ? grey({u, v}) : grey({v, u});
+        sum += direction == 0 ? light({u, v}) : light({v, u});
       }
     }
     const double mean = sum / (3.0 * kSamples);
@@ -90,6 +98,8 @@ class Code {
   }
 
   const ImageView& image_;
+  const ToneCurve& tone_;
+  double middle_of_cell_;
   Eigen::Matrix3d H_;
   int count_;  // of cells along an edge
   double width_;
@@ -100,32 +110,48 @@ Eigen::Vector4d bilinear(const Eigen::Vector2d& at) {
   return {1.0, at.x(), at.y(), at.x() * at.y()};
 }
 
-// Bilinear shifts, robust (Tukey's biweight): cells that are covered themselves tell nothing.
-std::optional<Eigen::Vector4d> fit(const std::vector<Step>& steps) {
+template <int N>
+using Numbers = Eigen::Matrix<double, N, 1>;
+
+// What a step's shift is made of: the four numbers of a bilinear warp, and with a fifth one how far
+// bright cells grow over dark ones.
+template <int N>
+Numbers<N> parts(const Step& step) {
+  if constexpr (N == 4) {
+    return bilinear(step.at);
+  } else {
+    return (Numbers<5>() << bilinear(step.at), step.to_dark).finished();
+  }
+}
+
+// Robust (Tukey's biweight): cells that are covered themselves tell nothing.
+template <int N>
+std::optional<Numbers<N>> fit(const std::vector<Step>& steps) {
   constexpr int kReweightings = 5;
   constexpr double kTukey = 4.685;
   constexpr double kLeastScale = 1e-4;
+  constexpr std::size_t kFewestSteps = 2 * N;
   if (steps.size() < kFewestSteps) return std::nullopt;
-  Eigen::Vector4d out = Eigen::Vector4d::Zero();
+  Numbers<N> out = Numbers<N>::Zero();
   std::vector<double> size(steps.size());
   double scale = 0.0;
   for (int round = 0; round <= kReweightings; ++round) {
-    Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d g = Eigen::Vector4d::Zero();
+    Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
+    Numbers<N> g = Numbers<N>::Zero();
     for (const Step& step : steps) {
-      const Eigen::Vector4d row = bilinear(step.at);
+      const Numbers<N> row = parts<N>(step);
       const double off = round == 0 ? 0.0 : (step.shift - row.dot(out)) / (kTukey * scale);
       const double weight = std::pow(std::max(0.0, 1.0 - off * off), 2);
       H += weight * row * row.transpose();
       g += weight * row * step.shift;
     }
-    const Eigen::LLT<Eigen::Matrix4d> solver(H);
+    const Eigen::LLT<Eigen::Matrix<double, N, N>> solver(H);
     if (solver.info() != Eigen::Success) return std::nullopt;
     out = solver.solve(g);
     for (std::size_t i = 0; i < steps.size(); ++i)
-      size[i] = std::abs(steps[i].shift - bilinear(steps[i].at).dot(out));
-    // Four of them could be made nothing.
-    const auto middle = size.begin() + static_cast<std::ptrdiff_t>((size.size() + 4) / 2);
+      size[i] = std::abs(steps[i].shift - parts<N>(steps[i]).dot(out));
+    // As many of them as there are numbers could be made nothing.
+    const auto middle = size.begin() + static_cast<std::ptrdiff_t>((size.size() + N) / 2);
     std::ranges::nth_element(size, middle);
     scale = std::max(1.4826 * *middle, kLeastScale);
   }
@@ -142,10 +168,11 @@ std::optional<double> pattern_shift(const ImageView& image, const Corners& corne
                                     const TagLayout& layout) {
   const std::optional<Eigen::Matrix3d> H = corner_fit::tag_to_image(corners);
   if (!H) return std::nullopt;
-  const Code code(image, *H, layout.cells);
+  const ToneCurve linear;
+  const Code code(image, *H, layout.cells, linear, kMiddleOfCell);
   if (!code.is_readable()) return std::nullopt;
-  const std::optional<Eigen::Vector4d> x = fit(code.steps(0));
-  const std::optional<Eigen::Vector4d> y = fit(code.steps(1));
+  const std::optional<Eigen::Vector4d> x = fit<4>(code.steps(0));
+  const std::optional<Eigen::Vector4d> y = fit<4>(code.steps(1));
   if (!x || !y) return std::nullopt;
 
   // Of both ends of every edge.
@@ -163,6 +190,25 @@ std::optional<double> pattern_shift(const ImageView& image, const Corners& corne
   double largest = 0.0;
   for (const double shift : outward) largest = std::max(largest, std::abs(shift - mean));
   return largest;
+}
+
+std::optional<PatternBloom> pattern_bloom(const ImageView& image, const Corners& corners,
+                                          const TagLayout& layout, const ToneCurve& tone,
+                                          double blur_px) {
+  const std::optional<Eigen::Matrix3d> H = corner_fit::tag_to_image(corners);
+  if (!H) return std::nullopt;
+  double edges = 0.0;
+  for (std::size_t e = 0; e < 4; ++e) edges += edge_px(corners, e);
+  const double cell = 0.25 * edges / layout.cells;
+  const double middle =
+      std::clamp(0.5 - kClearOfBlur * blur_px / cell, kLeastOfCell, kMiddleOfCell);
+  const Code code(image, *H, layout.cells, tone, middle);
+  if (!code.is_readable()) return std::nullopt;
+  const std::optional<Numbers<5>> x = fit<5>(code.steps(0));
+  const std::optional<Numbers<5>> y = fit<5>(code.steps(1));
+  if (!x || !y) return std::nullopt;
+  const double half = edges / 8.0;
+  return PatternBloom{0.5 * half * ((*x)(4) + (*y)(4)), 0.5 * half * ((*x)(1) + (*y)(2))};
 }
 
 bool is_partly_hidden(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,

@@ -20,6 +20,21 @@ namespace kinescope {
 [[nodiscard]] std::optional<double> pattern_shift(const ImageView& image, const Corners& corners,
                                                   const TagLayout& layout);
 
+/// How far bright cells reach over dark ones, and by how much the code is larger than the corners
+/// let expect, at its rim. A camera's tone curve moves the outer border inward by as much as the
+/// edges inside, so that both are alike, positive, and nought in light.
+struct PatternBloom {
+  double bloom_px = 0.0;
+  double growth_px = 0.0;
+};
+
+/// In light by `tone`, with corners and blur that were refined so. Nothing where the code has too
+/// few steps or too little contrast.
+[[nodiscard]] std::optional<PatternBloom> pattern_bloom(const ImageView& image,
+                                                        const Corners& corners,
+                                                        const TagLayout& layout,
+                                                        const ToneCurve& tone, double blur_px);
+
 /// Is the code further from the border than pixels, noise and lens allow? Where no border could be
 /// fitted, from the corners that the fit began with, known to `start_sigma_px`. Not where the
 /// marker is too small or too blurred to say.

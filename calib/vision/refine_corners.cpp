@@ -39,9 +39,10 @@ constexpr int kMinPixels = 40;
 
 class Fit {
  public:
-  Fit(const ImageView& image, const Corners& start, const TagLayout& tag)
+  Fit(const ImageView& image, const Corners& start, const TagLayout& tag, const ToneCurve& tone)
       : image_(image),
         tag_(tag),
+        tone_(tone),
         start_(start),
         layout_(start),
         corners_(start),
@@ -76,7 +77,7 @@ class Fit {
       }
       // The edges were laid anew through the corners: lines start at zero, all else is kept.
       for (int e = 0; e < 4; ++e) unknowns_(3 * e) = unknowns_(3 * e + 1) = 0.0;
-      predictions_ = predict(layout_, unknowns_, samples_);
+      predictions_ = predict(layout_, unknowns_, samples_, tone_);
       noise_ = robust_noise(samples_, predictions_);
       if (!step(*edges, round < kFullSteps ? 1.0 : 0.5)) return RefineStatus::kBadFit;
       if (round < kFullSteps) learn_steps();
@@ -255,6 +256,7 @@ class Fit {
 
   const ImageView& image_;
   const TagLayout& tag_;
+  const ToneCurve& tone_;
   const Corners& start_;
   Layout layout_;
   Corners corners_;
@@ -272,9 +274,9 @@ class Fit {
 
 }  // namespace
 
-RefinedCorners refine_corners(const ImageView& image, const Corners& start,
-                              const TagLayout& layout) {
-  return Fit(image, start, layout).run();
+RefinedCorners refine_corners(const ImageView& image, const Corners& start, const TagLayout& layout,
+                              const ToneCurve& tone) {
+  return Fit(image, start, layout, tone).run();
 }
 
 }  // namespace kinescope

@@ -17,6 +17,7 @@
 
 #include "calib/vision/image_view.h"
 #include "calib/vision/tag_detector.h"
+#include "calib/vision/tone_curve.h"
 
 namespace kinescope {
 
@@ -43,7 +44,10 @@ struct RefinedCorners {
   double blur_px = 0.0;   ///< standard deviation of the step's blur, larger of the two directions
 };
 
+/// `tone`: how the camera turns light to grey. A blurred step is even in light only; without its
+/// curve, bright areas grow over dark ones.
 [[nodiscard]] RefinedCorners refine_corners(const ImageView& image, const Corners& start,
-                                            const TagLayout& layout);
+                                            const TagLayout& layout,
+                                            const ToneCurve& tone = ToneCurve());
 
 }  // namespace kinescope

@@ -18,6 +18,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "calib/vision/detect.h"
+#include "calib/vision/find_tone.h"
 #include "calib/vision/refine_corners.h"
 #include "calib/vision/tag_detector.h"
 #include "calib/vision/video.h"
@@ -33,6 +34,8 @@ constexpr double kSquare95 = 5.991;  // of chi square with two degrees of freedo
 constexpr double kSame = 3.0;        // px between a tag that is seen and the one that is there
 constexpr double kFrameRate_hz = 30.0;
 constexpr double kPixelBlur = 1.0 / 12.0;  // px^2, of a pixel's own integration
+
+constexpr std::size_t kToneViews = 64;
 
 enum class Codec { kNone, kJpeg, kH264 };
 
@@ -183,18 +186,35 @@ class Trial {
         search_(make_tag_detector(row.family)),
         layout_(tag_layout(row.family)) {}
 
+  // As if they were one recording, with one tone curve.
   void pictures(int trials) {
+    std::vector<Scene> scenes;
+    std::vector<ToneView> views;
     for (int trial = 0; trial < trials; ++trial) {
-      Scene scene = make_scene(row_, trial);
+      scenes.push_back(make_scene(row_, trial));
+      Scene& scene = scenes.back();
       if (row_.codec == Codec::kJpeg) scene.image = through_jpeg(scene.image, row_.quality);
       judge_packaged(scene.image, scene);
       const std::vector<TagObservation> tags = search_->detect(scene.image.view());
-      const TagObservation* tag = seen(tags, scene.truth);
-      if (tag == nullptr) continue;
-      ++found_;
-      const RefinedCorners refined = refine_corners(scene.image.view(), corners_of(*tag), layout_);
-      if (refined.status == RefineStatus::kDone)
-        ours_.add(refined.corners_px, scene.truth, refined.sigma_px);
+      if (const TagObservation* tag = seen(tags, scene.truth); tag != nullptr)
+        starts_.emplace_back(trial, *tag);
+    }
+    found_ = static_cast<int>(starts_.size());
+    for (const auto& [trial, tag] : starts_) {
+      const ImageView image = scenes[static_cast<std::size_t>(trial)].image.view();
+      const RefinedCorners refined = refine_corners(image, corners_of(tag), layout_);
+      if (views.size() < kToneViews && refined.status == RefineStatus::kDone &&
+          shows_tone(refined.corners_px, layout_))
+        views.push_back({image, tag.id, refined.corners_px, PlacedMarker{}.size_m});
+    }
+    if (const std::optional<FoundTone> tone = find_tone(views, layout_)) tone_ = *tone;
+    for (const auto& [trial, tag] : starts_) {
+      const Scene& scene = scenes[static_cast<std::size_t>(trial)];
+      const RefinedCorners refined =
+          refine_corners(scene.image.view(), corners_of(tag), layout_, tone_.curve);
+      if (refined.status != RefineStatus::kDone) continue;
+      const double left = tone_.is_explained() ? tone_.sigma_per_blur * refined.blur_px : 0.0;
+      ours_.add(refined.corners_px, scene.truth, std::hypot(refined.sigma_px, left));
     }
   }
 
@@ -235,10 +255,10 @@ class Trial {
       std::fflush(stdout);
       return;
     }
-    fmt::print(" | {:5.1f} {:5.1f} {:7.4f} {:+8.4f} {:7.4f} {:5.1f} {:7.4f} {:6.1f}\n",
+    fmt::print(" | {:5.1f} {:5.1f} {:7.4f} {:+8.4f} {:7.4f} {:5.1f} {:7.4f} {:6.1f} {:5.2f}\n",
                100.0 * found_ / count_, 100.0 * ours_.tags / count_, ours_.rms(), ours_.bias(),
                floor, ours_.rms() / floor, ours_.sigma / ours_.tags * std::numbers::sqrt2,
-               100.0 * ours_.inside / (4.0 * ours_.tags));
+               100.0 * ours_.inside / (4.0 * ours_.tags), tone_.curve.gamma());
     std::fflush(stdout);
   }
 
@@ -255,6 +275,8 @@ class Trial {
   std::unique_ptr<TagDetector> packaged_;
   std::unique_ptr<TagDetector> search_;
   TagLayout layout_;
+  std::vector<std::pair<int, TagObservation>> starts_;  // by picture
+  FoundTone tone_;
   int count_ = 0;
   int found_ = 0;
   double floor_ = 0.0;
@@ -285,8 +307,25 @@ std::vector<Row> all_rows() {
     add("motion 1 px").motion_px = 1.0;
     add("motion 2 px").motion_px = 2.0;
     add("motion 4 px").motion_px = 4.0;
-    add("gamma 1.5").image.gamma = 1.5;
-    add("gamma 2.2").image.gamma = 2.2;
+    for (const double gamma : {1.5, 1.8, 2.2}) {
+      add(fmt::format("gamma {:.1f}", gamma)).image.gamma = gamma;
+      for (const double blur : {0.4, 1.2}) {
+        ImageOptions& image = add(fmt::format("gamma {:.1f}, blur {:.1f}", gamma, blur)).image;
+        image.gamma = gamma;
+        image.blur_px = blur;
+      }
+      ImageOptions& noisy = add(fmt::format("gamma {:.1f}, noise 5", gamma)).image;
+      noisy.gamma = gamma;
+      noisy.noise = 5.0;
+      Row& compressed = add(fmt::format("gamma {:.1f}, JPEG 80", gamma));
+      compressed.image.gamma = gamma;
+      compressed.codec = Codec::kJpeg;
+      compressed.quality = 80;
+      Row& video = add(fmt::format("gamma {:.1f}, H.264 crf 23", gamma));
+      video.image.gamma = gamma;
+      video.codec = Codec::kH264;
+      video.quality = 23;
+    }
     add("vignetting 0.5").image.vignetting = 0.5;
     add("lens, k1 -0.25").k1 = -0.25;
     for (const int quality : {95, 80}) {
@@ -307,9 +346,9 @@ std::vector<Row> all_rows() {
 
 void run(int trials, const std::string& only) {
   fmt::print("{:34} packaged detector      | ours\n", "");
-  fmt::print("{:34} {:>5} {:>7} {:>8} | {:>5} {:>5} {:>7} {:>8} {:>7} {:>5} {:>7} {:>6}\n",
+  fmt::print("{:34} {:>5} {:>7} {:>8} | {:>5} {:>5} {:>7} {:>8} {:>7} {:>5} {:>7} {:>6} {:>5}\n",
              "picture", "found", "rms", "outward", "found", "fit", "rms", "outward", "floor",
-             "ratio", "sigma", "in 95%");
+             "ratio", "sigma", "in 95%", "gamma");
   for (const Row& row : all_rows()) {
     if (!(row.name.find(only) != std::string::npos)) continue;
     Trial trial(row);

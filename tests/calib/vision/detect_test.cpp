@@ -84,6 +84,27 @@ TEST_F(Detect, FindsEveryMarkerInEveryFrameWhereItIs) {
   expect_truth(found, 0.0);
 }
 
+TEST_F(Detect, TheCamerasToneCurveIsCorrectedAndNamed) {
+  Rng rng = Rng::from_name("detect, tone");
+  for (int f = 0; f < kFrames; ++f) {
+    std::vector<PlacedMarker> all(2);
+    for (std::size_t i = 0; i < 2; ++i) {
+      all[i].art = apriltag_art("tag36h11", i == 0 ? 4 : 9);
+      all[i].T_camera_tag = pose_showing(camera_, {80.0 + 130.0 * static_cast<double>(i), 90.0 + f},
+                                         60.0, all[i].size_m, 0.5, 0.1 * f, 0.05 * f);
+      truth_[static_cast<std::size_t>(f)][i] = true_corners(camera_, all[i]);
+    }
+    frames_[static_cast<std::size_t>(f)] =
+        render_markers(camera_, all, {.supersample = 4, .gamma = 2.2}, rng);
+  }
+  const Detection found = detect_tags(image_folder(), markers_);
+  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFrames));
+  ASSERT_EQ(found.warnings.size(), 1U);
+  EXPECT_NE(found.warnings[0].find("tone curve"), std::string::npos) << found.warnings[0];
+  EXPECT_NE(found.warnings[0].find("corrected"), std::string::npos) << found.warnings[0];
+  expect_truth(found, 0.0);
+}
+
 TEST_F(Detect, FromAVideoToo) {
   VideoSpec spec{frames_, {}, 2};
   for (int f = 0; f < kFrames; ++f) spec.stamps_ms.push_back(33 * f);
