@@ -18,6 +18,7 @@
 #include "app/report/report.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
+#include "calib/bundle/branches.h"
 #include "calib/quality/error_summary.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/file.h"
@@ -184,6 +185,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     }
     clock.lap("trace", run.times);
   }
+  run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
   run.errors = summarise_errors(run.calibration);
 
   const std::string urdf = run.nominal

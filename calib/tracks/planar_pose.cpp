@@ -13,7 +13,7 @@
 namespace kinescope {
 namespace {
 
-constexpr int kMaxIterations = 20;
+constexpr int kMaxIterations = 40;
 // Two refined branches closer than this (rad) are one pose.
 constexpr double kSameBranch = 1e-3;
 
@@ -108,14 +108,20 @@ std::optional<Linearised> linearise(const CameraModel& camera, const Pose& T_cam
   return out;
 }
 
+struct Refined {
+  PlanarBranch branch;
+  bool converged = false;
+};
+
 // Levenberg-Marquardt on the corners.
-std::optional<PlanarBranch> refine(const CameraModel& camera, Pose pose,
-                                   std::span<const Eigen::Vector3d> points,
-                                   std::span<const Eigen::Vector2d> pixels, double sigma_px) {
+std::optional<Refined> refine(const CameraModel& camera, Pose pose,
+                              std::span<const Eigen::Vector3d> points,
+                              std::span<const Eigen::Vector2d> pixels, double sigma_px) {
   auto state = linearise(camera, pose, points, pixels, sigma_px);
   if (!state) return std::nullopt;
   double damping = 1e-6;
-  for (int i = 0; i < kMaxIterations; ++i) {
+  bool converged = false;
+  for (int i = 0; i < kMaxIterations && !converged; ++i) {
     Matrix6d damped = state->normal;
     damped.diagonal() *= 1.0 + damping;
     const Vector6d step = solve_symmetric(damped, state->gradient);
@@ -123,18 +129,49 @@ std::optional<PlanarBranch> refine(const CameraModel& camera, Pose pose,
     const auto next = linearise(camera, candidate, points, pixels, sigma_px);
     if (!next || next->chi_square > state->chi_square) {
       damping *= 10.0;
-      if (damping > 1e6) break;
+      converged = damping > 1e6;
       continue;
     }
     const double gain = state->chi_square - next->chi_square;
     pose = candidate;
     state = next;
     damping = std::max(1e-12, damping * 0.1);
-    if (gain < 1e-9 * (1.0 + state->chi_square)) break;
+    converged = gain < 1e-9 * (1.0 + state->chi_square);
   }
   const std::optional<Matrix6d> covariance = inverse_of_positive(state->normal);
   if (!covariance || !covariance->allFinite()) return std::nullopt;
-  return PlanarBranch{pose, state->chi_square, *covariance};
+  return Refined{{pose, state->chi_square, *covariance}, converged};
+}
+
+// Halfway between two branches, where its translation fits best.
+std::optional<PlanarBranch> between(const CameraModel& camera, const PlanarBranch& a,
+                                    const PlanarBranch& b, std::span<const Eigen::Vector3d> points,
+                                    std::span<const Eigen::Vector2d> pixels, double sigma_px) {
+  constexpr int kSteps = 2;
+  const Pose& from = a.T_camera_marker;
+  const Pose& to = b.T_camera_marker;
+  Pose pose{from.rotation.slerp(0.5, to.rotation), 0.5 * (from.translation + to.translation)};
+  for (int k = 0; k <= kSteps; ++k) {
+    const auto state = linearise(camera, pose, points, pixels, sigma_px);
+    if (!state) return std::nullopt;
+    if (k == kSteps) return PlanarBranch{pose, state->chi_square, Matrix6d::Identity()};
+    const Eigen::Matrix3d normal = state->normal.bottomRightCorner<3, 3>();
+    const Eigen::Vector3d gradient = state->gradient.tail<3>();
+    pose.translation += pose.rotation * Eigen::Vector3d(solve_symmetric(normal, gradient));
+  }
+  return std::nullopt;
+}
+
+// Where the two branches nearly meet, the corners say less than they do near either one: the
+// covariance is widened towards the middle, as far as that is likely, until it allows the middle
+// as the corners do, but by no more than half the way to the other branch.
+void widen_towards(const PlanarBranch& middle, PlanarBranch& branch) {
+  const Vector6d d = log_pose(branch.T_camera_marker.inverse() * middle.T_camera_marker);
+  const double claimed = d.dot(solve_symmetric(branch.covariance, d));
+  const double rise = std::max(1.0, middle.chi_square - branch.chi_square);
+  if (claimed <= rise) return;
+  const double likelihood = std::exp(0.5 * (1.0 - rise));
+  branch.covariance += likelihood * (1.0 / rise - 1.0 / claimed) * d * d.transpose();
 }
 
 }  // namespace
@@ -162,10 +199,12 @@ std::optional<PlanarPose> estimate_planar_pose(const CameraModel& camera,
   if (!rotations) return std::nullopt;
 
   std::vector<PlanarBranch> branches;
+  bool converged = true;
   for (const Eigen::Matrix3d& R : *rotations) {
     const Pose start{Eigen::Quaterniond(R).normalized(), translation_for(R, corners_m, image)};
-    if (auto branch = refine(camera, start, corners_m, corners_px, sigma_px)) {
-      branches.push_back(*branch);
+    if (const auto refined = refine(camera, start, corners_m, corners_px, sigma_px)) {
+      branches.push_back(refined->branch);
+      converged = converged && refined->converged;
     }
   }
   if (branches.empty()) return std::nullopt;
@@ -175,6 +214,12 @@ std::optional<PlanarPose> estimate_planar_pose(const CameraModel& camera,
       kSameBranch) {
     return PlanarPose{branches[0], std::nullopt};
   }
+  const auto middle = between(camera, branches[0], branches[1], corners_m, corners_px, sigma_px);
+  if (!middle) return PlanarPose{branches[0], branches[1]};
+  // On its way to the first branch, no branch of its own.
+  if (!converged && middle->chi_square < branches[1].chi_square)
+    return PlanarPose{branches[0], std::nullopt};
+  for (PlanarBranch& branch : branches) widen_towards(*middle, branch);
   return PlanarPose{branches[0], branches[1]};
 }
 

@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
 
 #include "calib/tracks/planar_pose.h"
 #include "kinematics/core/chi_square.h"
@@ -46,6 +49,7 @@ PlanarPose with_own_misfit(PlanarPose pose) {
 
 struct Candidate {
   int frame = 0;
+  const TagObservation* seen = nullptr;
   PlanarPose pose;
   double freedom = kFreedom;
   [[nodiscard]] int count() const { return pose.other ? 2 : 1; }
@@ -107,6 +111,60 @@ std::vector<int> choose_branches(const std::vector<Candidate>& candidates,
   return chosen;
 }
 
+// The corners of a marker that hardly moves, as one view: far more exact than any of its own.
+// Nothing where it moves.
+std::optional<TagObservation> resting_view(const std::vector<Candidate>& candidates,
+                                           double variance) {
+  constexpr std::size_t kFewest = 8;
+  // Variance of the corners about their medians, over the declared one, of a marker that moves by
+  // so little that all views show one branch.
+  constexpr double kHardlyMoves = 4.0;
+  if (candidates.size() < kFewest) return std::nullopt;
+  TagObservation view = *candidates.front().seen;
+  for (std::size_t c = 0; c < view.corners_px.size(); ++c) {
+    for (const Eigen::Index axis : {0, 1}) {
+      std::vector<double> places;
+      for (const Candidate& candidate : candidates)
+        places.push_back(candidate.seen->corners_px[c][axis]);
+      view.corners_px[c][axis] = median_of(std::move(places));
+    }
+  }
+  std::vector<double> squared;
+  std::vector<double> sigmas;
+  for (const Candidate& candidate : candidates) {
+    double sum = 0.0;
+    for (std::size_t c = 0; c < view.corners_px.size(); ++c)
+      sum += (candidate.seen->corners_px[c] - view.corners_px[c]).squaredNorm();
+    sigmas.push_back(candidate.seen->sigma_px * std::sqrt(variance));
+    squared.push_back(sum / (sigmas.back() * sigmas.back()));
+  }
+  const auto numbers = 2.0 * static_cast<double>(view.corners_px.size());
+  if (median_of(std::move(squared)) > kHardlyMoves * numbers) return std::nullopt;
+  // The median of n has pi / 2 times the variance of their mean.
+  view.sigma_px = median_of(std::move(sigmas)) *
+                  std::sqrt(0.5 * std::numbers::pi / static_cast<double>(candidates.size()));
+  return view;
+}
+
+// Of a marker that rests, the branches nearer to its one pose stand first, and the others cost what
+// all views say against them together.
+void settle_resting(const PlanarPose& rest, PoseTrack& track) {
+  for (PoseSample& s : track.samples) {
+    if (!s.T_camera_marker_alternative) continue;
+    const Eigen::Quaterniond& rotation = rest.best.T_camera_marker.rotation;
+    if (angle_between(s.T_camera_marker_alternative->rotation, rotation) <
+        angle_between(s.T_camera_marker.rotation, rotation)) {
+      std::swap(s.T_camera_marker, *s.T_camera_marker_alternative);
+      std::swap(s.covariance, *s.alternative_covariance);
+      s.alternative_cost = -s.alternative_cost;
+    }
+    if (rest.other) {
+      s.alternative_cost =
+          std::max(s.alternative_cost, rest.other->chi_square - rest.best.chi_square);
+    }
+  }
+}
+
 PoseTrack make_track(TagId id, const std::vector<Candidate>& candidates,
                      const std::vector<double>& times_s) {
   PoseTrack track{id, {}};
@@ -121,6 +179,7 @@ PoseTrack make_track(TagId id, const std::vector<Candidate>& candidates,
       const PlanarBranch& other = candidates[i].branch(1 - chosen[i]);
       sample.T_camera_marker_alternative = other.T_camera_marker;
       sample.alternative_cost = other.chi_square - branch.chi_square;
+      sample.alternative_covariance = other.covariance;
     }
     track.samples.push_back(std::move(sample));
   }
@@ -160,7 +219,7 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
                                            observation.corners_px, observation.sigma_px);
     if (!pose) continue;
     const double freedom = 2.0 * static_cast<double>(observation.corners_px.size()) - 6.0;
-    candidates[observation.id].push_back({observation.frame, *pose, freedom});
+    candidates[observation.id].push_back({observation.frame, &observation, *pose, freedom});
   }
   const double variance = variance_of_corners(candidates);
   PoseTracks tracks{observations.times_s, {}};
@@ -171,6 +230,11 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
     }
     std::ranges::sort(list, {}, &Candidate::frame);
     tracks.tracks.push_back(make_track(id, list, observations.times_s));
+    const auto view = resting_view(list, variance);
+    if (!view) continue;
+    const auto rest =
+        estimate_planar_pose(camera, markers.corners_m(id), view->corners_px, view->sigma_px);
+    if (rest) settle_resting(*rest, tracks.tracks.back());
   }
   return tracks;
 }

@@ -3,7 +3,8 @@
 // Takes   TagObservations, the camera and the markers.
 // Gives   PoseTracks with both planar branches; the branch that fits the neighbouring frames stands
 // first. Method  estimate_planar_pose for each sighting; one factor for the corners' sigmas from
-// all of them, where they fit worse than declared; dynamic programming over time.
+// all of them, where they fit worse than declared; dynamic programming over time; all views of a
+// marker at rest taken as one.
 #pragma once
 
 #include "calib/camera/camera_model.h"

@@ -17,6 +17,11 @@ constexpr std::array kAllowances{0.003, 0.01};
 // Variance across a joint over the declared one.
 constexpr double kFarMore = 10.0;
 
+void add_variance(Branch& branch, const Vector6d& variance) {
+  branch.covariance.diagonal() += variance;
+  branch.whitening = whitening_of(branch.covariance);
+}
+
 Series with_allowance(Series series, double share) {
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(share * share),
@@ -24,8 +29,8 @@ Series with_allowance(Series series, double share) {
   for (Body& body : series.bodies) {
     for (Sighting& s : body.at) {
       if (!s.seen) continue;
-      s.covariance.diagonal() += variance;
-      s.whitening = whitening_of(s.covariance);
+      add_variance(s, variance);
+      if (s.alternative) add_variance(*s.alternative, variance);
     }
   }
   return series;

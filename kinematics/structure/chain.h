@@ -24,6 +24,7 @@ struct MotionSample {
   Pose pose;
   Matrix6d whitening = Matrix6d::Identity();
   std::optional<Pose> alternative;
+  Matrix6d alternative_whitening = Matrix6d::Identity();
   double alternative_cost = 0.0;
 };
 

@@ -14,17 +14,18 @@ namespace {
 struct SampleResidual {
   Vector6d white;
   double penalty = 0.0;
+  bool other = false;
 };
 
 SampleResidual residual_of(const MotionSample& sample, const ChainKinematics& chain,
                            const double* coordinates) {
-  SampleResidual r{sample.whitening * fast_log(chain.left_over(coordinates, sample.pose)), 0.0};
+  SampleResidual r{sample.whitening * fast_log(chain.left_over(coordinates, sample.pose)), 0.0,
+                   false};
   if (!sample.alternative) return r;
   const Vector6d other =
-      sample.whitening * fast_log(chain.left_over(coordinates, *sample.alternative));
+      sample.alternative_whitening * fast_log(chain.left_over(coordinates, *sample.alternative));
   if (other.squaredNorm() + sample.alternative_cost < r.white.squaredNorm()) {
-    r.white = other;
-    r.penalty = std::max(0.0, sample.alternative_cost);
+    r = {other, std::max(0.0, sample.alternative_cost), true};
   }
   return r;
 }
@@ -48,6 +49,8 @@ void clear(ChainResiduals& e, std::size_t samples) {
   e.axis.clear();
   e.white.reserve(samples);
   e.axis.reserve(samples);
+  e.other.clear();
+  e.other.reserve(samples);
   for (auto* part : {&e.parts.along, &e.parts.across, &e.parts.lever, &e.parts.penalty}) {
     part->clear();
     part->reserve(samples);
@@ -99,8 +102,9 @@ ChainResiduals chain_residuals(const Motion& motion, const ChainModel& model,
   for (std::size_t i = 0; i < motion.size(); ++i) {
     const SampleResidual r = residual_of(motion[i], chain, e.coordinates.data() + i * joints);
     double along = 0.0;
+    e.other.push_back(r.other ? 1 : 0);
     if (e.parts.split) {
-      e.axis.emplace_back(motion[i].whitening * chain.last_axis());
+      e.axis.emplace_back(whitening_of(motion[i], r.other) * chain.last_axis());
       e.parts.lever.push_back(e.axis.back().norm());
       along = e.axis.back().dot(r.white) / e.parts.lever.back();
     }
@@ -127,7 +131,7 @@ NormalEquations normal_equations(const Motion& motion, const ChainModel& model,
   for (std::size_t i = 0; i < motion.size(); ++i) {
     if (weights[i] <= 0.0) continue;
     chain.jacobian(e.coordinates.data() + i * joints, readings, motion[i].instant, J);
-    Matrix6d W = std::sqrt(weights[i]) * motion[i].whitening;
+    Matrix6d W = std::sqrt(weights[i]) * whitening_of(motion[i], e.other[i] != 0);
     Vector6d white = std::sqrt(weights[i]) * e.white[i];
     if (reduced) {
       const Vector6d u = e.axis[i] / e.parts.lever[i];

@@ -14,9 +14,15 @@ namespace kinescope::structure_search {
 struct ChainResiduals {
   ResidualParts parts;
   std::vector<Vector6d> white;      ///< one a sample
+  std::vector<char> other;          ///< one a sample: the alternative is the better branch
   std::vector<Vector6d> axis;       ///< whitened axis, one a sample (single joint)
   std::vector<double> coordinates;  ///< samples x joints
 };
+
+/// Of the branch that the residuals of a sample are of.
+[[nodiscard]] inline const Matrix6d& whitening_of(const MotionSample& sample, bool other) {
+  return other ? sample.alternative_whitening : sample.whitening;
+}
 
 [[nodiscard]] ChainResiduals chain_residuals(const Motion& motion, const ChainModel& model,
                                              const Eigen::MatrixXd& readings);

@@ -5,6 +5,7 @@
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
+#include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"
 #include "kinematics/structure/tangent.h"
 
@@ -147,11 +148,11 @@ Deviations deviations_of(const Body& body, const Steps& step, const std::vector<
     known.push_back(out.main[f]);
     steps.push_back(d->median.norm());
     if (!s.alternative) continue;
-    const Pose inverse = s.alternative->inverse();
+    const Pose inverse = s.alternative->pose.inverse();
     const auto other = neighbourhood_of(body, times_s, f, [&](std::size_t g) {
       return fast_log(compose(inverse, body.at[g].pose));
     });
-    if (other) out.alternative[f] = (s.whitening * other->median).norm();
+    if (other) out.alternative[f] = (s.alternative->whitening * other->median).norm();
   }
   out.median = median_of(std::move(known));
   out.step = median_of(std::move(steps));
@@ -183,7 +184,7 @@ bool is_smooth(const Body& body, const Deviations& d, const std::vector<double>&
 }
 
 void swap_branch(Sighting& s) {
-  std::swap(s.pose, value_of(s.alternative));
+  std::swap(static_cast<Branch&>(s), value_of(s.alternative));
   s.alternative_cost = -s.alternative_cost;
 }
 
@@ -223,14 +224,41 @@ std::optional<double> noise_from_differences(const Body& body, const Steps& step
   return 1.4826 * median_of(std::move(absolute));
 }
 
+void scale_branch(Branch& branch, double scale) {
+  branch.covariance = floored(branch.covariance * (scale * scale));
+  branch.whitening = whitening_of(branch.covariance);
+}
+
 void scale_noise(Body& body, double scale) {
   body.noise_scale = scale;
   for (Sighting& s : body.at) {
     if (!s.seen) continue;
-    s.covariance = floored(s.covariance * (scale * scale));
-    s.whitening = whitening_of(s.covariance);
+    scale_branch(s, scale);
+    if (s.alternative) scale_branch(*s.alternative, scale);
     s.alternative_cost /= scale * scale;
   }
+}
+
+// A sighting that has to take such a branch counts as an outlier anyway.
+void drop_unlikely_branches(Body& body) {
+  for (Sighting& s : body.at) {
+    if (s.alternative && s.alternative_cost > kOutlierCost) s.alternative.reset();
+  }
+}
+
+// The covariance of the first branch as the camera sees it, for the other one.
+Matrix6d turned_covariance(const PoseSample& sample) {
+  const Eigen::Matrix3d turn =
+      sample.T_camera_marker_alternative->matrix3().transpose() * sample.T_camera_marker.matrix3();
+  Matrix6d both = Matrix6d::Zero();
+  both.topLeftCorner<3, 3>() = turn;
+  both.bottomRightCorner<3, 3>() = turn;
+  return both * sample.covariance * both.transpose();
+}
+
+Branch branch_of(const Pose& pose, const Matrix6d& covariance) {
+  const Matrix6d believed = floored(covariance);
+  return {pose, believed, whitening_of(believed)};
 }
 
 Body body_of(const PoseTrack& track, std::size_t frames) {
@@ -244,10 +272,11 @@ Body body_of(const PoseTrack& track, std::size_t frames) {
     if (!finite || sample.frame < 0 || static_cast<std::size_t>(sample.frame) >= frames) continue;
     Sighting& s = body.at[static_cast<std::size_t>(sample.frame)];
     s.seen = true;
-    s.pose = sample.T_camera_marker;
-    s.covariance = floored(sample.covariance);
-    s.whitening = whitening_of(s.covariance);
-    s.alternative = sample.T_camera_marker_alternative;
+    static_cast<Branch&>(s) = branch_of(sample.T_camera_marker, sample.covariance);
+    if (!sample.T_camera_marker_alternative) continue;
+    const Matrix6d& other =
+        sample.alternative_covariance ? *sample.alternative_covariance : turned_covariance(sample);
+    s.alternative = branch_of(*sample.T_camera_marker_alternative, other);
     s.alternative_cost = sample.alternative_cost;
   }
   return body;
@@ -279,6 +308,7 @@ Series clean_series(const PoseTracks& tracks) {
     const auto noise = noise_from_differences(body, step);
     if (noise) scale_noise(body, std::max(*noise, kLeastNoiseScale));
   }
+  for (Body& body : series.bodies) drop_unlikely_branches(body);
   series.smooth = judged > 0 && 2 * smooth > judged;
   count_seen(series);
   return series;

@@ -56,7 +56,8 @@ void describe(const Motion& motion, const ChainResiduals& e, const ResidualScale
   std::vector<double> rotation;
   std::vector<double> translation;
   for (std::size_t i = 0; i < motion.size(); ++i) {
-    const Vector6d plain = motion[i].whitening.triangularView<Eigen::Upper>().solve(e.white[i]);
+    const Vector6d plain =
+        whitening_of(motion[i], e.other[i] != 0).triangularView<Eigen::Upper>().solve(e.white[i]);
     rotation.push_back(plain.head<3>().squaredNorm());
     translation.push_back(plain.tail<3>().squaredNorm());
   }

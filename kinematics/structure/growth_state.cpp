@@ -150,12 +150,13 @@ const Attachment* acceptable_best(const GrowthState& state, std::size_t body) {
   const Attachment* best = best_of(alternatives);
   if (best == nullptr || is_acceptable(state, body, *best)) return best;
   if (best->at_rest() || best->driven()) return nullptr;
-  const Attachment* driven = nullptr;
+  const Attachment* other = nullptr;
   for (const Attachment& a : alternatives) {
-    if (!a.driven() || a.parent != best->parent || !is_acceptable(state, body, a)) continue;
-    if (driven == nullptr || a.data_cost < driven->data_cost) driven = &a;
+    const bool free = !a.driven() && !a.at_rest();
+    if (free || a.parent != best->parent || !is_acceptable(state, body, a)) continue;
+    if (other == nullptr || a.data_cost < other->data_cost) other = &a;
   }
-  return driven;
+  return other;
 }
 
 }  // namespace kinescope::structure_search

@@ -45,7 +45,7 @@ bool look_again_at_free_bodies(GrowthState& state);
 [[nodiscard]] bool is_acceptable(const GrowthState& state, std::size_t body, const Attachment& a);
 
 /// The best of what is known of a body, if it is acceptable; else null. Of a joint that would need
-/// to leave less to do without a channel, the same joint with one may be.
+/// to leave less to do without a channel, the same joint with one, or rest, may be.
 [[nodiscard]] const Attachment* acceptable_best(const GrowthState& state, std::size_t body);
 
 }  // namespace kinescope::structure_search

@@ -14,6 +14,12 @@ double log_det_ratio(const Matrix6d& W, const Matrix6d& V) {
   return 2.0 * std::log(std::abs(ratio));
 }
 
+// Of a child's pose with this covariance in the frame of a parent with that one.
+Matrix6d whitening_with(const Matrix6d& child, const Matrix6d& parent, const Pose& T_parent_child) {
+  const Matrix6d ad = adjoint(T_parent_child.inverse());
+  return whitening_of(child + ad * parent * ad.transpose());
+}
+
 }  // namespace
 
 LinkPath camera_path(int instants) {
@@ -43,11 +49,18 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
               .pose = inverse * s.pose,
               .whitening = s.whitening,
               .alternative = {},
+              .alternative_whitening = {},
               .alternative_cost = s.alternative_cost};
-    if (s.alternative) sample.alternative = inverse * *s.alternative;
+    if (s.alternative) {
+      sample.alternative = inverse * s.alternative->pose;
+      sample.alternative_whitening = s.alternative->whitening;
+    }
     if (path.covariance.empty()) continue;
-    const Matrix6d ad = adjoint(sample.pose.inverse());
-    sample.whitening = whitening_of(s.covariance + ad * path.covariance[i] * ad.transpose());
+    sample.whitening = whitening_with(s.covariance, path.covariance[i], sample.pose);
+    if (s.alternative) {
+      sample.alternative_whitening =
+          whitening_with(s.alternative->covariance, path.covariance[i], *sample.alternative);
+    }
     out.log_det += log_det_ratio(sample.whitening, s.whitening);
   }
   return out;

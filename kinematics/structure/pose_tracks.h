@@ -19,6 +19,8 @@ struct PoseSample {
   Matrix6d covariance = Matrix6d::Identity();       ///< of a right perturbation; rad, m
   std::optional<Pose> T_camera_marker_alternative;  ///< the other planar branch, where there is one
   double alternative_cost = 0.0;  ///< chi-square of the other branch minus this one's
+  /// Of a right perturbation of the other branch; none: the first's, as the camera sees it.
+  std::optional<Matrix6d> alternative_covariance = {};
 };
 
 struct PoseTrack {

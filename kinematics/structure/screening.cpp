@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/median.h"
+#include "kinematics/structure/chain_residuals.h"
 #include "kinematics/structure/line_regression.h"
 #include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/series.h"
+#include "kinematics/structure/tangent.h"
 #include "kinematics/structure/wide_turn.h"
 
 namespace kinescope::structure_search {
@@ -224,6 +227,45 @@ Eigen::MatrixXd readings_of(const Motion& motion, const Eigen::MatrixXd& reading
   return q;
 }
 
+// How far a sighting is from a pose, by the branch that is nearer.
+double distance_from(const Pose& inverse, const MotionSample& sample) {
+  const double own = (sample.whitening * fast_log(inverse * sample.pose)).squaredNorm();
+  if (!sample.alternative) return own;
+  const Vector6d other = sample.alternative_whitening * fast_log(inverse * *sample.alternative);
+  return std::min(own, other.squaredNorm() + sample.alternative_cost);
+}
+
+// Rest where one branch of most sightings is: what the first branches leave of a marker at rest
+// tells nothing when every other one is wrong. Nothing for sightings with one branch.
+std::optional<Candidate> rest_of_branches(const Motion& motion, const Eigen::MatrixXd& readings) {
+  constexpr std::size_t kPlaces = 12;
+  constexpr std::size_t kJudges = 40;
+  if (std::ranges::none_of(motion, [](const MotionSample& s) { return s.alternative.has_value(); }))
+    return std::nullopt;
+  Candidate best;
+  double least = std::numeric_limits<double>::infinity();
+  const auto judge = [&](const Pose& place) {
+    const Pose inverse = place.inverse();
+    double sum = 0.0;
+    const std::size_t stride = std::max<std::size_t>(1, motion.size() / kJudges);
+    for (std::size_t i = 0; i < motion.size(); i += stride) {
+      sum += std::min(kOutlierCost, distance_from(inverse, motion[i]));
+    }
+    if (sum >= least) return;
+    least = sum;
+    best.start.mount = place;
+  };
+  for (std::size_t i = 0; i < motion.size();
+       i += std::max<std::size_t>(1, motion.size() / kPlaces)) {
+    judge(motion[i].pose);
+    if (motion[i].alternative) judge(*motion[i].alternative);
+  }
+  const ResidualScale scale = residual_scale(chain_residuals(motion, best.start, readings).parts);
+  best.cost = scale.cost;
+  best.across = scale.across;
+  return best;
+}
+
 }  // namespace
 
 ChainJoint joint_from_twist(const Pose& T0, const Vector6d& twist, JointType type) {
@@ -254,6 +296,8 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
 
   const LineProblem problem = line_problem(linear, motion);
   out.push_back(rest_candidate(linear, problem));
+  const auto rest = rest_of_branches(motion, readings);
+  if (rest && rest->cost < out.back().cost) out.back() = *rest;
   if (linear.widest > kWideTurn) {
     for (Candidate& c : wide_turn_candidates(motion, q, usable, options.coordinate_free)) {
       out.push_back(std::move(c));

@@ -30,11 +30,26 @@ double fast_step(const Series& series) {
   return fastest;
 }
 
-// The mean of the sightings symmetric about a frame, at that frame's time.
-Sighting averaged(const Body& body, int f, int half_width) {
-  Sighting out = body.at[static_cast<std::size_t>(f)];
-  if (!out.seen || half_width == 0) return out;
-  const Pose inverse = out.pose.inverse();
+// The branch of a sighting that agrees with another pose, seen from there, and its cost.
+struct Agreeing {
+  Vector6d away;
+  double cost = 0.0;
+};
+
+Agreeing agreeing_branch(const Sighting& sighting, const Branch& with, const Pose& inverse) {
+  Agreeing out{fast_log(inverse * sighting.pose), 0.0};
+  if (!sighting.alternative) return out;
+  const Vector6d other = fast_log(inverse * sighting.alternative->pose);
+  const double gain = (with.whitening * out.away).squaredNorm() -
+                      (with.whitening * other).squaredNorm() - sighting.alternative_cost;
+  if (gain > 0.0) out = {other, sighting.alternative_cost};
+  return out;
+}
+
+// The mean of the branches about a frame that agree with one of its own; what they cost together
+// is added to `cost`.
+Branch mean_branch(const Body& body, int f, int half_width, const Branch& own, double& cost) {
+  const Pose inverse = own.pose.inverse();
   Vector6d sum = Vector6d::Zero();
   int count = 1;
   for (int d = 1; d <= half_width; ++d) {
@@ -42,12 +57,27 @@ Sighting averaged(const Body& body, int f, int half_width) {
     const Sighting& before = body.at[static_cast<std::size_t>(f - d)];
     const Sighting& after = body.at[static_cast<std::size_t>(f + d)];
     if (!before.seen || !after.seen) continue;
-    sum += fast_log(inverse * before.pose) + fast_log(inverse * after.pose);
+    const Agreeing a = agreeing_branch(before, own, inverse);
+    const Agreeing b = agreeing_branch(after, own, inverse);
+    sum += a.away + b.away;
+    cost += a.cost + b.cost;
     count += 2;
   }
-  out.pose = out.pose * exp_pose(sum / count);
-  out.covariance /= count;
-  out.whitening *= std::sqrt(static_cast<double>(count));
+  return {own.pose * exp_pose(sum / count), own.covariance / count,
+          own.whitening * std::sqrt(static_cast<double>(count))};
+}
+
+// The mean of the sightings symmetric about a frame, at that frame's time.
+Sighting averaged(const Body& body, int f, int half_width) {
+  const Sighting& own = body.at[static_cast<std::size_t>(f)];
+  Sighting out = own;
+  if (!own.seen || half_width == 0) return out;
+  double cost = 0.0;
+  static_cast<Branch&>(out) = mean_branch(body, f, half_width, own, cost);
+  if (!own.alternative) return out;
+  double other = own.alternative_cost;
+  out.alternative = mean_branch(body, f, half_width, *own.alternative, other);
+  out.alternative_cost = other - cost;
   return out;
 }
 

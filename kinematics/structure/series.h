@@ -19,13 +19,17 @@ namespace kinescope::structure_search {
 /// Noise below this is not believed: interpolation of the log alone is worse (rad, m).
 inline constexpr double kNoiseFloor = 2e-6;
 
-/// One marker at one instant.
-struct Sighting {
-  bool seen = false;
+/// One pose that a view allows.
+struct Branch {
   Pose pose;                                  ///< in the camera's frame
   Matrix6d covariance = Matrix6d::Zero();     ///< right perturbation
   Matrix6d whitening = Matrix6d::Identity();  ///< W with W' W = covariance^-1, upper triangular
-  std::optional<Pose> alternative;
+};
+
+/// One marker at one instant: the branch that is believed.
+struct Sighting : Branch {
+  bool seen = false;
+  std::optional<Branch> alternative;
   double alternative_cost = 0.0;
 };
 

@@ -165,6 +165,57 @@ TEST(PoseTracks, TimeChoosesTheBranchThatMovesSmoothly) {
   EXPECT_EQ(scene.wrong_in(scene.track()), 0);
 }
 
+TEST(PoseTracks, AllViewsOfAMarkerAtRestShowOneBranch) {
+  // 20 px, nearly face on: its branches lie so close that single views jump between them all the
+  // time, and no step from frame to frame looks unlikely.
+  constexpr double kSigma = 0.13;
+  constexpr double kTie = 0.02;  // rad: branches as far from the truth as each other
+  Rng rng = Rng::from_name("marker at rest");
+  MarkerSet markers;
+  markers.default_size_m = 0.029;
+  TagObservations observations;
+  observations.width = 1280;
+  observations.height = 720;
+  const Pose truth{exp_rotation({0.12, 0.1, 0.4}), {0.1, 0.05, 1.3}};
+  for (int frame = 0; frame < 300; ++frame) {
+    observations.times_s.push_back(frame / 30.0);
+    TagObservation seen;
+    seen.frame = frame;
+    seen.id = TagId{7};
+    seen.sigma_px = kSigma;
+    seen.corners_px = images(camera_720p(), truth, markers.corners_m(seen.id));
+    for (auto& p : seen.corners_px) p += Eigen::Vector2d(rng.normal(kSigma), rng.normal(kSigma));
+    observations.observations.push_back(seen);
+  }
+  const PoseTracks tracks = pose_tracks_from_tags(observations, camera_720p(), markers);
+  ASSERT_EQ(tracks.tracks.size(), 1U);
+  int with_other = 0;
+  for (const PoseSample& s : tracks.tracks[0].samples) {
+    if (!s.T_camera_marker_alternative) continue;
+    ++with_other;
+    EXPECT_LT(angle_between(s.T_camera_marker.rotation, truth.rotation),
+              angle_between(s.T_camera_marker_alternative->rotation, truth.rotation) + kTie)
+        << s.frame;
+    EXPECT_GT(s.alternative_cost, 0.0);
+  }
+  EXPECT_GT(with_other, 250);
+}
+
+TEST(PoseTracks, TheOtherBranchHasACovarianceOfItsOwn) {
+  const Swaying scene(0.05, 0.05);
+  std::vector<double> squared;
+  for (const PoseSample& s : scene.track().samples) {
+    ASSERT_TRUE(s.T_camera_marker_alternative);
+    ASSERT_TRUE(s.alternative_covariance);
+    // The corners tell a marker's place across the line of sight far better than along it.
+    const Eigen::Vector3d sight = s.T_camera_marker_alternative->rotation.conjugate() *
+                                  s.T_camera_marker_alternative->translation.normalized();
+    const Eigen::Matrix3d place = s.alternative_covariance->bottomRightCorner<3, 3>();
+    squared.push_back(sight.dot(place * sight) / place.trace());
+  }
+  EXPECT_GT(median_of(squared), 0.98);
+}
+
 TEST(PoseTracks, TheNoiseIsTakenFromTheCornersWhereItIsMoreThanDeclared) {
   constexpr double kSigma = 0.5;
   const PoseTrack right = Swaying(kSigma, kSigma).track();

@@ -184,6 +184,7 @@ TEST(Chain, TheOtherBranchIsTakenWhereItFits) {
   Motion motion = motion_of(truth, q, rng, 1.0);
   for (std::size_t i = 0; i < motion.size(); i += 4) {
     motion[i].alternative = motion[i].pose;
+    motion[i].alternative_whitening = motion[i].whitening;
     motion[i].alternative_cost = 1.0;
     motion[i].pose.rotation =
         motion[i].pose.rotation * exp_rotation(Eigen::Vector3d(0.9, 0.0, 0.0));
