@@ -111,17 +111,18 @@ bool attach_through_unseen_links(GrowthState& state) {
   return false;
 }
 
-bool is_coarse(const Attachment& attachment) {
+bool is_coarse(const Attachment& attachment, bool channel_left) {
   constexpr double kCoarse = 4.0;  // variance across the joint over the declared one
   return attachment.driven() && attachment.fit.model.joints.size() == 1 &&
-         attachment.fit.model.joints.front().terms.size() > 1 && attachment.fit.variance > kCoarse;
+         (channel_left || attachment.fit.model.joints.front().terms.size() > 1) &&
+         attachment.fit.variance > kCoarse;
 }
 
-bool unfold_coupled_joint(GrowthState& state) {
+bool unfold_coarse_joint(GrowthState& state) {
   for (int l = 1; l < static_cast<int>(state.tree.links.size()); ++l) {
     const GrownLink& link = state.tree.link(l);
-    if (!is_coarse(link.attachment)) continue;
     std::vector<char> channels = unused_channels(state);
+    if (!is_coarse(link.attachment, std::ranges::find(channels, 1) != channels.end())) continue;
     channels[static_cast<std::size_t>(link.attachment.channel())] = 1;
     const std::size_t body = state.tree.founder_of(l);
     auto found =

@@ -17,11 +17,12 @@ void attach_all(GrowthState& state);
 /// acceptable.
 bool attach_through_unseen_links(GrowthState& state);
 
-/// A single joint that several channels move, and that leaves far more than noise, may be several
-/// joints in series with no marker between. True when one was replaced.
-bool unfold_coupled_joint(GrowthState& state);
+/// A single joint that leaves far more than noise, while several channels move it or a channel
+/// drives nothing, may be several joints in series with no marker between. True when one was
+/// replaced.
+bool unfold_coarse_joint(GrowthState& state);
 
-/// Such a joint.
-[[nodiscard]] bool is_coarse(const Attachment& attachment);
+/// Such a joint; `channel_left`: a channel that moves drives nothing.
+[[nodiscard]] bool is_coarse(const Attachment& attachment, bool channel_left);
 
 }  // namespace kinescope::structure_search

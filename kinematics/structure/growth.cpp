@@ -16,7 +16,7 @@ GrownTree grow_tree(const Series& series, const Readings& readings, const Growth
   } while (options.paths_of_several_joints && attach_through_unseen_links(state));
   rearrange(state);
   const int joints = options.paths_of_several_joints ? readings.channels() : 0;
-  for (int k = 0; k < joints && unfold_coupled_joint(state); ++k) rearrange(state);
+  for (int k = 0; k < joints && unfold_coarse_joint(state); ++k) rearrange(state);
   while (give_up_contradicted_joint(state)) {
   }
   return std::move(state.tree);

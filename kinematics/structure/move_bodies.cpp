@@ -149,6 +149,8 @@ bool improve(GrowthState& state, std::size_t body) {
   double least = grown.attachment.cost(correlation) - kGain;
   for (const Attachment& a : grown.alternatives) {
     if (is_below(state.tree, a.parent, body) || conflicts(state.tree, body, a)) continue;
+    const bool free = !a.at_rest() && !a.driven();
+    if (free && !is_acceptable(state, body, a)) continue;
     const double cost = a.cost(correlation) + idle_change(state.tree, state.readings, body, a);
     if (cost >= least) continue;
     least = cost;

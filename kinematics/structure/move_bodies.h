@@ -19,7 +19,8 @@ int release_link(GrowthState& state, int link);
 /// The same for all that hangs on a link by joints, and for one of the bodies at rest on it.
 void release_children(GrowthState& state, int link, std::size_t body);
 
-/// Moves the body to the best place known; false when it stands there already.
+/// Moves the body to the best place known, by a joint without a channel only where that is to be
+/// believed; false when it stands there already.
 bool improve(GrowthState& state, std::size_t body);
 
 /// A joint that no channel drives stands on one marker's word: that its motion has one direction.

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "kinematics/structure/attach_bodies.h"
+#include "kinematics/structure/idle_channels.h"
 #include "kinematics/structure/pair_tree.h"
 #include "kinematics/structure/rearrange.h"
 #include "kinematics/structure/time_offset.h"
@@ -58,9 +59,12 @@ bool has_free_body(const GrownTree& tree) {
 }
 
 // Something that several joints in series may explain better.
-bool is_unfinished(const GrownTree& tree) {
-  return has_free_body(tree) || std::ranges::any_of(tree.links, [](const GrownLink& l) {
-           return l.founder >= 0 && is_coarse(l.attachment);
+bool is_unfinished(const FoundTree& found) {
+  const std::vector<char> idle = idle_channels(found.tree, found.readings);
+  const bool left = std::ranges::find(idle, 1) != idle.end();
+  return has_free_body(found.tree) ||
+         std::ranges::any_of(found.tree.links, [&](const GrownLink& l) {
+           return l.founder >= 0 && is_coarse(l.attachment, left);
          });
 }
 
@@ -231,8 +235,7 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
   for (std::size_t k = 1; k < found.size(); ++k) {
     if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
   }
-  if (!is_unfinished(found[best].tree))
-    return search.finished(std::move(found[best]), step_s, quick);
+  if (!is_unfinished(found[best])) return search.finished(std::move(found[best]), step_s, quick);
   return search.finished(search.settle_at(found[best].offset.value_s, step_s, {}), step_s, {});
 }
 

@@ -74,6 +74,21 @@ TEST(SeveralJoints, ASlideIsNoTurnAboutAnAxisFarAway) { expect_right_joints(with
 
 TEST(SeveralJoints, TwoSlidesAreNoCoupledOne) { expect_right_joints(with_a_bare_link(47)); }
 
+// One slide that leaves five times the noise, beside a channel that drives nothing.
+TEST(SeveralJoints, ACoarseJointBesideAnIdleChannelIsTwo) {
+  expect_right_joints(with_a_bare_link(114));
+}
+
+// Its flips keep to a plane, as if it turned; that motion is too small to be believed.
+TEST(Rest, IsTakenWhereAJointWithoutAChannelIsNotBelieved) {
+  RecordingOptions o = noisy();
+  o.flip_share = 0.1;
+  const Scene scene = scene_of("stress flips 0.1", 79, {}, o);
+  const Structure found = find_structure(scene.recording.tracks, scene.recording.log);
+  EXPECT_TRUE(found.free_markers.empty());
+  EXPECT_EQ(described(found, scene.robot), described(scene));
+}
+
 // -2 ln of 1 : 9 that it drives nothing, and of the choice that its joint would have had.
 TEST(IdleChannels, CostWhatTheyCouldHaveDriven) {
   structure_search::Readings readings;
