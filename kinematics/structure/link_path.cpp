@@ -45,12 +45,10 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
     const Sighting& s = body.at[i];
     const Pose inverse = path.pose[i].inverse();
     MotionSample& sample = out.motion.emplace_back();
-    sample = {.instant = static_cast<int>(i),
-              .pose = inverse * s.pose,
-              .whitening = s.whitening,
-              .alternative = {},
-              .alternative_whitening = {},
-              .alternative_cost = s.alternative_cost};
+    sample.instant = static_cast<int>(i);
+    sample.pose = inverse * s.pose;
+    sample.whitening = s.whitening;
+    sample.alternative_cost = s.alternative_cost;
     if (s.alternative) {
       sample.alternative = inverse * s.alternative->pose;
       sample.alternative_whitening = s.alternative->whitening;
