@@ -138,8 +138,8 @@ std::string field_figure(const Rest& rest) {
       series_class(1));
   plot.legend("does not", "faint");
   return figure(plot.str(),
-                fmt::format("What is left at {} as a function of the {}: where corners are seen "
-                            "less where the model expects them (Gaussian process).",
+                fmt::format("What is left at {} as a function of the {}: from where the model "
+                            "expects corners to where they are seen (Gaussian process).",
                             rest.place, rest.covariate),
                 "half");
 }

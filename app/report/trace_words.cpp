@@ -165,7 +165,9 @@ std::string whole_change_words(const Trace& trace, const HeldOutError& after) {
 
 // The model with the effects is the one that is exported; curves stand in the report only.
 std::string unknown_words(const Trace& trace) {
-  const std::string curves = trace.rest.size() > 1 ? "curves" : "a curve";
+  const std::string curves = trace.rest.size() > 1           ? "curves"
+                             : trace.rest.front().is_field() ? "a field"
+                                                             : "a curve";
   if (trace.accepted.empty()) {
     return fmt::format("{}. Error on unseen data {} with {} for it, which no product carries.",
                        trace.reason, whole_change_words(trace, trace.held_out_after), curves);

@@ -61,7 +61,7 @@ TEST(TraceSection, AFieldIsDrawnAsArrowsOverTheImage) {
 TEST(TraceSection, TheHeadOfAnUnknownRestNamesTheEffectsAndTheModelThatIsExported) {
   Trace trace = trace_with_a_field();
   const std::string alone = trace_lines(trace).front();
-  EXPECT_NE(alone.find("0.15 px → 0.05 px with a curve for it"), std::string::npos) << alone;
+  EXPECT_NE(alone.find("0.15 px → 0.05 px with a field for it"), std::string::npos) << alone;
   TracedEffect scale;
   scale.id = {"encoder_scale", "q2"};
   scale.unit = "";
