@@ -235,6 +235,9 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
   out.candidate.size = [shares](const Eigen::VectorXd& theta) {
     return (shares * theta).cwiseAbs().maxCoeff();
   };
+  // Loads can be alike: large parts of either sign may stand for a small sag.
+  out.candidate.possible = [size = out.candidate.size, limit = kLargest.at(s.unit)](
+                               const Eigen::VectorXd& theta) { return size(theta) < limit; };
   out.corrections = [corrections](double) { return corrections; };
   return out;
 }

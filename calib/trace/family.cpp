@@ -167,12 +167,12 @@ double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
   return std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
 }
 
-double smallest_size(const Candidate& candidate, const Score& score, double p_value) {
-  // At the threshold of the test plus the one-sided 95 % quantile of the normal distribution.
+double smallest_size(const Candidate& candidate, const Score& score, double p_value,
+                     double least_size) {
+  // The one-sided 95 % quantile of the normal distribution.
   constexpr double kPower = 1.645;
   const double k = score.rank;
-  const double threshold =
-      std::sqrt(k * f_quantile(p_value, k, std::max(2.0, score.freedom))) + kPower;
+  const double threshold = std::sqrt(k * f_quantile(p_value, k, std::max(2.0, score.freedom)));
   double variance = score.covariance(0, 0);
   if (candidate.parameters.size() > 1) {
     double counted = 0.0;
@@ -184,7 +184,8 @@ double smallest_size(const Candidate& candidate, const Score& score, double p_va
     }
     variance /= std::max(1.0, counted);
   }
-  return threshold * std::sqrt(std::max(0.0, variance));
+  const double sigma = std::sqrt(std::max(0.0, variance));
+  return std::max(threshold * sigma, least_size) + kPower * sigma;
 }
 
 }  // namespace kinescope::trace

@@ -37,7 +37,9 @@ struct TestedMember {
 /// Standard uncertainty of it.
 [[nodiscard]] double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
                                 const Eigen::MatrixXd& covariance);
-/// The size that a test at level `p_value` finds in 95 of 100 recordings.
-[[nodiscard]] double smallest_size(const Candidate& candidate, const Score& score, double p_value);
+/// The size that is found in 95 of 100 recordings by a test at level `p_value` that passes over
+/// what comes out smaller than `least_size`.
+[[nodiscard]] double smallest_size(const Candidate& candidate, const Score& score, double p_value,
+                                   double least_size);
 
 }  // namespace kinescope::trace

@@ -118,6 +118,52 @@ double effective_stretches(const Eigen::VectorXd& energy) {
   return squares > 0.0 ? std::floor(energy.sum() * energy.sum() / squares) : 0.0;
 }
 
+// Where else the effect might have acted: by how much the residual lets its carriers move in any
+// `length` stretches of the recording, as a variance of whitened rows. Errors of sensors come and
+// go slowly, and one place's more slowly than the average.
+PooledNoise noise_elsewhere(const NormalSystem& system, const Projected& p,
+                            const std::vector<EffectColumn>& columns, int length) {
+  std::vector<EffectColumn> all;
+  for (const EffectColumn& column : columns) {
+    if (std::ranges::find(all, column.carrier, &EffectColumn::carrier) == all.end())
+      all.push_back({column.carrier, {}});
+  }
+  const auto n = static_cast<Eigen::Index>(all.size());
+  const auto k = static_cast<Eigen::Index>(columns.size());
+  all.insert(all.end(), columns.begin(), columns.end());
+  const std::vector<EffectSums> cells = system.cell_sums(all);
+  const Eigen::VectorXd theta = p.T * p.theta;
+  const int windows = (system.partition().stretches + length - 1) / length;
+  std::vector<Eigen::MatrixXd> S(static_cast<std::size_t>(windows), Eigen::MatrixXd::Zero(n, n));
+  std::vector<Eigen::VectorXd> score(S.size(), Eigen::VectorXd::Zero(n));
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const auto w = static_cast<std::size_t>(system.partition().cells[c].stretch / length);
+    S[w] += cells[c].EE.topLeftCorner(n, n);
+    score[w] += cells[c].Er.head(n) - cells[c].JE.leftCols(n).transpose() * p.delta -
+                cells[c].EE.topRightCorner(n, k) * theta;
+  }
+  double squares = 0.0;
+  double directions = 0.0;
+  double seen = 0.0;
+  for (std::size_t w = 0; w < S.size(); ++w) {
+    if (!(S[w].diagonal().maxCoeff() > 0.0)) continue;
+    const Eigen::VectorXd scale = S[w].diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * S[w] * scale.asDiagonal());
+    const Eigen::VectorXd along = eigen.vectors.transpose() * scale.asDiagonal() * score[w];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (!(eigen.values[i] > kHidden)) continue;
+      squares += along[i] * along[i] / eigen.values[i];
+      directions += 1.0;
+    }
+    seen += 1.0;
+  }
+  // Where it was fitted nothing is left. A window's directions are good or bad together (oblique
+  // views, blur): each window is one witness.
+  directions -= static_cast<double>(p.theta.size());
+  if (directions < 1.0 || seen < 2.0) return {};
+  return {squares / directions, seen - 1.0};
+}
+
 void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
            const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
            Score& out) {
@@ -133,7 +179,11 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   out.freedom = effective - k;
   if (effective < kFewestStretches) return;
   const bool few = out.freedom < kFewStretches;
-  const PooledNoise noise = few ? pooled_noise(system, p, columns) : PooledNoise{};
+  PooledNoise noise = few ? pooled_noise(system, p, columns) : PooledNoise{};
+  if (few) {
+    const PooledNoise elsewhere = noise_elsewhere(system, p, columns, static_cast<int>(effective));
+    if (elsewhere.variance > noise.variance) noise = elsewhere;
+  }
   if (few && !(noise.freedom > 0.0)) return;
   const double pooled_statistic = p.gain / (k * noise.variance);
   if (effective < k + 2.0) {

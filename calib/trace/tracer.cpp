@@ -42,7 +42,9 @@ void Tracer::search() {
   do {
     forward();
   } while (backward());
-  look_for_rest();
+  do {
+    look_for_rest();
+  } while (name_the_rest());
   summarise();
   list_not_found();
   conclude();
@@ -157,7 +159,8 @@ void Tracer::search_again(const std::optional<std::string>& place) {
 }
 
 bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
-  return score.rms >= candidate.floor && trace::is_large(score, options_);
+  return small_.contains(candidate.id) ||
+         (score.rms >= candidate.floor && trace::is_large(score, options_));
 }
 
 bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {

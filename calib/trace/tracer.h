@@ -41,7 +41,7 @@ class Tracer {
   [[nodiscard]] bool can_say(const Stage& stage);
   void search();
   void forward();
-  /// Beyond what the sensor's own errors do.
+  /// Beyond what the sensor's own errors do, or shown by more than its own rows to be there.
   [[nodiscard]] bool is_large(const Candidate& candidate, const Score& score) const;
   /// Seen at all, large enough, possible, and not taken out before; significance apart.
   [[nodiscard]] bool may_be_added(const Candidate& candidate, const Score& score) const;
@@ -59,6 +59,9 @@ class Tracer {
                                    const TestedMember& own);
   void replace_waves_by_a_curve();
   void look_for_rest();
+  /// True where an effect that is small in the mean over the rows it touches says as much as what
+  /// was found to be left.
+  [[nodiscard]] bool name_the_rest();
   void look_for_curves();
   [[nodiscard]] bool look_for_field();
   [[nodiscard]] double rest_level() const;
@@ -87,6 +90,7 @@ class Tracer {
   StagePtr now_;
   std::vector<Detail> details_;  // beside now_->added, filled by the backward check
   std::set<EffectId> removed_;
+  std::set<EffectId> small_;  // may be added below the floors
   std::vector<FoundRest> rests_;
   int round_ = 0;
   Trace trace_;

@@ -71,6 +71,29 @@ void Tracer::look_for_rest() {
   } while (look_for_field() || drop_what_rests_explain());
 }
 
+// Floors are means over all rows that an effect touches. What moves a few of them by more is found
+// there as a rest; a name for it is worth more than a curve.
+bool Tracer::name_the_rest() {
+  if (rests_.empty()) return false;
+  const std::set<EffectId> known = small_;
+  for (const Candidate& candidate : now_->fit.candidates) {
+    if (!std::isinf(candidate.floor)) small_.insert(candidate.id);
+  }
+  StagePtr named =
+      refit_best(contenders(*now_, test_family(now_->system, now_->fit.candidates)), round_);
+  small_ = known;
+  if (!named || named->held_out_sum() > rests_.back().held_out.sum()) return false;
+  const EffectId& id = named->added.back().id;
+  small_.insert(id);
+  now_ = std::move(named);
+  mark(round_, id, CandidateState::kAccepted, now_->error.value);
+  add_step(round_, fmt::format("{} says what is left", name_of(id)), *now_);
+  rests_.clear();
+  while (backward()) {
+  }
+  return true;
+}
+
 void Tracer::look_for_curves() {
   rests_.clear();
   while (rests_.size() < kMostRests) {
@@ -293,14 +316,14 @@ void Tracer::list_not_found() {
     if (missing.hidden) {
       missing.record = candidate.record;
     } else {
-      missing.smallest_size = smallest_size(candidate, score, level_ / member.tests);
-      // What lies below the sensor's own errors is not looked for either.
+      // What lies below the sensor's own errors is not looked for.
       const double size = std::abs(size_of(candidate, score.theta));
+      double least_size = 0.0;
       if (score.rms > 0.0) {
         const double floor = std::max(options_.floor, candidate.floor);
-        missing.smallest_size = std::max({missing.smallest_size, size * floor / score.rms,
-                                          size * options_.noise_floor / score.noise_share});
+        least_size = size * std::max(floor / score.rms, options_.noise_floor / score.noise_share);
       }
+      missing.smallest_size = smallest_size(candidate, score, level_ / member.tests, least_size);
       if (beyond_possible(candidate, score, missing.smallest_size))
         missing = {candidate.id, true, 0.0, candidate.size_unit, candidate.record};
     }

@@ -251,5 +251,29 @@ TEST(ScoreTest, FewStretchesAreJudgedByTheNoiseOfTheirRows) {
   EXPECT_EQ(score_test(system, once).p_value, 1.0);
 }
 
+// Errors that last longer in some rows than the model's correlation time says: what a window of
+// the recording shows, other windows must not show as well.
+TEST(ScoreTest, FewStretchesAreJudgedByWhatOtherWindowsShow) {
+  Linearisation linear = linear_model(0.0);
+  const std::vector<EffectColumn> columns = seldom(96, 24);
+  const Eigen::MatrixXd E = explicit_columns(linear, columns);
+  constexpr int kRuns = 200;
+  constexpr Eigen::Index kWindow = 24;  // instants over which carriers drift together
+  Rng rng = Rng::from_name("drift of windows");
+  int significant = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    Eigen::VectorXd drift;
+    for (Eigen::Index i = 0; i < kInstants; ++i) {
+      if (i % kWindow == 0) drift = Eigen::VectorXd::NullaryExpr(3, [&] { return rng.normal(); });
+      linear.residual.segment(i * kRows, kRows) =
+          linear.carriers.middleRows(i * kRows, kRows) * (0.6 * drift);
+    }
+    for (double& r : linear.residual) r += rng.normal();
+    const NormalSystem system(linear, make_partition(linear));
+    if (score_test(system, columns).p_value < 0.01) ++significant;
+  }
+  EXPECT_LE(significant, 10);
+}
+
 }  // namespace
 }  // namespace kinescope::trace
