@@ -68,7 +68,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   CalibrationStart from = continued(start, plain);
   const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
                                                    recording.log, from, trace_options, progress);
-  TracedCalibration out{found.trace, plain, found.effects, trace_options.gravity_base,
+  TracedCalibration out{found.trace, plain, found.effects, found.gravity_base,
                         found.stamp_jitter_s};
   if (!found.corrections.empty()) {
     from.corrections = found.corrections;

@@ -40,7 +40,8 @@ struct CalibrationTrace {
   std::vector<FittedEffect> effects;  ///< all that were accepted
   /// Of all accepted effects but the time offset, in their order: for CalibrationStart.
   std::vector<Correction> corrections;
-  double stamp_jitter_s = 0.0;  ///< EffectBundle's
+  std::optional<Eigen::Vector3d> gravity_base;  ///< as declared, or as a joint's sag says
+  double stamp_jitter_s = 0.0;                  ///< EffectBundle's
 };
 
 /// Throws as calibrate().

@@ -22,8 +22,10 @@ class TracedBundle final : public TracedModel {
   };
   [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects) const;
 
- private:
+  /// The robot and its motion, the log read that much later than the plain model reads it.
   [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
+
+ private:
   [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
                                        const std::vector<AddedEffect>& effects) const;
 

@@ -214,6 +214,21 @@ TEST(TraceCalibration, AWobblesBearingMayBeAnywhereOnTheAxis) {
             kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
+TEST(TraceCalibration, AJointThatSagsTellsWhereGravityPoints) {
+  const InjectedEffect sag = strong("compliance", "q2");
+  const CalibrationTrace found = trace_of(make_effect_world(filmed({sag})));
+  EXPECT_EQ(found.trace.verdict, TraceVerdict::kEffects) << answer(found.trace);
+  ASSERT_EQ(found.trace.accepted.size(), 1U) << answer(found.trace);
+  EXPECT_EQ(found.trace.accepted.front().id, (EffectId{"compliance", "q2"}));
+  EXPECT_TRUE(size_is_right(found.trace.accepted.front(), sag.size));
+  EXPECT_LT(found.trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  constexpr double kAlike = 0.15;  // rad; the masses' places are guessed
+  ASSERT_TRUE(found.gravity_base);
+  EXPECT_LT(std::acos(-found.gravity_base->z()), kAlike) << found.gravity_base->transpose();
+  EXPECT_FALSE(clean_trace().gravity_base);
+}
+
 // q3's log shows its motor, which q2 turns, too; the model takes `ratio` for it.
 CalibrationTrace trace_of_coupled(double truth, double ratio) {
   World world = make_effect_world(filmed());
