@@ -385,8 +385,9 @@ class Detecting {
     tag.sigma_px = detector_sigma_;
     if (refined.status == RefineStatus::kDone) {
       std::ranges::copy(refined.corners_px, tag.corners_px.begin());
+      // All cells together tell the tone curve's part themselves.
       tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0,
-                                tone_sigma_ * refined.blur_px);
+                                refined.by_cells ? 0.0 : tone_sigma_ * refined.blur_px);
     }
     tag.partly_hidden = is_partly_hidden(frame.image.view(), refined, layout_, detector_sigma_);
   }

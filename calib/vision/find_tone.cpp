@@ -47,7 +47,7 @@ std::vector<Shift> measure(std::span<const ToneView> views, const TagLayout& lay
                            const ToneCurve& tone) {
   std::vector<Shift> out;
   for (const ToneView& view : views) {
-    const RefinedCorners refined = refine_corners(view.image, view.corners_px, layout, tone);
+    const RefinedCorners refined = refine_border(view.image, view.corners_px, layout, tone);
     if (refined.status != RefineStatus::kDone) continue;
     const double edge = mean_edge(refined.corners_px);
     if (refined.blur_px > kSharp * edge / layout.cells) continue;

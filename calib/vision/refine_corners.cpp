@@ -11,6 +11,7 @@
 
 #include "calib/vision/edge_model.h"
 #include "calib/vision/marker_edges.h"
+#include "calib/vision/whole_tag.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
@@ -274,9 +275,14 @@ class Fit {
 
 }  // namespace
 
+RefinedCorners refine_border(const ImageView& image, const Corners& start, const TagLayout& layout,
+                             const ToneCurve& tone) {
+  return Fit(image, start, layout, tone).run();
+}
+
 RefinedCorners refine_corners(const ImageView& image, const Corners& start, const TagLayout& layout,
                               const ToneCurve& tone) {
-  return Fit(image, start, layout, tone).run();
+  return refine_by_cells(image, refine_border(image, start, layout, tone), layout, tone);
 }
 
 }  // namespace kinescope

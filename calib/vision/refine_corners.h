@@ -42,6 +42,7 @@ struct RefinedCorners {
   double contrast = 0.0;  ///< outside minus inside, grey levels
   double noise = 0.0;     ///< standard deviation of what the model leaves, grey levels
   double blur_px = 0.0;   ///< standard deviation of the step's blur, larger of the two directions
+  bool by_cells = false;  ///< by the steps between all cells (whole_tag.h), else the border's alone
 };
 
 /// `tone`: how the camera turns light to grey. A blurred step is even in light only; without its
@@ -49,5 +50,10 @@ struct RefinedCorners {
 [[nodiscard]] RefinedCorners refine_corners(const ImageView& image, const Corners& start,
                                             const TagLayout& layout,
                                             const ToneCurve& tone = ToneCurve());
+
+/// The same by the outer border alone.
+[[nodiscard]] RefinedCorners refine_border(const ImageView& image, const Corners& start,
+                                           const TagLayout& layout,
+                                           const ToneCurve& tone = ToneCurve());
 
 }  // namespace kinescope

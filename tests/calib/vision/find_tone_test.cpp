@@ -39,18 +39,19 @@ struct Pictures {
       truth.push_back(true_corners(camera, marker));
     }
     for (std::size_t i = 0; i < images.size(); ++i) {
-      const RefinedCorners refined = refine_corners(images[i].view(), truth[i], kLayout);
+      const RefinedCorners refined = refine_border(images[i].view(), truth[i], kLayout);
       EXPECT_EQ(refined.status, RefineStatus::kDone);
       views.push_back({images[i].view(), TagId{static_cast<int>(i) % kMarkers}, refined.corners_px,
                        PlacedMarker{}.size_m});
     }
   }
 
-  // Mean over all corners of how far they are outward of where they should be, px.
+  // Mean over all corners of how far the border's fit puts them outward of where they should be,
+  // px.
   [[nodiscard]] double outward(const ToneCurve& tone) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < images.size(); ++i) {
-      const Corners found = refine_corners(images[i].view(), truth[i], kLayout, tone).corners_px;
+      const Corners found = refine_border(images[i].view(), truth[i], kLayout, tone).corners_px;
       const Eigen::Vector2d middle = 0.25 * (truth[i][0] + truth[i][1] + truth[i][2] + truth[i][3]);
       for (std::size_t c = 0; c < 4; ++c)
         sum += (found[c] - truth[i][c]).dot((truth[i][c] - middle).normalized());
