@@ -167,8 +167,9 @@ Observed observe(const Recording& recording, const RunOptions& options,
       if (cached) {
         out.tags = *cached;
       } else {
-        Detection detection =
-            detect_tags(recording.video, recording.markers, options.detect, progress);
+        DetectOptions detect = options.detect;
+        detect.lens = recording.camera;
+        Detection detection = detect_tags(recording.video, recording.markers, detect, progress);
         out.tags = std::move(detection.observations);
         out.tags.warnings = std::move(detection.warnings);
         for (double& t : out.tags.times_s) t += recording.settings.video_start_s;

@@ -107,6 +107,11 @@ std::string RunFolder::detection_key(const Recording& recording) const {
   const MarkerSet& markers = recording.markers;
   key += fmt::format(" family {} only_listed {} ids", markers.family, markers.only_listed);
   for (const auto& [id, size] : markers.sizes_m) key += fmt::format(" {}", id.value);
+  if (const auto& camera = recording.camera) {
+    key += fmt::format(" lens {} {} {} {} {}", to_string(camera->model), camera->fx, camera->fy,
+                       camera->cx, camera->cy);
+    for (const double term : camera->distortion) key += fmt::format(" {}", term);
+  }
   return key;
 }
 

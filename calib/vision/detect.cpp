@@ -353,7 +353,7 @@ class Detecting {
     const Corners start = as_corners(expected.corners_px);
     const Corners seen = as_corners(last.corners_px);
     const auto refined =
-        follow_tag(frame.image.view(), start, {image_before, seen}, layout_, tone_);
+        follow_tag(frame.image.view(), start, {image_before, seen}, layout_, tone_, lens());
     if (!refined) return std::nullopt;
     TagObservation tag = last;
     take(tag, *refined, frame);
@@ -365,8 +365,7 @@ class Detecting {
                                      const VideoFrame& frame) const {
     for (TagObservation& tag : tags) {
       if (options_.refine_corners) {
-        take(tag, refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_, tone_),
-             frame);
+        take(tag, refined(frame.image.view(), as_corners(tag.corners_px)), frame);
       } else {
         take(tag, {}, frame);
       }
@@ -434,6 +433,15 @@ class Detecting {
     }
     if (mean_edge_px(corners) > kLargeEdge) return std::nullopt;
     return window_around(id, corners, reach, width, height);
+  }
+
+  [[nodiscard]] const CameraModel* lens() const {
+    return options_.lens ? &*options_.lens : nullptr;
+  }
+
+  [[nodiscard]] RefinedCorners refined(const ImageView& image, const Corners& start) const {
+    return options_.lens ? refine_corners(image, start, layout_, tone_, lens())
+                         : refine_border(image, start, layout_, tone_);
   }
 
   DetectOptions options_;

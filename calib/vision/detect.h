@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/camera/camera_model.h"
 #include "calib/camera/marker_set.h"
 #include "calib/camera/tag_observations.h"
 #include "calib/vision/tag_detector.h"
@@ -33,6 +34,9 @@ struct DetectOptions {
       30;                 ///< every so many frames the whole of one is searched at full resolution
   bool fill_gaps = true;  ///< look again, at full resolution, where a marker should be
   bool refine_corners = true;  ///< false keeps the detector's corners
+  /// As declared. Without it corners come from the markers' borders alone: cells in a picture that
+  /// a lens bends say a wrong size.
+  std::optional<CameraModel> lens;
 };
 
 struct Detection {

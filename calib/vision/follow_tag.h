@@ -24,6 +24,7 @@ struct LastSighting {
                                                        const Corners& expected,
                                                        const LastSighting& last,
                                                        const TagLayout& layout,
-                                                       const ToneCurve& tone = ToneCurve());
+                                                       const ToneCurve& tone = ToneCurve(),
+                                                       const CameraModel* lens = nullptr);
 
 }  // namespace kinescope

@@ -281,8 +281,8 @@ RefinedCorners refine_border(const ImageView& image, const Corners& start, const
 }
 
 RefinedCorners refine_corners(const ImageView& image, const Corners& start, const TagLayout& layout,
-                              const ToneCurve& tone) {
-  return refine_by_cells(image, refine_border(image, start, layout, tone), layout, tone);
+                              const ToneCurve& tone, const CameraModel* lens) {
+  return refine_by_cells(image, refine_border(image, start, layout, tone), layout, tone, lens);
 }
 
 }  // namespace kinescope

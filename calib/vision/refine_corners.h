@@ -15,6 +15,7 @@
 
 #include <Eigen/Core>
 
+#include "calib/camera/camera_model.h"
 #include "calib/vision/image_view.h"
 #include "calib/vision/tag_detector.h"
 #include "calib/vision/tone_curve.h"
@@ -47,9 +48,11 @@ struct RefinedCorners {
 
 /// `tone`: how the camera turns light to grey. A blurred step is even in light only; without its
 /// curve, bright areas grow over dark ones.
+/// `lens`: as declared; null where it is not known.
 [[nodiscard]] RefinedCorners refine_corners(const ImageView& image, const Corners& start,
                                             const TagLayout& layout,
-                                            const ToneCurve& tone = ToneCurve());
+                                            const ToneCurve& tone = ToneCurve(),
+                                            const CameraModel* lens = nullptr);
 
 /// The same by the outer border alone.
 [[nodiscard]] RefinedCorners refine_border(const ImageView& image, const Corners& start,

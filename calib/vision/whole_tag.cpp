@@ -44,11 +44,12 @@ constexpr int kMinPixels = 4 * kSize;
 constexpr int kBlock = 8;  // px, of the usual video codecs
 
 // What is known beforehand, standard deviations.
-constexpr double kCurvatureSigma = 2e-4;   // 1/px: what lenses bend lines by ..
-constexpr double kCurvatureScale = 400.0;  // px over which that changes by its own size ..
-constexpr double kOddBending = 0.07;       // .. and the share that is not even about the lens' axis
-constexpr double kBlurMean = 0.64;         // px^2
-constexpr double kBlurSigma = 1.0;         // px^2
+constexpr double kKnownCurvatureSigma = 1e-5;  // 1/px: what a declared lens leaves
+constexpr double kCurvatureSigma = 2e-4;       // 1/px: what lenses bend lines by ..
+constexpr double kCurvatureScale = 400.0;      // px over which that changes by its own size ..
+constexpr double kOddBending = 0.07;  // .. and the share that is not even about the lens' axis
+constexpr double kBlurMean = 0.64;    // px^2
+constexpr double kBlurSigma = 1.0;    // px^2
 constexpr double kGammaSigma = 0.8;
 constexpr double kKnownGammaSigma = 0.1;
 constexpr double kSpreadSigma = 0.03;  // px: ink, where the tone curve is not
@@ -206,13 +207,68 @@ void add_products(const Row* slopes, const float* weights, std::size_t count, Sy
   }
 }
 
+// Where pixels near a marker would be without the lens's distortion: cubic between the nodes of a
+// grid.
+class Straight {
+ public:
+  // Nothing where the lens cannot be undone.
+  static std::optional<Straight> over(const CameraModel& lens, const Eigen::Vector2d& low,
+                                      const Eigen::Vector2d& high) {
+    Straight out;
+    out.low_ = low;
+    out.step_ = (high - low) / (kNodes - 1);
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      for (std::size_t j = 0; j < kNodes; ++j) {
+        const Eigen::Vector2d px =
+            low +
+            Eigen::Vector2d(static_cast<double>(i), static_cast<double>(j)).cwiseProduct(out.step_);
+        const auto ray = unproject(lens, px);
+        if (!ray) return std::nullopt;
+        out.node_[i][j] = {lens.fx * ray->x() + lens.cx, lens.fy * ray->y() + lens.cy};
+      }
+    }
+    return out;
+  }
+
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const {
+    const Eigen::Vector2d place = (px - low_).cwiseQuotient(step_);
+    const auto x = weights(place.x());
+    const auto y = weights(place.y());
+    Eigen::Vector2d out = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      for (std::size_t j = 0; j < kNodes; ++j) out += x[i] * y[j] * node_[i][j];
+    }
+    return out;
+  }
+
+ private:
+  static constexpr std::size_t kNodes = 4;
+
+  // Lagrange's, at nodes 0 to 3.
+  static std::array<double, kNodes> weights(double t) {
+    return {-(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0, t * (t - 2.0) * (t - 3.0) / 2.0,
+            -t * (t - 1.0) * (t - 3.0) / 2.0, t * (t - 1.0) * (t - 2.0) / 6.0};
+  }
+
+  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d step_ = Eigen::Vector2d::Zero();
+  std::array<std::array<Eigen::Vector2d, kNodes>, kNodes> node_;
+};
+
+// The inverse.
+std::optional<Eigen::Vector2d> as_seen(const CameraModel& lens, const Eigen::Vector2d& straight) {
+  return project(lens,
+                 {(straight.x() - lens.cx) / lens.fx, (straight.y() - lens.cy) / lens.fy, 1.0});
+}
+
 class Fit {
  public:
   Fit(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,
-      const ToneCurve& tone)
+      const ToneCurve& tone, const CameraModel* lens)
       : image_(image),
         border_(border),
         layout_(layout),
+        lens_(lens),
         gamma_sigma_(tone.is_linear() ? kGammaSigma : kKnownGammaSigma),
         likely_gamma_(tone.gamma()),
         gamma_(tone.gamma()),
@@ -241,7 +297,21 @@ class Fit {
 
  private:
   bool begin() {
-    const Corners& corners = border_.corners_px;
+    const Corners& seen_corners = border_.corners_px;
+    const std::optional<Eigen::Matrix3d> seen_H = corner_fit::tag_to_image(seen_corners);
+    if (!seen_H) return false;
+    Corners corners = seen_corners;
+    if (lens_ != nullptr) {
+      Eigen::Vector2d low = corners[0];
+      Eigen::Vector2d high = low;
+      for (const Eigen::Vector2d& corner : corners) {
+        low = low.cwiseMin(corner);
+        high = high.cwiseMax(corner);
+      }
+      straight_ = Straight::over(*lens_, low, high);
+      if (!straight_) return false;
+      for (Eigen::Vector2d& corner : corners) corner = straight_->at(corner);
+    }
     const std::optional<Eigen::Matrix3d> H = corner_fit::tag_to_image(corners);
     if (!H) return false;
     H_ = *H;
@@ -251,7 +321,7 @@ class Fit {
     const Eigen::Vector2d middle = H_.col(2).hnormalized();
     const LocalBlur blur = local_blur(place(middle.x(), middle.y()).on_tag, blur_);
     if (!(std::max(blur.x, blur.y) < kMostBlur)) return false;
-    const std::optional<SeenCode> seen = read_code(image_, H_, layout_, {blur.x, blur.y});
+    const std::optional<SeenCode> seen = read_code(image_, *seen_H, layout_, {blur.x, blur.y});
     if (!seen || !(seen->bright - seen->dark > kMinContrast)) return false;
     code_ = seen->code;
     dark_(0) = seen->dark;
@@ -303,11 +373,12 @@ class Fit {
       const std::uint8_t* row = image_.data + static_cast<std::ptrdiff_t>(image_.stride) * y;
       const int block_row = (y / kBlock - y0 / kBlock) * block_columns;
       for (int x = x0; x <= x1; ++x) {
-        const auto [weight, is_clear] = weight_at(place(x, y).on_tag);
+        Eigen::Vector2d at(x, y);
+        if (straight_) at = straight_->at(at);
+        const auto [weight, is_clear] = weight_at(place(at.x(), at.y()).on_tag);
         if (!is_clear) ++unclear;
         if (!(weight > 0.0)) continue;
-        pixels_.push_back({static_cast<double>(x), static_cast<double>(y),
-                           static_cast<double>(row[x]), weight,
+        pixels_.push_back({at.x(), at.y(), static_cast<double>(row[x]), weight,
                            block_row + x / kBlock - x0 / kBlock});
       }
     }
@@ -459,7 +530,8 @@ class Fit {
   // 1 / sigma^2.
   [[nodiscard]] Step beliefs() const {
     Step sigma = Step::Zero();
-    const double sagitta = kCurvatureSigma * side_ * side_ / 8.0;
+    const double sagitta =
+        (lens_ == nullptr ? kCurvatureSigma : kKnownCurvatureSigma) * side_ * side_ / 8.0;
     sigma.segment<2>(kBending).setConstant(sagitta);
     sigma.segment<2>(kBending + 2).setConstant(kOddBending * sagitta);
     sigma(kBarrel) = sagitta * side_ / (4.0 * kCurvatureScale);
@@ -519,6 +591,11 @@ class Fit {
     RefinedCorners out = border_;
     for (std::size_t c = 0; c < 4; ++c) {
       out.corners_px[c] = (H_ * corner_fit::kSquare[c].homogeneous()).hnormalized();
+      if (lens_ != nullptr) {
+        const auto corner = as_seen(*lens_, out.corners_px[c]);
+        if (!corner) return std::nullopt;
+        out.corners_px[c] = *corner;
+      }
       const double moved = (out.corners_px[c] - border_.corners_px[c]).norm();
       if (!(moved < kMostMove * side_ / layout_.cells)) return std::nullopt;
     }
@@ -556,6 +633,8 @@ class Fit {
   const ImageView& image_;
   const RefinedCorners& border_;
   const TagLayout& layout_;
+  const CameraModel* lens_;
+  std::optional<Straight> straight_;  // without a lens none
   double gamma_sigma_;
   double likely_gamma_;
   // The model.
@@ -588,9 +667,10 @@ class Fit {
 }  // namespace
 
 RefinedCorners refine_by_cells(const ImageView& image, const RefinedCorners& border,
-                               const TagLayout& layout, const ToneCurve& tone) {
+                               const TagLayout& layout, const ToneCurve& tone,
+                               const CameraModel* lens) {
   if (border.status != RefineStatus::kDone) return border;
-  return Fit(image, border, layout, tone).run().value_or(border);
+  return Fit(image, border, layout, tone, lens).run().value_or(border);
 }
 
 }  // namespace kinescope

@@ -7,7 +7,9 @@
 //         (tag_light.h), T the camera's tone curve. Gauss-Newton for the homography, what a lens
 //         bends beyond it, the blur, the tone curve's gamma, a spread of bright over dark, and the
 //         levels. Steps inside go both ways, the border's all one way: what moves edges shows apart
-//         from the marker's size. Covariance from the pulls of 8 px blocks (compression).
+//         from the marker's size. Covariance from the pulls of 8 px blocks (compression). A
+//         declared lens is undone first: of what bends a marker beyond a homography the part that
+//         scales it cannot be told from its size.
 #pragma once
 
 #include "calib/vision/refine_corners.h"
@@ -16,7 +18,9 @@ namespace kinescope {
 
 /// `border` with better corners and sigma; as it is where the marker does not look like the model
 /// (partly hidden, a shadow across it, cells too small for the blur). `tone` linear: not known.
+/// `lens`: null where it is not known.
 [[nodiscard]] RefinedCorners refine_by_cells(const ImageView& image, const RefinedCorners& border,
-                                             const TagLayout& layout, const ToneCurve& tone);
+                                             const TagLayout& layout, const ToneCurve& tone,
+                                             const CameraModel* lens);
 
 }  // namespace kinescope
