@@ -36,7 +36,7 @@ struct DetectOptions {
   bool refine_corners = true;  ///< false keeps the detector's corners
   /// As declared. Without it corners come from the markers' borders alone: cells in a picture that
   /// a lens bends say a wrong size.
-  std::optional<CameraModel> lens;
+  std::optional<CameraModel> lens = std::nullopt;
 };
 
 struct Detection {
