@@ -612,7 +612,7 @@ class Fit {
   [[nodiscard]] double predicted_sigma() const {
     Eigen::Matrix<double, kSize, 8> lever = Eigen::Matrix<double, kSize, 8>::Zero();
     for (int c = 0; c < 4; ++c) {
-      const Eigen::Vector2d at = corner_fit::kSquare[static_cast<std::size_t>(c)];
+      const Eigen::Vector2d& at = corner_fit::kSquare[static_cast<std::size_t>(c)];
       const Eigen::Vector3d q = H_ * at.homogeneous();
       Eigen::Matrix2d J;
       for (int k = 0; k < 2; ++k)
