@@ -99,8 +99,7 @@ RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
       "kinescope {} corners by cells video {} decimate {} blur {} refine {} hamming {} margin {} "
-      "sightings {} start "
-      "{}",
+      "sightings {} start {}",
       program_version(), sha256_of_path(recording.video), detect_.detector.decimate,
       detect_.detector.blur_sigma, detect_.detector.refine_edges, detect_.detector.max_hamming,
       detect_.detector.min_margin, detect_.min_sightings, recording.settings.video_start_s);

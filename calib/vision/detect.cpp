@@ -365,7 +365,10 @@ class Detecting {
                                      const VideoFrame& frame) const {
     for (TagObservation& tag : tags) {
       if (options_.refine_corners) {
-        take(tag, refined(frame.image.view(), as_corners(tag.corners_px)), frame);
+        take(
+            tag,
+            refine_as_known(frame.image.view(), as_corners(tag.corners_px), layout_, tone_, lens()),
+            frame);
       } else {
         take(tag, {}, frame);
       }
@@ -437,11 +440,6 @@ class Detecting {
 
   [[nodiscard]] const CameraModel* lens() const {
     return options_.lens ? &*options_.lens : nullptr;
-  }
-
-  [[nodiscard]] RefinedCorners refined(const ImageView& image, const Corners& start) const {
-    return options_.lens ? refine_corners(image, start, layout_, tone_, lens())
-                         : refine_border(image, start, layout_, tone_);
   }
 
   DetectOptions options_;

@@ -34,8 +34,7 @@ struct DetectOptions {
       30;                 ///< every so many frames the whole of one is searched at full resolution
   bool fill_gaps = true;  ///< look again, at full resolution, where a marker should be
   bool refine_corners = true;  ///< false keeps the detector's corners
-  /// As declared. Without it corners come from the markers' borders alone: cells in a picture that
-  /// a lens bends say a wrong size.
+  /// As declared. Without it corners come from the markers' borders alone (refine_corners.h).
   std::optional<CameraModel> lens = std::nullopt;
 };
 

@@ -285,4 +285,11 @@ RefinedCorners refine_corners(const ImageView& image, const Corners& start, cons
   return refine_by_cells(image, refine_border(image, start, layout, tone), layout, tone, lens);
 }
 
+RefinedCorners refine_as_known(const ImageView& image, const Corners& start,
+                               const TagLayout& layout, const ToneCurve& tone,
+                               const CameraModel* lens) {
+  return lens == nullptr ? refine_border(image, start, layout, tone)
+                         : refine_corners(image, start, layout, tone, lens);
+}
+
 }  // namespace kinescope

@@ -59,4 +59,10 @@ struct RefinedCorners {
                                            const TagLayout& layout,
                                            const ToneCurve& tone = ToneCurve());
 
+/// By the cells where the lens is known, else by the border: cells in a picture that an unknown
+/// lens bends say a wrong size.
+[[nodiscard]] RefinedCorners refine_as_known(const ImageView& image, const Corners& start,
+                                             const TagLayout& layout, const ToneCurve& tone,
+                                             const CameraModel* lens);
+
 }  // namespace kinescope

@@ -207,20 +207,25 @@ void add_products(const Row* slopes, const float* weights, std::size_t count, Sy
   }
 }
 
+Eigen::AlignedBox2d box_of(const Corners& corners) {
+  Eigen::AlignedBox2d out;
+  for (const Eigen::Vector2d& corner : corners) out.extend(corner);
+  return out;
+}
+
 // Where pixels near a marker would be without the lens's distortion: cubic between the nodes of a
 // grid.
 class Straight {
  public:
   // Nothing where the lens cannot be undone.
-  static std::optional<Straight> over(const CameraModel& lens, const Eigen::Vector2d& low,
-                                      const Eigen::Vector2d& high) {
+  static std::optional<Straight> over(const CameraModel& lens, const Eigen::AlignedBox2d& box) {
     Straight out;
-    out.low_ = low;
-    out.step_ = (high - low) / (kNodes - 1);
+    out.low_ = box.min();
+    out.step_ = box.sizes() / (kNodes - 1);
     for (std::size_t i = 0; i < kNodes; ++i) {
       for (std::size_t j = 0; j < kNodes; ++j) {
         const Eigen::Vector2d px =
-            low +
+            out.low_ +
             Eigen::Vector2d(static_cast<double>(i), static_cast<double>(j)).cwiseProduct(out.step_);
         const auto ray = unproject(lens, px);
         if (!ray) return std::nullopt;
@@ -302,13 +307,7 @@ class Fit {
     if (!seen_H) return false;
     Corners corners = seen_corners;
     if (lens_ != nullptr) {
-      Eigen::Vector2d low = corners[0];
-      Eigen::Vector2d high = low;
-      for (const Eigen::Vector2d& corner : corners) {
-        low = low.cwiseMin(corner);
-        high = high.cwiseMax(corner);
-      }
-      straight_ = Straight::over(*lens_, low, high);
+      straight_ = Straight::over(*lens_, box_of(corners));
       if (!straight_) return false;
       for (Eigen::Vector2d& corner : corners) corner = straight_->at(corner);
     }
@@ -352,12 +351,9 @@ class Fit {
 
   // The pixels near steps between dark and bright.
   bool collect() {
-    Eigen::Vector2d low = border_.corners_px[0];
-    Eigen::Vector2d high = low;
-    for (const Eigen::Vector2d& corner : border_.corners_px) {
-      low = low.cwiseMin(corner);
-      high = high.cwiseMax(corner);
-    }
+    const Eigen::AlignedBox2d box = box_of(border_.corners_px);
+    const Eigen::Vector2d& low = box.min();
+    const Eigen::Vector2d& high = box.max();
     const double margin = std::max(kMinOuterWidth, kReach * std::sqrt(blur_(0, 0))) + 1.0;
     if (!(low.minCoeff() > margin) || !(high.x() < image_.width - 1 - margin) ||
         !(high.y() < image_.height - 1 - margin))
