@@ -367,7 +367,7 @@ class Detecting {
       if (options_.refine_corners) {
         take(
             tag,
-            refine_as_known(frame.image.view(), as_corners(tag.corners_px), layout_, tone_, lens()),
+            refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_, tone_, lens()),
             frame);
       } else {
         take(tag, {}, frame);

@@ -11,7 +11,7 @@ std::optional<RefinedCorners> follow_tag(const ImageView& image, const Corners& 
                                          const ToneCurve& tone, const CameraModel* lens) {
   const auto before = corner_fit::tag_to_image(last.corners);
   if (!before) return std::nullopt;
-  RefinedCorners refined = refine_as_known(image, expected, layout, tone, lens);
+  RefinedCorners refined = refine_corners(image, expected, layout, tone, lens);
   if (refined.status != RefineStatus::kDone) return std::nullopt;
   const auto now = corner_fit::tag_to_image(refined.corners_px);
   if (!now || !is_same_code(read_cells(last.image, *before, layout.cells),

@@ -29,7 +29,13 @@ constexpr double kMinStep =
     0.001;  // of the contrast: how levels differ from knot to knot, at least ..
 constexpr double kMaxStep = 0.3;    // .. and at most
 constexpr double kBlurSigma = 0.6;  // px: what blurs are like, for tags too small to show their own
-constexpr double kConverged = 2e-3;  // px; the next step would be far smaller
+// A fit is over after so many rounds when its corners move by less, px.
+struct Patience {
+  int least_rounds;
+  double converged_px;
+};
+constexpr Patience kUntilExact{4, 2e-3};  // the next step would be far smaller
+constexpr Patience kUntilNear{2, 0.1};    // as a start for the cells
 constexpr int kMaxRounds = 24;
 constexpr int kFullSteps = 6;          // rounds before steps are halved
 constexpr double kMinContrast = 12.0;  // grey levels
@@ -40,10 +46,12 @@ constexpr int kMinPixels = 40;
 
 class Fit {
  public:
-  Fit(const ImageView& image, const Corners& start, const TagLayout& tag, const ToneCurve& tone)
+  Fit(const ImageView& image, const Corners& start, const TagLayout& tag, const ToneCurve& tone,
+      Patience patience)
       : image_(image),
         tag_(tag),
         tone_(tone),
+        patience_(patience),
         start_(start),
         layout_(start),
         corners_(start),
@@ -84,7 +92,8 @@ class Fit {
       if (round < kFullSteps) learn_steps();
       const double moved = take_corners(*edges);
       if (!(moved < kMaxMove)) return RefineStatus::kMoved;
-      if (round > 2 && moved < kConverged) return RefineStatus::kDone;
+      if (round + 1 >= patience_.least_rounds && moved < patience_.converged_px)
+        return RefineStatus::kDone;
     }
     return RefineStatus::kNotConverged;
   }
@@ -258,6 +267,7 @@ class Fit {
   const ImageView& image_;
   const TagLayout& tag_;
   const ToneCurve& tone_;
+  Patience patience_;
   const Corners& start_;
   Layout layout_;
   Corners corners_;
@@ -277,19 +287,17 @@ class Fit {
 
 RefinedCorners refine_border(const ImageView& image, const Corners& start, const TagLayout& layout,
                              const ToneCurve& tone) {
-  return Fit(image, start, layout, tone).run();
+  return Fit(image, start, layout, tone, kUntilExact).run();
 }
 
 RefinedCorners refine_corners(const ImageView& image, const Corners& start, const TagLayout& layout,
                               const ToneCurve& tone, const CameraModel* lens) {
-  return refine_by_cells(image, refine_border(image, start, layout, tone), layout, tone, lens);
-}
-
-RefinedCorners refine_as_known(const ImageView& image, const Corners& start,
-                               const TagLayout& layout, const ToneCurve& tone,
-                               const CameraModel* lens) {
-  return lens == nullptr ? refine_border(image, start, layout, tone)
-                         : refine_corners(image, start, layout, tone, lens);
+  if (lens != nullptr) {
+    const RefinedCorners near = Fit(image, start, layout, tone, kUntilNear).run();
+    const RefinedCorners found = refine_by_cells(image, near, layout, tone, *lens);
+    if (found.by_cells) return found;
+  }
+  return refine_border(image, start, layout, tone);
 }
 
 }  // namespace kinescope

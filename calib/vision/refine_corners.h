@@ -48,21 +48,16 @@ struct RefinedCorners {
 
 /// `tone`: how the camera turns light to grey. A blurred step is even in light only; without its
 /// curve, bright areas grow over dark ones.
-/// `lens`: as declared; null where it is not known.
+/// By the steps between all cells (whole_tag.h) where the `lens` is declared, else by the border
+/// alone: cells in a picture that an unknown lens bends say a wrong size.
 [[nodiscard]] RefinedCorners refine_corners(const ImageView& image, const Corners& start,
                                             const TagLayout& layout,
                                             const ToneCurve& tone = ToneCurve(),
                                             const CameraModel* lens = nullptr);
 
-/// The same by the outer border alone.
+/// By the outer border alone.
 [[nodiscard]] RefinedCorners refine_border(const ImageView& image, const Corners& start,
                                            const TagLayout& layout,
                                            const ToneCurve& tone = ToneCurve());
-
-/// By the cells where the lens is known, else by the border: cells in a picture that an unknown
-/// lens bends say a wrong size.
-[[nodiscard]] RefinedCorners refine_as_known(const ImageView& image, const Corners& start,
-                                             const TagLayout& layout, const ToneCurve& tone,
-                                             const CameraModel* lens);
 
 }  // namespace kinescope

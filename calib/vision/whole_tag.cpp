@@ -16,6 +16,8 @@
 
 #include "calib/vision/marker_edges.h"
 #include "calib/vision/tag_light.h"
+#include "calib/vision/tone_table.h"
+#include "calib/vision/undistorted_patch.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
@@ -25,31 +27,28 @@ using namespace whole_tag;
 
 // Places of the unknowns. Each is a step from what the model has now.
 constexpr int kHomography = 0;  // 8: shift, affine and perspective parts, px at the border
-constexpr int kBending = 8;     // 4, px
-constexpr int kBarrel = 12;     // px
-constexpr int kBlur = 13;       // xx, xy, yy, px^2
-constexpr int kGamma = 16;
-constexpr int kSpread = 17;  // px
-constexpr int kPeak = 18;    // px^4
-constexpr int kDark = 19;    // 3: in the middle, along x and y
-constexpr int kBright = 22;  // 3
-constexpr int kBowl = 25;    // 3: x^2, x y, y^2
-constexpr int kSize = 28;    // a multiple of 4
+constexpr int kBlur = 8;        // xx, xy, yy, px^2
+constexpr int kGamma = 11;
+constexpr int kSpread = 12;  // px
+constexpr int kPeak = 13;    // px^4
+constexpr int kDark = 14;    // 3: in the middle, along x and y
+constexpr int kBright = 17;  // 3
+constexpr int kBowl = 20;    // 3: x^2, x y, y^2
+constexpr int kUnknowns = 23;
+constexpr int kSize = 24;  // the same with what fills it up to a multiple of 4
 
 constexpr double kReach = 2.5;          // blurs from a step, of pixels that are used
 constexpr double kMinOuterWidth = 1.1;  // px around the border that are used at least ..
 constexpr double kOuterReach = 2.0;     // .. and at most these blurs less than a cell
 constexpr double kTaper = 0.7;          // px over which a weight fades out there
-constexpr int kMinPixels = 4 * kSize;
-constexpr int kBlock = 8;  // px, of the usual video codecs
+constexpr std::size_t kMinPixels = 112;
+constexpr std::size_t kEnough = 250;  // pixels to come near with
+constexpr std::size_t kCoarse = 4;    // one in so many pixels
+constexpr int kBlock = 8;             // px, of the usual video codecs
 
 // What is known beforehand, standard deviations.
-constexpr double kKnownCurvatureSigma = 1e-5;  // 1/px: what a declared lens leaves
-constexpr double kCurvatureSigma = 2e-4;       // 1/px: what lenses bend lines by ..
-constexpr double kCurvatureScale = 400.0;      // px over which that changes by its own size ..
-constexpr double kOddBending = 0.07;  // .. and the share that is not even about the lens' axis
-constexpr double kBlurMean = 0.64;    // px^2
-constexpr double kBlurSigma = 1.0;    // px^2
+constexpr double kBlurMean = 0.64;  // px^2
+constexpr double kBlurSigma = 1.0;  // px^2
 constexpr double kGammaSigma = 0.8;
 constexpr double kKnownGammaSigma = 0.1;
 constexpr double kSpreadSigma = 0.03;  // px: ink, where the tone curve is not
@@ -78,105 +77,13 @@ using Row = Eigen::Matrix<float, kSize, 1>;
 using System = Eigen::Matrix<double, kSize, kSize>;
 using Step = Eigen::Matrix<double, kSize, 1>;
 
-// The tone curve between a dark and a bright level, both 0 to 1, from a table: sharpened pictures
-// go a little beyond.
-class Tone {
- public:
-  Tone(double dark, double bright, double gamma) {
-    const double black = std::max(1.0, dark) / kWhite;
-    const double white = std::max(black + kMinContrast / kWhite, bright / kWhite);
-    const double low = std::pow(black, gamma);
-    const double high = std::pow(white, gamma);
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      const double share = static_cast<double>(i) / kPerUnit - kBeyond;
-      const double light = std::max(kDarkest * low, low + (high - low) * share);
-      const double grey = std::pow(light, 1.0 / gamma);
-      // By gamma, at the same levels.
-      const double low_slope = low * std::log(black);
-      const double light_slope = low_slope + (high * std::log(white) - low_slope) * share;
-      entries_[i].value = (grey - black) / (white - black);
-      entries_[i].per_gamma =
-          grey * (light_slope / light - std::log(light) / gamma) / gamma / (white - black);
-    }
-  }
-
-  struct Value {
-    double value = 0.0;
-    double slope = 0.0;
-    double per_gamma = 0.0;
-  };
-  [[nodiscard]] Value at(double share) const {
-    const double place = (share + kBeyond) * kPerUnit;
-    const auto i = static_cast<std::size_t>(
-        std::clamp(place, 0.0, static_cast<double>(entries_.size()) - 2.0));
-    const double part = place - static_cast<double>(i);
-    const Entry& a = entries_[i];
-    const Entry& b = entries_[i + 1];
-    return {a.value + part * (b.value - a.value), (b.value - a.value) * kPerUnit,
-            a.per_gamma + part * (b.per_gamma - a.per_gamma)};
-  }
-
- private:
-  static constexpr double kWhite = 255.0;
-  static constexpr double kPerUnit = 64.0;
-  static constexpr double kBeyond = 0.25;
-  static constexpr double kDarkest = 0.2;  // of the dark cells' light
-  struct Entry {
-    double value = 0.0;
-    double per_gamma = 0.0;
-  };
-  std::array<Entry, 97> entries_;  // -0.25 .. 1.25
-};
-
-// What a lens bends of a marker, but for what a homography can do: second order, v = |p|^2 c with p
-// from the marker's middle and any c, and what is not of that form; third order, v = q |p|^2 p.
-class Bending {
- public:
-  Bending() = default;
-  Bending(const Eigen::Matrix3d& H, double side) {
-    Eigen::Matrix2d J;
-    for (int k = 0; k < 2; ++k)
-      J.col(k) = (H.col(k).head<2>() - H(2, k) * H.col(2).head<2>() / H(2, 2)) / H(2, 2);
-    const Eigen::Matrix2d inverse = J.inverse();
-    const double a = J.col(0).squaredNorm();
-    const double b = J.col(0).dot(J.col(1));
-    const double d = J.col(1).squaredNorm();
-    // As multiples of (x^2 - 1, y^2 - 1) along x, and the same along y; an unknown is the sagitta
-    // of a side. x y along x is a homography and -y^2 along y.
-    Eigen::Matrix<double, 4, 2> even;
-    for (int k = 0; k < 2; ++k) {
-      const Eigen::Vector2d e = 2.0 / side * inverse.col(k);
-      even.col(k) << e.x() * a - 2.0 * b * e.y(), e.x() * d, e.y() * a, e.y() * d - 2.0 * b * e.x();
-    }
-    const Eigen::HouseholderQR<Eigen::Matrix<double, 4, 2>> qr(even);
-    const Eigen::Matrix4d Q = qr.householderQ();
-    second_ << even, Q.rightCols<2>() * std::sqrt(0.5) * even.norm();
-    third_ = 8.0 / (side * side) * Eigen::Vector3d(a, 2.0 * b, d);
-  }
-
-  /// Columns: what each unknown moves, as x and y in px over the side.
-  [[nodiscard]] Eigen::Matrix<double, 2, 5> at(double x, double y) const {
-    const double xx = x * x - 1.0;
-    const double yy = y * y - 1.0;
-    Eigen::Matrix<double, 2, 5> out;
-    out.topLeftCorner<1, 4>() = xx * second_.row(0) + yy * second_.row(1);
-    out.bottomLeftCorner<1, 4>() = xx * second_.row(2) + yy * second_.row(3);
-    const double form = third_(0) * xx + third_(1) * x * y + third_(2) * yy;
-    out.col(4) << form * x - third_(1) * y, form * y - third_(1) * x;
-    return out;
-  }
-
- private:
-  Eigen::Matrix4d second_ = Eigen::Matrix4d::Zero();
-  Eigen::Vector3d third_ = Eigen::Vector3d::Zero();
-};
-
 struct Pixel {
   double x = 0.0;
   double y = 0.0;
   double grey = 0.0;
   double weight = 0.0;
   int block = 0;
+  bool is_coarse = false;
 };
 
 // Adds w s s' of `count` pixels to A's lower triangle; four at a time, so that A is loaded once.
@@ -213,63 +120,10 @@ Eigen::AlignedBox2d box_of(const Corners& corners) {
   return out;
 }
 
-// Where pixels near a marker would be without the lens's distortion: cubic between the nodes of a
-// grid.
-class Straight {
- public:
-  // Nothing where the lens cannot be undone.
-  static std::optional<Straight> over(const CameraModel& lens, const Eigen::AlignedBox2d& box) {
-    Straight out;
-    out.low_ = box.min();
-    out.step_ = box.sizes() / (kNodes - 1);
-    for (std::size_t i = 0; i < kNodes; ++i) {
-      for (std::size_t j = 0; j < kNodes; ++j) {
-        const Eigen::Vector2d px =
-            out.low_ +
-            Eigen::Vector2d(static_cast<double>(i), static_cast<double>(j)).cwiseProduct(out.step_);
-        const auto ray = unproject(lens, px);
-        if (!ray) return std::nullopt;
-        out.node_[i][j] = {lens.fx * ray->x() + lens.cx, lens.fy * ray->y() + lens.cy};
-      }
-    }
-    return out;
-  }
-
-  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const {
-    const Eigen::Vector2d place = (px - low_).cwiseQuotient(step_);
-    const auto x = weights(place.x());
-    const auto y = weights(place.y());
-    Eigen::Vector2d out = Eigen::Vector2d::Zero();
-    for (std::size_t i = 0; i < kNodes; ++i) {
-      for (std::size_t j = 0; j < kNodes; ++j) out += x[i] * y[j] * node_[i][j];
-    }
-    return out;
-  }
-
- private:
-  static constexpr std::size_t kNodes = 4;
-
-  // Lagrange's, at nodes 0 to 3.
-  static std::array<double, kNodes> weights(double t) {
-    return {-(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0, t * (t - 2.0) * (t - 3.0) / 2.0,
-            -t * (t - 1.0) * (t - 3.0) / 2.0, t * (t - 1.0) * (t - 2.0) / 6.0};
-  }
-
-  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d step_ = Eigen::Vector2d::Zero();
-  std::array<std::array<Eigen::Vector2d, kNodes>, kNodes> node_;
-};
-
-// The inverse.
-std::optional<Eigen::Vector2d> as_seen(const CameraModel& lens, const Eigen::Vector2d& straight) {
-  return project(lens,
-                 {(straight.x() - lens.cx) / lens.fx, (straight.y() - lens.cy) / lens.fy, 1.0});
-}
-
 class Fit {
  public:
   Fit(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,
-      const ToneCurve& tone, const CameraModel* lens)
+      const ToneCurve& tone, const CameraModel& lens)
       : image_(image),
         border_(border),
         layout_(layout),
@@ -281,21 +135,13 @@ class Fit {
 
   std::optional<RefinedCorners> run() {
     if (!begin() || !collect()) return std::nullopt;
-    bool small = false;
-    for (int round = 0; !small && round < kMostRounds; ++round) {
-      compare(true);
-      const std::optional<Step> step = solve(true);
-      if (!step) return std::nullopt;
-      take(*step);
-      small = is_small(*step);
-    }
-    // Once more with the slopes as they are.
-    compare(false);
-    const std::optional<Step> step = solve(false);
-    if (!small || !step) return std::nullopt;
-    take(*step);
-    for (std::size_t i = 0; i < residuals_.size(); ++i)
-      residuals_[i] -= static_cast<double>(slopes_[i].dot(step->cast<float>()));
+    // Most of the way with a part of the pixels.
+    if (!approach(coarse_)) return std::nullopt;
+    const std::optional<Step> step = approach(pixels_.size());
+    if (!step) return std::nullopt;
+    const Row last = step->cast<float>();
+    for (std::size_t i = 0; i < used_; ++i)
+      residuals_[i] -= static_cast<double>(slopes_[i].dot(last));
     if (!weigh()) return std::nullopt;
     return judged();
   }
@@ -305,18 +151,23 @@ class Fit {
     const Corners& seen_corners = border_.corners_px;
     const std::optional<Eigen::Matrix3d> seen_H = corner_fit::tag_to_image(seen_corners);
     if (!seen_H) return false;
+    blur_ = std::max(kLeastBlur, border_.blur_px * border_.blur_px) * Eigen::Matrix2d::Identity();
+    const double margin = std::max(kMinOuterWidth, kReach * std::sqrt(blur_(0, 0))) + 1.0;
+    box_ = box_of(seen_corners);
+    box_.min().array() -= margin;
+    box_.max().array() += margin;
+    if (!(box_.min().minCoeff() > 0.0) || !(box_.max().x() < image_.width - 1) ||
+        !(box_.max().y() < image_.height - 1))
+      return false;
+    patch_ = UndistortedPatch::over(lens_, box_);
+    if (!patch_) return false;
     Corners corners = seen_corners;
-    if (lens_ != nullptr) {
-      straight_ = Straight::over(*lens_, box_of(corners));
-      if (!straight_) return false;
-      for (Eigen::Vector2d& corner : corners) corner = straight_->at(corner);
-    }
+    for (Eigen::Vector2d& corner : corners) corner = patch_->row(corner.y()).at(corner.x());
     const std::optional<Eigen::Matrix3d> H = corner_fit::tag_to_image(corners);
     if (!H) return false;
     H_ = *H;
     inverse_ = H_.inverse();
     for (std::size_t e = 0; e < 4; ++e) side_ += 0.25 * (corners[(e + 1) % 4] - corners[e]).norm();
-    blur_ = std::max(kLeastBlur, border_.blur_px * border_.blur_px) * Eigen::Matrix2d::Identity();
     const Eigen::Vector2d middle = H_.col(2).hnormalized();
     const LocalBlur blur = local_blur(place(middle.x(), middle.y()).on_tag, blur_);
     if (!(std::max(blur.x, blur.y) < kMostBlur)) return false;
@@ -325,7 +176,6 @@ class Fit {
     code_ = seen->code;
     dark_(0) = seen->dark;
     bright_(0) = seen->bright;
-    bending_ = Bending(H_, side_);
     return true;
   }
 
@@ -351,34 +201,35 @@ class Fit {
 
   // The pixels near steps between dark and bright.
   bool collect() {
-    const Eigen::AlignedBox2d box = box_of(border_.corners_px);
-    const Eigen::Vector2d& low = box.min();
-    const Eigen::Vector2d& high = box.max();
-    const double margin = std::max(kMinOuterWidth, kReach * std::sqrt(blur_(0, 0))) + 1.0;
-    if (!(low.minCoeff() > margin) || !(high.x() < image_.width - 1 - margin) ||
-        !(high.y() < image_.height - 1 - margin))
-      return false;
-    const int x0 = static_cast<int>(low.x() - margin);
-    const int x1 = static_cast<int>(high.x() + margin);
-    const int y0 = static_cast<int>(low.y() - margin);
-    const int y1 = static_cast<int>(high.y() + margin);
+    const int x0 = static_cast<int>(box_.min().x());
+    const int x1 = static_cast<int>(box_.max().x());
+    const int y0 = static_cast<int>(box_.min().y());
+    const int y1 = static_cast<int>(box_.max().y());
     const int block_columns = x1 / kBlock - x0 / kBlock + 1;
     blocks_ = static_cast<std::size_t>(block_columns * (y1 / kBlock - y0 / kBlock + 1));
     std::size_t unclear = 0;
     for (int y = y0; y <= y1; ++y) {
+      const UndistortedPatch::Row patch_row = patch_->row(y);
       const std::uint8_t* row = image_.data + static_cast<std::ptrdiff_t>(image_.stride) * y;
       const int block_row = (y / kBlock - y0 / kBlock) * block_columns;
       for (int x = x0; x <= x1; ++x) {
-        Eigen::Vector2d at(x, y);
-        if (straight_) at = straight_->at(at);
+        const Eigen::Vector2d at = patch_row.at(x);
         const auto [weight, is_clear] = weight_at(place(at.x(), at.y()).on_tag);
         if (!is_clear) ++unclear;
         if (!(weight > 0.0)) continue;
         pixels_.push_back({at.x(), at.y(), static_cast<double>(row[x]), weight,
-                           block_row + x / kBlock - x0 / kBlock});
+                           block_row + x / kBlock - x0 / kBlock, (x + 2 * y) % 4 == 0});
       }
     }
-    return pixels_.size() > static_cast<std::size_t>(kMinPixels) && unclear < pixels_.size();
+    if (pixels_.size() <= kMinPixels || unclear >= pixels_.size()) return false;
+    if (pixels_.size() < kCoarse * kEnough) {
+      coarse_ = pixels_.size();
+      return true;
+    }
+    const auto rest =
+        std::ranges::stable_partition(pixels_, [](const Pixel& pixel) { return pixel.is_coarse; });
+    coarse_ = static_cast<std::size_t>(rest.begin() - pixels_.begin());
+    return true;
   }
 
   struct Weight {
@@ -422,28 +273,36 @@ class Fit {
     return {t * t * (3.0 - 2.0 * t), true};
   }
 
-  // Residuals of all pixels, and slopes.
-  void compare(bool with_slopes) {
+  // Steps with the first `count` pixels until they are small, and the last of them.
+  std::optional<Step> approach(std::size_t count) {
+    used_ = count;
+    for (int round = 0; round < kMostRounds; ++round) {
+      compare();
+      std::optional<Step> step = solve();
+      if (!step) return std::nullopt;
+      take(*step);
+      if (is_small(*step)) return step;
+    }
+    return std::nullopt;
+  }
+
+  // Residuals and slopes.
+  void compare() {
+    const double per_px = layout_.cells / side_;
     inverse_ = H_.inverse();
-    const Tone tone(dark_(0), bright_(0), gamma_);
-    residuals_.resize(pixels_.size());
-    slopes_.resize(pixels_.size());
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    const ToneTable tone(dark_(0), bright_(0), gamma_);
+    residuals_.resize(used_);
+    slopes_.resize(used_);
+    for (std::size_t i = 0; i < used_; ++i) {
       const Pixel& pixel = pixels_[i];
-      Place p = place(pixel.x, pixel.y);
-      const double per_px = layout_.cells / side_;
-      const Eigen::Matrix<double, 2, 5> bend = bending_.at(p.x, p.y);
-      const Eigen::Vector2d moved = per_px * (bend * bent_);
-      p.on_tag.x += moved.x();
-      p.on_tag.y += moved.y();
+      const Place p = place(pixel.x, pixel.y);
       const Share share = bright_share(code_, p.on_tag, blur_);
-      const Tone::Value t = tone.at(share.value + spread_ * share.spread + peak_ * share.peak);
+      const ToneTable::Value t = tone.at(share.value + spread_ * share.spread + peak_ * share.peak);
       const double bowl = bowl_(0) * p.x * p.x + bowl_(1) * p.x * p.y + bowl_(2) * p.y * p.y;
       const double ratio = dark_(0) / bright_(0);
       const double dark = dark_(0) + dark_(1) * p.x + dark_(2) * p.y + ratio * bowl;
       const double contrast = bright_(0) + bright_(1) * p.x + bright_(2) * p.y + bowl - dark;
       residuals_[i] = pixel.grey - dark - contrast * t.value;
-      if (!with_slopes) continue;
       const double w = contrast * t.slope;
       const double x = w * per_px * share.x;
       const double y = w * per_px * share.y;
@@ -451,29 +310,25 @@ class Fit {
       const double off = 1.0 - t.value;
       const double both = t.value + off * ratio;
       Step s;
-      s << x, x * p.x, x * p.y, y, y * p.x, y * p.y, pull * p.x, pull * p.y,
-          (bend.transpose() * Eigen::Vector2d(x, y)), w * share.blur, contrast * t.per_gamma,
-          w * share.spread, w * share.peak, off, off * p.x, off * p.y, t.value, t.value * p.x,
-          t.value * p.y, both * p.x * p.x, both * p.x * p.y, both * p.y * p.y;
+      s << x, x * p.x, x * p.y, y, y * p.x, y * p.y, pull * p.x, pull * p.y, w * share.blur,
+          contrast * t.per_gamma, w * share.spread, w * share.peak, off, off * p.x, off * p.y,
+          t.value, t.value * p.x, t.value * p.y, both * p.x * p.x, both * p.x * p.y,
+          both * p.y * p.y, 0.0;
       slopes_[i] = s.cast<float>();
     }
   }
 
-  std::optional<Step> solve(bool with_slopes) {
-    if (with_slopes) {
-      std::vector<double> size;
-      size.reserve(residuals_.size());
-      for (const double r : residuals_) size.push_back(std::abs(r));
-      noise_ = std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
-    }
+  std::optional<Step> solve() {
+    std::vector<double> size;
+    size.reserve(used_);
+    for (const double r : residuals_) size.push_back(std::abs(r));
+    noise_ = std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
     if (!weigh()) return std::nullopt;
     Row pull = Row::Zero();
     for (const Row& block : pulls_) pull += block;
     Step g = pull.cast<double>();
-    if (with_slopes) {
-      seen_ = System::Zero();
-      add_products(slopes_.data(), weights_.data(), pixels_.size(), seen_);
-    }
+    seen_ = System::Zero();
+    add_products(slopes_.data(), weights_.data(), used_, seen_);
     const Step believed = variance_ * beliefs();
     solver_.compute(seen_ + System(believed.asDiagonal()));
     if (solver_.info() != Eigen::Success) return std::nullopt;
@@ -487,11 +342,11 @@ class Fit {
   // Robust weights of the residuals, their variance, and how they pull.
   bool weigh() {
     pulls_.assign(blocks_, Row::Zero());
-    weights_.resize(pixels_.size());
+    weights_.resize(used_);
     double cost = 0.0;
     double weight = 0.0;
     const double limit = kRobust * noise_;
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    for (std::size_t i = 0; i < used_; ++i) {
       const double r = residuals_[i];
       const double w = pixels_[i].weight * (std::abs(r) > limit ? limit / std::abs(r) : 1.0);
       weights_[i] = static_cast<float>(w);
@@ -499,15 +354,14 @@ class Fit {
       cost += w * r * r;
       weight += w;
     }
-    if (!(weight > 2.0 * kSize)) return false;
-    variance_ = std::max(cost / (weight - kSize), kMinNoise * kMinNoise);
+    if (!(weight > 2.0 * kUnknowns)) return false;
+    variance_ = std::max(cost / (weight - kUnknowns), kMinNoise * kMinNoise);
     return true;
   }
 
   // The unknowns about which something is known beforehand, the others being zero.
   [[nodiscard]] Step values() const {
     Step out = Step::Zero();
-    out.segment<5>(kBending) = bent_;
     out.segment<3>(kBlur) << blur_(0, 0), blur_(0, 1), blur_(1, 1);
     out(kGamma) = gamma_;
     out(kSpread) = spread_;
@@ -526,18 +380,14 @@ class Fit {
   // 1 / sigma^2.
   [[nodiscard]] Step beliefs() const {
     Step sigma = Step::Zero();
-    const double sagitta =
-        (lens_ == nullptr ? kCurvatureSigma : kKnownCurvatureSigma) * side_ * side_ / 8.0;
-    sigma.segment<2>(kBending).setConstant(sagitta);
-    sigma.segment<2>(kBending + 2).setConstant(kOddBending * sagitta);
-    sigma(kBarrel) = sagitta * side_ / (4.0 * kCurvatureScale);
     sigma.segment<3>(kBlur).setConstant(kBlurSigma);
     sigma(kGamma) = gamma_sigma_;
     sigma(kSpread) = kSpreadSigma;
     sigma(kPeak) = kPeakSigma;
     sigma.segment<3>(kBowl).setConstant(kBowlSigma * (bright_(0) - dark_(0)));
     Step out = Step::Zero();
-    for (int i = 0; i < kSize; ++i) out(i) = sigma(i) > 0.0 ? 1.0 / (sigma(i) * sigma(i)) : 0.0;
+    for (int i = 0; i < kUnknowns; ++i) out(i) = sigma(i) > 0.0 ? 1.0 / (sigma(i) * sigma(i)) : 0.0;
+    out(kUnknowns) = 1.0;
     return out;
   }
 
@@ -547,7 +397,6 @@ class Fit {
     G << 1.0 + s * d(1), s * d(2), s * d(0), s * d(4), 1.0 + s * d(5), s * d(3), -s * d(6),
         -s * d(7), 1.0;
     H_ = H_ * G.inverse();
-    bent_ += d.segment<5>(kBending);
     blur_(0, 0) += d(kBlur);
     blur_(0, 1) += d(kBlur + 1);
     blur_(1, 1) += d(kBlur + 2);
@@ -586,12 +435,10 @@ class Fit {
     if (noise > kMostNoise * std::max(border_.noise, kMinNoise)) return std::nullopt;
     RefinedCorners out = border_;
     for (std::size_t c = 0; c < 4; ++c) {
-      out.corners_px[c] = (H_ * corner_fit::kSquare[c].homogeneous()).hnormalized();
-      if (lens_ != nullptr) {
-        const auto corner = as_seen(*lens_, out.corners_px[c]);
-        if (!corner) return std::nullopt;
-        out.corners_px[c] = *corner;
-      }
+      const auto corner =
+          distorted(lens_, (H_ * corner_fit::kSquare[c].homogeneous()).hnormalized());
+      if (!corner) return std::nullopt;
+      out.corners_px[c] = *corner;
       const double moved = (out.corners_px[c] - border_.corners_px[c]).norm();
       if (!(moved < kMostMove * side_ / layout_.cells)) return std::nullopt;
     }
@@ -629,16 +476,15 @@ class Fit {
   const ImageView& image_;
   const RefinedCorners& border_;
   const TagLayout& layout_;
-  const CameraModel* lens_;
-  std::optional<Straight> straight_;  // without a lens none
+  const CameraModel& lens_;
+  Eigen::AlignedBox2d box_;  // of the pixels that may be used
+  std::optional<UndistortedPatch> patch_;
   double gamma_sigma_;
   double likely_gamma_;
   // The model.
   Eigen::Matrix3d H_ = Eigen::Matrix3d::Identity();  // square to px
   Eigen::Matrix3d inverse_ = Eigen::Matrix3d::Identity();
   double side_ = 0.0;  // px
-  Bending bending_;
-  Eigen::Matrix<double, 5, 1> bent_ = Eigen::Matrix<double, 5, 1>::Zero();
   Eigen::Matrix2d blur_ = Eigen::Matrix2d::Identity();
   double gamma_;
   double spread_ = 0.0;
@@ -648,7 +494,9 @@ class Fit {
   Eigen::Vector3d bowl_ = Eigen::Vector3d::Zero();
   TagCode code_;
   // The pixels, and how they compare.
-  std::vector<Pixel> pixels_;
+  std::vector<Pixel> pixels_;  // every fourth of them first
+  std::size_t coarse_ = 0;     // how many those are, or all
+  std::size_t used_ = 0;
   std::size_t blocks_ = 0;
   std::vector<double> residuals_;
   std::vector<Row> slopes_;
@@ -664,7 +512,7 @@ class Fit {
 
 RefinedCorners refine_by_cells(const ImageView& image, const RefinedCorners& border,
                                const TagLayout& layout, const ToneCurve& tone,
-                               const CameraModel* lens) {
+                               const CameraModel& lens) {
   if (border.status != RefineStatus::kDone) return border;
   return Fit(image, border, layout, tone, lens).run().value_or(border);
 }

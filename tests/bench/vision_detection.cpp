@@ -12,6 +12,7 @@
 #include <opencv2/aruco.hpp>
 #include <opencv2/core.hpp>
 
+#include "calib/camera/camera_file.h"
 #include "calib/vision/detect.h"
 #include "calib/vision/pattern_shift.h"
 #include "calib/vision/refine_corners.h"
@@ -21,8 +22,10 @@
 namespace kinescope {
 namespace {
 
-const std::filesystem::path kRecording =
-    std::filesystem::path(KINESCOPE_SOURCE_DIR) / "sample_videos" / "ur6_none" / "video.mp4";
+const std::filesystem::path kFolder =
+    std::filesystem::path(KINESCOPE_SOURCE_DIR) / "sample_videos" / "ur6_none";
+const std::filesystem::path kRecording = kFolder / "video.mp4";
+const std::filesystem::path kCamera = kFolder / "camera.yaml";
 constexpr const char* kFamily = "tag36h11";
 constexpr std::size_t kFrames = 60;
 constexpr double kDetectorSigmaPx = 0.3;
@@ -95,7 +98,7 @@ void BM_OpenCv(benchmark::State& state) {
   per_frame(state, frames().size(), tags);
 }
 
-// Corners of all frames, refined, and whether anything covers them.
+// Corners of all frames: by the border; by the cells; and whether anything covers them.
 void BM_Refine(benchmark::State& state) {
   const auto detector = make_tag_detector(kFamily, {.decimate = 2.0});
   const TagLayout layout = tag_layout(kFamily);
@@ -110,11 +113,14 @@ void BM_Refine(benchmark::State& state) {
       tags += 1.0;
     }
   }
-  const bool look_for_covers = state.range(0) == 1;
+  const CameraModel lens = read_camera(kCamera);
+  const CameraModel* declared = state.range(0) > 0 ? &lens : nullptr;
+  const bool look_for_covers = state.range(0) > 1;
   for (auto _ : state) {
     for (std::size_t f = 0; f < frames().size(); ++f) {
       for (const Corners& start : starts[f]) {
-        const RefinedCorners refined = refine_corners(frames()[f].view(), start, layout);
+        const RefinedCorners refined =
+            refine_corners(frames()[f].view(), start, layout, ToneCurve(), declared);
         benchmark::DoNotOptimize(refined);
         if (look_for_covers) {
           benchmark::DoNotOptimize(
@@ -129,6 +135,7 @@ void BM_Refine(benchmark::State& state) {
 void BM_DetectTags(benchmark::State& state) {
   DetectOptions options;
   options.threads = 1;
+  if (state.range(0) > 0) options.lens = read_camera(kCamera);
   std::size_t count = 0;
   double tags = 0.0;
   for (auto _ : state) {
@@ -142,8 +149,13 @@ void BM_DetectTags(benchmark::State& state) {
 BENCHMARK(BM_Decode)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_PackagedDetector)->Arg(2)->Arg(1)->ArgName("decimate")->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_OpenCv)->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Refine)->Arg(0)->Arg(1)->ArgName("covers")->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_DetectTags)->MeasureProcessCPUTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_Refine)->DenseRange(0, 2)->ArgName("to covers")->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_DetectTags)
+    ->Arg(0)
+    ->Arg(1)
+    ->ArgName("lens")
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace kinescope

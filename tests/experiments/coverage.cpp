@@ -151,7 +151,8 @@ Measurements filmed(const World& world, std::uint64_t seed) {
       if (world.tree.marker(seen.id) == nullptr) continue;
       Corners corners;
       std::ranges::copy(seen.corners_px, corners.begin());
-      const RefinedCorners refined = refine_corners(image.view(), corners, layout);
+      const RefinedCorners refined =
+          refine_corners(image.view(), corners, layout, ToneCurve(), &world.camera);
       if (refined.status != RefineStatus::kDone) continue;
       seen.frame = f;
       std::ranges::copy(refined.corners_px, seen.corners_px.begin());

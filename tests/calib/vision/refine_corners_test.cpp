@@ -26,6 +26,8 @@ constexpr int kTrials = 40;
 constexpr double kChi2Most = 1.3;
 constexpr double kChi2Least = 0.25;
 
+const CameraModel kLens = pinhole_guess(220, 220, 900.0);
+
 struct Scene {
   GreyImage image;
   Corners truth;
@@ -34,14 +36,13 @@ struct Scene {
 Scene make_scene(double side, std::uint64_t salt, const ImageOptions& options,
                  double max_tilt_deg = 55.0) {
   Rng rng = Rng::from_name("refine corners", salt);
-  const CameraModel camera = pinhole_guess(220, 220, 900.0);
   PlacedMarker marker;
   marker.art = apriltag_art("tag36h11", rng.index(500));
   marker.T_camera_tag = pose_showing(
-      camera, {110.0 + rng.uniform(-5.0, 5.0), 110.0 + rng.uniform(-5.0, 5.0)}, side, marker.size_m,
+      kLens, {110.0 + rng.uniform(-5.0, 5.0), 110.0 + rng.uniform(-5.0, 5.0)}, side, marker.size_m,
       rng.uniform(0.0, max_tilt_deg) * std::numbers::pi / 180.0,
       rng.uniform(0.0, 2.0 * std::numbers::pi), rng.uniform(0.0, 2.0 * std::numbers::pi));
-  Scene scene{render_markers(camera, {marker}, options, rng), true_corners(camera, marker)};
+  Scene scene{render_markers(kLens, {marker}, options, rng), true_corners(kLens, marker)};
   return scene;
 }
 
@@ -54,6 +55,10 @@ Corners disturbed(const Corners& corners, double size, std::uint64_t salt) {
   return out;
 }
 
+RefinedCorners refined(const GreyImage& image, const Corners& start, const TagLayout& layout = {}) {
+  return refine_corners(image.view(), start, layout, ToneCurve(), &kLens);
+}
+
 TEST(RefineCorners, ReachesItsGoalsWithAnHonestSigma) {
   for (const Goal& goal : kGoals) {
     double squared = 0.0;
@@ -63,8 +68,7 @@ TEST(RefineCorners, ReachesItsGoalsWithAnHonestSigma) {
     for (int trial = 0; trial < kTrials; ++trial) {
       const auto salt = static_cast<std::uint64_t>(trial);
       const Scene scene = make_scene(goal.side_px, salt, {.supersample = 6});
-      const RefinedCorners found =
-          refine_corners(scene.image.view(), disturbed(scene.truth, 0.3, salt), {8, true});
+      const RefinedCorners found = refined(scene.image, disturbed(scene.truth, 0.3, salt));
       if (found.status != RefineStatus::kDone) continue;
       const Eigen::Vector2d middle =
           0.25 * (scene.truth[0] + scene.truth[1] + scene.truth[2] + scene.truth[3]);
@@ -91,8 +95,7 @@ TEST(RefineCorners, ItsEllipsesHoldTheTruth) {
   for (const double side : {60.0, 90.0}) {
     for (std::uint64_t salt = 0; salt < 30; ++salt) {
       const Scene scene = make_scene(side, salt, {.supersample = 4});
-      const RefinedCorners found =
-          refine_corners(scene.image.view(), disturbed(scene.truth, 0.3, salt), {8, true});
+      const RefinedCorners found = refined(scene.image, disturbed(scene.truth, 0.3, salt));
       ASSERT_EQ(found.status, RefineStatus::kDone);
       for (std::size_t i = 0; i < 4; ++i, ++corners) {
         const double error = (found.corners_px[i] - scene.truth[i]).squaredNorm();
@@ -109,10 +112,8 @@ TEST(RefineCorners, DoesNotDependOnTheStart) {
   constexpr double kSame = 0.004;  // px, a fraction of sigma
   for (std::uint64_t salt = 0; salt < 10; ++salt) {
     const Scene scene = make_scene(50.0, salt, {.supersample = 6});
-    const RefinedCorners a =
-        refine_corners(scene.image.view(), disturbed(scene.truth, 0.6, salt), {});
-    const RefinedCorners b =
-        refine_corners(scene.image.view(), disturbed(scene.truth, 0.6, salt + 100), {});
+    const RefinedCorners a = refined(scene.image, disturbed(scene.truth, 0.6, salt));
+    const RefinedCorners b = refined(scene.image, disturbed(scene.truth, 0.6, salt + 100));
     ASSERT_EQ(a.status, RefineStatus::kDone);
     ASSERT_EQ(b.status, RefineStatus::kDone);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -129,7 +130,7 @@ TEST(RefineCorners, AToneCurveDoesNotShrinkSmallMarkers) {
     for (std::uint64_t salt = 0; salt < 12; ++salt) {
       const Scene scene = make_scene(side, salt, {.supersample = 6, .gamma = 2.2}, 30.0);
       const RefinedCorners border = refine_border(scene.image.view(), scene.truth, {});
-      const RefinedCorners found = refine_corners(scene.image.view(), scene.truth, {});
+      const RefinedCorners found = refined(scene.image, scene.truth);
       ASSERT_TRUE(found.by_cells) << salt;
       const Eigen::Vector2d middle =
           0.25 * (scene.truth[0] + scene.truth[1] + scene.truth[2] + scene.truth[3]);
@@ -147,21 +148,21 @@ TEST(RefineCorners, AToneCurveDoesNotShrinkSmallMarkers) {
 // What does not look like a marker of dark and bright cells is left to the border.
 TEST(RefineCorners, AShadowIsNotForTheCells) {
   Scene scene = make_scene(70.0, 0, {.supersample = 4}, 20.0);
-  EXPECT_TRUE(refine_corners(scene.image.view(), scene.truth, {}).by_cells);
+  EXPECT_TRUE(refined(scene.image, scene.truth).by_cells);
   for (int y = 0; y < scene.image.height; ++y) {
     for (int x = 0; x < scene.image.width / 2; ++x) {
       auto& grey = scene.image.pixels[static_cast<std::size_t>(y * scene.image.width + x)];
       grey = static_cast<std::uint8_t>(grey / 2);
     }
   }
-  EXPECT_FALSE(refine_corners(scene.image.view(), scene.truth, {}).by_cells);
+  EXPECT_FALSE(refined(scene.image, scene.truth).by_cells);
 }
 
 TEST(RefineCorners, MoreNoiseGivesMoreSigma) {
   const Scene quiet = make_scene(60.0, 1, {.noise = 2.0, .supersample = 6});
   const Scene loud = make_scene(60.0, 1, {.noise = 8.0, .supersample = 6});
-  const RefinedCorners a = refine_corners(quiet.image.view(), quiet.truth, {});
-  const RefinedCorners b = refine_corners(loud.image.view(), loud.truth, {});
+  const RefinedCorners a = refined(quiet.image, quiet.truth);
+  const RefinedCorners b = refined(loud.image, loud.truth);
   ASSERT_EQ(a.status, RefineStatus::kDone);
   ASSERT_EQ(b.status, RefineStatus::kDone);
   EXPECT_NEAR(a.noise, 2.0, 0.4);
@@ -183,7 +184,7 @@ TEST(RefineCorners, AShadowAcrossTheTagDoesNotMoveIt) {
         grey = static_cast<std::uint8_t>(std::lround(grey * light));
       }
     }
-    const RefinedCorners found = refine_corners(scene.image.view(), scene.truth, {});
+    const RefinedCorners found = refined(scene.image, scene.truth);
     ASSERT_EQ(found.status, RefineStatus::kDone);
     for (std::size_t i = 0; i < 4; ++i) {
       EXPECT_LT((found.corners_px[i] - scene.truth[i]).norm(), kShadowed) << salt << " " << i;
@@ -194,18 +195,17 @@ TEST(RefineCorners, AShadowAcrossTheTagDoesNotMoveIt) {
 TEST(RefineCorners, SaysWhyItGaveUp) {
   const Scene scene = make_scene(50.0, 3, {.supersample = 6}, 20.0);
   // Bright inside is expected, and there is none.
-  EXPECT_EQ(refine_corners(scene.image.view(), scene.truth, {8, false}).status,
-            RefineStatus::kWrongContrast);
+  EXPECT_EQ(refined(scene.image, scene.truth, {8, false}).status, RefineStatus::kWrongContrast);
   const GreyImage flat{220, 220, std::vector<std::uint8_t>(220 * 220, 90)};
-  EXPECT_EQ(refine_corners(flat.view(), scene.truth, {}).status, RefineStatus::kWrongContrast);
+  EXPECT_EQ(refined(flat, scene.truth).status, RefineStatus::kWrongContrast);
   // Cut by the image's border.
   Corners outside = scene.truth;
   for (Eigen::Vector2d& corner : outside) corner.x() += 150.0;
-  EXPECT_NE(refine_corners(scene.image.view(), outside, {}).status, RefineStatus::kDone);
+  EXPECT_NE(refined(scene.image, outside).status, RefineStatus::kDone);
   // All four corners in one place.
   Corners point;
   point.fill({100.0, 100.0});
-  const RefinedCorners none = refine_corners(scene.image.view(), point, {});
+  const RefinedCorners none = refined(scene.image, point);
   EXPECT_NE(none.status, RefineStatus::kDone);
   EXPECT_EQ(none.corners_px[0], point[0]);
 }

@@ -40,7 +40,9 @@ void expect_found(const std::string& family, const PlacedMarker& marker, int id)
   }
   EXPECT_LT(truth[0].x(), truth[1].x());  // lb left of rb
   EXPECT_GT(truth[0].y(), truth[3].y());  // lb below lt
-  const RefinedCorners refined = refine_corners(image.view(), start, tag_layout(family));
+  const CameraModel lens = small_camera();
+  const RefinedCorners refined =
+      refine_corners(image.view(), start, tag_layout(family), ToneCurve(), &lens);
   ASSERT_EQ(refined.status, RefineStatus::kDone) << family;
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_LT((refined.corners_px[i] - truth[i]).norm(), kRefined) << family << " corner " << i;
