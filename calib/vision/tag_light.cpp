@@ -24,6 +24,12 @@ constexpr int kSpread = kOrders;  // place of what belongs to the spread, beside
 
 double as_number(Cell cell) { return cell == Cell::kBright ? 1.0 : 0.0; }
 
+// std::floor is a call where the processor is not known to have it.
+int floor_of(double x) {
+  const int toward_zero = static_cast<int>(x);
+  return toward_zero - (x < toward_zero ? 1 : 0);
+}
+
 // The normal distribution and its derivatives at z.
 std::array<double, kOrders> derivatives(double z) {
   const auto [step, density] = corner_fit::BlurredStep::table().at(z);
@@ -162,10 +168,10 @@ std::optional<SeenCode> read_code(const ImageView& image, const Eigen::Matrix3d&
 }
 
 LinesNear lines_near(double place, double reach, int cells) {
-  const int first = std::max(0, static_cast<int>(std::ceil(place - reach)));
-  const int last = std::min(cells, static_cast<int>(std::floor(place + reach)));
+  const int first = std::max(0, -floor_of(reach - place));
+  const int last = std::min(cells, floor_of(place + reach));
   if (last >= first) return {first - 1, last - first + 1};
-  return {std::clamp(static_cast<int>(std::floor(place)), -1, cells), 0};
+  return {std::clamp(floor_of(place), -1, cells), 0};
 }
 
 LocalBlur local_blur(const TagPlace& place, const Eigen::Matrix2d& blur_px2) {

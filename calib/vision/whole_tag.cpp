@@ -152,10 +152,10 @@ class Fit {
     const std::optional<Eigen::Matrix3d> seen_H = corner_fit::tag_to_image(seen_corners);
     if (!seen_H) return false;
     blur_ = std::max(kLeastBlur, border_.blur_px * border_.blur_px) * Eigen::Matrix2d::Identity();
-    const double margin = std::max(kMinOuterWidth, kReach * std::sqrt(blur_(0, 0))) + 1.0;
+    margin_ = std::max(kMinOuterWidth, kReach * std::sqrt(blur_(0, 0))) + 1.0;
     box_ = box_of(seen_corners);
-    box_.min().array() -= margin;
-    box_.max().array() += margin;
+    box_.min().array() -= margin_;
+    box_.max().array() += margin_;
     if (!(box_.min().minCoeff() > 0.0) || !(box_.max().x() < image_.width - 1) ||
         !(box_.max().y() < image_.height - 1))
       return false;
@@ -212,7 +212,8 @@ class Fit {
       const UndistortedPatch::Row patch_row = patch_->row(y);
       const std::uint8_t* row = image_.data + static_cast<std::ptrdiff_t>(image_.stride) * y;
       const int block_row = (y / kBlock - y0 / kBlock) * block_columns;
-      for (int x = x0; x <= x1; ++x) {
+      const auto [first, last] = span(y);
+      for (int x = std::max(x0, first); x <= std::min(x1, last); ++x) {
         const Eigen::Vector2d at = patch_row.at(x);
         const auto [weight, is_clear] = weight_at(place(at.x(), at.y()).on_tag);
         if (!is_clear) ++unclear;
@@ -232,6 +233,26 @@ class Fit {
     return true;
   }
 
+  // Where a row of pixels passes the marker with its margin.
+  [[nodiscard]] std::pair<int, int> span(int y) const {
+    double low = box_.max().x();
+    double high = box_.min().x();
+    for (std::size_t e = 0; e < 4; ++e) {
+      const Eigen::Vector2d& a = border_.corners_px[e];
+      const Eigen::Vector2d along = border_.corners_px[(e + 1) % 4] - a;
+      const double above = (y - margin_ - a.y()) / along.y();  // +-infinity along a row
+      const double below = (y + margin_ - a.y()) / along.y();
+      const double from = std::max(0.0, std::min(above, below));
+      const double to = std::min(1.0, std::max(above, below));
+      if (!(from <= to)) continue;
+      for (const double t : {from, to}) {
+        low = std::min(low, a.x() + t * along.x());
+        high = std::max(high, a.x() + t * along.x());
+      }
+    }
+    return {static_cast<int>(low - margin_), static_cast<int>(high + margin_)};
+  }
+
   struct Weight {
     double weight = 0.0;
     bool is_clear = true;
@@ -245,7 +266,7 @@ class Fit {
     const double square_x = kReach * kReach * at.per_px_x.dot(blur_ * at.per_px_x);
     const double square_y = kReach * kReach * at.per_px_y.dot(blur_ * at.per_px_y);
     const auto is_off = [](double place, double square) {
-      const double off = place - std::round(place);
+      const double off = place - static_cast<int>(place + 1.5) + 1.0;  // from the nearest line
       return off * off > square;
     };
     if (is_off(at.x, square_x) && is_off(at.y, square_y)) return {};
@@ -320,8 +341,8 @@ class Fit {
 
   std::optional<Step> solve() {
     std::vector<double> size;
-    size.reserve(used_);
-    for (const double r : residuals_) size.push_back(std::abs(r));
+    size.reserve(coarse_);
+    for (std::size_t i = 0; i < coarse_; ++i) size.push_back(std::abs(residuals_[i]));
     noise_ = std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
     if (!weigh()) return std::nullopt;
     Row pull = Row::Zero();
@@ -477,6 +498,7 @@ class Fit {
   const RefinedCorners& border_;
   const TagLayout& layout_;
   const CameraModel& lens_;
+  double margin_ = 0.0;      // px around the marker
   Eigen::AlignedBox2d box_;  // of the pixels that may be used
   std::optional<UndistortedPatch> patch_;
   double gamma_sigma_;
