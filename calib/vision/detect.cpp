@@ -365,10 +365,9 @@ class Detecting {
                                      const VideoFrame& frame) const {
     for (TagObservation& tag : tags) {
       if (options_.refine_corners) {
-        take(
-            tag,
-            refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_, tone_, lens()),
-            frame);
+        take(tag,
+             refine_corners(frame.image.view(), as_corners(tag.corners_px), layout_, tone_, lens()),
+             frame);
       } else {
         take(tag, {}, frame);
       }

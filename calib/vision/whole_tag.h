@@ -5,10 +5,11 @@
 // Units   px, grey levels; the square [-1, 1]^2 of marker_edges.h.
 // Method  pixel = dark + (bright - dark) T(S): S the share of bright cells under the blur
 //         (tag_light.h), T the camera's tone curve. Gauss-Newton for the homography, the blur, the
-//         tone curve's gamma, a spread of bright over dark, and the levels. Steps inside go both ways, the border's all one way: what moves edges shows apart
-//         from the marker's size. Covariance from the pulls of 8 px blocks (compression).
-//         The declared lens is undone first: of what bends a marker beyond a homography the part
-//         that scales it cannot be told from its size, so an unknown lens cannot be fitted here.
+//         tone curve's gamma, a spread of bright over dark, and the levels. Steps inside go both
+//         ways, the border's all one way: what moves edges shows apart from the marker's size.
+//         Covariance from the pulls of 8 px blocks (compression). The declared lens is undone
+//         first: of what bends a marker beyond a homography the part that scales it cannot be told
+//         from its size, so an unknown lens cannot be fitted here.
 #pragma once
 
 #include "calib/vision/refine_corners.h"
