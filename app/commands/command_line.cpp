@@ -123,7 +123,7 @@ void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
   add_recording_options(run, line.run.recording);
   run.add_option_function<std::string>(
-         "--output", [&line](const std::string& text) { line.run.output = text; },
+         "-o,--output", [&line](const std::string& text) { line.run.output = text; },
          "Folder for the results (default: <recording>_run here)")
       ->type_name("FOLDER");
   add_estimation_options(run, line);
@@ -168,7 +168,7 @@ void add_correct(CLI::App& app, CommandLine& line) {
                     "FILE");
   correct
       .add_option_function<std::string>(
-          "--output", [&line](const std::string& text) { line.correct.output = text; },
+          "-o,--output", [&line](const std::string& text) { line.correct.output = text; },
           "File to write (default: joints_corrected.csv)")
       ->type_name("FILE");
   add_output_options(correct, line.output);
@@ -254,7 +254,7 @@ void add_camera(CLI::App& app, CommandLine& line) {
       ->type_name("MODEL");
   camera
       .add_option_function<std::string>(
-          "--output", [&line](const std::string& text) { line.camera.output = text; },
+          "-o,--output", [&line](const std::string& text) { line.camera.output = text; },
           "ROS camera_info file to write (default: camera.yaml)")
       ->type_name("FILE");
   add_output_options(camera, line.output);

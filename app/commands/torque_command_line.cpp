@@ -154,7 +154,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   add_cutoff(command, dynamics.data);
   command
       .add_option_function<std::string>(
-          "--output", [&dynamics](const std::string& text) { dynamics.output = text; },
+          "-o,--output", [&dynamics](const std::string& text) { dynamics.output = text; },
           "Folder for the results (default: <first log's name>_dynamics here)")
       ->type_name("FOLDER");
   add_output_options(command, line.output);
@@ -187,7 +187,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
   add_cutoff(command, contact.data);
   command
       .add_option_function<std::string>(
-          "--output", [&contact](const std::string& text) { contact.output = text; },
+          "-o,--output", [&contact](const std::string& text) { contact.output = text; },
           "Folder for the results (default: <first log's name>_contact here)")
       ->type_name("FOLDER");
   add_output_options(command, line.output);
