@@ -159,8 +159,11 @@ void add_small_travel(const RunSummary& run, const Analysis& analysis,
     const JointEstimate& estimate = calibration.joints[j];
     if (calibration.tree.joints[j].type == JointType::kFixed) continue;
     ++moving;
-    if (estimate.direction_sigma_rad && *estimate.direction_sigma_rad > worst) {
-      worst = *estimate.direction_sigma_rad;
+    // What the base is uncertain by is in all axes alike.
+    const Sigma& own = estimate.among_direction_sigma_rad ? estimate.among_direction_sigma_rad
+                                                          : estimate.direction_sigma_rad;
+    if (own && *own > worst) {
+      worst = *own;
       weakest = &calibration.tree.joints[j];
       travel = estimate.range.upper - estimate.range.lower;
     }

@@ -84,6 +84,8 @@ json joint_json(const RunSummary& run, std::size_t index) {
   document["point_base_m"] = vector3(estimate.point_base);
   document["direction_expanded_rad"] = expanded(estimate.direction_sigma_rad);
   document["position_expanded_m"] = expanded(estimate.position_sigma_m);
+  document["among_direction_expanded_rad"] = expanded(estimate.among_direction_sigma_rad);
+  document["among_position_expanded_m"] = expanded(estimate.among_position_sigma_m);
   document["offset_expanded"] = expanded(estimate.offset_sigma);
   document["scale_expanded"] = expanded(estimate.scale_sigma);
   document["range"] = {number(estimate.range.lower), number(estimate.range.upper)};

@@ -101,41 +101,62 @@ std::string axis_uncertainty(double direction, std::optional<double> position) {
   return text;
 }
 
-std::string axis_words(const Calibration& calibration) {
+// Standard uncertainties of the joints' axes, and which of them is the least certain.
+struct AxisFigures {
   std::vector<double> directions, positions;
-  std::vector<std::string> unknown;
   double worst = -1.0;
   std::optional<double> worst_position;
   std::string worst_name;
-  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
-       ++j) {
-    const JointEstimate& estimate = calibration.joints[j];
-    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
-    if (!estimate.direction_sigma_rad) {
-      unknown.push_back(calibration.tree.joints[j].name);
-      continue;
-    }
-    const double direction = *estimate.direction_sigma_rad;
-    directions.push_back(direction);
-    if (estimate.position_sigma_m) positions.push_back(*estimate.position_sigma_m);
-    if (direction > worst) {
-      worst = direction;
-      worst_position = estimate.position_sigma_m;
-      worst_name = calibration.tree.joints[j].name;
-    }
+
+  void add(const std::string& name, const Sigma& direction, const Sigma& position) {
+    if (!direction) return;
+    directions.push_back(*direction);
+    if (position) positions.push_back(*position);
+    if (*direction <= worst) return;
+    worst = *direction;
+    worst_position = position;
+    worst_name = name;
   }
-  std::string text;
-  if (directions.size() == 1) {
-    text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).", worst_name,
-                       axis_uncertainty(worst, worst_position));
-  } else if (!directions.empty()) {
+
+  [[nodiscard]] std::string typical() const {
     std::optional<double> position;
     if (!positions.empty()) position.emplace(median(positions));
+    return axis_uncertainty(median(directions), position);
+  }
+};
+
+/// Where the base is far less certain than the axes, it is told apart from them.
+std::string axis_words(const Calibration& calibration) {
+  constexpr double kFarLess = 2.0;
+  AxisFigures in_base, among;
+  std::vector<std::string> unknown;
+  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+       ++j) {
+    const JointEstimate& joint = calibration.joints[j];
+    const std::string& name = calibration.tree.joints[j].name;
+    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
+    if (!joint.direction_sigma_rad) unknown.push_back(name);
+    in_base.add(name, joint.direction_sigma_rad, joint.position_sigma_m);
+    among.add(name, joint.among_direction_sigma_rad, joint.among_position_sigma_m);
+  }
+  std::string text;
+  if (in_base.directions.size() == 1) {
+    text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).",
+                       in_base.worst_name, in_base.typical());
+  } else if (!in_base.directions.empty()) {
+    const bool apart = among.directions.size() == in_base.directions.size() &&
+                       median(in_base.directions) > kFarLess * median(among.directions);
+    const AxisFigures& axes = apart ? among : in_base;
     text = fmt::format(
-        " Joint axes are known to {} (median, expanded uncertainty, k = 2); least certain is {} "
+        " Joint axes are known {}to {} (median, expanded uncertainty, k = 2); least certain is {} "
         "with {}.",
-        axis_uncertainty(median(directions), position), worst_name,
-        axis_uncertainty(worst, worst_position));
+        apart ? "among one another " : "", axes.typical(), axes.worst_name,
+        axis_uncertainty(axes.worst, axes.worst_position));
+    if (apart) {
+      text += fmt::format(
+          " Against the base, which its markers hold less exactly, they are known to {}.",
+          in_base.typical());
+    }
   }
   if (!unknown.empty()) {
     text += fmt::format(

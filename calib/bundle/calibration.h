@@ -28,6 +28,10 @@ struct JointEstimate {
   /// direction, in 95 of 100 recordings. Position: revolute joints only.
   Sigma direction_sigma_rad;
   Sigma position_sigma_m;
+  /// The same among the axes, wherever the base is: what moves all of them alike is taken out.
+  /// Absent where nothing else could be seen (a single axis).
+  Sigma among_direction_sigma_rad;
+  Sigma among_position_sigma_m;
   Sigma offset_sigma;  ///< rad or m; where the offset was estimated
   Sigma scale_sigma;   ///< rad or m per unit; where the scale was estimated
   JointLimits range;   ///< of the joint value over the recording

@@ -42,6 +42,7 @@ void add_corners(const Measurements& measurements, const MarkerSet& markers, Spe
     sighting.corners_px = observation.corners_px;
     sighting.geometry_m = markers.corners_m(observation.id);
     sighting.sigma = observation.sigma_px;
+    sighting.declared_sigma = sighting.sigma;
     KINESCOPE_CHECK(sighting.corners_px.size() == sighting.geometry_m.size(),
                     "as many corners as the marker has");
     spec.sightings.push_back(std::move(sighting));

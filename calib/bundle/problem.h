@@ -29,6 +29,7 @@ struct Sighting {
   std::vector<Eigen::Vector2d> corners_px;    ///< corners
   std::vector<Eigen::Vector3d> geometry_m;    ///< corners in the marker's frame
   double sigma = 1.0;                         ///< px (corners) or m (points)
+  double declared_sigma = 1.0;                ///< the same before any estimate of the noise
   Pose T_camera_marker;                       ///< poses
   Matrix6d whitening = Matrix6d::Identity();  ///< poses: L' with L L' = inverse covariance
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< points with a measured place

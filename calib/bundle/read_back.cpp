@@ -6,25 +6,12 @@
 #include <limits>
 #include <map>
 
+#include "calib/bundle/axis_uncertainty.h"
 #include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
-#include "kinematics/core/chi_square.h"
 
 namespace kinescope::bundle {
 namespace {
-
-// Half the length that an error of this covariance stays below in 95 of 100 cases, so that twice it
-// is an interval of that kind however the error is spread over directions. The squared length is
-// taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946). Nothing when a
-// parameter is unseen.
-Sigma length_sigma(const Eigen::MatrixXd& covariance) {
-  constexpr double kNormal95 = 1.6449;  // 95 % quantile of the normal distribution
-  const double mean = covariance.trace();
-  const double square = covariance.squaredNorm();
-  if (!(mean > 0.0) || !std::isfinite(square)) return std::nullopt;
-  const double freedom = mean * mean / square;
-  return 0.5 * std::sqrt(mean / freedom * chi_square_quantile(freedom, kNormal95));
-}
 
 bool all_seen(const Uncertainty& uncertainty, const PoseColumns& columns, int first, int count) {
   for (int i = first; i < first + count; ++i) {
@@ -44,12 +31,6 @@ Sigma block_sigma(const Uncertainty& uncertainty, const PoseColumns& columns, in
   }
   if (present.empty() || !all_seen(uncertainty, columns, first, 3)) return std::nullopt;
   return length_sigma(uncertainty.covariance(present, present));
-}
-
-double value_of(const FreeBlock& block, std::size_t i, const State& start) {
-  // Poses are reported as changes, everything else as it is.
-  static_cast<void>(start);
-  return block.data[block.components[i]];
 }
 
 Eigen::VectorXd mean_values(const Calibration& out) {
@@ -119,50 +100,23 @@ void fill_tree(const Spec& spec, const State& state, Calibration& out) {
   out.T_camera_base = from_block(state.camera_base.data());
 }
 
-// Uncertainty of each axis in the base frame, all joints at their mean: the frames before it count.
+// All joints at their mean.
 void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncertainty,
                  Calibration& out) {
-  const auto columns = pose_columns(uncertainty.blocks);
   const Eigen::VectorXd mean = mean_values(out);
   const std::vector<Pose> T_base_link = forward_kinematics(out.tree, mean);
-  const auto parameters = uncertainty.covariance.rows();
+  std::vector<bool> held;
   for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
     const Joint& joint = out.tree.joints[j];
+    held.push_back(is_held(spec, j));
     JointEstimate estimate;
     const Pose T_base_joint = T_base_link[joint.parent.index()] * joint.T_parent_joint;
     estimate.axis_base = T_base_joint.rotation * joint.axis;
     estimate.point_base = T_base_joint.translation;
-    if (joint.limits && !is_held(spec, j)) estimate.range = *joint.limits;
-    if (joint.type != JointType::kFixed && !is_held(spec, j) && parameters > 0) {
-      Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, parameters);
-      bool seen = true;
-      for (const int up : spec.path[joint.child.index()]) {
-        const auto found = columns.find(state.joint_frames[static_cast<std::size_t>(up)].data());
-        if (found == columns.end()) continue;
-        const Joint& above = out.tree.joints[static_cast<std::size_t>(up)];
-        const Pose T_base_above = T_base_link[above.parent.index()] * above.T_parent_joint;
-        const Matrix6d carry = adjoint(T_base_joint.inverse() * T_base_above);
-        seen = seen && all_seen(uncertainty, found->second, 0, 6);
-        for (int i = 0; i < 6; ++i) {
-          const int column = found->second[static_cast<std::size_t>(i)];
-          if (column >= 0) A.col(column) += carry.col(i);
-        }
-      }
-      // Only what tilts the axis, and what moves it sideways, matters.
-      const Eigen::Matrix3d R = rotation_to_axis(joint.axis).toRotationMatrix().transpose();
-      const Eigen::MatrixXd tilt = (R * A.topRows<3>()).topRows<2>();
-      const Eigen::MatrixXd shift = (R * A.bottomRows<3>()).topRows<2>();
-      if (seen) {
-        estimate.direction_sigma_rad =
-            length_sigma(tilt * uncertainty.covariance * tilt.transpose());
-        if (joint.type == JointType::kRevolute) {
-          estimate.position_sigma_m =
-              length_sigma(shift * uncertainty.covariance * shift.transpose());
-        }
-      }
-    }
+    if (joint.limits && !held[j]) estimate.range = *joint.limits;
     out.joints.push_back(estimate);
   }
+  fill_axis_uncertainty(spec, state, uncertainty, out.tree, mean, held, out.joints);
 }
 
 void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncertainty,
@@ -177,7 +131,7 @@ void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncer
                       !block.block.starts_with("target ");
     for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
       Parameter& parameter = out.parameters[next];
-      if (!pose) parameter.value = value_of(block, i, state);
+      if (!pose) parameter.value = block.data[block.components[i]];
       if (block.block == "clock") out.time_offset_sigma_s = parameter.sigma;
       if (block.block == "intrinsics") {
         out.intrinsics_sigma[static_cast<std::size_t>(block.components[i])] = parameter.sigma;

@@ -22,10 +22,16 @@ constexpr double kWeak = 1e-3;
 constexpr double kUnseen = 1e-8;
 // Blocks of the sandwich: no fewer than this many, or its scatter says nothing.
 constexpr int kMinStretches = 12;
+// A marker that rests within so many pixels shows the same pixels in every frame.
+constexpr double kRest_px = 0.5;
+constexpr std::size_t kMinRest = 10;  // sightings, or its scatter says nothing
+// Its scatter against that of the others, as variances, below which its error rests with it.
+constexpr double kMostScatter = 0.5;
 
 // Which stretch of time each frame belongs to, and what the stretches' sums miss of the variance.
 struct Stretches {
   std::map<int, int> of_frame;
+  double length_s = 0.0;
   double widening = 1.0;
 };
 
@@ -34,6 +40,7 @@ Stretches stretches(const Spec& spec, const LinearBundle& linear, double correla
   const double begin = spec.times_s.front();
   const double duration = std::max(1e-9, spec.times_s.back() - begin);
   const double length = std::clamp(4.0 * correlation_s, duration / 200.0, duration / kMinStretches);
+  if (!spec.postures) out.length_s = length;
   // Half a step is the integral time of white noise.
   const double step = duration / std::max(1.0, static_cast<double>(spec.times_s.size()) - 1.0);
   if (!spec.postures) out.widening = stretch_widening(length, correlation_s - 0.5 * step);
@@ -71,6 +78,97 @@ Eigen::VectorXd inflation(const LinearBundle& linear, const Stretches& stretch,
   // The ratio of one parameter scatters by sqrt(2 / stretches); half of it is taken from the pool.
   const double pooled = ratio.mean();
   return (0.5 * (ratio.array() + pooled)).max(1.0);
+}
+
+// A marker at rest in the image: what its sightings say together.
+struct Rest {
+  const Sighting* first = nullptr;
+  double last_s = 0.0;
+  double declared_square = 0.0;  // sum over the sightings, px^2
+  std::vector<Eigen::VectorXd> residuals_px;
+  Eigen::MatrixXd pull;  // of an error of 1 px that all sightings share, on the score
+
+  // Of the residuals about their mean, one coordinate, px^2.
+  [[nodiscard]] double scatter() const {
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(residuals_px.front().size());
+    for (const Eigen::VectorXd& r : residuals_px) mean += r;
+    mean /= static_cast<double>(residuals_px.size());
+    double sum = 0.0;
+    for (const Eigen::VectorXd& r : residuals_px) sum += (r - mean).squaredNorm();
+    return sum / (static_cast<double>(residuals_px.size() - 1) * static_cast<double>(mean.size()));
+  }
+};
+
+bool is_near(const Sighting& a, const Sighting& b) {
+  for (std::size_t c = 0; c < a.corners_px.size(); ++c) {
+    if ((a.corners_px[c] - b.corners_px[c]).norm() > kRest_px) return false;
+  }
+  return true;
+}
+
+// The markers' rests that outlast a stretch of time; and the noise that was found in all other
+// sightings over the declared one, as variances.
+struct Rests {
+  std::vector<Rest> rests;
+  double noise_ratio = 1.0;
+};
+
+Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector<int>& used,
+                 double stretch_s) {
+  Rests out;
+  double found = 0.0;
+  double declared = 0.0;
+  std::map<int, Rest> open;         // by marker
+  std::map<int, Eigen::Index> row;  // by frame, the next sighting's
+  const auto close = [&](Rest& rest) {
+    const double begin_s = spec.times_s[static_cast<std::size_t>(rest.first->frame)];
+    if (rest.residuals_px.size() >= kMinRest && rest.last_s - begin_s > stretch_s) {
+      out.rests.push_back(std::move(rest));
+      return;
+    }
+    declared += rest.declared_square;
+    for (const Eigen::VectorXd& r : rest.residuals_px)
+      found += r.squaredNorm() / static_cast<double>(r.size());
+  };
+  for (const int index : used) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const FrameRows& rows = linear.frames.at(sighting.frame);
+    Eigen::Index& begin = row.try_emplace(sighting.frame, 0).first->second;
+    const Eigen::Index size = sighting.dimension();
+    Rest& rest = open[sighting.marker];
+    if (rest.first != nullptr && !is_near(*rest.first, sighting)) {
+      close(rest);
+      rest = {};
+    }
+    if (rest.first == nullptr) {
+      rest.first = &sighting;
+      rest.pull = Eigen::MatrixXd::Zero(size, rows.J.cols());
+    }
+    rest.last_s = spec.times_s[static_cast<std::size_t>(sighting.frame)];
+    rest.declared_square += sighting.declared_sigma * sighting.declared_sigma;
+    rest.residuals_px.emplace_back(sighting.sigma * rows.r.segment(begin, size));
+    rest.pull += rows.J.middleRows(begin, size) / sighting.sigma;
+    begin += size;
+  }
+  for (auto& [marker, rest] : open) close(rest);
+  if (declared > 0.0) out.noise_ratio = found / declared;
+  return out;
+}
+
+// How the score scatters because a marker at rest has one error in all its frames, not one in each:
+// compressed video repeats the pixels of what does not move, and any camera samples it in one
+// place. Its residuals cannot show that, as the marker's pose takes it up; their scatter does,
+// where it is less than the noise.
+Eigen::MatrixXd scatter_of_rests(const Rests& all, Eigen::Index parameters) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(parameters, parameters);
+  for (const Rest& rest : all.rests) {
+    const double noise =
+        all.noise_ratio * rest.declared_square / static_cast<double>(rest.residuals_px.size());
+    const double scatter = rest.scatter();
+    if (scatter < kMostScatter * noise)
+      out += (noise - scatter) * rest.pull.transpose() * rest.pull;
+  }
+  return out;
 }
 
 std::string in_words(const std::vector<Parameter>& parameters, const WeakDirection& direction) {
@@ -151,9 +249,13 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
   const Eigen::MatrixXd white =
       observe(data, data + linear.prior_information, out.parameters, out.observability, unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
-  const Eigen::VectorXd factor =
-      inflation(linear, stretches(spec, linear, out.correlation_time_s), white).cwiseSqrt();
+  const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
+  const Eigen::VectorXd factor = inflation(linear, stretch, white).cwiseSqrt();
   out.covariance = factor.asDiagonal() * white * factor.asDiagonal();
+  if (spec.kind == MeasurementKind::kCorners) {
+    out.covariance +=
+        white * scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n) * white;
+  }
   for (int i = 0; i < n; ++i) {
     // With a prior the posterior is finite even where the data are silent, and says so by its size.
     if (unseen[static_cast<std::size_t>(i)] && !spec.prior) continue;

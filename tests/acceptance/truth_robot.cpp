@@ -148,6 +148,8 @@ TruthComparison compare_with_truth(const TruthRobot& truth, const KinematicTree&
     sum += (T_truth_learned * Eigen::Vector3d(found.col(c)) - expected.col(c)).squaredNorm();
   }
   out.marker_rms_m = std::sqrt(sum / static_cast<double>(found.cols()));
+  const Eigen::Matrix4d similar = Eigen::umeyama(found, expected, true);
+  out.scale = 1.0 / similar.topLeftCorner<3, 3>().colwise().norm().mean() - 1.0;
 
   Eigen::VectorXd middle(joints);
   for (Eigen::Index j = 0; j < joints; ++j) {

@@ -32,6 +32,7 @@ struct AxisError {
 struct TruthComparison {
   std::vector<AxisError> axes;
   double marker_rms_m = 0.0;  ///< of tag centres at random postures within the recorded ranges
+  double scale = 0.0;         ///< learned over true lengths, minus one
   double median_direction_rad = 0.0, worst_direction_rad = 0.0;
   double median_position_m = 0.0, worst_position_m = 0.0;
 };

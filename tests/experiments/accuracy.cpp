@@ -57,9 +57,10 @@ void judge(const fs::path& recording) {
   const auto error = acceptance::compare_with_truth(truth, learned);
   fmt::print(
       "  axis direction median {:.4f} worst {:.4f} deg; position median {:.4f} worst {:.4f} mm; "
-      "markers at unseen postures {:.4f} mm rms\n",
+      "markers at unseen postures {:.4f} mm rms, scale {:+.4f} %\n",
       error.median_direction_rad / kDegree, error.worst_direction_rad / kDegree,
-      1e3 * error.median_position_m, 1e3 * error.worst_position_m, 1e3 * error.marker_rms_m);
+      1e3 * error.median_position_m, 1e3 * error.worst_position_m, 1e3 * error.marker_rms_m,
+      100.0 * error.scale);
   const double training = calibration.at("training_rms").get<double>();
   const double held_out = calibration.at("held_out_rms").get<double>();
   fmt::print(

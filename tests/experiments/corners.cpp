@@ -2,10 +2,11 @@
 //
 // How exact corners are, on pictures with exactly known ones: `corners [--trials N]`. A row is a
 // size of markers under one kind of picture: contrast 200, tilts to 55 degrees. The packaged
-// detector (its default, half resolution) and ours (full resolution, refined corners) see the same
-// pictures. 2-D RMS of a corner and its mean pull outward, px; the Cramér-Rao floor of the border's
-// four lines, sigma = 2 / sqrt(I L), I = A^2 / (2 sqrt(pi) b s^2), with the lines of these very
-// tags; and the share of corners inside the 95 % ellipse of the sigma that is given with them.
+// detector (its default, half resolution) and ours (full resolution, refined corners; the lens
+// declared, or with --undeclared not) see the same pictures. 2-D RMS of a corner and its mean pull
+// outward, px; the Cramér-Rao floor of the border's four lines, sigma = 2 / sqrt(I L), I = A^2 / (2
+// sqrt(pi) b s^2), with the lines of these very tags; and the share of corners inside the 95 %
+// ellipse of the sigma that is given with them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -52,6 +53,7 @@ struct Row {
 
 /// One picture.
 struct Scene {
+  CameraModel camera;
   GreyImage image;
   Corners truth;
   double floor_square = 0.0;  ///< px^2, sum over the corners of the least 2-D variance
@@ -150,7 +152,8 @@ Scene make_scene(const Row& row, int trial) {
   ImageOptions image = row.image;
   const double direction = rng.uniform(0.0, 2.0 * std::numbers::pi);
   image.motion_px = row.motion_px * Eigen::Vector2d(std::cos(direction), std::sin(direction));
-  Scene scene{render_markers(camera, {marker}, image, rng), true_corners(camera, marker), 0.0};
+  Scene scene{camera, render_markers(camera, {marker}, image, rng), true_corners(camera, marker),
+              0.0};
   scene.floor_square = floor_square(scene.truth, row, image.motion_px);
   return scene;
 }
@@ -180,8 +183,9 @@ const TagObservation* seen(const std::vector<TagObservation>& tags, const Corner
 // One row's sums.
 class Trial {
  public:
-  explicit Trial(const Row& row)
+  Trial(const Row& row, bool declared)
       : row_(row),
+        declared_(declared),
         packaged_(make_tag_detector(row.family, {.decimate = 2.0, .min_margin = 0.0})),
         search_(make_tag_detector(row.family)),
         layout_(tag_layout(row.family)) {}
@@ -202,7 +206,7 @@ class Trial {
     found_ = static_cast<int>(starts_.size());
     for (const auto& [trial, tag] : starts_) {
       const ImageView image = scenes[static_cast<std::size_t>(trial)].image.view();
-      const RefinedCorners refined = refine_corners(image, corners_of(tag), layout_);
+      const RefinedCorners refined = refine_border(image, corners_of(tag), layout_);
       if (views.size() < kToneViews && refined.status == RefineStatus::kDone &&
           shows_tone(refined.corners_px, layout_))
         views.push_back({image, tag.id, refined.corners_px, PlacedMarker{}.size_m});
@@ -211,7 +215,8 @@ class Trial {
     for (const auto& [trial, tag] : starts_) {
       const Scene& scene = scenes[static_cast<std::size_t>(trial)];
       const RefinedCorners refined =
-          refine_corners(scene.image.view(), corners_of(tag), layout_, tone_.curve);
+          refine_corners(scene.image.view(), corners_of(tag), layout_, tone_.curve,
+                         declared_ ? &scene.camera : nullptr);
       if (refined.status != RefineStatus::kDone) continue;
       const double left = tone_.is_explained() ? tone_.sigma_per_blur * refined.blur_px : 0.0;
       ours_.add(refined.corners_px, scene.truth, std::hypot(refined.sigma_px, left));
@@ -233,8 +238,10 @@ class Trial {
     MarkerSet markers;
     markers.family = row_.family;
     markers.default_size_m = PlacedMarker{}.size_m;
+    DetectOptions options;
+    if (declared_) options.lens = scenes.front().camera;
     for (const TagObservation& tag :
-         detect_tags(file, markers, {.threads = 1}).observations.observations) {
+         detect_tags(file, markers, options).observations.observations) {
       const Corners& truth = scenes.at(static_cast<std::size_t>(tag.frame)).truth;
       if ((tag.corners_px[0] - truth[0]).norm() > kSame) continue;
       ++found_;
@@ -272,6 +279,7 @@ class Trial {
   }
 
   const Row& row_;
+  bool declared_;
   std::unique_ptr<TagDetector> packaged_;
   std::unique_ptr<TagDetector> search_;
   TagLayout layout_;
@@ -344,14 +352,14 @@ std::vector<Row> all_rows() {
   return rows;
 }
 
-void run(int trials, const std::string& only) {
+void run(int trials, const std::string& only, bool declared) {
   fmt::print("{:34} packaged detector      | ours\n", "");
   fmt::print("{:34} {:>5} {:>7} {:>8} | {:>5} {:>5} {:>7} {:>8} {:>7} {:>5} {:>7} {:>6} {:>5}\n",
              "picture", "found", "rms", "outward", "found", "fit", "rms", "outward", "floor",
              "ratio", "sigma", "in 95%", "gamma");
   for (const Row& row : all_rows()) {
     if (!(row.name.find(only) != std::string::npos)) continue;
-    Trial trial(row);
+    Trial trial(row, declared);
     const int count = std::max(10, static_cast<int>(trials * std::min(1.0, 60.0 / row.side_px)));
     if (row.codec == Codec::kH264) {
       trial.video(count);
@@ -370,7 +378,10 @@ int main(int argc, char** argv) {
       "Corners of rendered markers, beside the packaged detector and the Cramér-Rao floor");
   int trials = 150;
   std::string only;
+  bool undeclared = false;
   app.add_option("--trials", trials, "pictures a row (fewer for large markers)");
   app.add_option("--only", only, "rows whose name holds this");
-  return kinescope::run_experiment(app, argc, argv, [&] { kinescope::run(trials, only); });
+  app.add_flag("--undeclared", undeclared, "without the lens: by the markers' borders alone");
+  return kinescope::run_experiment(app, argc, argv,
+                                   [&] { kinescope::run(trials, only, !undeclared); });
 }

@@ -3,8 +3,8 @@
 // Claimed intervals against scatter: `coverage [WORLDS [RENDERED]]`. Random robots, first with
 // white noise on exact corners, then as pictures that go through detection and corner refinement.
 // For every axis the error in direction and position against twice its standard uncertainty, and
-// for the clock; the axes are compared in the base marker's frame, where they do not depend on the
-// gauge.
+// for the clock; the axes in the base marker's frame, where they do not depend on the gauge, and
+// among one another.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +16,7 @@
 #include "calib/bundle/calibrate.h"
 #include "calib/vision/refine_corners.h"
 #include "calib/vision/tag_detector.h"
+#include "tests/truth/axis_errors.h"
 #include "tests/truth/camera_world.h"
 #include "tests/truth/render.h"
 
@@ -26,6 +27,7 @@ using truth::World;
 using truth::WorldOptions;
 
 constexpr double kOffset = 0.012;  // s
+constexpr double kLinkLength_m = 0.2;
 
 /// How often 95 % intervals hold the truth, and the mean square of error over sigma.
 struct Coverage {
@@ -40,50 +42,47 @@ struct Coverage {
   }
   void print(const char* name) const {
     const double share = static_cast<double>(held) / count;
-    fmt::print("  {:14} {:5.1f} % of {} hold the truth (+- {:.1f} %); rms of error/sigma {:.2f}\n",
+    fmt::print("  {:22} {:5.1f} % of {} hold the truth (+- {:.1f} %); rms of error/sigma {:.2f}\n",
                name, 100.0 * share, count, 100.0 * std::sqrt(share * (1.0 - share) / count),
                std::sqrt(square / count));
   }
 };
 
+struct AxisCoverage {
+  Coverage direction, position;
+
+  void add(const truth::AxisDifference& error, const Sigma& direction_rad,
+           const Sigma& position_m) {
+    if (direction_rad) direction.add(error.direction_rad, *direction_rad);
+    if (position_m && error.position_m) position.add(*error.position_m, *position_m);
+  }
+  void print(const std::string& where) const {
+    direction.print(("direction " + where).c_str());
+    position.print(("position " + where).c_str());
+  }
+};
+
 struct Score {
-  Coverage direction, position, clock;
+  AxisCoverage in_base, among;
+  Coverage clock;
   double ratio = 0.0;  // sum of held out / training
   int worlds = 0;
 
   void print(const char* name) const {
     fmt::print("{}, {} recordings: held out / training {:.3f}\n", name, worlds, ratio / worlds);
-    direction.print("axis direction");
-    position.print("axis position");
+    in_base.print("in the base");
+    among.print("among axes");
     clock.print("clock offset");
     std::fflush(stdout);
   }
 };
 
-Eigen::VectorXd mean_values(const Eigen::MatrixXd& values) {
-  Eigen::VectorXd mean(values.cols());
-  for (Eigen::Index j = 0; j < values.cols(); ++j) mean[j] = values.col(j).mean();
-  return mean;
-}
-
 void judge(const World& world, const Calibration& found, Score& score) {
-  const Marker& anchor = world.tree.markers.front();
-  const Pose T_found_truth =
-      found.tree.markers.front().T_link_marker * anchor.T_link_marker.inverse();
-  const auto links = forward_kinematics(world.tree, mean_values(found.joint_values));
-  for (std::size_t j = 0; j < world.tree.joints.size(); ++j) {
-    const Joint& joint = world.tree.joints[j];
-    const Pose T_found_joint = T_found_truth * links[joint.parent.index()] * joint.T_parent_joint;
-    const Eigen::Vector3d axis = T_found_joint.rotation * joint.axis;
-    const JointEstimate& estimate = found.joints[j];
-    const double cosine = std::min(1.0, std::abs(axis.dot(estimate.axis_base)));
-    if (estimate.direction_sigma_rad) {
-      score.direction.add(std::acos(cosine), *estimate.direction_sigma_rad);
-    }
-    const Eigen::Vector3d off = estimate.point_base - T_found_joint.translation;
-    if (estimate.position_sigma_m) {
-      score.position.add(off.cross(axis).norm(), *estimate.position_sigma_m);
-    }
+  const truth::AxisDifferences errors = truth::axis_differences(world.tree, found, kLinkLength_m);
+  for (std::size_t j = 0; j < found.joints.size(); ++j) {
+    const JointEstimate& joint = found.joints[j];
+    score.in_base.add(errors.in_base[j], joint.direction_sigma_rad, joint.position_sigma_m);
+    score.among.add(errors.among[j], joint.among_direction_sigma_rad, joint.among_position_sigma_m);
   }
   if (found.time_offset_sigma_s) {
     score.clock.add(found.time_offset_s - kOffset, *found.time_offset_sigma_s);
@@ -96,7 +95,7 @@ WorldOptions options_of(int seed) {
   WorldOptions options;
   options.seed = 5000 + static_cast<std::uint64_t>(seed);
   options.time_offset_s = kOffset;
-  options.link_length_m = 0.2;
+  options.link_length_m = kLinkLength_m;
   options.joints = {JointType::kRevolute, JointType::kRevolute,
                     seed % 2 == 0 ? JointType::kRevolute : JointType::kPrismatic,
                     JointType::kRevolute};

@@ -176,8 +176,8 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
     return out;
   }
   const auto error = acceptance::compare_with_truth(truth, learned);
-  fmt::print("{:.3f} mm {:.4f} deg; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
-             1e3 * error.marker_rms_m, error.worst_direction_rad / kDegree,
+  fmt::print("{:.3f} mm {:+.3f} % {:.4f} deg; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
+             1e3 * error.marker_rms_m, 100.0 * error.scale, error.worst_direction_rad / kDegree,
              trace.at("held_out_before").at("value").get<double>(),
              trace.at("held_out_after").at("value").get<double>(),
              out.named     ? ""

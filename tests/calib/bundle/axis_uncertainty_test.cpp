@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "calib/bundle/calibrate.h"
+#include "kinematics/core/rng.h"
+#include "tests/truth/axis_errors.h"
+#include "tests/truth/camera_world.h"
+
+namespace kinescope {
+namespace {
+
+using truth::World;
+
+constexpr double kNoise_px = 0.1;
+
+// The least extent that weighs directions against places: the worlds' axes are that near.
+constexpr double kAngle_m = 0.1;
+
+/// Errors over claims, squared, and how many are within twice the claim.
+struct Coverage {
+  int count = 0;
+  int held = 0;
+  double square = 0.0;
+
+  void add(double error, const Sigma& sigma) {
+    ASSERT_TRUE(sigma);
+    ++count;
+    held += error < 2.0 * *sigma ? 1 : 0;
+    square += std::pow(error / *sigma, 2);
+  }
+
+  [[nodiscard]] double share() const { return static_cast<double>(held) / count; }
+  [[nodiscard]] double rms() const { return std::sqrt(square / count); }
+};
+
+struct Coverages {
+  Coverage in_base, among;
+  double base_sigma = 0.0, among_sigma = 0.0;  // sums, rad
+};
+
+// Noise of each sighting; the base's marker: one error for all of them and `flicker_px` on top.
+World make_world(std::uint64_t seed, double flicker_px) {
+  truth::WorldOptions options;
+  options.seed = seed;
+  options.sigma_px = 0.0;
+  options.link_length_m = 0.08;
+  World world = truth::make_world(options);
+  const auto at_rest = world.tree.markers.front().id;
+  Rng rng = Rng::from_name("axis uncertainty", seed);
+  std::array<Eigen::Vector2d, 4> lasting;
+  for (Eigen::Vector2d& error : lasting) error = {rng.normal(kNoise_px), rng.normal(kNoise_px)};
+  for (TagObservation& seen : world.measurements.corners) {
+    seen.sigma_px = kNoise_px;
+    const bool rests = seen.id == at_rest && flicker_px < kNoise_px;
+    const double sigma = rests ? flicker_px : kNoise_px;
+    for (std::size_t c = 0; c < 4; ++c) {
+      if (rests) seen.corners_px[c] += lasting[c];
+      seen.corners_px[c] += Eigen::Vector2d(rng.normal(sigma), rng.normal(sigma));
+    }
+  }
+  return world;
+}
+
+Coverages cover(double flicker_px) {
+  Coverages out;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const World world = make_world(seed, flicker_px);
+    CalibrateOptions options;
+    options.folds = 0;
+    const Calibration found = calibrate(world.measurements, world.markers, world.log,
+                                        truth::perturbed_start(world, 0.01, 0.002, seed), options);
+    const truth::AxisDifferences errors = truth::axis_differences(world.tree, found, kAngle_m);
+    for (std::size_t j = 0; j < found.joints.size(); ++j) {
+      const JointEstimate& joint = found.joints[j];
+      out.in_base.add(errors.in_base[j].direction_rad, joint.direction_sigma_rad);
+      out.in_base.add(*errors.in_base[j].position_m, joint.position_sigma_m);
+      out.among.add(errors.among[j].direction_rad, joint.among_direction_sigma_rad);
+      out.among.add(*errors.among[j].position_m, joint.among_position_sigma_m);
+      out.base_sigma += joint.direction_sigma_rad.value_or(0.0);
+      out.among_sigma += joint.among_direction_sigma_rad.value_or(0.0);
+    }
+  }
+  return out;
+}
+
+// Compressed video repeats the pixels of what does not move.
+TEST(AxisUncertainty, OneErrorOfAMarkerAtRestIsHeld) {
+  const Coverages rests = cover(0.02 * kNoise_px);
+  EXPECT_GE(rests.in_base.share(), 0.85);
+  EXPECT_LT(rests.in_base.rms(), 1.3);
+  EXPECT_GE(rests.among.share(), 0.9);
+  EXPECT_LT(rests.among.rms(), 1.2);
+  EXPECT_GT(rests.base_sigma, 3.0 * rests.among_sigma);
+}
+
+TEST(AxisUncertainty, NoiseOfEverySightingIsHeldAsWell) {
+  const Coverages noise = cover(kNoise_px);
+  EXPECT_GE(noise.in_base.share(), 0.9);
+  EXPECT_GT(noise.in_base.rms(), 0.6);
+  EXPECT_LT(noise.in_base.rms(), 1.2);
+  EXPECT_GE(noise.among.share(), 0.9);
+  EXPECT_GT(noise.among.rms(), 0.6);
+  EXPECT_LT(noise.among.rms(), 1.2);
+}
+
+}  // namespace
+}  // namespace kinescope

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/truth/axis_errors.h"
+
+#include "kinematics/model/kinematic_tree.h"
+
+namespace kinescope::truth {
+namespace {
+
+struct Line {
+  Eigen::Vector3d direction, point;
+  bool turns = false;
+};
+
+Eigen::Vector3d across(const Eigen::Vector3d& direction, const Eigen::Vector3d& v) {
+  return v - v.dot(direction) * direction;
+}
+
+// The turn, and the shift, from the true line to the found one.
+Eigen::Vector3d turn(const Line& a, const Eigen::Vector3d& found) {
+  return a.direction.cross(a.direction.dot(found) < 0.0 ? -found : found);
+}
+
+Eigen::Vector3d shift(const Line& a, const Eigen::Vector3d& found) {
+  return across(a.direction, found - a.point);
+}
+
+}  // namespace
+
+AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& found,
+                                 double angle_m) {
+  Eigen::VectorXd mean(found.joint_values.cols());
+  for (Eigen::Index j = 0; j < mean.size(); ++j) mean[j] = found.joint_values.col(j).mean();
+  const auto links = forward_kinematics(truth, mean);
+  const Pose T_found_truth =
+      found.tree.markers.front().T_link_marker * truth.markers.front().T_link_marker.inverse();
+  std::vector<Line> lines;
+  for (const Joint& joint : truth.joints) {
+    const Pose T = T_found_truth * links[joint.parent.index()] * joint.T_parent_joint;
+    lines.push_back({T.rotation * joint.axis, T.translation, joint.type == JointType::kRevolute});
+  }
+  // By a motion (turn, shift) of the whole: turn across the axis, shift + turn x point across it.
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+  for (std::size_t j = 0; j < lines.size(); ++j) {
+    const Line& line = lines[j];
+    const Eigen::Matrix3d P =
+        Eigen::Matrix3d::Identity() - line.direction * line.direction.transpose();
+    Eigen::Matrix<double, 3, 6> by = Eigen::Matrix<double, 3, 6>::Zero();
+    by.leftCols<3>() = angle_m * P;
+    normal += by.transpose() * by;
+    right += by.transpose() * angle_m * turn(line, found.joints[j].axis_base);
+    if (!line.turns) continue;
+    for (int i = 0; i < 3; ++i) by.col(i) = P * Eigen::Vector3d::Unit(i).cross(line.point);
+    by.rightCols<3>() = P;
+    normal += by.transpose() * by;
+    right += by.transpose() * shift(line, found.joints[j].point_base);
+  }
+  const Eigen::Matrix<double, 6, 1> motion = normal.completeOrthogonalDecomposition().solve(right);
+  AxisDifferences out;
+  for (std::size_t j = 0; j < lines.size(); ++j) {
+    const Line& line = lines[j];
+    const Eigen::Vector3d turned = turn(line, found.joints[j].axis_base);
+    const Eigen::Vector3d moved = shift(line, found.joints[j].point_base);
+    out.in_base.push_back({turned.norm(), {}});
+    out.among.push_back({(turned - across(line.direction, motion.head<3>())).norm(), {}});
+    if (!line.turns) continue;
+    out.in_base.back().position_m = moved.norm();
+    const Eigen::Vector3d carried = motion.tail<3>() + motion.head<3>().cross(line.point);
+    out.among.back().position_m = (moved - across(line.direction, carried)).norm();
+  }
+  return out;
+}
+
+}  // namespace kinescope::truth
