@@ -27,7 +27,6 @@ using truth::World;
 using truth::WorldOptions;
 
 constexpr double kOffset = 0.012;  // s
-constexpr double kLinkLength_m = 0.2;
 
 /// How often 95 % intervals hold the truth, and the mean square of error over sigma.
 struct Coverage {
@@ -78,7 +77,7 @@ struct Score {
 };
 
 void judge(const World& world, const Calibration& found, Score& score) {
-  const truth::AxisDifferences errors = truth::axis_differences(world.tree, found, kLinkLength_m);
+  const truth::AxisDifferences errors = truth::axis_differences(world.tree, found);
   for (std::size_t j = 0; j < found.joints.size(); ++j) {
     const JointEstimate& joint = found.joints[j];
     score.in_base.add(errors.in_base[j], joint.direction_sigma_rad, joint.position_sigma_m);
@@ -95,7 +94,7 @@ WorldOptions options_of(int seed) {
   WorldOptions options;
   options.seed = 5000 + static_cast<std::uint64_t>(seed);
   options.time_offset_s = kOffset;
-  options.link_length_m = kLinkLength_m;
+  options.link_length_m = 0.2;
   options.joints = {JointType::kRevolute, JointType::kRevolute,
                     seed % 2 == 0 ? JointType::kRevolute : JointType::kPrismatic,
                     JointType::kRevolute};

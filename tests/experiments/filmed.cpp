@@ -206,6 +206,36 @@ Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect, cons
   return out;
 }
 
+// That the camera sees it, and no marker nearer to the camera before it.
+bool is_clear(const truth::World& world, const std::vector<Pose>& links, const Marker& marker) {
+  const auto in_camera = [&](const Marker& m) -> Eigen::Vector3d {
+    return (world.T_camera_base * links[m.link.index()] * m.T_link_marker).translation;
+  };
+  const Eigen::Vector3d here = in_camera(marker);
+  const auto pixel = project(world.camera, here);
+  if (!pixel) return false;
+  return std::ranges::none_of(world.tree.markers, [&](const Marker& other) {
+    const Eigen::Vector3d there = in_camera(other);
+    const auto covers = project(world.camera, there);
+    return covers && there.z() < here.z() &&
+           (*covers - *pixel).norm() < world.camera.fx * other.size_m / there.z();
+  });
+}
+
+// A marker that another one hides for most of the time: no structure can be asked for.
+std::optional<int> hidden_tag(const truth::World& world) {
+  const auto frames = world.joint_values.rows();
+  for (const Marker& marker : world.tree.markers) {
+    Eigen::Index clear = 0;
+    for (Eigen::Index f = 0; f < frames; ++f) {
+      const auto links = forward_kinematics(world.tree, world.joint_values.row(f));
+      clear += is_clear(world, links, marker) ? 1 : 0;
+    }
+    if (4 * clear < frames) return marker.id.value;
+  }
+  return std::nullopt;
+}
+
 bool can_have(RobotKind kind, int seed, const std::string& effect, const Request& request) {
   return effect == kNothing || pick(effect, 1.0, exact_world(kind, seed, request)).has_value();
 }
@@ -218,6 +248,11 @@ void run(const Request& request) {
   int among = 0;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed) {
     for (const RobotKind kind : request.kinds) {
+      if (const auto tag = hidden_tag(truth::make_effect_world(exact_world(kind, seed, request)))) {
+        fmt::print("{}_{}: tag {} is hidden most of the time; not filmed\n", to_string(kind), seed,
+                   *tag);
+        continue;
+      }
       Floor floor;
       for (const std::string& effect : request.effects) {
         if (!can_have(kind, seed, effect, request)) continue;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/truth/axis_errors.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "kinematics/model/kinematic_tree.h"
 
 namespace kinescope::truth {
@@ -24,10 +27,25 @@ Eigen::Vector3d shift(const Line& a, const Eigen::Vector3d& found) {
   return across(a.direction, found - a.point);
 }
 
+double extent_m(const std::vector<Line>& lines) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (const Line& line : lines) {
+    if (!line.turns) continue;
+    middle += line.point;
+    count += 1.0;
+  }
+  middle /= std::max(1.0, count);
+  double square = 0.0;
+  for (const Line& line : lines) {
+    if (line.turns) square += (line.point - middle).squaredNorm();
+  }
+  return std::max(0.1, std::sqrt(square / std::max(1.0, count)));
+}
+
 }  // namespace
 
-AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& found,
-                                 double angle_m) {
+AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& found) {
   Eigen::VectorXd mean(found.joint_values.cols());
   for (Eigen::Index j = 0; j < mean.size(); ++j) mean[j] = found.joint_values.col(j).mean();
   const auto links = forward_kinematics(truth, mean);
@@ -38,6 +56,7 @@ AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& 
     const Pose T = T_found_truth * links[joint.parent.index()] * joint.T_parent_joint;
     lines.push_back({T.rotation * joint.axis, T.translation, joint.type == JointType::kRevolute});
   }
+  const double angle_m = extent_m(lines);
   // By a motion (turn, shift) of the whole: turn across the axis, shift + turn x point across it.
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();

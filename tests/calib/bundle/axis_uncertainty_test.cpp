@@ -15,9 +15,6 @@ using truth::World;
 
 constexpr double kNoise_px = 0.1;
 
-// The least extent that weighs directions against places: the worlds' axes are that near.
-constexpr double kAngle_m = 0.1;
-
 /// Errors over claims, squared, and how many are within twice the claim.
 struct Coverage {
   int count = 0;
@@ -45,7 +42,6 @@ World make_world(std::uint64_t seed, double flicker_px) {
   truth::WorldOptions options;
   options.seed = seed;
   options.sigma_px = 0.0;
-  options.link_length_m = 0.08;
   World world = truth::make_world(options);
   const auto at_rest = world.tree.markers.front().id;
   Rng rng = Rng::from_name("axis uncertainty", seed);
@@ -71,7 +67,7 @@ Coverages cover(double flicker_px) {
     options.folds = 0;
     const Calibration found = calibrate(world.measurements, world.markers, world.log,
                                         truth::perturbed_start(world, 0.01, 0.002, seed), options);
-    const truth::AxisDifferences errors = truth::axis_differences(world.tree, found, kAngle_m);
+    const truth::AxisDifferences errors = truth::axis_differences(world.tree, found);
     for (std::size_t j = 0; j < found.joints.size(); ++j) {
       const JointEstimate& joint = found.joints[j];
       out.in_base.add(errors.in_base[j].direction_rad, joint.direction_sigma_rad);
