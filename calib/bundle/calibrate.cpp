@@ -293,8 +293,13 @@ void set_status(Calibration& out, const RobustSolution& robust) {
   std::string undetermined_joints;
   for (std::size_t j = 0; j < out.joints.size(); ++j) {
     const JointEstimate& joint = out.joints[j];
-    const bool tilt_unknown = joint.direction_sigma_rad && *joint.direction_sigma_rad > kMaxTilt;
-    const bool place_unknown = joint.position_sigma_m && *joint.position_sigma_m > kMaxShift;
+    // Of a base that hardly shows the robot is determined nevertheless.
+    const Sigma& tilt = joint.among_direction_sigma_rad ? joint.among_direction_sigma_rad
+                                                        : joint.direction_sigma_rad;
+    const Sigma& shift =
+        joint.among_position_sigma_m ? joint.among_position_sigma_m : joint.position_sigma_m;
+    const bool tilt_unknown = tilt && *tilt > kMaxTilt;
+    const bool place_unknown = shift && *shift > kMaxShift;
     if (!tilt_unknown && !place_unknown) continue;
     undetermined_joints += (undetermined_joints.empty() ? "" : ", ") + out.tree.joints[j].name;
   }
