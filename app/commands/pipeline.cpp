@@ -160,6 +160,7 @@ double edge_px(const TagObservation& seen) {
 }  // namespace
 
 Observed observe(const Recording& recording, const RunOptions& options,
+                 const std::optional<CameraModel>& lens,
                  const std::optional<TagObservations>& cached, const Progress& progress) {
   Observed out;
   switch (recording.entry) {
@@ -168,7 +169,7 @@ Observed observe(const Recording& recording, const RunOptions& options,
         out.tags = *cached;
       } else {
         DetectOptions detect = options.detect;
-        detect.lens = recording.camera;
+        detect.lens = lens;
         Detection detection = detect_tags(recording.video, recording.markers, detect, progress);
         out.tags = std::move(detection.observations);
         out.tags.warnings = std::move(detection.warnings);
@@ -257,8 +258,8 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   return start;
 }
 
-CameraModel camera_from_motion(const Recording& recording, const Observed& observed,
-                               const CameraModel& camera, CalibrateOptions options) {
+std::optional<CameraModel> camera_from_motion(const Recording& recording, const Observed& observed,
+                                              const CameraModel& camera, CalibrateOptions options) {
   options.estimate_intrinsics = true;
   options.folds = 0;
   try {
@@ -268,11 +269,11 @@ CameraModel camera_from_motion(const Recording& recording, const Observed& obser
     const Calibration calibration =
         calibrate(observed.measurements, recording.markers, recording.log,
                   start_from_structure(structure, recording, camera), options);
-    return calibration.status == CalibrationStatus::kUndetermined ? camera : calibration.camera;
+    if (calibration.status != CalibrationStatus::kUndetermined) return calibration.camera;
   } catch (const Error&) {
     // What is wrong will be said of the answer, not of this first look.
-    return camera;
   }
+  return std::nullopt;
 }
 
 CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,

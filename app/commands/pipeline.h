@@ -22,10 +22,11 @@ struct Observed {
   std::vector<std::string> warnings;
 };
 
-/// Detects the markers of the video (or takes them from `cached`), or reads corners, poses or
-/// points. Throws bad_input when there is no marker, or none with a size; when video and log do not
-/// overlap in time.
+/// Detects the markers of the video, its lens known or not (or takes them from `cached`), or reads
+/// corners, poses or points. Throws bad_input when there is no marker, or none with a size; when
+/// video and log do not overlap in time.
 [[nodiscard]] Observed observe(const Recording& recording, const RunOptions& options,
+                               const std::optional<CameraModel>& lens,
                                const std::optional<TagObservations>& cached,
                                const Progress& progress);
 
@@ -34,9 +35,11 @@ struct Observed {
 
 /// What a first calibration, on the structure that `camera` shows, says of the camera: lens and
 /// planar poses that are right to a per cent would pass for motion in the search for the structure.
-/// `camera` where that leads nowhere.
-[[nodiscard]] CameraModel camera_from_motion(const Recording& recording, const Observed& observed,
-                                             const CameraModel& camera, CalibrateOptions options);
+/// Nothing where that leads nowhere.
+[[nodiscard]] std::optional<CameraModel> camera_from_motion(const Recording& recording,
+                                                            const Observed& observed,
+                                                            const CameraModel& camera,
+                                                            CalibrateOptions options);
 
 /// What to look at where the markers do not move as any robot does: files that the recording has.
 [[nodiscard]] std::string model_remedy(RecordingEntry entry, bool camera_declared);

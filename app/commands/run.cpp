@@ -120,6 +120,32 @@ KinematicTree with_nominal_limits(KinematicTree tree, const KinematicTree& nomin
   return tree;
 }
 
+struct Seen {
+  Observed observed;
+  CameraModel camera;
+};
+
+/// The markers, and the camera. One that nobody declared is found from the markers' borders; then
+/// it is known, and their cells can be used, too.
+Seen see(const Recording& recording, const RunOptions& options,
+         const std::optional<TagObservations>& cached, const Progress& progress) {
+  Seen out;
+  out.observed = observe(recording, options, recording.camera, cached, progress);
+  out.camera = choose_camera(recording, out.observed.tags);
+  if (recording.camera || recording.nominal || out.observed.tags.observations.empty()) return out;
+  const auto find_camera = [&] {
+    return camera_from_motion(recording, out.observed, out.camera, options.calibrate);
+  };
+  std::optional<CameraModel> found = find_camera();
+  if (found && recording.entry == RecordingEntry::kVideo && !out.observed.tags.lens_known) {
+    out.observed = observe(recording, options, found, std::nullopt, progress);
+    out.camera = choose_camera(recording, out.observed.tags);
+    found = find_camera();
+  }
+  if (found) out.camera = *found;
+  return out;
+}
+
 }  // namespace
 
 ExitCode run_command(const RunOptions& options, const Console& console) {
@@ -130,8 +156,8 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   RunFolder folder(options, recording);
   clock.lap("read", run.times);
 
-  const Observed observed =
-      observe(recording, options, folder.cached_observations(recording), console.progress);
+  const auto [observed, camera] =
+      see(recording, options, folder.cached_observations(recording), console.progress);
   describe_recording(recording, observed, options, run);
   for (const std::string& warning : run.warnings) print_warning(warning, console);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
@@ -139,11 +165,6 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!answered) folder.keep_observations(recording, observed.tags);
   clock.lap("detect", run.times);
 
-  CameraModel camera = choose_camera(recording, observed.tags);
-  if (!run.camera_declared && !recording.nominal) {
-    camera = camera_from_motion(recording, observed, camera, options.calibrate);
-    clock.lap("camera", run.times);
-  }
   run.tracks = observed.tags.observations.empty()
                    ? observed.measurements.poses
                    : pose_tracks_from_tags(observed.tags, camera, recording.markers);

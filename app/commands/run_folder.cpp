@@ -84,6 +84,7 @@ std::optional<TagObservations> observations_of(const json& kept, TagObservations
                               tag.at("reason").get<std::string>()});
   }
   table.warnings = kept.at("warnings").get<std::vector<std::string>>();
+  table.lens_known = kept.at("lens_known").get<bool>();
   return table;
 }
 
@@ -138,10 +139,10 @@ void RunFolder::keep_observations(const Recording& recording, const TagObservati
     rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
   }
   const json kept{
-      {"key", detection_key(recording)},  {"sha256", sha256_of_file(file(kObservations))},
-      {"width", observations.width},      {"height", observations.height},
-      {"times_s", observations.times_s},  {"rejected", std::move(rejected)},
-      {"warnings", observations.warnings}};
+      {"key", detection_key(recording)},   {"sha256", sha256_of_file(file(kObservations))},
+      {"width", observations.width},       {"height", observations.height},
+      {"times_s", observations.times_s},   {"rejected", std::move(rejected)},
+      {"warnings", observations.warnings}, {"lens_known", observations.lens_known}};
   write(kObservationsKey, kept.dump(1) + "\n");
 }
 

@@ -38,6 +38,7 @@ struct TagObservations {
   std::vector<TagObservation> observations;  ///< by frame, then id
   std::vector<RejectedTag> rejected;
   std::vector<std::string> warnings = {};  ///< of the detection, one line each
+  bool lens_known = false;                 ///< of the detection (DetectOptions::lens)
 };
 
 }  // namespace kinescope

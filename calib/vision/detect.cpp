@@ -77,6 +77,7 @@ class Detecting {
     TagObservations& found = out.observations;
     found.width = info.width;
     found.height = info.height;
+    found.lens_known = options_.lens.has_value();
     std::vector<SearchedFrame> waiting;  // searched, not yet for gaps
     const std::size_t most = most_frames(info);
     const auto every = static_cast<std::size_t>(every_);

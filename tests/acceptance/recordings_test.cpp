@@ -36,8 +36,8 @@ constexpr double kHeldOutRatio = 1.1;
 // Of an effect's size, and of the error that it causes.
 constexpr double kSizeTolerance = 0.02;
 constexpr double kLeftOver = 0.2;
-// With the lens estimated from the same markers; with the declared one it is 0.05 to 0.08.
-constexpr double kHeldOutWithoutCameraPx = 0.1;
+// With the lens estimated from the same markers; with the declared one it is 0.03 to 0.05.
+constexpr double kHeldOutWithoutCameraPx = 0.07;
 
 struct Case {
   const char* name;
@@ -155,6 +155,11 @@ TEST_P(Cameras, ThatNobodyDeclaredAreFound) {
   const json found = json::parse(read_text_file(options.output / "calibration.json"));
   EXPECT_TRUE(found.at("camera").at("estimated"));
   EXPECT_LT(found.at("held_out_rms").get<double>(), kHeldOutWithoutCameraPx);
+
+  // A second run takes the markers from the first one's folder and says the same.
+  EXPECT_TRUE(json::parse(read_text_file(options.output / "observations.json")).at("lens_known"));
+  ASSERT_EQ(run_command(options, {false, true, {}}), ExitCode::kDone);
+  EXPECT_EQ(json::parse(read_text_file(options.output / "calibration.json")), found);
   fs::remove_all(scratch);
 }
 

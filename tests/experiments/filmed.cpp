@@ -2,12 +2,13 @@
 //
 // Videos of random robots with undeclared effects, through the whole program, against their truth:
 //   filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] [--effect NAME|none]
-//          [--strength X] [--scale X] [--keep FOLDER]
+//          [--strength X] [--scale X] [--camera no] [--keep FOLDER]
 // One line a recording: structure, error of the markers at unseen postures, answer of the tracing.
 // An effect counts as visible where it is larger than the smallest one that the tracing of the same
 // recording without effects says it would have found.
 // The seed chooses robot, motion, noise and the place of the effect; --strength is in weakest ones
-// (tests/truth/injected_effect.h). --keep leaves the recordings and their run folders there.
+// (tests/truth/injected_effect.h). --camera no: lens and centre are not declared. --keep leaves the
+// recordings and their run folders there.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -52,6 +53,7 @@ struct Request {
   double scale = 2.0;  ///< of the robot: smaller ones hide their tags
   std::vector<RobotKind> kinds{truth::kRobotKinds.begin(), truth::kRobotKinds.end()};
   std::vector<std::string> effects;
+  bool camera = true;  ///< declared
   fs::path keep;
 };
 
@@ -200,6 +202,7 @@ Outcome film_and_judge(RobotKind kind, int seed, const std::string& effect, cons
   fs::create_directories(folder);
   const truth::World world = truth::make_effect_world(options);
   truth::write_recording(folder, world, {.frame_rate_hz = kFrameRate, .seed = options.seed});
+  if (!request.camera) fs::remove(folder / "camera.yaml");
   const Outcome out = judge(world, injected, folder, name, floor);
   std::fflush(stdout);
   if (!keeps) fs::remove_all(folder);
@@ -287,6 +290,8 @@ bool parse(int argc, char** argv, Request& request) {
       request.scale = std::atof(value.c_str());
     } else if (key == "--effect") {
       request.effects.push_back(value);
+    } else if (key == "--camera") {
+      request.camera = value != "no";
     } else if (key == "--keep") {
       request.keep = value;
     } else if (key == "--robot") {
@@ -310,7 +315,7 @@ int main(int argc, char** argv) {
   if (!kinescope::parse(argc, argv, request)) {
     fmt::print(stderr,
                "filmed [--seeds N] [--first-seed N] [--frames N] [--robot KIND] "
-               "[--effect NAME|none] [--strength X] [--scale X] [--keep FOLDER]\n");
+               "[--effect NAME|none] [--strength X] [--scale X] [--camera no] [--keep FOLDER]\n");
     return 2;
   }
   kinescope::run(request);
