@@ -138,7 +138,10 @@ Seen see(const Recording& recording, const RunOptions& options,
   };
   std::optional<CameraModel> found = find_camera();
   if (found && recording.entry == RecordingEntry::kVideo && !out.observed.tags.lens_known) {
-    out.observed = observe(recording, options, found, std::nullopt, progress);
+    const Progress again = [&](std::string_view, int done, int total) {
+      report_progress(progress, "markers with this lens", done, total);
+    };
+    out.observed = observe(recording, options, found, std::nullopt, again);
     out.camera = choose_camera(recording, out.observed.tags);
     found = find_camera();
   }
