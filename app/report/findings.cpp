@@ -66,26 +66,36 @@ void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
   }
 }
 
+// Tracing asked of the same residual what is beyond chance, and has its answer.
+bool is_answered(const RunSummary& run) {
+  if (!run.trace) return false;
+  const TraceVerdict verdict = run.trace->verdict;
+  return verdict == TraceVerdict::kClean || verdict == TraceVerdict::kEffects ||
+         verdict == TraceVerdict::kAmbiguous;
+}
+
 void add_dependence(const RunSummary& run, const Analysis& analysis,
                     std::vector<Finding>& findings) {
   const auto strongest = std::ranges::find_if(
       analysis.dependence, [](const Dependence& one) { return one.explained >= kDependenceLimit; });
   if (strongest == analysis.dependence.end()) return;
-  const double weight = 2.0 * kAdvice + kModelError * strongest->explained;
+  const bool by_chance = is_answered(run);
+  const double weight = (by_chance ? 1.0 : 2.0) * kAdvice + kModelError * strongest->explained;
+  constexpr const char* kByChance =
+      "; tracing finds nothing there beyond chance and the sensor's own errors";
   const std::string share = fmt::format("{:.0f} %", 100.0 * strongest->explained);
   if (strongest->time) {
     const bool corners = run.calibration.kind == MeasurementKind::kCorners;
     findings.push_back(
         {weight,
-         fmt::format("{} of the residual drifts with time (up to ±{} for one marker): something "
-                     "moved or changed "
-                     "during the recording.",
-                     share,
+         fmt::format("{} of the residual drifts with time (up to ±{} for one marker){}.", share,
                      fmt::format("{} {}",
                                  uncertainty_text(strongest->half_range,
                                                   corners ? Quantity::kPixels : Quantity::kLength),
-                                 corners ? "px" : "mm")),
-         "Check that camera, base and markers sit firmly, and record again."});
+                                 corners ? "px" : "mm"),
+                     by_chance ? kByChance : ": something moved or changed during the recording"),
+         by_chance ? "Record longer, through the same postures again and again."
+                   : "Check that camera, base and markers sit firmly, and record again."});
     return;
   }
   const Joint& joint = run.calibration.tree.joints.at(static_cast<std::size_t>(strongest->joint));
@@ -95,10 +105,11 @@ void add_dependence(const RunSummary& run, const Analysis& analysis,
       {weight,
        fmt::format(
            "{} of what is left along the motion of {} repeats with its value (as an error of "
-           "{} in this joint): an effect that the model lacks.",
+           "{} in this joint){}.",
            share, joint.name,
            fmt::format("±{}{}{}", uncertainty_text(strongest->half_range, quantity),
-                       slides ? " " : "", display_unit(quantity).text)),
+                       slides ? " " : "", display_unit(quantity).text),
+           by_chance ? kByChance : ": an effect that the model lacks"),
        fmt::format("Record slow sweeps of {} alone over its whole range, in both directions, to "
                    "show the effect by itself.",
                    joint.name)});

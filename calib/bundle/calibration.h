@@ -59,7 +59,7 @@ struct Parameter {
 struct WeakDirection {
   double relative_singular_value = 0.0;  ///< against the largest, columns scaled to unit length
   std::vector<std::pair<int, double>> parameters;  ///< index, weight (largest first)
-  std::string words;  ///< "the zero of joint3 and the yaw of tag_4 cannot be told apart"
+  std::string words;  ///< "this recording does not tell zero of joint3 and yaw of tag_4 apart"
 };
 
 struct Observability {

@@ -172,14 +172,14 @@ Eigen::MatrixXd scatter_of_rests(const Rests& all, Eigen::Index parameters) {
 }
 
 std::string in_words(const std::vector<Parameter>& parameters, const WeakDirection& direction) {
-  std::string words;
   const std::size_t count = std::min<std::size_t>(3, direction.parameters.size());
+  std::string words = count > 1 ? "this recording does not tell " : "this recording does not show ";
   for (std::size_t i = 0; i < count; ++i) {
     const std::string& name =
         parameters[static_cast<std::size_t>(direction.parameters[i].first)].name;
     words += (i == 0 ? "" : i + 1 == count ? " and " : ", ") + name;
   }
-  return words + (count > 1 ? " cannot be told apart" : " is not seen");
+  return words + (count > 1 ? " apart" : "");
 }
 
 // Singular values of the Jacobian with its columns scaled to unit length, and the directions behind

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -93,33 +95,41 @@ bool Tracer::backward() {
 }
 
 // An effect that bends the model can be significant where it is absent and of no certain size where
-// it is fitted: a gain of 7 that may be -5.
+// it is fitted: a gain of 7 that may be -5, a camera that turned by 0.5 deg or by nothing. Several
+// parameters may be uncertain one by one and yet predict: they stay if they clearly do.
 bool Tracer::drop_without_size() {
-  Eigen::Index count = 0;
-  for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
-  if (count == 0) return false;
-  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  Eigen::Index all = 0;
+  for (const Eigen::VectorXd& values : now_->fit.values) all += values.size();
+  if (all == 0) return false;
+  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, all);
   const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
-  std::optional<std::size_t> weakest;
-  double least = t;
+  std::vector<std::pair<double, std::size_t>> weak;  // size in sigmas, index
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const Eigen::VectorXd& values = now_->fit.values[i];
-    const double variance = covariance(at, at);
-    at += values.size();
-    if (values.size() > 1 || !(variance > 0.0)) continue;
-    const double ratio = std::abs(values[0]) / std::sqrt(variance);
-    if (ratio >= least) continue;
-    least = ratio;
-    weakest = i;
+    const Candidate& candidate = *find_candidate(base_->fit, now_->added[i].id);
+    const Eigen::Index count = values.size();
+    const double sigma = size_sigma(candidate, values, covariance.block(at, at, count, count));
+    at += count;
+    if (!(sigma > 0.0)) continue;
+    const double ratio = std::abs(size_of(candidate, values)) / sigma;
+    if (ratio < t) weak.emplace_back(ratio, i);
   }
-  if (!weakest) return false;
-  const EffectId id = now_->added[*weakest].id;
-  removed_.insert(id);
-  now_ = stage_of(kinescope::trace::without(now_->added, *weakest));
-  mark(round_, id, CandidateState::kRemoved, now_->error.value);
-  add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
-  return true;
+  std::ranges::sort(weak);
+  for (const auto& [ratio, index] : weak) {
+    StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
+    if (now_->fit.values[index].size() > 1 &&
+        predicts_clearly_worse(stage->held_out.whitened, now_->held_out.whitened)) {
+      continue;
+    }
+    const EffectId id = now_->added[index].id;
+    removed_.insert(id);
+    now_ = std::move(stage);
+    mark(round_, id, CandidateState::kRemoved, now_->error.value);
+    add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
+    return true;
+  }
+  return false;
 }
 
 bool Tracer::check(std::size_t index) {

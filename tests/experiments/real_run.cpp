@@ -118,6 +118,7 @@ Outcome run_recording(const RecordingPaths& paths, const fs::path& output,
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   read_structure(read_json(output / "structure.json"), out);
   out.result = read_json(output / "result.json");
+  out.trace = read_json(output / "trace.json");
   read_errors(out.result, output / "residuals.csv", out);
   return out;
 }

@@ -53,6 +53,7 @@ struct Outcome {
   bool calibrated = false;
   Errors errors;
   nlohmann::json result;  ///< result.json; null where the run did not get so far
+  nlohmann::json trace;   ///< trace.json; null where nothing was traced
   double seconds = 0.0;
 
   /// "revolute revolute", from the base outwards.

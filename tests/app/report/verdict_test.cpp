@@ -97,6 +97,18 @@ TEST(Verdict, NamesTheJointThatTheResidualFollows) {
   EXPECT_TRUE(has(verdict.limits, "±0.11") || has(verdict.limits, "±0.10")) << verdict.limits;
   EXPECT_TRUE(has(verdict.next, "sweeps of q2")) << verdict.next;
   EXPECT_FALSE(has(verdict.limits, "noise of the measurement limits")) << verdict.limits;
+  EXPECT_TRUE(has(verdict.limits, "the model lacks")) << verdict.limits;
+}
+
+TEST(Verdict, DoesNotContradictTracing) {
+  RunSummary run = synthetic_run({.gear_error_rad = 0.002});
+  run.trace.emplace();
+  run.trace->verdict = TraceVerdict::kClean;
+  const Verdict clean = make_verdict(run);
+  EXPECT_TRUE(has(clean.limits, "along the motion of q2")) << clean.limits;
+  EXPECT_FALSE(has(clean.limits, "the model lacks")) << clean.limits;
+  run.trace->verdict = TraceVerdict::kNothingToSay;
+  EXPECT_TRUE(has(make_verdict(run).limits, "the model lacks"));
 }
 
 TEST(Verdict, SaysWhenUnseenDataAreWorse) {
