@@ -14,8 +14,6 @@
 
 namespace kinescope::report {
 
-/// Valid UTF-8 with what is not replaced by U+FFFD; control characters become spaces.
-[[nodiscard]] std::string clean_text(std::string_view text);
 /// clean_text() with & < > " ' escaped: safe as content and inside a quoted attribute.
 [[nodiscard]] std::string escaped(std::string_view text);
 /// <p class="..">text</p>, the text escaped.

@@ -10,6 +10,7 @@
 #include "app/report/facts.h"
 #include "app/report/html.h"
 #include "app/report/result_values.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope::report {
 

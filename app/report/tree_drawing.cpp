@@ -8,6 +8,7 @@
 #include "app/report/html.h"
 #include "app/report/numbers.h"
 #include "app/report/sections.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope::report {
 namespace {

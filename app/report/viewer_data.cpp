@@ -13,6 +13,7 @@
 #include "app/report/html.h"
 #include "app/report/prediction.h"
 #include "app/report/sections.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope::report {
 namespace {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include <Eigen/LU>
+
 #include "calib/bundle/corrected.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/median.h"
@@ -198,6 +200,39 @@ double lasting_bend(const std::vector<SightingError>& errors) {
   return sum.norm() / static_cast<double>(errors.size()) / std::sqrt(freedom);
 }
 
+// What poses are declared to be uncertain by is seldom right for turns and shifts alike: each by
+// its own scatter from neighbour to neighbour.
+void balance_poses(Spec& spec, const State& state, const std::vector<int>& usable) {
+  constexpr std::size_t kFewest = 30;
+  const Readings readings(spec, state);
+  std::map<int, std::vector<Eigen::VectorXd>> turns;
+  std::map<int, std::vector<Eigen::VectorXd>> shifts;
+  for (const int index : usable) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const auto at = corrected_error_of(spec, state, readings, sighting);
+    if (!at || !at->error.residual.allFinite()) continue;
+    const Matrix6d& W = sighting.whitening;
+    const Vector6d d = W.partialPivLu().solve(Vector6d(at->error.residual));
+    turns[sighting.marker].emplace_back(W.topLeftCorner<3, 3>() * d.head<3>());
+    shifts[sighting.marker].emplace_back(W.bottomRightCorner<3, 3>() * d.tail<3>());
+  }
+  const auto scatter = [](const std::map<int, std::vector<Eigen::VectorXd>>& all) {
+    std::vector<double> squares;
+    for (const auto& [marker, series] : all) {
+      for (std::size_t i = 0; i < series.size(); ++i)
+        squares.push_back(from_neighbours(series, i).squaredNorm());
+    }
+    return squares.size() < kFewest ? 0.0 : std::sqrt(median_of(std::move(squares)));
+  };
+  const double turn = scatter(turns);
+  const double shift = scatter(shifts);
+  if (!(turn > 0.0) || !(shift > 0.0)) return;
+  for (Sighting& sighting : spec.sightings) {
+    sighting.whitening.leftCols<3>() *= std::sqrt(shift / turn);
+    sighting.whitening.rightCols<3>() *= std::sqrt(turn / shift);
+  }
+}
+
 // Multiplies a sighting's sigma.
 void widen(Sighting& sighting, double factor) {
   sighting.sigma *= factor;
@@ -208,6 +243,7 @@ void widen(Sighting& sighting, double factor) {
 
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
                                      double reject_sigma) {
+  if (spec.kind == MeasurementKind::kPose) balance_poses(spec, state, usable);
   const Readings readings(spec, state);
   std::map<int, Series> all;
   for (const int index : usable) {

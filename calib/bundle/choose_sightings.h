@@ -19,8 +19,9 @@ struct ChosenSightings {
 };
 
 /// Sets the sigmas in `spec` to how much residuals at `state` differ from those of their
-/// neighbours; markers at rest count once for all their frames. Where the stamps of the frames
-/// jitter, sightings in motion count for less: the faster, the less.
+/// neighbours (of poses, turns and shifts each by their own); markers at rest count once for all
+/// their frames. Where the stamps of the frames jitter, sightings in motion count for less: the
+/// faster, the less.
 [[nodiscard]] ChosenSightings choose_by_neighbours(Spec& spec, const State& state,
                                                    const std::vector<int>& usable,
                                                    double reject_sigma);

@@ -184,7 +184,7 @@ Eigen::VectorXd units_of(const Sighting& sighting) {
   }
   // Of a pose the error is given in metres: the turn's rows have none.
   Eigen::VectorXd units = Eigen::VectorXd::Zero(6);
-  units.tail<3>() = sighting.whitening.diagonal().tail<3>().cwiseInverse();
+  units.tail<3>() = sighting.whitening.bottomRightCorner<3, 3>().rowwise().norm().cwiseInverse();
   return units;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "kinematics/core/error.h"
@@ -49,6 +50,19 @@ void add_corners(const Measurements& measurements, const MarkerSet& markers, Spe
   }
 }
 
+// The last three rows are of the translation alone and at right angles to one another, so that
+// their lengths say what a residual is in metres.
+Matrix6d whitening_of(const Matrix6d& covariance) {
+  const Eigen::LLT<Matrix6d> factor(covariance.inverse());
+  KINESCOPE_CHECK(factor.info() == Eigen::Success, "a pose's covariance is positive definite");
+  Matrix6d out = factor.matrixU();
+  const Eigen::Matrix3d U = out.bottomRightCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(U.transpose() * U);
+  out.bottomRightCorner<3, 3>() =
+      axes.eigenvalues().cwiseSqrt().asDiagonal() * axes.eigenvectors().transpose();
+  return out;
+}
+
 void add_poses(const Measurements& measurements, Spec& spec) {
   const auto index = marker_index(spec.tree);
   for (const PoseTrack& track : measurements.poses.tracks) {
@@ -60,9 +74,7 @@ void add_poses(const Measurements& measurements, Spec& spec) {
       sighting.frame = sample.frame;
       sighting.marker = found->second;
       sighting.T_camera_marker = sample.T_camera_marker;
-      const Eigen::LLT<Matrix6d> factor(sample.covariance.inverse());
-      KINESCOPE_CHECK(factor.info() == Eigen::Success, "a pose's covariance is positive definite");
-      sighting.whitening = factor.matrixU();
+      sighting.whitening = whitening_of(sample.covariance);
       spec.sightings.push_back(std::move(sighting));
     }
   }

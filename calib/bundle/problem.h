@@ -31,7 +31,7 @@ struct Sighting {
   double sigma = 1.0;                         ///< px (corners) or m (points)
   double declared_sigma = 1.0;                ///< the same before any estimate of the noise
   Pose T_camera_marker;                       ///< poses
-  Matrix6d whitening = Matrix6d::Identity();  ///< poses: L' with L L' = inverse covariance
+  Matrix6d whitening = Matrix6d::Identity();  ///< poses: W' W = inverse covariance
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< points with a measured place
   int target = -1;  ///< points held in an unknown place: index into Spec::targets
   [[nodiscard]] int dimension() const;

@@ -10,6 +10,7 @@
 #include <tinyxml2.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/text.h"
 #include "kinematics/urdf/xml_numbers.h"
 
 namespace kinescope::urdf_document {
@@ -39,6 +40,13 @@ class Checker {
     if (name == nullptr || *name == '\0') {
       throw bad_input(place(element), fmt::format("a <{}> has no name", element.Name()),
                       "give it a name attribute");
+    }
+    // Readers of XML disagree about what such bytes mean.
+    if (clean_text(name) != name) {
+      throw bad_input(
+          place(element),
+          fmt::format("the name of a <{}> holds bytes that are no text", element.Name()),
+          "use letters, digits and _, and save the file as UTF-8");
     }
     return name;
   }

@@ -8,6 +8,7 @@
 
 #include "app/report/html.h"
 #include "app/report/plot.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope::report {
 namespace {

@@ -102,6 +102,19 @@ TEST(UrdfRefuses, NamesThatAreMissingOrTaken) {
   EXPECT_TRUE(refusal(robot(R"(<link/>)")).starts_with("robot.urdf:4: a <link> has no name"));
 }
 
+TEST(UrdfRefuses, NamesThatAreNoText) {
+  for (const char* name : {"j\xC3\xC3j", "j\xFF", "j\x01"}) {
+    EXPECT_TRUE(
+        refusal(robot(fmt::format(
+                    R"(<joint name="{}" type="fixed"><parent link="a"/><child link="b"/></joint>)",
+                    name)))
+            .starts_with("robot.urdf:4: the name of a <joint> holds bytes that are no text"));
+  }
+  EXPECT_EQ(refusal(robot(R"(<joint name="Gelenk_ö" type="fixed"><parent link="a"/>)"
+                          R"(<child link="b"/></joint>)")),
+            "accepted");
+}
+
 TEST(UrdfRefuses, TypesItDoesNotKnow) {
   for (const char* type : {"planar", "floating", "ball", ""}) {
     EXPECT_EQ(
