@@ -10,6 +10,7 @@
 #include "calib/bundle/effect_bundle.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
+#include "kinematics/model/kinematic_tree.h"
 #include "tests/truth/camera_effects.h"
 
 namespace kinescope {
@@ -149,6 +150,52 @@ TEST(TraceCalibration, ACleanWorldIsClean) {
   EXPECT_TRUE(clean_trace().corrections.empty());
   EXPECT_NEAR(trace.noise, std::numbers::sqrt2 * kSigma, kSigmaTolerance);
   EXPECT_NEAR(trace.held_out_after.value, std::numbers::sqrt2 * kSigma, 2.0 * kSigmaTolerance);
+}
+
+// A hinge without a log, tracked by poses whose turns scatter ten times as far as they are declared
+// to and whose shifts a tenth as far, both the more in depth.
+TEST(TraceCalibration, PosesAreWeighedByTheirOwnScatterAndGivenInMetres) {
+  constexpr double kSigmaM = 2e-5;
+  constexpr double kSigmaRad = 2e-3;
+  constexpr double kWrong = 10.0;
+  const Eigen::Vector3d depth(1.0, 1.0, 5.0);
+  truth::WorldOptions options;
+  options.joints = {JointType::kRevolute};
+  options.base_tag = false;
+  options.frames = 300;
+  World world = truth::make_world(options);
+  Marker& marker = world.tree.markers.front();
+  marker.T_link_marker = marker.T_link_marker * Pose{exp_rotation({0.7, 0.4, 0.0}), {0, 0, 0}};
+  Rng rng = Rng::from_name("tracked poses");
+  PoseTrack track{marker.id, {}};
+  for (Eigen::Index f = 0; f < world.joint_values.rows(); ++f) {
+    const auto links = forward_kinematics(world.tree, world.joint_values.row(f).transpose());
+    const Pose truth = world.T_camera_base * links[marker.link.index()] * marker.T_link_marker;
+    const Eigen::Matrix3d R = truth.rotation.conjugate().toRotationMatrix();  // marker from camera
+    Vector6d noise;
+    noise << rng.normal3(kSigmaRad), R * depth.cwiseProduct(rng.normal3(kSigmaM));
+    PoseSample sample;
+    sample.frame = static_cast<int>(f);
+    sample.T_camera_marker = truth * exp_pose(noise);
+    sample.covariance.setZero();
+    sample.covariance.topLeftCorner<3, 3>().diagonal().setConstant(std::pow(kSigmaRad / kWrong, 2));
+    sample.covariance.bottomRightCorner<3, 3>() =
+        std::pow(kSigmaM * kWrong, 2) * R * depth.cwiseAbs2().asDiagonal() * R.transpose();
+    track.samples.push_back(sample);
+  }
+  Measurements measurements;
+  measurements.times_s = world.measurements.times_s;
+  measurements.poses = {measurements.times_s, {track}};
+  CalibrationStart start = truth::perturbed_start(world, 0.005, 0.001, 1);
+  start.tree.joints.front().channel.clear();
+  start.joint_values = world.joint_values;
+  const Calibration plain = calibrate(measurements, world.markers, {}, start);
+  const Trace trace = trace_calibration(measurements, world.markers, {}, start, {}).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
+  // The joint's value takes a part of the noise.
+  EXPECT_LT(plain.training_rms, kSigmaM * depth.norm());
+  EXPECT_NEAR(trace.noise, plain.training_rms, 0.05 * plain.training_rms);
+  EXPECT_NEAR(trace.held_out_after.value, plain.held_out_rms, 0.05 * plain.held_out_rms);
 }
 
 // A camera that says 30 and takes 29.97 frames a second: the clocks part by 33 ms on the way.
