@@ -112,9 +112,9 @@ void add_detection_options(CLI::App& run, DetectOptions& detect) {
       ->type_name("N")
       ->group(group);
   run.add_option("--max-hamming", detect.detector.max_hamming,
-                 "Wrong bits of a marker to forgive: finds more, and invents more")
-      ->check(number_in(0, 3))
-      ->capture_default_str()
+                 "Wrong bits of a marker to forgive: finds more, and invents more [1; 2 of large "
+                 "ArUco codes]")
+      ->check(number_in(0, 2))
       ->type_name("BITS")
       ->group(group);
 }

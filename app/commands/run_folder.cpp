@@ -99,11 +99,13 @@ RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
 
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
-      "kinescope {} corners by cells video {} decimate {} blur {} refine {} hamming {} margin {} "
+      "kinescope {} corners by cells, pictures twice, video {} decimate {} blur {} refine {} "
+      "hamming {} margin {} "
       "sightings {} start {}",
       program_version(), sha256_of_path(recording.video), detect_.detector.decimate,
-      detect_.detector.blur_sigma, detect_.detector.refine_edges, detect_.detector.max_hamming,
-      detect_.detector.min_margin, detect_.min_sightings, recording.settings.video_start_s);
+      detect_.detector.blur_sigma, detect_.detector.refine_edges,
+      detect_.detector.max_hamming.value_or(-1), detect_.detector.min_margin, detect_.min_sightings,
+      recording.settings.video_start_s);
   const MarkerSet& markers = recording.markers;
   key += fmt::format(" family {} only_listed {} ids", markers.family, markers.only_listed);
   for (const auto& [id, size] : markers.sizes_m) key += fmt::format(" {}", id.value);
@@ -201,7 +203,8 @@ std::vector<std::pair<std::string, std::string>> list_options(const RunOptions& 
           {"rejection", fmt::format("{} sigma", c.reject_sigma)},
           {"folds", fmt::format("{}", c.folds)},
           {"decimate", fmt::format("{}", d.decimate)},
-          {"largest hamming distance", fmt::format("{}", d.max_hamming)},
+          {"largest hamming distance",
+           d.max_hamming ? fmt::format("{}", *d.max_hamming) : "the family's own"},
           {"least decision margin", fmt::format("{}", d.min_margin)},
           {"least sightings of a marker", fmt::format("{}", options.detect.min_sightings)}};
 }

@@ -71,8 +71,8 @@ class Detecting {
     const VideoInfo& info = reader->info();
     lossy_ = is_lossy(info.codec);
     // Pictures that were taken one by one need not follow from one another.
-    const bool follows = info.codec != "images";
-    const std::size_t run_length = follows ? static_cast<std::size_t>(every_) : 1;
+    one_by_one_ = info.codec == "images";
+    const std::size_t run_length = one_by_one_ ? 1 : static_cast<std::size_t>(every_);
     Detection out;
     TagObservations& found = out.observations;
     found.width = info.width;
@@ -299,6 +299,9 @@ class Detecting {
 
   std::vector<TagObservation> search_whole(std::size_t worker, const VideoFrame& frame,
                                            bool full) const {
+    const Searcher& searcher = searchers_[worker];
+    if (one_by_one_ && searcher.fine)
+      return detect_with_both(*searcher.fine, *searcher.coarse, frame.image.view());
     return (full ? fine(worker) : searchers_[worker].coarse.get())->detect(frame.image.view());
   }
 
@@ -446,6 +449,7 @@ class Detecting {
   TagLayout layout_;
   double detector_sigma_ = kAprilTagSigma;
   bool lossy_ = true;
+  bool one_by_one_ = false;  // pictures; nothing is known from one to the next
   ToneCurve tone_;
   double tone_sigma_ = 0.0;  // of what it leaves, px per px of blur
   bool tone_settled_ = false;

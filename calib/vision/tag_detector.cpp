@@ -77,19 +77,21 @@ struct FreeDetector {
 class AprilTagDetector final : public TagDetector {
  public:
   AprilTagDetector(std::string_view name, const DetectorOptions& options)
-      : options_(options), family_(make_apriltag_family(name)) {
-    if (options.max_hamming > 1 && family_->ncodes > kMaxCodesForTwoBits) {
-      throw bad_request("max_hamming",
-                        fmt::format("{} bits corrected in {} would take gigabytes of tables",
-                                    options.max_hamming, name),
-                        "use 0 or 1 with this family");
+      : options_(options),
+        max_hamming_(options.max_hamming.value_or(1)),
+        family_(make_apriltag_family(name)) {
+    if (max_hamming_ > 1 && family_->ncodes > kMaxCodesForTwoBits) {
+      throw bad_request(
+          "max_hamming",
+          fmt::format("{} bits corrected in {} would take gigabytes of tables", max_hamming_, name),
+          "use 0 or 1 with this family");
     }
     detector_.reset(apriltag_detector_create());
     detector_->nthreads = 1;
     detector_->quad_decimate = static_cast<float>(options.decimate);
     detector_->quad_sigma = static_cast<float>(options.blur_sigma);
     detector_->refine_edges = options.refine_edges;
-    apriltag_detector_add_family_bits(detector_.get(), family_.get(), options.max_hamming);
+    apriltag_detector_add_family_bits(detector_.get(), family_.get(), max_hamming_);
   }
 
   std::vector<TagObservation> detect(const ImageView& image) override {
@@ -101,7 +103,7 @@ class AprilTagDetector final : public TagDetector {
     for (int i = 0; i < zarray_size(found.get()); ++i) {
       apriltag_detection_t* detection = nullptr;
       zarray_get(found.get(), i, static_cast<void*>(&detection));
-      if (detection->hamming > options_.max_hamming) continue;
+      if (detection->hamming > max_hamming_) continue;
       if (!(static_cast<double>(detection->decision_margin) >= options_.min_margin)) continue;
       TagObservation tag;
       tag.id = TagId{detection->id};
@@ -116,6 +118,7 @@ class AprilTagDetector final : public TagDetector {
 
  private:
   DetectorOptions options_;
+  int max_hamming_;
   AprilTagFamily family_;  // outlives the detector, which refers to it
   std::unique_ptr<apriltag_detector_t, FreeDetector> detector_;
 };
@@ -129,6 +132,10 @@ void use_one_thread() {
   }();
 }
 
+// Bits that can be corrected where two codes differ in nine or more: chance then makes one of a
+// thousand codes with two wrong bits out of fewer than one in ten thousand squares.
+constexpr int kFarApart = 4;
+
 class ArucoDetector final : public TagDetector {
  public:
   ArucoDetector(const ArucoDictionary& dictionary, const DetectorOptions& options)
@@ -141,11 +148,10 @@ class ArucoDetector final : public TagDetector {
     // At the default 0.05 the rim of a white margin of one cell counts as the same square and hides
     // the marker.
     parameters_->minMarkerDistanceRate = 0.02;
+    const int correctable = dictionary_->maxCorrectionBits;
+    const int bits = options.max_hamming.value_or(correctable >= kFarApart ? 2 : 1);
     parameters_->errorCorrectionRate =
-        dictionary_->maxCorrectionBits > 0
-            ? std::min(1.0,
-                       static_cast<double>(options.max_hamming) / dictionary_->maxCorrectionBits)
-            : 0.0;
+        correctable > 0 ? std::min(1.0, static_cast<double>(bits) / correctable) : 0.0;
   }
 
   std::vector<TagObservation> detect(const ImageView& image) override {
@@ -207,8 +213,8 @@ TagLayout tag_layout(const std::string& family) {
 
 std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
                                                const DetectorOptions& options) {
-  if (!(options.decimate >= 1.0) || !(options.blur_sigma >= 0.0) || options.max_hamming < 0 ||
-      options.max_hamming > 2) {
+  if (!(options.decimate >= 1.0) || !(options.blur_sigma >= 0.0) ||
+      options.max_hamming.value_or(1) < 0 || options.max_hamming.value_or(1) > 2) {
     throw bad_request("detector", "decimate below 1, negative blur or max_hamming outside 0..2",
                       "use decimate 1 or 2, blur 0, max_hamming 1");
   }
@@ -218,6 +224,25 @@ std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
   const std::string_view april = resolve_alias(family);
   if (!is_apriltag_family(april)) throw unknown_family(family);
   return std::make_unique<AprilTagDetector>(april, options);
+}
+
+std::vector<TagObservation> detect_with_both(TagDetector& fine, TagDetector& coarse,
+                                             const ImageView& image) {
+  const auto middle = [](const TagObservation& tag) -> Eigen::Vector2d {
+    return 0.25 * (tag.corners_px[0] + tag.corners_px[1] + tag.corners_px[2] + tag.corners_px[3]);
+  };
+  std::vector<TagObservation> out = fine.detect(image);
+  const std::size_t count = out.size();
+  for (TagObservation& tag : coarse.detect(image)) {
+    const double near = 0.5 * (tag.corners_px[0] - tag.corners_px[2]).norm();
+    const bool known = std::any_of(
+        out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count), [&](const auto& other) {
+          return other.id == tag.id && (middle(other) - middle(tag)).norm() < near;
+        });
+    if (!known) out.push_back(std::move(tag));
+  }
+  sort_detections(out);
+  return out;
 }
 
 }  // namespace kinescope

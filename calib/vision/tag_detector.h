@@ -7,6 +7,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,9 @@ struct DetectorOptions {
       1.0;  ///< search at 1/decimate of the resolution; more is faster and misses small tags
   double blur_sigma = 0.0;  ///< px, smoothing before the search
   bool refine_edges = true;
-  int max_hamming = 1;       ///< bits corrected at most; more finds more and invents more
+  /// Bits corrected at most; more finds more and invents more. Without it 1, and 2 of ArUco
+  /// dictionaries whose codes are as far apart as those of tag36h11.
+  std::optional<int> max_hamming = std::nullopt;
   double min_margin = 20.0;  ///< least decision margin (AprilTag families)
 };
 
@@ -49,5 +52,10 @@ void sort_detections(std::vector<TagObservation>& tags);
 /// Throws bad_request for a family we do not know (and names those we do).
 [[nodiscard]] std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
                                                              const DetectorOptions& options = {});
+
+/// What either of them finds; where both do, the first one's. At full resolution small markers are
+/// seen, at a reduced one large markers with rough edges.
+[[nodiscard]] std::vector<TagObservation> detect_with_both(TagDetector& fine, TagDetector& coarse,
+                                                           const ImageView& image);
 
 }  // namespace kinescope

@@ -94,6 +94,53 @@ TEST(TagDetector, MarkersTurnedInTheImageKeepTheirCorners) {
   }
 }
 
+// Two cells of the code are wrong: dust, a glint.
+TEST(TagDetector, CorrectsAsManyBitsAsTheCodesAllow) {
+  const auto found = [](const std::string& family, MarkerArt art, DetectorOptions options = {}) {
+    const int inside = (art.total_cells - art.border_cells) / 2 + 2;
+    for (const int column : {inside, inside + 1}) {
+      const auto wrong = static_cast<std::size_t>(inside * art.total_cells + column);
+      art.white[wrong] = !art.white[wrong];
+    }
+    Rng rng = Rng::from_name(family);
+    const GreyImage image =
+        render_markers(small_camera(), {upright(std::move(art))}, {.supersample = 6}, rng);
+    return make_tag_detector(family, options)->detect(image.view()).size();
+  };
+  EXPECT_EQ(found("DICT_6X6_250", aruco_art(cv::aruco::DICT_6X6_250, 11)), 1U);
+  EXPECT_EQ(found("DICT_6X6_250", aruco_art(cv::aruco::DICT_6X6_250, 11), {.max_hamming = 1}), 0U);
+  EXPECT_EQ(found("DICT_4X4_50", aruco_art(cv::aruco::DICT_4X4_50, 11)), 0U);
+  EXPECT_EQ(found("tag36h11", apriltag_art("tag36h11", 11)), 0U);
+  EXPECT_EQ(found("tag36h11", apriltag_art("tag36h11", 11), {.max_hamming = 2}), 1U);
+}
+
+class Told final : public TagDetector {
+ public:
+  explicit Told(std::vector<TagObservation> tags) : tags_(std::move(tags)) {}
+  std::vector<TagObservation> detect(const ImageView& /*image*/) override { return tags_; }
+
+ private:
+  std::vector<TagObservation> tags_;
+};
+
+TEST(TagDetector, WhatEitherSearchFindsIsFoundOnce) {
+  const auto tag = [](int id, double x, double margin) {
+    TagObservation out;
+    out.id = TagId{id};
+    out.decision_margin = margin;
+    out.corners_px = {{x, 50.0}, {x + 20.0, 50.0}, {x + 20.0, 30.0}, {x, 30.0}};
+    return out;
+  };
+  Told fine({tag(1, 10.0, 1.0), tag(1, 200.0, 1.0)});
+  Told coarse({tag(1, 10.4, 2.0), tag(1, 100.0, 2.0), tag(2, 200.0, 2.0)});
+  const std::vector<TagObservation> found = detect_with_both(fine, coarse, ImageView{});
+  ASSERT_EQ(found.size(), 4U);
+  EXPECT_EQ(found[0].decision_margin, 1.0);  // at 10
+  EXPECT_EQ(found[1].decision_margin, 2.0);  // at 100
+  EXPECT_EQ(found[2].decision_margin, 1.0);  // at 200
+  EXPECT_EQ(found[3].id, TagId{2});
+}
+
 TEST(TagDetector, KnowsItsFamiliesAndRefusesOthers) {
   for (const std::string& family : known_families()) {
     EXPECT_GE(tag_layout(family).cells, 5) << family;
