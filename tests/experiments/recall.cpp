@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 struct PhotoSet {
   std::string folder;  // below vision/
   std::string family;
-  std::string only = "";  // part of the pictures' names
+  std::string only = {};  // part of the pictures' names
 };
 
 // The pictures of one set are of one family.
