@@ -42,6 +42,7 @@ set(third_parties
     "libav: calib/vision"
     "libsw: calib/vision"
     "ceres/: calib/tracks calib/bundle dynamics/identify dynamics/gp"
+    "glog/: kinematics/core"
     "cblas: dynamics/gp"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"

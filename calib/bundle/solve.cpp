@@ -6,10 +6,10 @@
 #include <map>
 
 #include <ceres/solver.h>
-#include <glog/logging.h>
 
 #include "kinematics/core/chi_square.h"
 #include "kinematics/core/median.h"
+#include "kinematics/core/silence_glog.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -29,9 +29,6 @@ constexpr double kFirstRadius = 1e6;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
 constexpr double kPlainTolerance = 1e-10;
-
-// Ceres reports failed evaluations through glog to standard error; the summary says the same.
-void silence_glog() { FLAGS_minloglevel = google::GLOG_FATAL; }
 
 struct Misfit {
   int sighting = 0;

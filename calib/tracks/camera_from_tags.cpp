@@ -10,10 +10,10 @@
 #include <ceres/normal_prior.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
-#include <glog/logging.h>
 
 #include "calib/tracks/planar_pose.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/core/silence_glog.h"
 
 namespace kinescope {
 namespace {
@@ -133,7 +133,7 @@ CameraModel refined(const CameraModel& camera, const CameraModel& guess,
   }
   if (problem.NumResidualBlocks() == 0) return camera;
   add_prior(guess, intrinsics.data(), problem);
-  FLAGS_minloglevel = google::GLOG_FATAL;  // the summary says the same
+  silence_glog();
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.max_num_iterations = 50;

@@ -10,10 +10,10 @@
 #include <ceres/gradient_problem.h>
 #include <ceres/gradient_problem_solver.h>
 #include <fmt/format.h>
-#include <glog/logging.h>
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
+#include "kinematics/core/silence_glog.h"
 
 namespace kinescope::gp {
 namespace {
@@ -204,8 +204,7 @@ Climb best_climb(const GpModel& model, const Dataset& dataset, const std::vector
 
 Estimate estimate(const GpModel& model, const Dataset& dataset, Objective& objective, bool same,
                   const EstimateOptions& options) {
-  // Ceres says in its summary what it also prints.
-  FLAGS_minloglevel = google::GLOG_FATAL;
+  silence_glog();
   const std::vector<Parameter> parameters = parameters_of(model);
   const std::vector<Free> free = free_parameters(parameters);
   const Eigen::VectorXd before = log_values_of(model);
