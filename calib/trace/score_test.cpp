@@ -40,6 +40,7 @@ struct Projected {
   Eigen::MatrixXd B;  // the model's parameters that imitate the effect
   Eigen::MatrixXd S;  // normal matrix of what they cannot imitate
   Eigen::MatrixXd S_inverse;
+  Eigen::VectorXd alone;  // the diagonal of S, of E
   Eigen::VectorXd theta;  // of E T
   Eigen::VectorXd delta;  // step of the model's parameters
   double gain = 0.0;
@@ -53,6 +54,7 @@ Projected project(const NormalSystem& system, const EffectSums& raw) {
   out.B = system.inverse() * out.sums.JE;
   out.S = out.T.transpose() * S_raw * out.T;
   out.S_inverse = scaled_pseudo_inverse(out.S, 0.0);
+  out.alone = S_raw.diagonal().cwiseMax(0.0);
   const Eigen::VectorXd score = out.sums.Er - out.B.transpose() * system.total().g;
   out.theta = out.S_inverse * score;
   out.delta = system.inverse() * system.total().g - out.B * out.theta;
@@ -176,6 +178,7 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
   const double taken = p.theta.dot(p.S * p.theta);
   out.rms = system.shift_of(taken, columns);
   out.noise_share = system.noise_share_of(taken, columns);
+  out.of_one = (p.alone / std::max(taken, 1e-300)).cwiseSqrt();
   out.freedom = effective - k;
   if (effective < kFewestStretches) return;
   const bool few = out.freedom < kFewStretches;

@@ -25,6 +25,7 @@ struct Score {
   double rms = 0.0;  ///< of what the effect does to the rows it touches, freed of the model's own
                      ///< parameters, in the residual's unit
   double noise_share = 0.0;  ///< the same over each row's own noise, without a unit
+  Eigen::VectorXd of_one;    ///< as much of one unit of each parameter alone, over that of theta
   [[nodiscard]] bool hidden() const { return rank == 0; }
 };
 

@@ -285,6 +285,21 @@ void Tracer::summarise() {
 
 namespace {
 
+// The size of an effect that does as much as the one that was fitted. Where that is nothing but
+// noise, its direction is an accident: one parameter alone, in the mean over those that count.
+double typical_size(const Candidate& candidate, const Score& score) {
+  if (candidate.size || score.theta.size() == 1) return std::abs(size_of(candidate, score.theta));
+  double squares = 0.0;
+  double counted = 0.0;
+  for (Eigen::Index i = 0; i < score.theta.size(); ++i) {
+    const double weight = candidate.size_weights[i];
+    if (!(weight > 0.0) || !(score.of_one[i] > 0.0)) continue;
+    squares += weight / (score.of_one[i] * score.of_one[i]);
+    counted += 1.0;
+  }
+  return std::sqrt(squares / std::max(1.0, counted));
+}
+
 // Nobody overlooks an effect that large: from here on the recording is no test of it.
 bool beyond_possible(const Candidate& candidate, const Score& score, double smallest_size) {
   const double size = std::abs(size_of(candidate, score.theta));
@@ -317,11 +332,11 @@ void Tracer::list_not_found() {
       missing.record = candidate.record;
     } else {
       // What lies below the sensor's own errors is not looked for.
-      const double size = std::abs(size_of(candidate, score.theta));
       double least_size = 0.0;
       if (score.rms > 0.0) {
         const double floor = std::max(options_.floor, candidate.floor);
-        least_size = size * std::max(floor / score.rms, options_.noise_floor / score.noise_share);
+        least_size = typical_size(candidate, score) *
+                     std::max(floor / score.rms, options_.noise_floor / score.noise_share);
       }
       missing.smallest_size = smallest_size(candidate, score, level_ / member.tests, least_size);
       if (beyond_possible(candidate, score, missing.smallest_size))

@@ -85,6 +85,7 @@ LinearWorld::LinearWorld(const LinearWorldOptions& options, const std::vector<In
       observed_[row] += effect.size * change[row / kRows] * gains_(row, effect.joint);
     }
   }
+  if (options.noise_seed) rng = Rng(*options.noise_seed);
   Eigen::VectorXd memory = Eigen::VectorXd::Zero(kRows);
   const double fresh = std::sqrt(1.0 - options.noise_memory * options.noise_memory);
   for (Eigen::Index row = 0; row < observed_.size(); ++row) {

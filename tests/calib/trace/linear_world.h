@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace kinescope::truth {
 
 struct LinearWorldOptions {
   std::uint64_t seed = 1;
+  std::optional<std::uint64_t> noise_seed;  ///< of the same motion; none: goes on from `seed`
   int instants = 400;
   double noise = 1.0;         ///< of a row
   double noise_memory = 0.0;  ///< AR(1) from instant to instant

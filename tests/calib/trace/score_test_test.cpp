@@ -114,6 +114,20 @@ TEST(ScoreTest, ParametersAreThoseOfLeastSquares) {
   EXPECT_NEAR(gain_of(system, effect()), score.gain, kSame * score.gain);
 }
 
+TEST(ScoreTest, OneUnitOfAParameterDoesAsMuchAsItsColumnThatTheModelCannotImitate) {
+  const Linearisation linear = linear_model();
+  const NormalSystem system(linear, make_partition(linear));
+  const Eigen::MatrixXd E = explicit_columns(linear, effect());
+  const Eigen::MatrixXd& J = linear.jacobian;
+  const Eigen::MatrixXd H = J.transpose() * J + linear.prior;
+  const Eigen::MatrixXd S = E.transpose() * E - E.transpose() * J * H.inverse() * J.transpose() * E;
+  const Score score = score_test(system, effect());
+  const double fitted = score.theta.dot(S * score.theta);
+  ASSERT_EQ(score.of_one.size(), 2);
+  for (Eigen::Index k = 0; k < 2; ++k)
+    EXPECT_NEAR(score.of_one[k], std::sqrt(S(k, k) / fitted), kSame * score.of_one[k]);
+}
+
 // Liang and Zeger 1986: bread, meat by stretches, bread.
 TEST(ScoreTest, CovarianceIsTheSandwichOverStretches) {
   const Linearisation linear = linear_model();

@@ -195,6 +195,26 @@ TEST(TraceTest, ParametersThatCannotBeAreNotFound) {
   EXPECT_EQ(std::ranges::find(trace.accepted, scale, &TracedEffect::id), trace.accepted.end());
 }
 
+// Of an effect that is not there the direction is an accident, and what its size must be to rise
+// above a floor is not.
+TEST(TraceTest, TheSmallestSizeAboveAFloorDoesNotDependOnTheNoise) {
+  TraceOptions options;
+  options.floor = 20.0;  // far above what the test itself needs
+  std::vector<double> sizes;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    LinearWorldOptions world;
+    world.seed = 5;
+    world.noise_seed = seed;
+    const Trace trace = trace_effects(LinearWorld(world, {}), options);
+    const auto sine =
+        std::ranges::find(trace.not_found, EffectId{"sine", "joint1"}, &NotFoundEffect::id);
+    ASSERT_NE(sine, trace.not_found.end());
+    sizes.push_back(sine->smallest_size);
+  }
+  const auto [least, most] = std::ranges::minmax(sizes);
+  EXPECT_LT(most, 1.01 * least);
+}
+
 TEST(TraceTest, TooLittleToJudgeSaysNothing) {
   const Trace trace = trace_of(1, {{0, "scale", 5.0}}, 0.0, 8);
   EXPECT_EQ(trace.verdict, TraceVerdict::kNothingToSay);
