@@ -22,6 +22,7 @@ struct TagObservation {
   int hamming = 0;               ///< bits corrected
   double decision_margin = 0.0;  ///< contrast of the decoding; 0 where unknown
   bool partly_hidden = false;    ///< its code does not lie where its corners put it
+  bool fitted = true;            ///< its corners, to the pixels; else they are the detector's own
 };
 
 /// A detection that was seen and not believed.

@@ -388,7 +388,8 @@ class Detecting {
   void take(TagObservation& tag, const RefinedCorners& refined, const VideoFrame& frame) const {
     tag.frame = frame.index;
     tag.sigma_px = detector_sigma_;
-    if (refined.status == RefineStatus::kDone) {
+    tag.fitted = refined.status == RefineStatus::kDone;
+    if (tag.fitted) {
       std::ranges::copy(refined.corners_px, tag.corners_px.begin());
       // All cells together tell the tone curve's part themselves.
       tag.sigma_px = std::hypot(refined.sigma_px, lossy_ ? kCompressionSigma : 0.0,
@@ -469,6 +470,7 @@ Detection detect_tags(const std::filesystem::path& video, const MarkerSet& marke
        sort_out_sightings(out.observations, markers, options.min_sightings)) {
     out.warnings.push_back(std::move(warning));
   }
+  put_unfitted_aside(out.observations);
   return out;
 }
 

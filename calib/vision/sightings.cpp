@@ -24,6 +24,8 @@ constexpr double kJumpLeast = 5.0;      // .. and than this many px
 constexpr double kMarginRatio =
     1.5;  // decision margins that differ by this tell two detections apart
 
+constexpr double kNearlyAll = 0.9;
+
 using Sightings = std::vector<TagObservation>;
 
 void reject(TagObservations& all, const TagObservation& tag, std::string reason) {
@@ -187,6 +189,12 @@ void reject_rare(TagObservations& all, int min_sightings) {
   });
 }
 
+void sort_rejected(TagObservations& all) {
+  std::ranges::sort(all.rejected, {}, [](const RejectedTag& tag) {
+    return std::tuple(tag.frame, tag.id, tag.reason);
+  });
+}
+
 }  // namespace
 
 double mean_edge_px(const std::vector<Eigen::Vector2d>& corners_px) {
@@ -254,9 +262,7 @@ std::vector<std::string> sort_out_sightings(TagObservations& observations, const
   const std::map<TagId, int> doubles = settle_doubles(observations);
   reject_jumps(observations);
   reject_rare(observations, min_sightings);
-  std::ranges::sort(observations.rejected, {}, [](const RejectedTag& tag) {
-    return std::tuple(tag.frame, tag.id, tag.reason);
-  });
+  sort_rejected(observations);
 
   std::vector<std::string> warnings;
   for (const auto& [id, taken] : second_markers) {
@@ -274,6 +280,20 @@ std::vector<std::string> sort_out_sightings(TagObservations& observations, const
     }
   }
   return warnings;
+}
+
+void put_unfitted_aside(TagObservations& observations) {
+  std::map<TagId, double> fitted;  // share
+  for (const auto& [id, track] : by_marker(observations.observations)) {
+    const auto count =
+        std::ranges::count(track, true, [](const TagObservation* tag) { return tag->fitted; });
+    fitted[id] = static_cast<double>(count) / static_cast<double>(track.size());
+  }
+  keep_if(observations, [&](const TagObservation& tag) -> std::optional<std::string> {
+    if (tag.fitted || fitted[tag.id] < kNearlyAll) return std::nullopt;
+    return "its corners could not be fitted, those of its other sightings could";
+  });
+  sort_rejected(observations);
 }
 
 }  // namespace kinescope

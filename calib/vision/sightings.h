@@ -21,6 +21,10 @@ namespace kinescope {
                                                           const MarkerSet& markers,
                                                           int min_sightings);
 
+/// The same with sightings whose corners could not be fitted, of markers of which nearly all could:
+/// what hinders a fit moves the detector's corners by more than their usual error.
+void put_unfitted_aside(TagObservations& observations);
+
 /// Why a detection's shape cannot be a marker's picture; nothing when it can.
 [[nodiscard]] std::optional<std::string> impossible_shape(
     const std::vector<Eigen::Vector2d>& corners_px);

@@ -158,5 +158,22 @@ TEST(Sightings, ResultDoesNotDependOnTheOrder) {
   EXPECT_EQ(all.rejected.size(), shuffled.rejected.size());
 }
 
+TEST(Sightings, CornersThatCouldNotBeFittedAreLeftWhereTheOthersCould) {
+  TagObservations all = passing();
+  for (const int f : {7, 30, 31}) all.observations[static_cast<std::size_t>(f)].fitted = false;
+  put_unfitted_aside(all);
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames - 3));
+  EXPECT_EQ(rejected(all, "could not be fitted"), 3);
+}
+
+// A small or blurred marker has no others.
+TEST(Sightings, CornersThatCanSeldomBeFittedAreKept) {
+  TagObservations all = passing();
+  for (int f = 0; f < kFrames; f += 3) all.observations[static_cast<std::size_t>(f)].fitted = false;
+  put_unfitted_aside(all);
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_TRUE(all.rejected.empty());
+}
+
 }  // namespace
 }  // namespace kinescope
