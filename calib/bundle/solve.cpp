@@ -122,13 +122,22 @@ double rms_sigma(const Spec& spec) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, spec.sightings.size())));
 }
 
-// Sightings beyond `reject_sigma`; the others are what is used.
+// Sightings beyond `reject_sigma`; the others are what is used. What is off by no more than is
+// usual for others is no outlier: compressed video repeats the pixels of a marker at rest, which
+// then scatters by a fifth of that, and changes them once in a while.
 std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfits,
                               double reject_sigma) {
+  std::vector<double> sigmas;
+  for (const Misfit& misfit : misfits)
+    sigmas.push_back(spec.sightings[static_cast<std::size_t>(misfit.sighting)].sigma);
+  const double usual = sigmas.empty() ? 0.0 : median_of(std::move(sigmas));
   std::vector<int> kept;
   for (const Misfit& misfit : misfits) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
-    if (misfit.chi_square <= chi_square_quantile(sighting.dimension(), reject_sigma)) {
+    const double share =
+        sighting.kind == MeasurementKind::kPose ? 1.0 : std::min(1.0, sighting.sigma / usual);
+    if (share * share * misfit.chi_square <=
+        chi_square_quantile(sighting.dimension(), reject_sigma)) {
       kept.push_back(misfit.sighting);
     }
   }
