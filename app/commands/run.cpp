@@ -62,6 +62,27 @@ void print_warning(const std::string& warning, const Console& console) {
   if (!console.quiet) fmt::print(stderr, "warning: {}\n", warning);
 }
 
+double mean_step(const std::vector<double>& times_s) {
+  return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
+}
+
+// Motion between the readings of a slow log is interpolated: all that moves is then off by a time,
+// too.
+std::string jitter_words(double jitter_s, const JointLog& log, const Observed& observed) {
+  constexpr double kSlow = 2.0;  // frames
+  const double log_step = mean_step(log.times_s);
+  if (log_step > kSlow * mean_step(observed.measurements.times_s)) {
+    return fmt::format(
+        "the frames and the joint log scatter by {:.2g} ms (standard deviation) about each other: "
+        "{} has {:.2g} readings a second, and the motion between them is interpolated: log faster",
+        1e3 * jitter_s, log.source, 1.0 / log_step);
+  }
+  return fmt::format(
+      "the frames' stamps scatter by {:.2g} ms (standard deviation) about the joint log's clock: "
+      "use stamps of the camera's own clock, or a camera that is triggered",
+      1e3 * jitter_s);
+}
+
 void print_result(const RunSummary& run, const RunFolder& folder, std::string_view report,
                   const Console& console) {
   if (console.json) {
@@ -201,10 +222,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     run.gravity_base = traced.gravity_base;
     run.calibration = std::move(traced.calibration);
     if (traced.stamp_jitter_s > 0.0) {
-      run.warnings.push_back(fmt::format(
-          "the frames' stamps scatter by {:.2g} ms (standard deviation) about the joint log's "
-          "clock: use stamps of the camera's own clock, or a camera that is triggered",
-          1e3 * traced.stamp_jitter_s));
+      run.warnings.push_back(jitter_words(traced.stamp_jitter_s, recording.log, observed));
       print_warning(run.warnings.back(), console);
     }
     clock.lap("trace", run.times);

@@ -15,7 +15,7 @@
 namespace kinescope::effects {
 namespace {
 
-constexpr double kFirstStep = 0.4;   // rad, of half the way between the directions tried first
+constexpr double kFirstStep = 0.4;    // rad, of half the way between the directions tried first
 constexpr double kLastStep = 0.0005;  // rad: axes that stand nearly upright show little more of it
 
 // The columns of a joint's sag for any gravity: loads are linear in it.

@@ -66,6 +66,8 @@ bool has_luma_plane(AVPixelFormat format) {
          d->comp[0].plane == 0 && d->comp[0].offset == 0;
 }
 
+constexpr double kLeastTicks = 4.0;  // a frame, for its stamp's rounding to be seen as such
+
 GreyImage copy_plane(const std::uint8_t* data, int stride, int width, int height) {
   GreyImage grey{width, height, {}};
   const std::size_t row_bytes = static_cast<std::size_t>(width);
@@ -195,6 +197,11 @@ class VideoFileReader final : public VideoReader {
     if (container_->start_time != AV_NOPTS_VALUE) {
       start_s_ = static_cast<double>(container_->start_time) / AV_TIME_BASE;
     }
+    // Matroska gives the last stamp for its length.
+    if (std::string_view(container_->iformat->name).starts_with("matroska"))
+      info_.duration_s = std::max(0.0, info_.duration_s - start_s_);
+    const double rate = av_q2d(s.r_frame_rate);
+    if (rate > 0.0 && 1.0 / rate >= kLeastTicks * av_q2d(s.time_base)) step_s_ = 1.0 / rate;
     if (const std::int32_t* matrix = display_matrix(s)) {
       const double angle = av_display_rotation_get(matrix);  // degrees counterclockwise
       if (std::isfinite(angle)) {
@@ -283,12 +290,21 @@ class VideoFileReader final : public VideoReader {
       ++unstamped_;
       return std::nullopt;
     }
-    const double time = static_cast<double>(frame_->best_effort_timestamp) * unit;
+    const double time = unrounded(static_cast<double>(frame_->best_effort_timestamp) * unit, unit);
     if (index_ > 0 && !(time > last_time_)) {
       ++unordered_;
       return std::nullopt;
     }
     return time;
+  }
+
+  // Containers round stamps to their ticks (Matroska: 1 ms), half a pixel of what moves fast. A
+  // stamp within a tick of the stream's even frames is that frame's.
+  [[nodiscard]] double unrounded(double time, double tick) {
+    if (!first_time_) first_time_ = time;
+    if (!(step_s_ > 0.0)) return time;
+    const double even = *first_time_ + std::round((time - *first_time_) / step_s_) * step_s_;
+    return std::abs(time - even) <= tick ? even : time;
   }
 
   GreyImage grey() {
@@ -375,7 +391,9 @@ class VideoFileReader final : public VideoReader {
   int unstamped_ = 0;
   int unordered_ = 0;
   double last_time_ = 0.0;
-  double start_s_ = 0.0;       // stamp of the container's beginning
+  double start_s_ = 0.0;  // stamp of the container's beginning
+  double step_s_ = 0.0;   // between even frames; 0: not known, or as fine as the ticks
+  std::optional<double> first_time_;
   std::vector<double> steps_;  // between frames, s
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/video.h"
 
+#include <cmath>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -86,6 +87,24 @@ TEST_F(Video, StampsOfUnevenFramesAreTheContainers) {
       EXPECT_TRUE(reader->warnings().empty()) << reader->warnings().front();
     }
   }
+}
+
+// Matroska counts in ms; a video that begins at 5 s is not cut off.
+TEST_F(Video, RoundedStampsOfEvenFramesAreEven) {
+  constexpr double kRate_hz = 30.0;
+  constexpr int kFirst_ms = 5000;
+  std::vector<int> stamps;
+  for (int i = 0; i < 60; ++i)
+    stamps.push_back(kFirst_ms + static_cast<int>(std::lround(1000.0 * i / kRate_hz)));
+  write_video(folder_ / "v.mkv", numbered(stamps, 2));
+  const auto reader = open_video(folder_ / "v.mkv");
+  int count = 0;
+  while (const auto frame = reader->next()) {
+    EXPECT_NEAR(frame->time_s, 1e-3 * kFirst_ms + frame->index / kRate_hz, 1e-9);
+    ++count;
+  }
+  EXPECT_EQ(count, 60);
+  EXPECT_TRUE(reader->warnings().empty()) << reader->warnings().front();
 }
 
 TEST_F(Video, AviHasEvenStamps) {
