@@ -13,8 +13,6 @@ namespace {
 // Effects that may be hidden by another one: p-values up to this, so many of them.
 constexpr double kHint = 0.2;
 constexpr std::size_t kMostHints = 3;
-// Several waves at one place are what any function is made of: a rest, not effects.
-constexpr std::ptrdiff_t kMostWaves = 3;
 
 }  // namespace
 
@@ -166,7 +164,7 @@ bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
 bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {
   return !score.hidden() && is_large(candidate, score) && !removed_.contains(candidate.id) &&
          is_possible(candidate, score.theta) &&
-         std::ranges::count(now_->added, candidate.id, &AddedEffect::id) < kMostWaves;
+         std::ranges::count(now_->added, candidate.id, &AddedEffect::id) < kMostAlike;
 }
 
 std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,

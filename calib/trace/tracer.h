@@ -4,6 +4,7 @@
 // (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp).
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <optional>
 #include <set>
@@ -16,6 +17,9 @@
 #include "calib/trace/trace.h"
 
 namespace kinescope::trace {
+
+// Several waves at one place are what any function is made of: a rest, not effects.
+inline constexpr std::ptrdiff_t kMostAlike = 3;
 
 class Tracer {
  public:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -18,6 +19,8 @@ constexpr std::size_t kMostRests = 3;
 // A rest that explains this much of what a named effect at its place explains puts that name in
 // doubt.
 constexpr double kDoubtfulShare = 0.1;
+// Of what several waves explain, held out, that a curve in their stead may leave.
+constexpr double kSmallLoss = 0.05;
 // Less than this of what named effects explain at its place is the imperfection of their shapes.
 constexpr double kSlightShare = 1e-3;
 
@@ -34,7 +37,7 @@ bool same_place(const std::string& rest, const std::string& effect) {
 }  // namespace
 
 // Several waves at one place are what any function is made of. Where one curve in their stead
-// predicts as well, none of them is the cause.
+// predicts as well, or as many of them as there may be hardly better, none of them is the cause.
 void Tracer::replace_waves_by_a_curve() {
   std::map<EffectId, std::vector<std::size_t>> same;
   for (std::size_t i = 0; i < now_->added.size(); ++i) same[now_->added[i].id].push_back(i);
@@ -45,10 +48,12 @@ void Tracer::replace_waves_by_a_curve() {
     StagePtr stage = stage_of(std::move(others));
     const auto curve = find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates, {},
                                  rest_level(), options_);
-    if (!curve || !same_place(curve->rest.place, id.place) ||
-        predicts_clearly_worse(curve->held_out, now_->held_out.whitened)) {
-      continue;
-    }
+    if (!curve || !same_place(curve->rest.place, id.place)) continue;
+    const double explained = stage->held_out_sum() - now_->held_out_sum();
+    const double lost = curve->held_out.sum() - now_->held_out_sum();
+    const bool hardly_worse =
+        std::cmp_greater_equal(members.size(), kMostAlike) && lost < kSmallLoss * explained;
+    if (!hardly_worse && predicts_clearly_worse(curve->held_out, now_->held_out.whitened)) continue;
     removed_.insert(id);
     mark(round_, id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);

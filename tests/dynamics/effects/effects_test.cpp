@@ -155,6 +155,25 @@ TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
   EXPECT_TRUE(out.contacts.empty());
 }
 
+// A step over the position is in no library. A spring and three ripples come near to it.
+TEST(TorqueEffects, a_snag_is_no_sum_of_ripples) {
+  for (const std::uint64_t seed : {8044U, 8049U, 8052U}) {
+    Rng rng = Rng::from_name("trace_torque", seed);
+    const int joint = static_cast<int>(seed % 5);
+    const EffectWorld world =
+        effect_world({{.effect = "snag", .joint = joint, .strength = 0.15}}, {}, rng);
+    MotionOptions motion;
+    motion.cutoff_hz = tracing_cutoff_hz(derive_motion(world.log).cutoff);
+    const Motion derived = derive_motion(world.log, motion);
+    TorqueTraceOptions options;
+    options.model.filter = {derived.filter, derived.cutoff.cutoff_hz};
+    const Trace trace = trace_torque(world.model, derived.samples, options).trace;
+    EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << seed << ": " << trace.reason;
+    ASSERT_FALSE(trace.rest.empty());
+    EXPECT_EQ(trace.rest.front().covariate, "value of joint" + std::to_string(joint + 1));
+  }
+}
+
 TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);
