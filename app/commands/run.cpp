@@ -70,7 +70,7 @@ double mean_step(const std::vector<double>& times_s) {
 // too.
 std::string jitter_words(double jitter_s, const JointLog& log, const Observed& observed) {
   constexpr double kSlow = 2.0;  // frames
-  const double log_step = mean_step(log.times_s);
+  const double log_step = log.size() > 1 ? mean_step(log.times_s) : 0.0;
   if (log_step > kSlow * mean_step(observed.measurements.times_s)) {
     return fmt::format(
         "the frames and the joint log scatter by {:.2g} ms (standard deviation) about each other: "

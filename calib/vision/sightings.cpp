@@ -23,8 +23,7 @@ constexpr double kJumpOfMotion = 0.75;  // .. and of its motion between the neig
 constexpr double kJumpLeast = 5.0;      // .. and than this many px
 constexpr double kMarginRatio =
     1.5;  // decision margins that differ by this tell two detections apart
-
-constexpr double kNearlyAll = 0.9;
+constexpr double kNearlyAll = 0.9;  // of a marker's sightings
 
 using Sightings = std::vector<TagObservation>;
 
