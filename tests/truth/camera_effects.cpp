@@ -268,6 +268,24 @@ void film(const EffectWorldOptions& options, const FilmedRobot& robot, const Mec
   }
 }
 
+// Every tag's pose in every frame, from whatever side: what a tracker sees.
+void track(const EffectWorldOptions& options, const FilmedRobot& robot, const Eye& eye,
+           World& world) {
+  PoseTracks& poses = world.measurements.poses;
+  poses.times_s = world.measurements.times_s;
+  for (const Marker& marker : robot.tree.markers) {
+    PoseTrack track;
+    track.id = marker.id;
+    for (int f = 0; f < options.frames; ++f) {
+      PoseSample sample;
+      sample.frame = f;
+      sample.T_camera_marker = eye.camera_from_tag(marker, f / options.frame_rate_hz);
+      track.samples.push_back(sample);
+    }
+    poses.tracks.push_back(std::move(track));
+  }
+}
+
 double rounded(double value, double step) {
   return step > 0.0 ? step * std::round(value / step) : value;
 }
@@ -300,6 +318,7 @@ FilmedRobot robot_of(const EffectWorldOptions& options) {
   robot.kind = options.kind;
   robot.duration_s = options.frames / options.frame_rate_hz;
   robot.amplitude_rad = options.amplitude_rad;
+  robot.rest_s = options.rest_s;
   robot.tag_size_m = options.tag_size_m;
   robot.scale = options.scale;
   robot.down = options.down;
@@ -318,7 +337,9 @@ World make_effect_world(const EffectWorldOptions& options) {
   world.camera = robot.camera;
   world.markers = robot.markers;
   log_encoders(options, robot, world);
-  film(options, robot, mechanics, Eye(robot, mechanics, std::move(undeclared)), world);
+  const Eye eye(robot, mechanics, std::move(undeclared));
+  film(options, robot, mechanics, eye, world);
+  if (options.poses) track(options, robot, eye, world);
   return world;
 }
 

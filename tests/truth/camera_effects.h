@@ -23,6 +23,7 @@ struct EffectWorldOptions {
   double frame_rate_hz = 30.0;
   double log_rate_hz = 200.0;
   double amplitude_rad = 1.0;
+  double rest_s = 0.0;  ///< at the beginning and the end
   double tag_size_m = 0.05;
   double scale = 1.0;                                ///< of the robot, not of its tags
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< gravity, base frame
@@ -32,6 +33,7 @@ struct EffectWorldOptions {
   double detector_bias_px = 0.0;  ///< outward, grows to this as a tag is seen from the side
   double encoder_step_rad = 0.0;  ///< the log is rounded to this; slides by the m per rad
   double clock_jitter = 0.1;      ///< of the log's stamps, share of their distance
+  bool poses = false;             ///< of the tags, exact, beside the corners
   std::vector<InjectedEffect> effects;
 };
 

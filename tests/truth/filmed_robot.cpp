@@ -84,6 +84,20 @@ std::vector<JointPlan> gantry(Rng& rng) {
   return plan;
 }
 
+std::vector<JointPlan> planar(Rng& rng) {
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  std::vector<JointPlan> plan;
+  for (int j = 0; j < 4; ++j)
+    plan.push_back(built(j, JointType::kRevolute, {0.12, 0.02 * (j % 2), 0.03}, z, rng));
+  return plan;
+}
+
+std::vector<JointPlan> slider_wrist(Rng& rng) {
+  std::vector<JointPlan> plan = random_chain(5, rng);
+  plan[3].type = plan[4].type = JointType::kPrismatic;
+  return plan;
+}
+
 std::vector<JointPlan> plan_of(RobotKind kind, Rng& rng) {
   switch (kind) {
     case RobotKind::kArm3:
@@ -96,6 +110,12 @@ std::vector<JointPlan> plan_of(RobotKind kind, Rng& rng) {
       return gantry(rng);
     case RobotKind::kTree:
       return random_tree(rng);
+    case RobotKind::kArm7:
+      return random_chain(7, rng);
+    case RobotKind::kPlanar:
+      return planar(rng);
+    case RobotKind::kWrist:
+      return slider_wrist(rng);
   }
   return {};
 }
@@ -172,6 +192,12 @@ std::string_view to_string(RobotKind kind) {
       return "gantry";
     case RobotKind::kTree:
       return "tree";
+    case RobotKind::kArm7:
+      return "arm7";
+    case RobotKind::kPlanar:
+      return "planar";
+    case RobotKind::kWrist:
+      return "wrist";
   }
   return "";
 }
@@ -182,7 +208,8 @@ std::vector<double> instants(double duration_s, double step_s) {
   return out;
 }
 
-SmoothMotion::SmoothMotion(double reach, const FilmedRobotOptions& options, Rng& rng) {
+SmoothMotion::SmoothMotion(double reach, const FilmedRobotOptions& options, Rng& rng)
+    : rest_s_(options.rest_s), duration_s_(options.duration_s) {
   for (Sine& sine : sines_) {
     sine.amplitude = rng.uniform(0.4, 1.0);
     sine.omega = 2.0 * std::numbers::pi * rng.uniform(options.lowest_hz, options.highest_hz);
@@ -194,16 +221,31 @@ SmoothMotion::SmoothMotion(double reach, const FilmedRobotOptions& options, Rng&
   for (Sine& sine : sines_) sine.amplitude *= reach / peak;
 }
 
+double SmoothMotion::phase_s(double t_s) const {
+  if (rest_s_ <= 0.0) return t_s;
+  // Constant acceleration over a second, so that the start is no jerk.
+  const auto since = [](double t) { return t <= 0.0 ? 0.0 : t < 1.0 ? 0.5 * t * t : t - 0.5; };
+  return since(t_s - rest_s_) - since(t_s - (duration_s_ - rest_s_ - 1.0));
+}
+
+double SmoothMotion::pace(double t_s) const {
+  if (rest_s_ <= 0.0) return 1.0;
+  const auto since = [](double t) { return std::clamp(t, 0.0, 1.0); };
+  return since(t_s - rest_s_) - since(t_s - (duration_s_ - rest_s_ - 1.0));
+}
+
 double SmoothMotion::value(double t_s) const {
   double sum = 0.0;
-  for (const Sine& s : sines_) sum += s.amplitude * std::sin(s.omega * t_s + s.phase);
+  const double t = phase_s(t_s);
+  for (const Sine& s : sines_) sum += s.amplitude * std::sin(s.omega * t + s.phase);
   return sum;
 }
 
 double SmoothMotion::rate(double t_s) const {
   double sum = 0.0;
-  for (const Sine& s : sines_) sum += s.amplitude * s.omega * std::cos(s.omega * t_s + s.phase);
-  return sum;
+  const double t = phase_s(t_s);
+  for (const Sine& s : sines_) sum += s.amplitude * s.omega * std::cos(s.omega * t + s.phase);
+  return sum * pace(t_s);
 }
 
 Eigen::VectorXd FilmedRobot::encoders(double t_s) const {
@@ -218,6 +260,7 @@ FilmedRobot draw_filmed_robot(const FilmedRobotOptions& options) {
   Rng rng = Rng::from_name(fmt::format("filmed robot {}", to_string(options.kind)), options.seed);
   FilmedRobot robot;
   robot.duration_s = options.duration_s;
+  robot.rest_s = options.rest_s;
   robot.prismatic_m_per_rad = options.scale * options.prismatic_m_per_rad;
   robot.seed = options.seed;
   robot.down = options.down.normalized();

@@ -22,10 +22,17 @@ enum class RobotKind {
   kArm6,    ///< six
   kScara,   ///< R R P R, axes nearly parallel
   kGantry,  ///< P P P at right angles and a wrist
-  kTree     ///< a trunk with two branches, five joints
+  kTree,    ///< a trunk with two branches, five joints
+  kArm7,    ///< seven
+  kPlanar,  ///< four revolute joints, axes nearly parallel
+  kWrist    ///< R R R and a wrist of two slides
 };
+/// Those of the figures that others are compared with.
 inline constexpr std::array<RobotKind, 5> kRobotKinds{
     RobotKind::kArm3, RobotKind::kArm6, RobotKind::kScara, RobotKind::kGantry, RobotKind::kTree};
+inline constexpr std::array<RobotKind, 8> kAllRobotKinds{
+    RobotKind::kArm3, RobotKind::kArm6, RobotKind::kScara,  RobotKind::kGantry,
+    RobotKind::kTree, RobotKind::kArm7, RobotKind::kPlanar, RobotKind::kWrist};
 [[nodiscard]] std::string_view to_string(RobotKind kind);
 
 struct FilmedRobotOptions {
@@ -36,13 +43,14 @@ struct FilmedRobotOptions {
   double prismatic_m_per_rad = 0.12;  ///< prismatic joints move this far where others turn by 1 rad
   double lowest_hz = 0.1;             ///< of the three sines of every joint
   double highest_hz = 0.4;
+  double rest_s = 0.0;  ///< at the beginning and the end; a second of starting and stopping between
   double tag_size_m = 0.05;
   double scale = 1.0;                                ///< of the links' lengths and the slides' ways
   double distance_m = 1.3;                           ///< of the camera from the middle of the robot
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< gravity, base frame
 };
 
-/// Three sines.
+/// Three sines, begun and ended at rest where that is asked for.
 class SmoothMotion {
  public:
   /// Peak `reach` between 0 and `duration_s`.
@@ -56,7 +64,13 @@ class SmoothMotion {
     double omega = 0.0;  ///< rad/s
     double phase = 0.0;
   };
+  // Time along the motion, and how fast it goes.
+  [[nodiscard]] double phase_s(double t_s) const;
+  [[nodiscard]] double pace(double t_s) const;
+
   std::array<Sine, 3> sines_;
+  double rest_s_ = 0.0;
+  double duration_s_ = 0.0;
 };
 
 /// 0, step, .. up to the duration.
@@ -69,6 +83,7 @@ struct FilmedRobot {
   MarkerSet markers;
   std::vector<SmoothMotion> motions;  ///< of every joint's encoder, on the joint log's clock
   double duration_s = 0.0;
+  double rest_s = 0.0;  ///< at the beginning and the end
   double prismatic_m_per_rad = 0.0;
   std::uint64_t seed = 0;
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< gravity, unit, base frame

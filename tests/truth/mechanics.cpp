@@ -145,9 +145,9 @@ Mechanics::Motion motion_of(const InjectedEffect& effect, double phase,
 
 }  // namespace
 
-Play::Play(const SmoothMotion& leader, double width, double duration_s)
+Play::Play(const SmoothMotion& leader, double width, double duration_s, double start)
     : leader_(leader), half_width_(0.5 * width) {
-  double held = leader_.value(-kBefore);
+  double held = leader_.value(-kBefore) + start * half_width_;
   const auto steps = static_cast<std::size_t>((duration_s + 2.0 * kBefore) / kStep);
   for (std::size_t i = 0; i <= steps; ++i) {
     const double q = leader_.value(static_cast<double>(i) * kStep - kBefore);
@@ -247,7 +247,9 @@ void Mechanics::add(const InjectedEffect& effect) {
   KINESCOPE_CHECK(can_have(robot_.tree.joints[j].type, effect.effect),
                   "an effect sits on a joint that can have it");
   if (effect.effect == "backlash") {
-    plays_[j].emplace(robot_.motions[j], effect.size, robot_.duration_s);
+    // A robot that rests at first may rest anywhere in its gap.
+    const double start = robot_.rest_s > 0.0 ? rng.uniform(-1.0, 1.0) : 0.0;
+    plays_[j].emplace(robot_.motions[j], effect.size, robot_.duration_s, start);
   } else if (effect.effect == "compliance") {
     const double largest = gravity_range(robot_, j).largest();
     KINESCOPE_CHECK(largest > 0.0, "gravity acts on a joint that sags");

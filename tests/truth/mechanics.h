@@ -17,7 +17,8 @@ namespace kinescope::truth {
 /// crossed the gap. Runs from 2 s before the recording to 2 s after it.
 class Play {
  public:
-  Play(const SmoothMotion& leader, double width, double duration_s);
+  /// `start`: where in the gap it begins, -1 to 1.
+  Play(const SmoothMotion& leader, double width, double duration_s, double start = 0.0);
   [[nodiscard]] double value(double t_s) const;
 
  private:
