@@ -101,33 +101,15 @@ bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
   return within;
 }
 
-bool is_answer(const RunSummary& run) {
-  return run.calibration.status != CalibrationStatus::kUndetermined &&
-         !(run.structure && run.structure->status == StructureStatus::kAmbiguous);
-}
-
 void require_trace(const RunSummary& run) {
   if (!run.trace || run.trace->verdict != TraceVerdict::kNothingToSay) return;
   throw undetermined("tracing", run.trace->reason,
                      "record longer, through more postures; the calibration stands");
 }
 
-void require_answer(const RunSummary& run, std::string_view see) {
-  if (is_answer(run)) return;
-  if (run.calibration.status == CalibrationStatus::kUndetermined) {
-    throw undetermined("calibration", run.calibration.status_reason,
-                       fmt::format("{}; {}", run.calibration.status_remedy, see));
-  }
-  const Structure& structure = value_of(run.structure);
-  const bool known = !structure.doubts.empty();
-  throw undetermined(
-      "structure",
-      known ? structure.doubts.front().what
-            : "another structure explains the recording as well: " + structure.runner_up,
-      fmt::format(
-          "{}; {}",
-          known ? structure.doubts.front().remedy : "record every joint moving at its own time",
-          see));
+void require(const Answer& answer, std::string_view see) {
+  if (answer.given) return;
+  throw undetermined(answer.where, answer.what, fmt::format("{}; {}", answer.remedy, see));
 }
 
 }  // namespace kinescope

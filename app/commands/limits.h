@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/report/run_summary.h"
+#include "app/report/answer.h"
 
 namespace kinescope {
 
@@ -24,15 +24,11 @@ struct Limit {
 /// Prints one line to standard error for every limit that is passed.
 [[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits);
 
-/// False when the result must not be trusted: an axis that is not determined, a structure with
-/// another one as probable.
-[[nodiscard]] bool is_answer(const RunSummary& run);
-
 /// Throws undetermined when tracing was able to say nothing.
 void require_trace(const RunSummary& run);
 
-/// Throws undetermined when the result is no answer. `see` says where the details are. Called once
+/// Throws undetermined where there is no answer. `see` says where the details are. Called once
 /// everything is written.
-void require_answer(const RunSummary& run, std::string_view see);
+void require(const Answer& answer, std::string_view see);
 
 }  // namespace kinescope

@@ -7,19 +7,21 @@
 #include <fmt/format.h>
 
 #include "app/commands/commands.h"
+#include "app/commands/explain.h"
 #include "app/commands/limits.h"
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
-#include "app/commands/trace_stage.h"
 #include "app/io/effects_file.h"
 #include "app/io/products.h"
+#include "app/report/answer.h"
 #include "app/report/report.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
 #include "calib/bundle/branches.h"
 #include "calib/quality/error_summary.h"
+#include "calib/quality/odd_readings.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
@@ -97,7 +99,7 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
   if (report == kReport) {
     fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(),
-               is_answer(run) ? "" : " (not determined: see below)");
+               judge(run).given ? "" : " (no answer: see below)");
   }
   fmt::print("report  {}\n", folder.file(report).string());
 }
@@ -170,6 +172,46 @@ Seen see(const Recording& recording, const RunOptions& options,
   return out;
 }
 
+bool shows_postures(const RunSummary& run) {
+  std::vector<int> channels;
+  for (const Joint& joint : run.calibration.tree.joints) {
+    if (const auto channel = run.log.channel(joint.channel)) channels.push_back(*channel);
+  }
+  return !run.log.empty() && is_posture_log(run.log, run.calibration.times_s, channels);
+}
+
+std::string odd_words(const OddReading& odd, const Recording& recording) {
+  return fmt::format(
+      "{}: at {} = {:.6g} '{}' reads {:.6g}, but the markers it moves say {:.6g}: left out",
+      recording.log.source, recording.log.time_column, odd.time_s, odd.channel, odd.read,
+      odd.expected);
+}
+
+ExplainOptions explain_options(const RunOptions& options, RunSummary& run, Stopwatch& clock,
+                               const Progress& progress) {
+  ExplainOptions out;
+  out.calibrate = options.calibrate;
+  out.calibrate.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
+  out.trace = options.trace;
+  out.lap = [&](std::string_view stage) { clock.lap(std::string(stage), run.times); };
+  out.progress = progress;
+  return out;
+}
+
+void take(TracedCalibration fitted, const Recording& recording, const Observed& observed,
+          const RunOptions& options, RunSummary& run) {
+  run.calibration = std::move(fitted.calibration);
+  run.effects = std::move(fitted.effects);
+  run.gravity_base = fitted.gravity_base;
+  if (options.trace) run.trace = std::move(fitted.trace);
+  if (fitted.stamp_jitter_s > 0.0)
+    run.warnings.push_back(jitter_words(fitted.stamp_jitter_s, run.log, observed));
+  // Between the readings of a motion a single wrong one is a spike, and stands apart already.
+  if (!shows_postures(run)) return;
+  for (const OddReading& odd : odd_readings(run.calibration, run.tracks, run.log))
+    run.warnings.push_back(odd_words(odd, recording));
+}
+
 }  // namespace
 
 ExitCode run_command(const RunOptions& options, const Console& console) {
@@ -195,38 +237,18 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
-  CalibrateOptions calibrate_options = options.calibrate;
-  calibrate_options.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
-  CalibrationStart begin;
-  if (recording.nominal) {
-    CheckedNominal checked =
-        start_from_nominal(recording, observed.measurements, run.tracks, camera, run.warnings);
-    run.nominal_faults = std::move(checked.faults);
-    begin = std::move(checked.start);
-    clock.lap("structure", run.times);
-  } else {
-    run.structure = find_robot(recording, run.tracks, options.calibrate);
-    if (!answered) write_structure(run, folder);
-    require_determined(*run.structure);
-    clock.lap("structure", run.times);
-    begin = start_from_structure(*run.structure, recording, camera);
-  }
-  run.calibration = calibrate(observed.measurements, recording.markers, recording.log, begin,
-                              calibrate_options, console.progress);
-  clock.lap("calibrate", run.times);
-  if (options.trace) {
-    TracedCalibration traced = trace_stage(recording, observed, begin, run.calibration,
-                                           calibrate_options, console.progress);
-    run.trace = std::move(traced.trace);
-    run.effects = std::move(traced.effects);
-    run.gravity_base = traced.gravity_base;
-    run.calibration = std::move(traced.calibration);
-    if (traced.stamp_jitter_s > 0.0) {
-      run.warnings.push_back(jitter_words(traced.stamp_jitter_s, recording.log, observed));
-      print_warning(run.warnings.back(), console);
-    }
-    clock.lap("trace", run.times);
-  }
+  const Evidence evidence{recording, observed, run.tracks, camera};
+  const std::size_t told = run.warnings.size();
+  Explanation best =
+      explain(evidence, explain_options(options, run, clock, console.progress), run.warnings);
+  run.log = std::move(best.log);
+  run.structure = std::move(best.structure);
+  run.nominal_faults = std::move(best.nominal_faults);
+  if (!answered) write_structure(run, folder);
+  if (best.failure) throw Error(*best.failure);
+  run.tracks = std::move(best.tracks);
+  take(std::move(value_of(best.fitted)), recording, observed, options, run);
+  for (std::size_t k = told; k < run.warnings.size(); ++k) print_warning(run.warnings[k], console);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
   run.errors = summarise_errors(run.calibration);
 
@@ -234,11 +256,12 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
                                ? write_urdf(with_nominal_limits(run.calibration.tree, *run.nominal),
                                             LimitSource::kRobotFile)
                                : write_urdf(run.calibration.tree);
-  if (answered && !is_answer(run)) {
+  const Answer answer = judge(run);
+  if (answered && !answer.given) {
     folder.write(kFailedReport, report_html(run, urdf));
     print_result(run, folder, kFailedReport, console);
-    require_answer(run, fmt::format("{} shows the details, the earlier answer stays",
-                                    folder.file(kFailedReport).string()));
+    require(answer, fmt::format("{} shows the details, the earlier answer stays",
+                                folder.file(kFailedReport).string()));
   }
   if (answered) folder.keep_observations(recording, observed.tags);
   write_products(run, urdf, folder);
@@ -255,7 +278,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   folder.write(kRun, run_json(run, folder.products()).dump(2) + "\n");
 
   print_result(run, folder, kReport, console);
-  require_answer(run, "the report shows the details");
+  require(answer, "the report shows the details");
   if (options.must_trace) require_trace(run);
   return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
 }

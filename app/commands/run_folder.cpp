@@ -152,13 +152,8 @@ bool RunFolder::holds_answer() const {
   if (!fs::exists(file("robot.urdf"))) return false;
   if (!fs::exists(file("result.json"))) return true;
   const json result = json::parse(read_text_file(file("result.json")), nullptr, false);
-  const auto status = [&](const char* part) {
-    const bool there = result.is_object() && result.contains(part) && result[part].is_object();
-    const json value = there ? result[part].value("status", json()) : json();
-    return value.is_string() ? value.get<std::string>() : std::string();
-  };
-  return status("calibration") != to_string(CalibrationStatus::kUndetermined) &&
-         status("structure") != to_string(StructureStatus::kAmbiguous);
+  const json verdict = result.is_object() ? result.value("verdict", json()) : json();
+  return !verdict.is_object() || verdict.value("answer", json(true)) != json(false);
 }
 
 void RunFolder::write(std::string_view name, std::string_view content) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/trace_stage.h"
 
+#include <algorithm>
+
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -29,11 +31,15 @@ CalibrationStart continued(const CalibrationStart& start, const Calibration& pla
 }
 
 // What is exported is fitted once more, without the curves of a rest: its numbers hold together.
-void take_values(const Calibration& calibration, std::vector<FittedEffect>& effects) {
+void take_values(const Calibration& calibration, const std::vector<Correction>& corrections,
+                 std::vector<FittedEffect>& effects) {
   std::vector<double> values;
   for (const Parameter& parameter : calibration.parameters) {
     if (parameter.block == "effects") values.push_back(parameter.value);
   }
+  KINESCOPE_CHECK(values.size() == corrections.size(), "a value for each correction");
+  values.resize(
+      static_cast<std::size_t>(std::ranges::count(corrections, false, &Correction::is_nuisance)));
   std::size_t next = 0;
   for (FittedEffect& effect : effects) {
     if (effect.id == EffectId{"time_offset", "clock"}) {
@@ -49,6 +55,7 @@ void take_values(const Calibration& calibration, std::vector<FittedEffect>& effe
 
 TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
                               const CalibrationStart& start, const Calibration& plain,
+                              const std::vector<AddedEffect>& known,
                               const CalibrateOptions& options, const Progress& progress) {
   if (options.free != FreeGeometry::kGeometry) {
     TracedCalibration out{{}, plain, {}, {}, 0.0};
@@ -60,6 +67,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   }
   CalibrationTraceOptions trace_options;
   trace_options.calibrate = options;
+  trace_options.trace.start = known;
   if (recording.entry == RecordingEntry::kVideo) trace_options.trace.floor = kDetectorBias;
   // A declared gravity, and a nominal robot, put the base upright.
   if (recording.settings.gravity || start.nominal) {
@@ -75,7 +83,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
     out.calibration =
         calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
   }
-  take_values(out.calibration, out.effects);
+  take_values(out.calibration, from.corrections, out.effects);
   return out;
 }
 

@@ -16,10 +16,11 @@ struct TracedCalibration {
   double stamp_jitter_s = 0.0;  ///< CalibrationTrace's
 };
 
-/// `start` is where `plain` began. The time offset stays estimated whether it is found to matter or
-/// not.
+/// `start` is where `plain` began; `known`: effects that it begins with, which stay if they earn
+/// their place. The time offset stays estimated whether it is found to matter or not.
 [[nodiscard]] TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
                                             const CalibrationStart& start, const Calibration& plain,
+                                            const std::vector<AddedEffect>& known,
                                             const CalibrateOptions& options,
                                             const Progress& progress);
 

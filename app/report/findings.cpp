@@ -7,8 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "app/report/answer.h"
 #include "app/report/facts.h"
 #include "app/report/numbers.h"
+#include "app/report/verdict_words.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -31,12 +33,15 @@ constexpr double kRarelySeen = 0.3;     ///< share of the frames
 constexpr double kSmallMarker = 25.0;   ///< px: below, tilt and depth are poorly seen
 constexpr double kOftenRejected = 0.1;  ///< share of the sightings of one marker
 
-void add_failures(const RunSummary& run, std::vector<Finding>& findings) {
-  const Calibration& calibration = run.calibration;
-  if (calibration.status == CalibrationStatus::kConverged) return;
-  std::string what = fmt::format("The calibration is {}", status_words(calibration.status));
-  if (!calibration.status_reason.empty()) what += ": " + calibration.status_reason;
-  findings.push_back({kFailure, sentence(what), ""});
+void add_failure(const RunSummary& run, std::vector<Finding>& findings) {
+  const Answer answer = judge(run);
+  if (answer.given) return;
+  findings.push_back(
+      {kFailure, sentence("This is no answer: " + answer.what), sentence(answer.remedy)});
+}
+
+bool is_told(const std::string& what, const std::vector<Finding>& findings) {
+  return std::ranges::find(findings, what, &Finding::what) != findings.end();
 }
 
 void add_structure_doubts(const RunSummary& run, std::vector<Finding>& findings) {
@@ -45,6 +50,7 @@ void add_structure_doubts(const RunSummary& run, std::vector<Finding>& findings)
   const bool traced = run.trace && !run.trace->accepted.empty();
   for (const StructureDoubt& doubt : run.structure->doubts) {
     if (doubt.of_model && traced) continue;  // the section on effects names the cause
+    if (is_told(sentence("This is no answer: " + doubt.what), findings)) continue;
     findings.push_back({weight, sentence(doubt.what), sentence(doubt.remedy)});
     weight -= 0.1;
   }
@@ -300,26 +306,52 @@ std::string sentence(std::string text) {
   return text;
 }
 
-std::string fault_words(const KinematicTree& nominal, const NominalFault& fault) {
-  const Joint& joint = nominal.joints[static_cast<std::size_t>(fault.joint)];
-  std::string what;
-  if (fault.axis) {
-    what = fmt::format("{} of the nominal robot moves {} {} of its joint frame, not {}", joint.name,
-                       joint.type == JointType::kRevolute ? "about" : "along",
-                       direction_words(*fault.axis), direction_words(joint.axis));
-  } else {
-    const auto other = static_cast<std::size_t>(value_of(fault.exchanged_with));
-    what = fmt::format("The channels of {} and {} are exchanged", joint.name,
-                       nominal.joints[other].name);
+std::vector<std::string> fault_sentences(const KinematicTree& nominal,
+                                         const std::vector<NominalFault>& faults) {
+  const auto joint_of = [&](int joint) -> const Joint& {
+    return nominal.joints[static_cast<std::size_t>(joint)];
+  };
+  const auto taken_so = [](const std::string& what, const NominalFault& fault) {
+    return sentence(fmt::format("{}; taken so (typical error of {} in a first fit {} → {})", what,
+                                marker_name(fault.marker), error_words(fault.before),
+                                error_words(fault.after)));
+  };
+  std::vector<std::string> out;
+  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
+    std::vector<std::string> names;
+    const NominalFault* worst = nullptr;
+    for (const NominalFault& fault : faults) {
+      if (!fault.unit || joint_of(fault.joint).type != type) continue;
+      names.push_back(joint_of(fault.joint).name);
+      if (worst == nullptr || fault.before.px + fault.before.m > worst->before.px + worst->before.m)
+        worst = &fault;
+    }
+    if (worst == nullptr) continue;
+    out.push_back(taken_so(fmt::format("The column{} of {} {} in {}", names.size() == 1 ? "" : "s",
+                                       joined(names), names.size() == 1 ? "is" : "are",
+                                       type == JointType::kRevolute ? "degrees" : "mm"),
+                           *worst));
   }
-  return sentence(fmt::format("{}; taken so (typical error of {} in a first fit {} → {})", what,
-                              marker_name(fault.marker), error_words(fault.before),
-                              error_words(fault.after)));
+  for (const NominalFault& fault : faults) {
+    const Joint& joint = joint_of(fault.joint);
+    if (fault.axis) {
+      out.push_back(
+          taken_so(fmt::format("{} of the nominal robot moves {} {} of its joint frame, not {}",
+                               joint.name, joint.type == JointType::kRevolute ? "about" : "along",
+                               direction_words(*fault.axis), direction_words(joint.axis)),
+                   fault));
+    } else if (fault.exchanged_with) {
+      out.push_back(taken_so(fmt::format("The channels of {} and {} are exchanged", joint.name,
+                                         joint_of(*fault.exchanged_with).name),
+                             fault));
+    }
+  }
+  return out;
 }
 
 std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis) {
   std::vector<Finding> findings;
-  add_failures(run, findings);
+  add_failure(run, findings);
   add_structure_doubts(run, findings);
   add_held_out(run, findings);
   add_dependence(run, analysis, findings);

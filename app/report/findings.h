@@ -23,7 +23,9 @@ struct Finding {
 /// A sentence of other rooms, begun with a capital and closed with a full stop.
 [[nodiscard]] std::string sentence(std::string text);
 
-/// "j6 of the nominal robot turns about x of its frame, not z: .." in one sentence with errors.
-[[nodiscard]] std::string fault_words(const KinematicTree& nominal, const NominalFault& fault);
+/// "j6 of the nominal robot turns about x of its frame, not z: .." in one sentence with errors; one
+/// for all columns in the same unit.
+[[nodiscard]] std::vector<std::string> fault_sentences(const KinematicTree& nominal,
+                                                       const std::vector<NominalFault>& faults);
 
 }  // namespace kinescope::report

@@ -36,7 +36,8 @@ struct Verdict {
 ///   schema, schema_version, coverage_factor
 ///   run            robot, recording, entry, kind (corners, poses, points), version,
 ///                  inputs [name, sha256], options [name, value]
-///   verdict        found, accurate, limits, next: the sentences that the report opens with
+///   verdict        answer (false: exit code 4), no_answer (what cannot be told; else null), found,
+///                  accurate, limits, next: the sentences that the report opens with
 ///   data           frames, duration_s, independent_frames (residuals are alike over time),
 ///   image_coverage
 ///                  (share of an 8 x 6 grid; corners only), camera_declared,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/report/answer.h"
 #include "app/report/facts.h"
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
@@ -238,6 +239,7 @@ json nominal_faults_json(const RunSummary& run) {
         {{"joint", name(fault.joint)},
          {"axis", fault.axis ? vector3(*fault.axis) : json(nullptr)},
          {"exchanged_with", fault.exchanged_with ? name(*fault.exchanged_with) : json(nullptr)},
+         {"unit", fault.unit ? number(*fault.unit) : json(nullptr)},
          {"marker", fault.marker.value},
          {"typical_error_with_it", error_json(fault.before)},
          {"typical_error_without", error_json(fault.after)}});
@@ -248,12 +250,15 @@ json nominal_faults_json(const RunSummary& run) {
 }  // namespace
 
 json make_result(const RunSummary& run, const Analysis& analysis, const Verdict& verdict) {
+  const Answer answer = judge(run);
   return {{"schema", "kinescope.result"},
           {"schema_version", 1},
           {"coverage_factor", kCoverageFactor},
           {"run", run_json(run)},
           {"verdict",
-           {{"found", text(verdict.found)},
+           {{"answer", answer.given},
+            {"no_answer", answer.given ? json(nullptr) : json(text(answer.what))},
+            {"found", text(verdict.found)},
             {"accurate", text(verdict.accurate)},
             {"limits", text(verdict.limits)},
             {"next", text(verdict.next)}}},

@@ -208,8 +208,10 @@ std::string found_words(const RunSummary& run) {
     text +=
         fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), what), driving_words(run));
     text += column_words(tree, run.log);
-    for (const NominalFault& fault : run.nominal_faults)
-      text += " " + fault_words(value_of(run.nominal), fault);
+    if (run.nominal) {
+      for (const std::string& words : fault_sentences(*run.nominal, run.nominal_faults))
+        text += " " + words;
+    }
     return text;
   }
   if (moving == 0) {

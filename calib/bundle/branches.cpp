@@ -4,23 +4,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "calib/bundle/links_in_camera.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
-
-// Links in the camera's frame, one list a frame; empty where a joint value is unknown.
-std::vector<std::vector<Pose>> links_in_camera(const Calibration& calibration) {
-  std::vector<std::vector<Pose>> out;
-  for (Eigen::Index f = 0; f < calibration.joint_values.rows(); ++f) {
-    std::vector<Pose>& links = out.emplace_back();
-    const Eigen::VectorXd q = calibration.joint_values.row(f);
-    if (!q.allFinite()) continue;
-    links = forward_kinematics(calibration.tree, q);
-    for (Pose& link : links) link = calibration.T_camera_base * link;
-  }
-  return out;
-}
 
 void take_other(PoseSample& sample) {
   std::swap(sample.T_camera_marker, value_of(sample.T_camera_marker_alternative));
@@ -32,7 +20,7 @@ void take_other(PoseSample& sample) {
 
 PoseTracks with_branches_of(const Calibration& calibration, PoseTracks tracks) {
   if (calibration.status != CalibrationStatus::kConverged) return tracks;
-  const auto links = links_in_camera(calibration);
+  const auto links = bundle::links_in_camera(calibration);
   for (PoseTrack& track : tracks.tracks) {
     const auto marker = std::ranges::find(calibration.tree.markers, track.id, &Marker::id);
     if (marker == calibration.tree.markers.end()) continue;

@@ -118,6 +118,7 @@ Gain gain(const Errors& from, const Errors& to) {
 void mend(const NominalFault& fault, KinematicTree& tree) {
   Joint& joint = tree.joints[static_cast<std::size_t>(fault.joint)];
   if (fault.axis) joint.axis = *fault.axis;
+  if (fault.unit) joint.scale *= *fault.unit;
   if (fault.exchanged_with) {
     Joint& other = tree.joints[static_cast<std::size_t>(*fault.exchanged_with)];
     std::swap(joint.channel, other.channel);
@@ -141,20 +142,42 @@ std::vector<Eigen::Vector3d> other_directions(const Eigen::Vector3d& axis) {
   return out;
 }
 
+// Degrees for rad, or mm for m.
+double other_unit(JointType type) {
+  return type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
+}
+
+bool is_driven(const Joint& joint) {
+  return joint.type != JointType::kFixed && !joint.channel.empty();
+}
+
+// A log has one unit for angles and one for lengths, mostly.
+std::vector<NominalFault> other_units(const KinematicTree& tree, JointType type) {
+  std::vector<NominalFault> out;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (is_driven(tree.joints[j]) && tree.joints[j].type == type)
+      out.push_back({.joint = static_cast<int>(j), .unit = other_unit(type)});
+  }
+  return out;
+}
+
 std::vector<NominalFault> possible_faults(const KinematicTree& tree,
                                           const std::vector<NominalFault>& known) {
   std::vector<NominalFault> out;
   const int joints = static_cast<int>(tree.joints.size());
+  const auto is_known = [&](int j, bool unit) {
+    return std::ranges::any_of(known, [&](const NominalFault& fault) {
+      return fault.unit.has_value() == unit && (fault.joint == j || fault.exchanged_with == j);
+    });
+  };
   const auto is_open = [&](int j) {
-    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
-    return joint.type != JointType::kFixed && !joint.channel.empty() &&
-           std::ranges::none_of(known, [&](const NominalFault& fault) {
-             return fault.joint == j || fault.exchanged_with == j;
-           });
+    return is_driven(tree.joints[static_cast<std::size_t>(j)]) && !is_known(j, false);
   };
   for (int j = 0; j < joints; ++j) {
-    if (!is_open(j)) continue;
     const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+    if (is_driven(joint) && !is_known(j, true))
+      out.push_back({.joint = j, .unit = other_unit(joint.type)});
+    if (!is_open(j)) continue;
     for (const Eigen::Vector3d& axis : other_directions(joint.axis))
       out.push_back({.joint = j, .axis = axis});
     for (int k = j + 1; k < joints; ++k) {
@@ -276,8 +299,17 @@ CheckedNominal check_nominal(const KinematicTree& nominal,
   std::vector<NominalFault> faults;
   std::optional<Trial> now = try_out(faults);
   if (!now) return {place(nominal), {}};
+  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
+    std::vector<NominalFault> more = faults;
+    std::ranges::copy(other_units(nominal, type), std::back_inserter(more));
+    std::optional<Trial> trial = more.size() > faults.size() ? try_out(more) : std::nullopt;
+    if (!trial || gain(now->errors, trial->errors).mean < kBetter) continue;
+    faults = std::move(more);
+    now = std::move(trial);
+  }
+  const std::size_t most = faults.size() + kMostFaults;
   // Beside another fault the first one found may help little.
-  while (faults.size() < kMostFaults) {
+  while (faults.size() < most) {
     std::optional<NominalFault> best;
     std::optional<Trial> best_trial;
     for (const NominalFault& fault : possible_faults(nominal, faults)) {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a nominal robot and what was measured of the real one.
-// Gives   what of the drawing is grossly wrong: axes that point elsewhere, channels exchanged; and
-//         the drawing without that.
-// Method  every joint is tried with each of the other five directions of its frame, and every two
-//         channels are exchanged; the markers are placed anew and the robot fitted on few frames.
-//         The best is taken, then the best beside it, until nothing helps; what does not cut the
-//         typical error of any marker by half, with all the others in, is left out again.
+// Gives   what of the drawing and its columns is grossly wrong: axes that point elsewhere, channels
+//         exchanged, columns in degrees or mm; and the drawing without that.
+// Method  the columns of all joints of a type are tried in the other unit, every joint with each of
+//         the other five directions of its frame and in the other unit, and every two channels are
+//         exchanged; the markers are placed anew and the robot fitted on few frames. The best is
+//         taken, then the best beside it, until nothing helps; what does not cut the typical error
+//         of any marker by half, with all the others in, is left out again.
 // Why     a fit with a prior cannot leave a wrong axis, a robust loss hides it, and tracing names
 //         nonsense on top.
 #pragma once
@@ -30,6 +31,7 @@ struct NominalFault {
   int joint = 0;
   std::optional<Eigen::Vector3d> axis = {};  ///< the direction it moves along or about, joint frame
   std::optional<int> exchanged_with = {};    ///< another joint, whose channel drives this one
+  std::optional<double> unit = {};           ///< of its column, rad or m
   TagId marker = {};                         ///< the one that it concerns most
   TypicalError before = {};                  ///< of that one, with this fault alone
   TypicalError after = {};                   ///< with none

@@ -40,6 +40,8 @@ struct Correction {
   double value = 0.0;  ///< where the search starts
   /// What the shares were divided by (the largest load's arm, m); 1 where they were not.
   double reference = 1.0;
+  /// What nobody asks for and yet has to be known beside an effect: where in its gap a joint began.
+  bool is_nuisance = false;
 };
 
 }  // namespace kinescope

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "calib/bundle/axis_uncertainty.h"
 #include "calib/bundle/linearise.h"
@@ -75,7 +77,24 @@ bool is_held(const Spec& spec, std::size_t joint) {
   return spec.channel[joint] < 0 && !spec.free_value[joint];
 }
 
-void fill_tree(const Spec& spec, const State& state, Calibration& out) {
+// The sightings that show a joint move; all of them where the fit left out every one.
+std::vector<int> shown_by(const Spec& spec, const RobustSolution& robust, std::size_t joint) {
+  const auto shows = [&](int index) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
+    const std::vector<int>& path = spec.path[marker.link.index()];
+    return std::ranges::find(path, static_cast<int>(joint)) != path.end();
+  };
+  std::vector<int> out;
+  std::ranges::copy_if(robust.used, std::back_inserter(out), shows);
+  if (!out.empty()) return out;
+  out.resize(spec.sightings.size());
+  std::iota(out.begin(), out.end(), 0);
+  return out;
+}
+
+void fill_tree(const Spec& spec, const State& state, const RobustSolution& robust,
+               Calibration& out) {
   out.tree = spec.tree;
   for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
     Joint& joint = out.tree.joints[j];
@@ -86,8 +105,9 @@ void fill_tree(const Spec& spec, const State& state, Calibration& out) {
     if (joint.type == JointType::kFixed || is_held(spec, j)) continue;
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
-    for (const Sighting& sighting : spec.sightings) {
-      const double value = out.joint_values(sighting.frame, static_cast<Eigen::Index>(j));
+    for (const int index : shown_by(spec, robust, j)) {
+      const int frame = spec.sightings[static_cast<std::size_t>(index)].frame;
+      const double value = out.joint_values(frame, static_cast<Eigen::Index>(j));
       if (!std::isfinite(value)) continue;
       low = std::min(low, value);
       high = std::max(high, value);
@@ -175,7 +195,7 @@ void read_back(const Spec& spec, const State& state, const RobustSolution& robus
   out.observability = uncertainty.observability;
   out.correlation_time_s = uncertainty.correlation_time_s;
   fill_joint_values(spec, state, readings, out);
-  fill_tree(spec, state, out);
+  fill_tree(spec, state, robust, out);
   fill_joints(spec, state, uncertainty, out);
   fill_markers(spec, state, robust, uncertainty, out);
   fill_numbers(spec, state, uncertainty, out);

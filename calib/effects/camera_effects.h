@@ -35,6 +35,8 @@ struct CameraEffect {
   Candidate candidate;  ///< without columns
   /// One correction a parameter; for the time offset the bundle's own parameter instead.
   std::function<std::vector<Correction>(double scan)> corrections;
+  /// Nuisance parameters that the model has while the effect is in it. Empty: none.
+  std::function<std::vector<Correction>(double scan)> nuisances;
   bool is_time_offset = false;
 };
 

@@ -199,6 +199,17 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
     return std::vector{
         turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames_s))};
   };
+  if (world.known) return out;
+  // A robot that rests at first rests anywhere in its gap.
+  out.nuisances = [s, drive, log_s = world.log.times_s,
+                   frames_s = world.frames.times_s](double width) {
+    std::vector<Correction> start;
+    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames_s);
+    if (share.isZero(0.0)) return start;
+    start.push_back(turn(s, "place in its gap at the start", s.unit, std::move(share)));
+    start.back().is_nuisance = true;
+    return start;
+  };
   return out;
 }
 

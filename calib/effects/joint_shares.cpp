@@ -57,6 +57,16 @@ Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width) {
   return out;
 }
 
+Eigen::VectorXd share_of_start(const Eigen::VectorXd& drive, double width) {
+  Eigen::VectorXd out(drive.size());
+  double furthest = 0.0;
+  for (Eigen::Index i = 0; i < drive.size(); ++i) {
+    furthest = std::max(furthest, std::abs(drive[i] - drive[0]));
+    out[i] = std::max(0.0, 1.0 - furthest / (0.5 * width));
+  }
+  return out;
+}
+
 Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd& values,
                         const std::vector<double>& to_s) {
   Eigen::VectorXd out(static_cast<Eigen::Index>(to_s.size()));

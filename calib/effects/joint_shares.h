@@ -18,6 +18,11 @@ namespace kinescope::effects {
 /// unit of `drive`. Visintin 1994, section III.2 (the play operator).
 [[nodiscard]] Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width);
 
+/// What a link that began elsewhere in its gap than play_state() has it is further by, as a share
+/// of that at the beginning: until the drive has crossed the gap once. From the middle of the gap;
+/// from elsewhere nearly so.
+[[nodiscard]] Eigen::VectorXd share_of_start(const Eigen::VectorXd& drive, double width);
+
 /// `values` at the stamps `from_s`, read at `to_s` (both increasing); the ends stay.
 [[nodiscard]] Eigen::VectorXd read_at(const std::vector<double>& from_s,
                                       const Eigen::VectorXd& values,

@@ -38,7 +38,8 @@ struct FittedEffect {
 struct CalibrationTrace {
   Trace trace;
   std::vector<FittedEffect> effects;  ///< all that were accepted
-  /// Of all accepted effects but the time offset, in their order: for CalibrationStart.
+  /// Of all accepted effects but the time offset, in their order, then nuisances: for
+  /// CalibrationStart.
   std::vector<Correction> corrections;
   std::optional<Eigen::Vector3d> gravity_base;  ///< as declared, or as a joint's sag says
   double stamp_jitter_s = 0.0;                  ///< EffectBundle's

@@ -79,6 +79,22 @@ const CameraEffect& effect_of(const std::vector<CameraEffect>& library, const Ef
   return *found;
 }
 
+// Behind the effects' own parameters.
+std::vector<Correction> nuisances_of(const std::vector<CameraEffect>& library,
+                                     const std::vector<AddedEffect>& effects) {
+  std::vector<Correction> out;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    if (!effect.nuisances) continue;
+    for (Correction& nuisance : effect.nuisances(added.scan)) {
+      // Play that was found twice began at one place.
+      if (std::ranges::find(out, nuisance.name, &Correction::name) == out.end())
+        out.push_back(std::move(nuisance));
+    }
+  }
+  return out;
+}
+
 // Where each effect's parameters stand among those of the change.
 std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<CameraEffect>& library,
                                                         const std::vector<AddedEffect>& effects,
@@ -184,6 +200,8 @@ BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
       out.corrections.push_back(std::move(correction));
     }
   }
+  for (Correction& nuisance : nuisances_of(library, effects))
+    out.corrections.push_back(std::move(nuisance));
   return out;
 }
 
@@ -243,6 +261,9 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   const Eigen::Index own = fit.jacobian.cols() - fit.values.size();
   std::vector<Eigen::Index> order;
   for (Eigen::Index c = 0; c < own; ++c) order.push_back(c);
+  for (std::size_t c = 0; c < change.corrections.size(); ++c) {
+    if (change.corrections[c].is_nuisance) order.push_back(own + static_cast<Eigen::Index>(c));
+  }
   for (const std::vector<Eigen::Index>& effect : places) {
     Eigen::VectorXd& values = out.values.emplace_back(static_cast<Eigen::Index>(effect.size()));
     for (std::size_t k = 0; k < effect.size(); ++k) {
@@ -314,6 +335,10 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
       out.corrections.push_back(std::move(corrections[k]));
     }
     out.effects.push_back(std::move(fitted));
+  }
+  for (Correction& nuisance : nuisances_of(library, effects)) {
+    nuisance.value = fit.values[next++];
+    out.corrections.push_back(std::move(nuisance));
   }
   return out;
 }

@@ -18,7 +18,7 @@ class TracedBundle final : public TracedModel {
   /// The same with its numbers: the corrections that stand for the effects, at their values.
   struct Corrected {
     std::vector<FittedEffect> effects;
-    std::vector<Correction> corrections;  ///< of all effects but the time offset
+    std::vector<Correction> corrections;  ///< of all effects but the time offset, then nuisances
   };
   [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects) const;
 

@@ -204,7 +204,8 @@ TEST(Verdict, AnUndeterminedStructureStandsFirst) {
   run.structure->doubts = {{"q2 and q3 move together", "Move q3 while q2 rests", {"q2", "q3"}}};
   const Verdict verdict = make_verdict(run);
   EXPECT_TRUE(has(verdict.found, "cannot determine the structure")) << verdict.found;
-  EXPECT_EQ(verdict.limits.find("Q2 and q3 move together."), 0U) << verdict.limits;
+  EXPECT_EQ(verdict.limits.find("This is no answer: q2 and q3 move together."), 0U)
+      << verdict.limits;
   EXPECT_EQ(verdict.next.find("Move q3 while q2 rests."), 0U) << verdict.next;
 }
 
@@ -235,7 +236,9 @@ TEST(Verdict, AFailedSolveIsSaidFirst) {
   RunSummary run = synthetic_run();
   run.calibration.status = CalibrationStatus::kNotConverged;
   run.calibration.status_reason = "100 iterations were not enough";
-  EXPECT_EQ(make_verdict(run).limits.find("The calibration is not converged: 100 iterations"), 0U);
+  EXPECT_EQ(make_verdict(run).limits.find(
+                "This is no answer: the fit did not settle: 100 iterations were not enough."),
+            0U);
 }
 
 TEST(Verdict, PointsAtAMarkerThatIsRarelySeenOrOftenRejected) {

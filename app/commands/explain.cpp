@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/explain.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/bundle/undone.h"
+#include "calib/quality/odd_readings.h"
+#include "calib/quality/predictive_score.h"
+#include "calib/tracks/camera_from_tags.h"
+#include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/log/readings_apart.h"
+
+namespace kinescope {
+namespace {
+
+// Which marker is on which link, what joins what, driven by what: as a value that compares.
+using Shape = std::set<std::tuple<std::vector<TagId>, std::vector<TagId>, JointType, int>>;
+
+Shape shape_of(const Structure& structure) {
+  Shape out;
+  const auto markers = [&](int link) {
+    return structure.links[static_cast<std::size_t>(link)].markers;
+  };
+  for (const StructureJoint& joint : structure.joints)
+    out.emplace(markers(joint.parent_link), markers(joint.child_link), joint.type,
+                joint.channel ? joint.channel->channel : -1);
+  return out;
+}
+
+bool has_model_doubt(const Structure& structure) {
+  return std::ranges::any_of(structure.doubts, &StructureDoubt::of_model);
+}
+
+bool is_structure_clear(const Explanation& of) {
+  return !of.structure ||
+         (of.structure->status == StructureStatus::kDetermined && !has_model_doubt(*of.structure));
+}
+
+bool is_all_explained(const Trace& trace) {
+  return trace.verdict != TraceVerdict::kUnknown && trace.verdict != TraceVerdict::kNothingToSay;
+}
+
+/// Of one piece: nothing is in doubt, nothing is left.
+bool is_settled(const Explanation& of) {
+  return of.fitted && of.fitted->calibration.status == CalibrationStatus::kConverged &&
+         is_structure_clear(of) &&
+         (of.fitted->trace.verdict == TraceVerdict::kNotRun || is_all_explained(of.fitted->trace));
+}
+
+/// A structure, and effects to begin with beside it.
+struct Proposal {
+  Structure structure;
+  std::vector<AddedEffect> known;
+};
+
+class Explainer {
+ public:
+  /// Both must outlive it.
+  Explainer(const Evidence& evidence, const ExplainOptions& options)
+      : evidence_(evidence), options_(options) {}
+
+  /// The best account of this evidence.
+  [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
+    if (recording().nominal) return of_nominal(warnings);
+    Explanation first = of_structure(structure_of(evidence_.tracks), {});
+    return is_settled(first) ? first : improved(std::move(first));
+  }
+
+  /// ln of the odds, over all measurements that there are, of one against another.
+  [[nodiscard]] static double log_odds_of(const Explanation& one, const Explanation& other,
+                                          const Measurements& measurements) {
+    return log_odds(predictive_score(one.fitted->calibration, measurements),
+                    predictive_score(other.fitted->calibration, measurements));
+  }
+
+ private:
+  [[nodiscard]] Explanation begun() const {
+    Explanation out;
+    out.log = recording().log;
+    out.tracks = evidence_.tracks;
+    return out;
+  }
+
+  [[nodiscard]] Explanation of_nominal(std::vector<std::string>& warnings) const {
+    Explanation out = begun();
+    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed.measurements,
+                                                evidence_.tracks, evidence_.camera, warnings);
+    lap("structure");
+    out.nominal_faults = std::move(checked.faults);
+    out.start = std::move(checked.start);
+    fit(out, {});
+    return out;
+  }
+
+  /// `known`: effects that it begins with.
+  [[nodiscard]] Explanation of_structure(Structure structure,
+                                         const std::vector<AddedEffect>& known) const {
+    Explanation out = begun();
+    out.structure = std::move(structure);
+    try {
+      require_determined(*out.structure);
+      out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
+      fit(out, known);
+    } catch (const Error& error) {
+      keep_if_undetermined(error, out);
+    }
+    return out;
+  }
+
+  [[nodiscard]] Structure structure_of(const PoseTracks& tracks) const {
+    Structure out = find_robot(recording(), tracks, options_.calibrate);
+    lap("structure");
+    return out;
+  }
+
+  /// The best of what the moves propose, one after the other until one is of one piece.
+  [[nodiscard]] Explanation improved(Explanation now) const {
+    now = asked_again(std::move(now));
+    std::set<Shape> tried;
+    if (now.structure) tried.insert(shape_of(*now.structure));
+    for (const auto& propose :
+         {&Explainer::with_half_the_recording, &Explainer::with_camera_doubted}) {
+      if (is_settled(now)) break;
+      for (const Proposal& proposal : (this->*propose)(now)) {
+        // A structure alone is no news where it was fitted before.
+        if (proposal.known.empty() && !tried.insert(shape_of(proposal.structure)).second) continue;
+        Explanation other = asked_again(of_structure(proposal.structure, proposal.known));
+        if (is_better(other, now)) now = std::move(other);
+      }
+    }
+    return now;
+  }
+
+  [[nodiscard]] const Recording& recording() const { return evidence_.recording; }
+
+  void lap(std::string_view stage) const {
+    if (options_.lap) options_.lap(stage);
+  }
+
+  static void keep_if_undetermined(const Error& error, Explanation& out) {
+    if (error.code() != ExitCode::kUndetermined) throw Error(error);
+    out.fitted.reset();
+    out.failure = error;
+  }
+
+  void fit(Explanation& out, const std::vector<AddedEffect>& known) const {
+    const Measurements& measurements = evidence_.observed.measurements;
+    Calibration plain = calibrate(measurements, recording().markers, recording().log, out.start,
+                                  options_.calibrate, options_.progress);
+    lap("calibrate");
+    if (!options_.trace) {
+      out.fitted = TracedCalibration{{}, std::move(plain), {}, {}, 0.0};
+      return;
+    }
+    out.fitted = trace_stage(recording(), evidence_.observed, out.start, plain, known,
+                             options_.calibrate, options_.progress);
+    lap("trace");
+  }
+
+  [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
+    if (!one.fitted || !other.fitted) return one.fitted.has_value();
+    return log_odds_of(one, other, evidence_.observed.measurements) > 0.0;
+  }
+
+  // The structure was searched for on tracks that the effects were in: once more without them.
+  [[nodiscard]] Explanation asked_again(Explanation now) const {
+    if (!now.fitted || !now.structure || now.fitted->effects.empty() || is_structure_clear(now))
+      return now;
+    Structure again = structure_of(with_effects_undone(now.fitted->calibration, evidence_.tracks));
+    if (shape_of(again) == shape_of(*now.structure)) {
+      now.structure = std::move(again);
+      return now;
+    }
+    Explanation other = of_structure(std::move(again), now.fitted->trace.added);
+    return is_better(other, now) ? other : now;
+  }
+
+  // Of two halves of a recording in which something happened once (a bump, a slip), one shows the
+  // robot as it is.
+  [[nodiscard]] std::vector<Proposal> with_half_the_recording(const Explanation& now) const {
+    std::vector<Proposal> out;
+    if (is_structure_clear(now) || evidence_.tracks.times_s.size() < 2) return out;
+    const int middle = static_cast<int>(evidence_.tracks.times_s.size()) / 2;
+    for (const bool first : {true, false}) {
+      PoseTracks half = evidence_.tracks;
+      for (PoseTrack& track : half.tracks)
+        std::erase_if(track.samples,
+                      [&](const PoseSample& sample) { return (sample.frame < middle) != first; });
+      Structure structure = structure_of(half);
+      if (structure.status == StructureStatus::kDetermined)
+        out.push_back({std::move(structure), {}});
+    }
+    return out;
+  }
+
+  // A lens or a focal length that is not this camera's bends the tracks themselves. The robot that
+  // shows when the camera is found with it, the declared camera, and what it lacks as effects.
+  [[nodiscard]] std::vector<Proposal> with_camera_doubted(const Explanation& now) const {
+    const TagObservations& tags = evidence_.observed.tags;
+    const bool by_place =
+        now.fitted && std::ranges::any_of(now.fitted->trace.rest, &Rest::is_field);
+    if (!recording().camera || tags.observations.empty() ||
+        (is_structure_clear(now) && now.fitted && !by_place))
+      return {};
+    for (const CameraModel& begin :
+         {camera_from_tags(tags, recording().markers), evidence_.camera}) {
+      const std::optional<CameraModel> found =
+          camera_from_motion(recording(), evidence_.observed, begin, options_.calibrate);
+      if (!found) continue;
+      return {
+          {structure_of(pose_tracks_from_tags(tags, *found, recording().markers)),
+           {{{"lens_distortion", "camera"}, 0.0}, {{"lens_distortion", "camera pinhole"}, 0.0}}}};
+    }
+    return {};
+  }
+
+  const Evidence& evidence_;
+  const ExplainOptions& options_;
+};
+
+// Evidence that owns what it changed.
+struct ChangedEvidence {
+  Recording recording;
+  Observed observed;
+  PoseTracks tracks;
+};
+
+// Without these readings. What was measured at the very instant of one has no reading then.
+ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart>& apart) {
+  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
+  const JointLog& log = evidence.recording.log;
+  out.recording.log = without_readings(log, apart);
+  std::set<int> frames;
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  for (const ReadingApart& reading : apart) {
+    const auto frame = std::ranges::find(times_s, log.times_s[reading.row]);
+    if (frame != times_s.end()) frames.insert(static_cast<int>(frame - times_s.begin()));
+  }
+  const auto is_aside = [&](const auto& seen) { return frames.contains(seen.frame); };
+  Measurements& measured = out.observed.measurements;
+  std::erase_if(measured.corners, is_aside);
+  std::erase_if(measured.points.observations, is_aside);
+  for (PoseTrack& track : measured.poses.tracks) std::erase_if(track.samples, is_aside);
+  for (PoseTrack& track : out.tracks.tracks) std::erase_if(track.samples, is_aside);
+  return out;
+}
+
+std::string words_of(const ReadingApart& reading, const Explanation& of, const Evidence& evidence) {
+  const JointLog& log = evidence.recording.log;
+  const double time_s = log.times_s[reading.row];
+  const std::string& channel = log.channels[static_cast<std::size_t>(reading.channel)];
+  std::string out = fmt::format(
+      "{}: at {} = {} '{}' reads {:.6g}, which none of its other readings comes near: put aside",
+      log.source, log.time_column, time_s, channel,
+      log.values(static_cast<Eigen::Index>(reading.row), reading.channel));
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  const auto frame = std::ranges::find(times_s, time_s);
+  if (frame == times_s.end()) return out;
+  const auto shown = reading_shown(of.fitted->calibration, evidence.tracks,
+                                   static_cast<int>(frame - times_s.begin()), channel);
+  return shown ? fmt::format("{}; the markers say {:.6g}", out, *shown) : out;
+}
+
+}  // namespace
+
+Explanation explain(const Evidence& evidence, const ExplainOptions& options,
+                    std::vector<std::string>& warnings) {
+  const Explainer explainer(evidence, options);
+  const std::vector<ReadingApart> apart = readings_apart(evidence.recording.log);
+  if (apart.empty()) return explainer.explained(warnings);
+  const ChangedEvidence changed = without(evidence, apart);
+  const Evidence rest{changed.recording, changed.observed, changed.tracks, evidence.camera};
+  std::vector<std::string> said;
+  Explanation without_them = Explainer(rest, options).explained(said);
+  Explanation with_them = explainer.explained(warnings);
+  const bool better =
+      without_them.fitted &&
+      (!with_them.fitted ||
+       Explainer::log_odds_of(without_them, with_them, evidence.observed.measurements) > 0.0);
+  if (!better) return with_them;
+  for (const ReadingApart& reading : apart)
+    warnings.push_back(words_of(reading, without_them, evidence));
+  return without_them;
+}
+
+}  // namespace kinescope

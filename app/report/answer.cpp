@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/report/answer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/numbers.h"
+#include "app/report/prediction.h"
+#include "app/report/verdict_words.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
+
+namespace kinescope {
+namespace {
+
+using report::Quantity;
+
+Answer no_answer(std::string where, std::string what, std::string remedy) {
+  return {false, std::move(where), std::move(what), std::move(remedy)};
+}
+
+// Moving joints whose frame was estimated, and of those the ones of which nothing is known.
+std::vector<std::string> unknown_axes(const Calibration& calibration) {
+  std::vector<std::string> out;
+  std::size_t estimated = 0;
+  for (std::size_t j = 0; j < calibration.joints.size(); ++j) {
+    const Joint& joint = calibration.tree.joints[j];
+    const bool is_free = std::ranges::any_of(calibration.parameters, [&](const Parameter& p) {
+      return p.block == joint.name && p.unit == "rad" && p.name.find("turn") != std::string::npos;
+    });
+    if (joint.type == JointType::kFixed || !is_free) continue;
+    ++estimated;
+    if (!calibration.joints[j].direction_sigma_rad) out.push_back(joint.name);
+  }
+  if (out.size() < estimated) out.clear();
+  return out;
+}
+
+// How far a model is from the measurements it did not leave out, and how far those move: root mean
+// squares, as one coordinate of a corner (px) or as a distance (m).
+struct Missed {
+  double by = 0.0;
+  double of = 0.0;
+  bool px = false;
+};
+
+Missed missed_motion(const Calibration& calibration) {
+  const report::Predictor predictor(calibration);
+  struct Places {
+    std::vector<Eigen::VectorXd> seen;
+    double squares = 0.0;
+  };
+  std::map<TagId, Places> markers;
+  const bool px = calibration.kind == MeasurementKind::kCorners;
+  for (const SightingResidual& sighting : calibration.residuals) {
+    const std::vector<Pose>& links = predictor.links(sighting.frame);
+    const Marker* marker = calibration.tree.marker(sighting.id);
+    if (!sighting.used || links.empty() || marker == nullptr) continue;
+    Eigen::VectorXd place;
+    double squares = 0.0;
+    if (px) {
+      const std::vector<Eigen::Vector2d> corners = predictor.corners(sighting);
+      if (corners.empty() || corners.size() != sighting.corners_px.size()) continue;
+      place = Eigen::VectorXd::Zero(2);
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        place += (corners[k] + sighting.corners_px[k]) / static_cast<double>(corners.size());
+        squares += sighting.corners_px[k].squaredNorm() / static_cast<double>(corners.size());
+      }
+    } else {
+      const Pose T = links[marker->link.index()] * marker->T_link_marker;
+      place = T.translation;
+      squares = sighting.displacement.tail<3>().squaredNorm();
+    }
+    markers[sighting.id].seen.push_back(std::move(place));
+    markers[sighting.id].squares += squares;
+  }
+  Missed out{0.0, 0.0, px};
+  double count = 0.0;
+  for (const auto& [id, places] : markers) {
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(places.seen.front().size());
+    for (const Eigen::VectorXd& place : places.seen)
+      mean += place / static_cast<double>(places.seen.size());
+    for (const Eigen::VectorXd& place : places.seen) out.of += (place - mean).squaredNorm();
+    out.by += places.squares;
+    count += static_cast<double>(places.seen.size());
+  }
+  if (count == 0.0) return out;
+  out.by = std::sqrt(out.by / count);
+  out.of = std::sqrt(out.of / count);
+  return out;
+}
+
+// A robot that misses its markers by this share of their motion is another one than was filmed.
+constexpr double kAnotherRobot = 0.1;
+
+std::string words_of(const Missed& missed, double value) {
+  return report::text_with_unit(value, missed.px ? Quantity::kPixels : Quantity::kLength);
+}
+
+Answer structure_answer(const Structure& structure) {
+  if (structure.status == StructureStatus::kDetermined) return {};
+  if (!structure.doubts.empty())
+    return no_answer("structure", structure.doubts.front().what, structure.doubts.front().remedy);
+  return no_answer("structure",
+                   "another structure explains the recording as well: " + structure.runner_up,
+                   "record every joint moving at its own time");
+}
+
+}  // namespace
+
+Answer judge(const RunSummary& run) {
+  const Calibration& calibration = run.calibration;
+  if (calibration.status == CalibrationStatus::kUndetermined)
+    return no_answer("calibration", calibration.status_reason, calibration.status_remedy);
+  const Missed missed = missed_motion(calibration);
+  if (missed.by > kAnotherRobot * missed.of) {
+    return no_answer(
+        "calibration",
+        fmt::format("the robot misses its markers by {} where they move by {}",
+                    words_of(missed, missed.by), words_of(missed, missed.of)),
+        run.nominal ? "check the lengths and axes of the nominal robot, that the columns are those "
+                      "of its joints, and the units of both"
+                    : "check the units of the log and the sizes of the markers, and that each "
+                      "reading belongs to its frame");
+  }
+  if (calibration.status == CalibrationStatus::kNotConverged) {
+    return no_answer("calibration", "the fit did not settle: " + calibration.status_reason,
+                     "record more different postures; check units and nominal values");
+  }
+  if (const std::vector<std::string> unknown = unknown_axes(calibration); !unknown.empty()) {
+    return no_answer("calibration",
+                     fmt::format("nothing is known of the ax{} of {}",
+                                 unknown.size() == 1 ? "is" : "es", report::joined(unknown)),
+                     "record more different postures: every joint through its range");
+  }
+  return run.structure ? structure_answer(*run.structure) : Answer{};
+}
+
+}  // namespace kinescope
