@@ -298,15 +298,15 @@ CheckedNominal check_nominal(const KinematicTree& nominal,
   };
   std::vector<NominalFault> faults;
   std::optional<Trial> now = try_out(faults);
-  if (!now) return {place(nominal), {}};
   for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
     std::vector<NominalFault> more = faults;
     std::ranges::copy(other_units(nominal, type), std::back_inserter(more));
     std::optional<Trial> trial = more.size() > faults.size() ? try_out(more) : std::nullopt;
-    if (!trial || gain(now->errors, trial->errors).mean < kBetter) continue;
+    if (!trial || (now && gain(now->errors, trial->errors).mean < kBetter)) continue;
     faults = std::move(more);
     now = std::move(trial);
   }
+  if (!now) return {place(nominal), {}};
   const std::size_t most = faults.size() + kMostFaults;
   // Beside another fault the first one found may help little.
   while (faults.size() < most) {

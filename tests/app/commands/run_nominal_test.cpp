@@ -44,6 +44,34 @@ TEST(RunNominal, AnAxisDrawnTheWrongWayRoundIsNamedAndMended) {
   EXPECT_TRUE(check.passed) << check.words;
 }
 
+TEST(RunNominal, ColumnsInDegreesAreSaidAndTakenSo) {
+  const RecordingFolder folder;
+  RobotRecording recording = arm("nominal in degrees", {}).recording;
+  write_poses(recording, folder);
+  const std::filesystem::path found = folder.path() / "found";
+  ASSERT_EQ(
+      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
+          .code,
+      0);
+  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  drawing.markers.clear();
+  folder.write("drawing.urdf", write_urdf(drawing));
+  recording.log.values /= kRadPerDegree;
+  write_poses(recording, folder);
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", out.string(), "--quiet", "--no-trace",
+           "--nominal", (folder.path() / "drawing.urdf").string()});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("are in degrees; taken so"), std::string::npos) << outcome.out;
+  const nlohmann::json result = nlohmann::json::parse(read_text_file(out / "result.json"));
+  ASSERT_EQ(result.at("nominal_faults").size(), 3U);
+  for (const nlohmann::json& fault : result["nominal_faults"])
+    EXPECT_EQ(fault["unit"], kRadPerDegree);
+  EXPECT_LT(result["calibration"]["held_out_rms"].get<double>(), 0.01);
+}
+
 TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   const RecordingFolder folder;
   write_poses(arm("nominal with a gripper", {}, 2).recording, folder);
