@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,17 +18,21 @@
 namespace kinescope {
 namespace {
 
-// Which marker is on which link, what joins what, driven by what: as a value that compares.
-using Shape = std::set<std::tuple<std::vector<TagId>, std::vector<TagId>, JointType, int>>;
+// Every link as the joints on its way, types and channels, and its markers: as a value that
+// compares.
+using Way = std::vector<std::pair<JointType, int>>;
+using Shape = std::set<std::pair<Way, std::vector<TagId>>>;
 
 Shape shape_of(const Structure& structure) {
+  std::vector<Way> ways(structure.links.size());
   Shape out;
-  const auto markers = [&](int link) {
-    return structure.links[static_cast<std::size_t>(link)].markers;
-  };
-  for (const StructureJoint& joint : structure.joints)
-    out.emplace(markers(joint.parent_link), markers(joint.child_link), joint.type,
-                joint.channel ? joint.channel->channel : -1);
+  out.emplace(ways.front(), structure.links.front().markers);
+  for (const StructureJoint& joint : structure.joints) {
+    const auto child = static_cast<std::size_t>(joint.child_link);
+    ways[child] = ways[static_cast<std::size_t>(joint.parent_link)];
+    ways[child].emplace_back(joint.type, joint.channel ? joint.channel->channel : -1);
+    out.emplace(ways[child], structure.links[child].markers);
+  }
   return out;
 }
 
@@ -163,9 +166,12 @@ class Explainer {
     lap("trace");
   }
 
+  // Clearly more probable; of two that are about as probable, the one that is of one piece.
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
     if (!one.fitted || !other.fitted) return one.fitted.has_value();
-    return log_odds_of(one, other, evidence_.observed.measurements) > 0.0;
+    const double clearly = StructureOptions{}.min_log_odds;
+    const double odds = log_odds_of(one, other, evidence_.observed.measurements);
+    return odds > clearly || (odds > -clearly && is_settled(one) && !is_settled(other));
   }
 
   // The structure was searched for on tracks that the effects were in: once more without them.
@@ -208,8 +214,7 @@ class Explainer {
     if (!recording().camera || tags.observations.empty() ||
         (is_structure_clear(now) && now.fitted && !by_place))
       return {};
-    for (const CameraModel& begin :
-         {camera_from_tags(tags, recording().markers), evidence_.camera}) {
+    for (const CameraModel& begin : cameras_to_begin_with()) {
       const std::optional<CameraModel> found =
           camera_from_motion(recording(), evidence_.observed, begin, options_.calibrate);
       if (!found) continue;
@@ -218,6 +223,15 @@ class Explainer {
            {{{"lens_distortion", "camera"}, 0.0}, {{"lens_distortion", "camera pinhole"}, 0.0}}}};
     }
     return {};
+  }
+
+  // What the shapes of the markers' images say, where they say something; the declared one.
+  [[nodiscard]] std::vector<CameraModel> cameras_to_begin_with() const {
+    try {
+      return {camera_from_tags(evidence_.observed.tags, recording().markers), evidence_.camera};
+    } catch (const Error&) {
+      return {evidence_.camera};
+    }
   }
 
   const Evidence& evidence_;
