@@ -75,11 +75,15 @@ class Explainer {
     return is_settled(first) ? first : improved(std::move(first));
   }
 
-  /// ln of the odds, over all measurements that there are, of one against another.
-  [[nodiscard]] static double log_odds_of(const Explanation& one, const Explanation& other,
-                                          const Measurements& measurements) {
-    return log_odds(predictive_score(one.fitted->calibration, measurements),
-                    predictive_score(other.fitted->calibration, measurements));
+  /// Clearly more probable, over all measurements that there are; of two that are about as
+  /// probable, the one that is of one piece.
+  [[nodiscard]] static bool is_better(const Explanation& one, const Explanation& other,
+                                      const Measurements& measurements) {
+    if (!one.fitted || !other.fitted) return one.fitted.has_value();
+    const double clearly = StructureOptions{}.min_log_odds;
+    const double odds = log_odds(predictive_score(one.fitted->calibration, measurements),
+                                 predictive_score(other.fitted->calibration, measurements));
+    return odds > clearly || (odds > -clearly && is_settled(one) && !is_settled(other));
   }
 
  private:
@@ -166,12 +170,8 @@ class Explainer {
     lap("trace");
   }
 
-  // Clearly more probable; of two that are about as probable, the one that is of one piece.
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
-    if (!one.fitted || !other.fitted) return one.fitted.has_value();
-    const double clearly = StructureOptions{}.min_log_odds;
-    const double odds = log_odds_of(one, other, evidence_.observed.measurements);
-    return odds > clearly || (odds > -clearly && is_settled(one) && !is_settled(other));
+    return is_better(one, other, evidence_.observed.measurements);
   }
 
   // The structure was searched for on tracks that the effects were in: once more without them.
@@ -291,13 +291,19 @@ Explanation explain(const Evidence& evidence, const ExplainOptions& options,
   const ChangedEvidence changed = without(evidence, apart);
   const Evidence rest{changed.recording, changed.observed, changed.tracks, evidence.camera};
   std::vector<std::string> said;
+  std::vector<std::string> said_with_them;
   Explanation without_them = Explainer(rest, options).explained(said);
-  Explanation with_them = explainer.explained(warnings);
-  const bool better =
-      without_them.fitted &&
-      (!with_them.fitted ||
-       Explainer::log_odds_of(without_them, with_them, evidence.observed.measurements) > 0.0);
-  if (!better) return with_them;
+  // What needed no sighting to be given up has nothing against it.
+  const bool cost_nothing =
+      sightings_in(changed.observed.measurements) == sightings_in(evidence.observed.measurements);
+  if (!cost_nothing || !is_settled(without_them)) {
+    Explanation with_them = explainer.explained(said_with_them);
+    if (!Explainer::is_better(without_them, with_them, evidence.observed.measurements)) {
+      warnings.insert(warnings.end(), said_with_them.begin(), said_with_them.end());
+      return with_them;
+    }
+  }
+  warnings.insert(warnings.end(), said.begin(), said.end());
   for (const ReadingApart& reading : apart)
     warnings.push_back(words_of(reading, without_them, evidence));
   return without_them;

@@ -45,4 +45,11 @@ struct Measurements {
   PointObservations points;             ///< of points.csv
 };
 
+/// Of markers, bodies and points, over all frames.
+[[nodiscard]] inline std::size_t sightings_in(const Measurements& measurements) {
+  std::size_t count = measurements.corners.size() + measurements.points.observations.size();
+  for (const PoseTrack& track : measurements.poses.tracks) count += track.samples.size();
+  return count;
+}
+
 }  // namespace kinescope

@@ -94,12 +94,6 @@ double values_read_off(const Calibration& calibration) {
   return static_cast<double>(frames.size()) * static_cast<double>(undriven);
 }
 
-std::size_t sightings_of(const Measurements& measurements) {
-  std::size_t count = measurements.corners.size() + measurements.points.observations.size();
-  for (const PoseTrack& track : measurements.poses.tracks) count += track.samples.size();
-  return count;
-}
-
 }  // namespace
 
 PredictiveScore predictive_score(const Calibration& calibration, const Measurements& measurements) {
@@ -128,7 +122,7 @@ PredictiveScore predictive_score(const Calibration& calibration, const Measureme
   }
   PredictiveScore out;
   const double read_off = values_read_off(calibration);
-  const std::size_t sightings = sightings_of(measurements);
+  const std::size_t sightings = sightings_in(measurements);
   if (calibration.kind == MeasurementKind::kCorners) {
     std::size_t missing = sightings;
     const double side_px =
