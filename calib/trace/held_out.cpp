@@ -108,4 +108,12 @@ double paired_t(const Partition& partition, const Eigen::VectorXd& worse,
   return mean / std::sqrt(variance / n);
 }
 
+double paired_p_value(const Partition& partition, const Eigen::VectorXd& worse,
+                      const Eigen::VectorXd& better) {
+  const double t = paired_t(partition, worse, better);
+  // t^2 is F with (1, n - 1) degrees of freedom.
+  const double beyond = 0.5 * f_survival(t * t, 1.0, std::max(1.0, partition.stretches - 1.0));
+  return t > 0.0 ? beyond : 1.0 - beyond;
+}
+
 }  // namespace kinescope::trace

@@ -30,6 +30,9 @@ struct HeldOutInstants {
 /// are per cell, or per instant.
 [[nodiscard]] double paired_t(const Partition& partition, const Eigen::VectorXd& worse,
                               const Eigen::VectorXd& better);
+/// Of that t by chance, one side.
+[[nodiscard]] double paired_p_value(const Partition& partition, const Eigen::VectorXd& worse,
+                                    const Eigen::VectorXd& better);
 /// From this t on one of two needs no refit to be called worse.
 inline constexpr double kClearlyWorse = 3.0;
 

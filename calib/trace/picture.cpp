@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "kinematics/core/error.h"
+
 namespace kinescope::trace {
 namespace {
 
@@ -30,11 +32,12 @@ Eigen::VectorXd factor_of(const Linearisation& linear, const Eigen::VectorXd& re
 }
 
 // What an effect does to every row, whitened.
-Eigen::VectorXd rows_of(const Linearisation& linear, const TestedMember& effect) {
+Eigen::VectorXd rows_of(const Linearisation& linear, const std::vector<EffectColumn>& columns,
+                        const Eigen::VectorXd& values) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(linear.residual.size());
-  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
-    const EffectColumn& column = effect.columns[k];
-    const double theta = effect.score.theta[static_cast<Eigen::Index>(k)];
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const EffectColumn& column = columns[k];
+    const double theta = values[static_cast<Eigen::Index>(k)];
     Eigen::Index instant = 0;
     for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, column.carrier); entry;
          ++entry) {
@@ -52,8 +55,9 @@ struct SeenAt {
   const RestPlace* place = nullptr;
   Eigen::VectorXd factor;
 };
-SeenAt seen_at(const TracedFit& fit, const TestedMember& effect) {
-  const Eigen::VectorXd rows = rows_of(fit.linear, effect);
+SeenAt seen_at(const TracedFit& fit, const std::vector<EffectColumn>& columns,
+               const Eigen::VectorXd& values) {
+  const Eigen::VectorXd rows = rows_of(fit.linear, columns, values);
   SeenAt out;
   double most = 0.0;
   for (const RestPlace& place : fit.rest_places) {
@@ -105,15 +109,16 @@ double explained_by(const Eigen::VectorXd& covariate, const Eigen::VectorXd& cur
 }  // namespace
 
 EffectPicture picture_of(const Stage& without, const Stage& with, const Candidate& candidate,
-                         const TestedMember& effect) {
+                         const std::vector<EffectColumn>& columns, const Eigen::VectorXd& values) {
+  KINESCOPE_CHECK(values.size() == std::ssize(columns), "one value a column");
   // The carrier through which the effect does most.
   const Linearisation& linear = without.fit.linear;
   int carrier = -1;
   double most = 0.0;
-  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
-    const EffectColumn& column = effect.columns[k];
-    const double weight = std::abs(effect.score.theta[static_cast<Eigen::Index>(k)]) *
-                          linear.carriers.col(column.carrier).norm();
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const EffectColumn& column = columns[k];
+    const double weight =
+        std::abs(values[static_cast<Eigen::Index>(k)]) * linear.carriers.col(column.carrier).norm();
     if (weight > most) {
       most = weight;
       carrier = column.carrier;
@@ -122,10 +127,10 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
   EffectPicture out;
   if (carrier < 0 || without.fit.covariates.empty()) return out;
   out.effect = Eigen::VectorXd::Zero(linear.instants());
-  for (std::size_t k = 0; k < effect.columns.size(); ++k) {
-    const EffectColumn& column = effect.columns[k];
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const EffectColumn& column = columns[k];
     if (column.carrier != carrier) continue;
-    const double theta = effect.score.theta[static_cast<Eigen::Index>(k)];
+    const double theta = values[static_cast<Eigen::Index>(k)];
     if (column.share.size() == 0) {
       out.effect.array() += theta;
     } else {
@@ -138,7 +143,7 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
   }
   const bool constant = (out.effect.array() == out.effect[0]).all();
   const SeenAt seen =
-      constant && effect.columns.size() > 1 ? seen_at(without.fit, effect) : SeenAt{};
+      constant && columns.size() > 1 ? seen_at(without.fit, columns, values) : SeenAt{};
   if (seen.place != nullptr) {
     carrier = seen.place->carrier;
     unit = seen.place->unit;

@@ -168,7 +168,15 @@ bool Tracer::check(std::size_t index) {
              *now_);
     return true;
   }
-  detail.picture = picture_of(*stage, *now_, *candidate, own);
+  detail.picture = picture_of(*stage, *now_, *candidate, own.columns, now_->fit.values[index]);
+  if (own.score.hidden()) {
+    // Only the refit speaks for it, and no linear test can compare it with another.
+    detail.p_value =
+        std::min(1.0, paired_p_value(now_->system.partition(), stage->held_out.whitened,
+                                     now_->held_out.whitened) *
+                          own.tests);
+    return false;
+  }
   return settle_rivals(index, *stage, own);
 }
 

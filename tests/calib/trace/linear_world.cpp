@@ -146,6 +146,11 @@ std::vector<Candidate> LinearWorld::candidates() const {
       return std::vector<EffectColumn>{{carrier, other}};
     });
   }
+  if (options_.bends) {
+    Candidate bend = simple("bend", 0, 1);
+    bend.columns = [](double) { return std::vector<EffectColumn>{{0, {}}}; };
+    out.push_back(std::move(bend));
+  }
   return out;
 }
 
@@ -172,7 +177,10 @@ TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
   for (const AddedEffect& effect : effects) {
     for (const Candidate& candidate : out.candidates) {
       if (candidate.id != effect.id) continue;
-      for (EffectColumn& column : candidate.columns(effect.scan)) columns.push_back(column);
+      for (EffectColumn& column : candidate.columns(effect.scan)) {
+        if (effect.id.effect == "bend") column.share = share({0, "tanh_other"});
+        columns.push_back(column);
+      }
     }
   }
   linear.jacobian.resize(observed_.size(), static_cast<Eigen::Index>(columns.size()));

@@ -22,6 +22,9 @@ struct LinearWorldOptions {
   int folds = 5;
   bool together = false;     ///< the second joint moves as the first one does
   bool scale_grows = false;  ///< a scale below zero cannot be
+  /// Candidate "bend" at joint1: at nothing it does what the joint's zero does, in the fit it is
+  /// "tanh_other" (as friction frees the width of its turn).
+  bool bends = false;
 };
 
 /// What is in the data and not in the model: one term of `LinearWorld::share`.

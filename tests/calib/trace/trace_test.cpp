@@ -184,6 +184,30 @@ TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
   EXPECT_GT(real.held_out_before.value, 1.1 * real.held_out_after.value);
 }
 
+// Beside the others its columns are what the model can do itself; fitted, it predicts clearly
+// better.
+TEST(TraceTest, WhatOnlyTheFitShowsIsPicturedAndSizedFromTheFit) {
+  LinearWorldOptions options;
+  options.bends = true;
+  TraceOptions known;
+  known.start = {{{"bend", "joint1"}, 0.0}};
+  constexpr double kSize = 1.0;
+  const Trace trace = trace_effects(LinearWorld(options, {{0, "tanh_other", kSize}}), known);
+  ASSERT_EQ(trace.accepted.size(), 1U) << trace.reason;
+  const TracedEffect& bend = trace.accepted.front();
+  EXPECT_EQ(bend.id, (EffectId{"bend", "joint1"}));
+  EXPECT_LE(bend.interval.low, kSize);
+  EXPECT_GE(bend.interval.high, kSize);
+  // As the refit shows it; the score test alone would say 1.
+  EXPECT_LT(bend.p_value, 0.03);
+  ASSERT_EQ(bend.picture.effect.size(), options.instants);
+  EXPECT_NEAR(bend.picture.effect.mean(), bend.size, 1e-9);
+  // No linear test says that another effect does the same.
+  EXPECT_TRUE(trace.ambiguities.empty());
+  const Trace idle = trace_effects(LinearWorld(options, {}), known);
+  EXPECT_TRUE(idle.accepted.empty());
+}
+
 TEST(TraceTest, ParametersThatCannotBeAreNotFound) {
   LinearWorldOptions options;
   const EffectId scale{"scale", "joint1"};
