@@ -18,9 +18,7 @@
 #include "app/io/nearest_name.h"
 #include "app/report/trace_lines.h"
 #include "dynamics/data/splits.h"
-#include "dynamics/data/torque_scale.h"
 #include "dynamics/identify/gravity_from_torques.h"
-#include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
@@ -69,10 +67,7 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
 // The scale of the torque against the nominal masses, where there are any.
 void check_scale(const DynamicModel& model, TorqueSummary& summary) {
   if (!has_masses(model) || summary.data.samples.torque_unit == "A") return;
-  const TorqueSamples& samples = summary.data.samples;
-  const TorqueScales scales = compare_torque_scale(
-      samples,
-      inverse_dynamics_of_samples(make_rigid_model(model), samples.q, samples.dq, samples.ddq));
+  const TorqueScales scales = torque_scales(make_rigid_model(model), summary.data.samples);
   throw_refusals(scales.findings);
   summary.data.findings.insert(summary.data.findings.end(), scales.findings.begin(),
                                scales.findings.end());

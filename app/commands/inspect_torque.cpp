@@ -11,8 +11,6 @@
 #include "app/commands/inspection.h"
 #include "app/commands/torque_inputs.h"
 #include "dynamics/data/statistics.h"
-#include "dynamics/data/torque_scale.h"
-#include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
 
@@ -63,9 +61,7 @@ void look_at_scale(const DynamicModel& model, const TorqueLogReport& report,
                    const TorqueDataOptions& options, std::vector<LogFinding>& findings) {
   if (!has_masses(model) || report.log.torque.cols() == 0 || report.log.torque_unit == "A") return;
   const TorqueSamples samples = filtered_data(report, options.motion).samples;
-  const TorqueScales scales = compare_torque_scale(
-      samples,
-      inverse_dynamics_of_samples(make_rigid_model(model), samples.q, samples.dq, samples.ddq));
+  const TorqueScales scales = torque_scales(make_rigid_model(model), samples);
   findings.insert(findings.end(), scales.findings.begin(), scales.findings.end());
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 
 #include "app/io/sha256.h"
+#include "dynamics/rigid/inverse_dynamics.h"
+#include "dynamics/rigid/mass_matrix.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -28,6 +30,12 @@ TorqueRobot read_torque_robot(const fs::path& urdf,
 bool has_masses(const DynamicModel& model) {
   return std::ranges::any_of(model.links,
                              [](const InertialParameters& link) { return link.mass_kg > 0.0; });
+}
+
+TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples) {
+  return compare_torque_scale(
+      samples, inverse_dynamics_of_samples(rigid, samples.q, samples.dq, samples.ddq),
+      weight_scale(rigid, samples.q.colwise().mean().transpose()));
 }
 
 std::string file_list(const std::vector<fs::path>& files) {

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "app/report/run_summary.h"
+#include "dynamics/data/torque_scale.h"
+#include "dynamics/rigid/rigid_model.h"
 #include "kinematics/model/dynamic_model.h"
 
 namespace kinescope {
@@ -27,6 +29,9 @@ struct TorqueRobot {
 
 /// Some link has a mass.
 [[nodiscard]] bool has_masses(const DynamicModel& model);
+
+/// The torque against the masses of the robot: unit, sign, lag.
+[[nodiscard]] TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples);
 
 /// "a.csv, b.csv": names of files without their folders.
 [[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/dense_algebra.h"
@@ -91,14 +92,43 @@ std::string joint_name(const TorqueSamples& samples, Eigen::Index joint) {
   return at < samples.joint_names.size() ? samples.joint_names[at] : fmt::format("{}", joint + 1);
 }
 
-void name_scale(const std::string& name, const TorqueScale& scale,
-                std::vector<LogFinding>& findings) {
+bool is_turned(const TorqueScale& scale) {
+  const double size = std::abs(scale.factor);
+  return scale.correlation < -kClearCorrelation && size <= kThousandLow &&
+         size >= 1.0 / kThousandLow;
+}
+
+/// A joint that moves next to no mass about its axis leaves the whole torque to friction. That of a
+/// drive may be many times what it lifts (a light wrist), but a thousandth's unit is beyond it.
+bool may_be_a_drives(const TorqueSamples& samples, Eigen::Index joint, double drive_scale) {
+  const double rms =
+      samples.torque.col(joint).norm() / std::sqrt(static_cast<double>(samples.size()));
+  return rms <= kThousandLow * drive_scale;
+}
+
+/// "[1, -1, 1]": what turns the joints whose torque goes against the model, and no other.
+std::string turning_factors(const std::vector<TorqueScale>& scales) {
+  std::vector<int> factors;
+  for (const TorqueScale& scale : scales) factors.push_back(is_turned(scale) ? -1 : 1);
+  return fmt::format("[{}]", fmt::join(factors, ", "));
+}
+
+void name_scale(const std::string& name, const TorqueScale& scale, bool of_a_drive,
+                const std::string& turning, std::vector<LogFinding>& findings) {
   const auto add = [&](FaultWeight weight, double value, std::string what, std::string remedy) {
     findings.push_back(
         {LogFault::kTorqueScale, weight, name, 1.0, value, "", std::move(what), std::move(remedy)});
   };
   if (std::abs(scale.correlation) < kClearCorrelation) return;
   const double size = std::abs(scale.factor);
+  if (size > kThousandLow && of_a_drive) {
+    add(FaultWeight::kNote, scale.factor,
+        fmt::format("torque of joint '{}' is hardly the model's, as where friction is far more; "
+                    "its scale and its sign are not checked",
+                    name),
+        "nothing to do if the torque is in Nm");
+    return;
+  }
   if (size > kThousandLow) {
     add(FaultWeight::kRefusal, scale.factor,
         fmt::format("torque of joint '{}' is {:.3g} times what the model says: mNm, or motor units",
@@ -112,7 +142,9 @@ void name_scale(const std::string& name, const TorqueScale& scale,
   } else if (scale.factor < 0.0) {
     add(FaultWeight::kRefusal, scale.factor,
         fmt::format("torque of joint '{}' has the other sign than the model", name),
-        "say so in recording.yaml, dynamics: {torque_factor: [-1]} or {position_factor: [-1]}");
+        fmt::format("say so in recording.yaml, dynamics: {{torque_factor: {0}}}, or "
+                    "{{position_factor: {0}}} where it is the position that turns the other way",
+                    turning));
   }
   if (scale.lag_s != 0.0) {
     findings.push_back(
@@ -143,10 +175,13 @@ void name_common_factor(const std::vector<TorqueScale>& scales, std::vector<LogF
 
 }  // namespace
 
-TorqueScales compare_torque_scale(const TorqueSamples& samples, const Eigen::MatrixXd& predicted) {
+TorqueScales compare_torque_scale(const TorqueSamples& samples, const Eigen::MatrixXd& predicted,
+                                  const Eigen::VectorXd& drive_scale) {
   KINESCOPE_CHECK(
       predicted.rows() == samples.torque.rows() && predicted.cols() == samples.torque.cols(),
       "one predicted torque a measured one");
+  KINESCOPE_CHECK(drive_scale.size() == 0 || drive_scale.size() == predicted.cols(),
+                  "one scale a joint");
   TorqueScales out;
   const std::vector<Eigen::Index> rows = inner_rows(samples);
   const double step_s = median_of(steps_of(samples.t_s, samples.trajectory));
@@ -162,7 +197,12 @@ TorqueScales compare_torque_scale(const TorqueSamples& samples, const Eigen::Mat
       scale.size_ratio = rms > 0.0 ? samples.torque.col(joint).norm() / rms : 0.0;
     }
     out.joints.push_back(scale);
-    name_scale(joint_name(samples, joint), scale, out.findings);
+  }
+  const std::string turning = turning_factors(out.joints);
+  for (Eigen::Index joint = 0; joint < predicted.cols(); ++joint) {
+    name_scale(joint_name(samples, joint), out.joints[static_cast<std::size_t>(joint)],
+               drive_scale.size() > 0 && may_be_a_drives(samples, joint, drive_scale[joint]),
+               turning, out.findings);
   }
   name_common_factor(out.joints, out.findings);
   return out;

@@ -25,10 +25,13 @@ struct TorqueScales {
 };
 
 /// `predicted` as `samples.torque`: samples x joints, Nm or N. The fit leaves an offset and Coulomb
-/// and viscous friction free, so that these do not pass for a scale. Findings: a factor of about
-/// 1000 or 1/1000 (refusal), a negative one (refusal), a factor common to all joints, a lag over
-/// half a sample.
+/// and viscous friction free, so that these do not pass for a scale. `drive_scale`: one a joint,
+/// the order of what its drive is built for; where the whole torque, friction of any kind included,
+/// may be such a drive's, a large factor is none of units. Empty: not known. Findings: a factor of
+/// about 1000 or 1/1000 (refusal), a negative one (refusal), a factor common to all joints, a lag
+/// over half a sample.
 [[nodiscard]] TorqueScales compare_torque_scale(const TorqueSamples& samples,
-                                                const Eigen::MatrixXd& predicted);
+                                                const Eigen::MatrixXd& predicted,
+                                                const Eigen::VectorXd& drive_scale = {});
 
 }  // namespace kinescope

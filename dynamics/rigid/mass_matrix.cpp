@@ -78,6 +78,20 @@ Eigen::MatrixXd mass_matrix(const RigidModel& model, const Eigen::VectorXd& q) {
   return M;
 }
 
+Eigen::VectorXd weight_scale(const RigidModel& model, const Eigen::VectorXd& q) {
+  Eigen::VectorXd mass(model.size());
+  for (std::size_t k = 0; k < model.bodies.size(); ++k) {
+    mass[static_cast<Eigen::Index>(k)] = model.bodies[k].inertia.mass_kg;
+  }
+  for (std::size_t k = model.bodies.size(); k-- > 0;) {
+    const int parent = model.bodies[k].parent;
+    if (parent >= 0) mass[parent] += mass[static_cast<Eigen::Index>(k)];
+  }
+  // Radius of gyration: sqrt(inertia / mass).
+  return kUsualGravity_m_s2 *
+         mass.cwiseProduct(mass_matrix(model, q).diagonal()).cwiseMax(0.0).cwiseSqrt();
+}
+
 Eigen::MatrixXd coriolis_matrix(const RigidModel& model, const Eigen::VectorXd& q,
                                 const Eigen::VectorXd& dq) {
   const std::vector<PlacedBody> bodies = place_bodies(model, q);

@@ -11,6 +11,11 @@ namespace kinescope {
 /// Composite rigid bodies, Featherstone 2008, section 6.3.
 [[nodiscard]] Eigen::MatrixXd mass_matrix(const RigidModel& model, const Eigen::VectorXd& q);
 
+/// The weight of all that a joint moves, at its radius of gyration about the axis (a sliding joint:
+/// the weight), N m or N, one a joint: the order of what its drive is built for, wherever gravity
+/// pulls.
+[[nodiscard]] Eigen::VectorXd weight_scale(const RigidModel& model, const Eigen::VectorXd& q);
+
 /// C(q, dq) of the Christoffel symbols: dM/dt - 2C is skew-symmetric. Echeandia and Wensing 2021,
 /// algorithm 1, in the base frame.
 [[nodiscard]] Eigen::MatrixXd coriolis_matrix(const RigidModel& model, const Eigen::VectorXd& q,

@@ -12,6 +12,7 @@
 #include "tests/app/commands/torque_log_text.h"
 #include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
+#include "tests/truth/shared_data.h"
 #include "tests/truth/torque_world.h"
 
 namespace kinescope {
@@ -223,6 +224,39 @@ TEST(TorqueVerdictWords, MassesThatNoRobotHasAskForTheUnit) {
 TEST(TorqueVerdictWords, WorseThanAConstantIsNothingLearned) {
   EXPECT_NE(limits_of(3.0, 250.0).find("worse than a constant"), std::string::npos);
   EXPECT_EQ(limits_of(3.0, 50.0).find("worse than a constant"), std::string::npos);
+}
+
+// A stand-in for a robot: a kilogram on one axis that gravity does not turn.
+constexpr const char* kOneJoint = R"(<robot name="one"><link name="base"/>
+<link name="tip"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="JOINT" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-6" upper="6" effort="100" velocity="10"/></joint></robot>)";
+
+std::string one_joint(const std::string& name) {
+  std::string out = kOneJoint;
+  out.replace(out.find("JOINT"), 5, name);
+  return out;
+}
+
+// Joints that creep at some mrad/s against friction: the traced model needs a Coulomb friction that
+// the score test does not see, and its torque is a million times what the masses say.
+TEST(OneJointCommand, MeasuredFrictionOfOneJointIsTraced) {
+  const auto logs = shared_data("dynamics/franka_fairino_friction");
+  if (!logs) GTEST_SKIP() << "shared/data/dynamics/franka_fairino_friction is not on this machine";
+  const RecordingFolder folder;
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"joint3", "fairino_line_slow_joint3"}, {"joint2", "fairino_spiral_slow_joint2"}};
+  for (const auto& [joint, log] : cases) {
+    folder.write("robot.urdf", one_joint(joint));
+    const Outcome outcome =
+        run({"dynamics", (*logs / (log + ".csv.gz")).string(), "--robot",
+             (folder.path() / "robot.urdf").string(), "--torque", "tau_friction" + joint.substr(5),
+             "--model", "parametric", "--no-robust", "--output", (folder.path() / "out").string(),
+             "--quiet"});
+    EXPECT_EQ(outcome.code, 0) << log << ": " << outcome.err;
+    EXPECT_NE(outcome.out.find("Tracing: "), std::string::npos) << outcome.out;
+  }
 }
 
 }  // namespace

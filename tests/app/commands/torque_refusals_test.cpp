@@ -202,6 +202,17 @@ TEST_F(TorqueRefusals, PayloadsThatCannotBeAskedFor) {
   refused(ExitCode::kBadRequest, "--unloaded", {"--payload"});
 }
 
+// A joint whose torque has the other sign: the advice names that joint alone, and works.
+TEST_F(TorqueRefusals, TheAdviceForATurnedTorqueTurnsThatJoint) {
+  TorqueSamples turned = samples_;
+  turned.torque.col(1) *= -1.0;
+  write(turned);
+  refused(ExitCode::kBadInput, "torque_factor: [1, -1]");
+  folder_.write("recording.yaml", "dynamics: {torque_factor: [1, -1]}\n");
+  const Outcome outcome = run(words());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
 TEST_F(TorqueRefusals, ContactRefusesAlike) {
   TorqueSamples without = samples_;
   without.torque.resize(0, 0);

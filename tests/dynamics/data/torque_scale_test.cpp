@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/data/torque_scale.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -62,12 +63,40 @@ TEST(TorqueScale, NamesUnitsSignsAndGains) {
   ASSERT_EQ(scales.findings.size(), 1U);
   EXPECT_EQ(scales.findings[0].channel, "joint2");
   EXPECT_NE(scales.findings[0].what.find("other sign"), std::string::npos);
+  // The joint concerned alone.
+  EXPECT_NE(scales.findings[0].remedy.find("torque_factor: [1, -1, 1]"), std::string::npos)
+      << scales.findings[0].remedy;
   scene.predicted.col(0) /= 0.8;
   scene.predicted.col(1) /= 1.2;
   scene.samples.torque = sound.torque / 12.0;
   scales = compare_torque_scale(scene.samples, scene.predicted);
   ASSERT_EQ(scales.findings.size(), 1U);
   EXPECT_NEAR(scales.findings[0].value, 1.0 / 12.0, 0.01);
+}
+
+bool refuses(const TorqueScales& scales) {
+  return std::ranges::any_of(scales.findings, [](const LogFinding& finding) {
+    return finding.weight == FaultWeight::kRefusal;
+  });
+}
+
+// A model that hardly loads a joint (a stand-in for masses, an axis that gravity does not turn):
+// what friction leaves may follow the acceleration and be a million times the model's.
+TEST(TorqueScale, WhereFrictionIsFarMoreTheScaleIsNotJudged) {
+  Scene scene = make_scene();
+  scene.predicted *= 1e-5;
+  const TorqueSamples sound = scene.samples;
+  const Eigen::Vector3d drive_scale{1.0, 1.0, 10.0};  // N m, N
+  for (const double sign : {1.0, -1.0}) {
+    scene.samples.torque = sign * sound.torque;
+    EXPECT_TRUE(refuses(compare_torque_scale(scene.samples, scene.predicted)));
+    const auto scales = compare_torque_scale(scene.samples, scene.predicted, drive_scale);
+    EXPECT_FALSE(refuses(scales)) << to_line(scales.findings.front());
+    EXPECT_EQ(findings_of(scales.findings, LogFault::kTorqueScale).size(), 3U);
+  }
+  // No drive of this robot has a thousand times that.
+  scene.samples.torque = 1000.0 * sound.torque;
+  EXPECT_TRUE(refuses(compare_torque_scale(scene.samples, scene.predicted, drive_scale)));
 }
 
 TEST(TorqueScale, FindsATorqueThatComesLate) {

@@ -62,6 +62,20 @@ TEST(ClosedForm, Pendulum) {
   }
 }
 
+TEST(ClosedForm, WeightScale) {
+  // A slide carries a pendulum: the weight of both, and the pendulum's at its radius of gyration.
+  DynamicModel model = chain({{JointType::kPrismatic, {0, 0, 0}, Eigen::Vector3d::UnitX()},
+                              {JointType::kRevolute, {0, 0, 0.2}, Eigen::Vector3d::UnitY()}});
+  const double m = 1.3;
+  const double l = 0.7;
+  const double I = 0.02;
+  model.links[1] = body(2.0, {0.1, 0, 0}, 0.05);
+  model.links[2] = body(m, {0, 0, -l}, I);
+  const Eigen::VectorXd scale = weight_scale(make_rigid_model(model), Eigen::Vector2d(0.3, -1.0));
+  EXPECT_NEAR(scale[0], (2.0 + m) * kG, kExact * 100);
+  EXPECT_NEAR(scale[1], kG * std::sqrt(m * (I + m * l * l)), kExact * 100);
+}
+
 TEST(ClosedForm, CartPole) {
   // Cart along x, pole about y hanging along -z at q = 0: force  = (M + m) a - m l cos(q) ddq + m l
   // sin(q) dq^2   (pole's centre at x - l sin q), torque = m l^2 ddq - m l cos(q) a + m g l sin q.
