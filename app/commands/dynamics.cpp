@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -224,6 +225,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   summary.types = robot.types;
   const TorqueLogReport log =
       read_checked_log(options.logs, wanted_joints(model.tree), options.data);
+  if (asks_for_payload(options)) require_payload_question(options, model, log.log.torque_unit);
   summary.data = filtered_data(log, options.data.motion);
   if (options.gravity_from_torques && !options.gravity_m_s2) {
     take_gravity_of(summary.data.samples, model, summary);
@@ -233,6 +235,13 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), options.models_options);
   clock.lap("read", summary.times);
 
+  // Refuses what it must before the slow fits.
+  std::optional<TorqueSamples> unloaded;
+  if (asks_for_payload(options)) {
+    report_progress(progress, "payload", 0, 0);
+    unloaded = add_payload(options, model, summary);
+    clock.lap("payload", summary.times);
+  }
   report_progress(progress, "identify", 0, 0);
   summary.identification = identify_dynamics(model, summary.train, options.models_options.identify);
   summary.consistent = consistent_model(summary.identification);
@@ -258,10 +267,10 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     add_robust_regressions(model, options.models_options, summary);
     clock.lap("robust regression", summary.times);
   }
-  if (options.payload || !options.unloaded_logs.empty()) {
-    report_progress(progress, "payload", 0, 0);
-    add_payload(options, model, summary);
-    clock.lap("payload", summary.times);
+  if (summary.payload && options.robust) {
+    report_progress(progress, "payload at rest", 0, 0);
+    add_payload_at_rest(options, model, unloaded, summary);
+    clock.lap("payload at rest", summary.times);
   }
   report_progress(progress, "", 0, 0);
   folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");

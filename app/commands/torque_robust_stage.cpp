@@ -17,6 +17,13 @@ RobustTorqueOptions robust_options(const TorqueModelOptions& options) {
   return out;
 }
 
+PayloadOptions payload_options(const DynamicsOptions& options) {
+  PayloadOptions out;
+  out.drives = options.models_options.identify.drives;
+  out.link = options.payload_link;
+  return out;
+}
+
 TorqueScore score_of(const std::shared_ptr<const RobustTorque>& learned, RobustMethod method,
                      const TorqueSamples& test) {
   FittedTorqueModel fitted;
@@ -65,42 +72,52 @@ void add_robust_regressions(const DynamicModel& model, const TorqueModelOptions&
   }
 }
 
-void add_payload(const DynamicsOptions& options, const DynamicModel& model,
-                 TorqueSummary& summary) {
-  const bool two_logs = !options.unloaded_logs.empty();
-  if (!two_logs && !has_masses(model)) {
+bool asks_for_payload(const DynamicsOptions& options) {
+  return options.payload || !options.unloaded_logs.empty();
+}
+
+void require_payload_question(const DynamicsOptions& options, const DynamicModel& model,
+                              const std::string& torque_unit) {
+  if (options.unloaded_logs.empty() && !has_masses(model)) {
     throw bad_request("--payload", "the URDF has no masses to compare with",
                       "name a log of the robot without its load with --unloaded");
   }
-  PayloadOptions payload;
-  payload.drives = options.models_options.identify.drives;
-  payload.link = options.payload_link;
+  require_payload_question(model, torque_unit, payload_options(options));
+}
+
+std::optional<TorqueSamples> add_payload(const DynamicsOptions& options, const DynamicModel& model,
+                                         TorqueSummary& summary) {
+  const PayloadOptions payload = payload_options(options);
   const TorqueSamples& loaded = summary.data.samples;
   PayloadSummary out;
-  TorqueSamples unloaded;
-  if (two_logs) {
+  std::optional<TorqueSamples> unloaded;
+  if (!options.unloaded_logs.empty()) {
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;
     unloaded = read_torque_data(options.unloaded_logs, wanted_joints(model.tree), data).samples;
     out.against = "the log without load " + file_list(options.unloaded_logs);
-    out.motion = estimate_payload(model, loaded, unloaded, payload);
+    out.motion = estimate_payload(model, loaded, *unloaded, payload);
   } else {
     out.against = "the masses of " + options.robot.filename().string();
     out.motion = estimate_payload(model, loaded, payload);
   }
   out.by_gains = !options.data.mapping.torque_factor.empty();
-  if (options.robust) {
-    try {
-      const RobustTorqueOptions robust = robust_options(options.models_options);
-      const RobustTorque with = learn_robust_torque(model, loaded, robust);
-      std::optional<RobustTorque> without;
-      if (two_logs) without = learn_robust_torque(model, unloaded, robust);
-      out.at_rest = payload_at_rest(model, with, without ? &*without : nullptr, payload);
-    } catch (const Error& error) {
-      summary.warnings.push_back(fmt::format("no payload at rest: {}", error.what()));
-    }
-  }
   summary.payload = std::move(out);
+  return unloaded;
+}
+
+void add_payload_at_rest(const DynamicsOptions& options, const DynamicModel& model,
+                         const std::optional<TorqueSamples>& unloaded, TorqueSummary& summary) {
+  try {
+    const RobustTorqueOptions robust = robust_options(options.models_options);
+    const RobustTorque with = learn_robust_torque(model, summary.data.samples, robust);
+    std::optional<RobustTorque> without;
+    if (unloaded) without = learn_robust_torque(model, *unloaded, robust);
+    summary.payload->at_rest =
+        payload_at_rest(model, with, without ? &*without : nullptr, payload_options(options));
+  } catch (const Error& error) {
+    summary.warnings.push_back(fmt::format("no payload at rest: {}", error.what()));
+  }
 }
 
 }  // namespace kinescope

@@ -258,8 +258,8 @@ PayloadEstimate solve(PayloadSystem data, std::string link, const PayloadOptions
   return out;
 }
 
-void check_unit(const TorqueSamples& samples) {
-  if (samples.torque_unit != "A") return;
+void check_unit(const std::string& torque_unit) {
+  if (torque_unit != "A") return;
   throw bad_request("payload", "the log holds currents, which say no mass",
                     "give the drives' gains in N m/A with --torque-factor");
 }
@@ -322,9 +322,15 @@ double student_point(int freedom) {
          (3.0 * x7 + 19.0 * x5 + 17.0 * x3 - 15.0 * kX) / (384.0 * n * n * n);
 }
 
+void require_payload_question(const DynamicModel& model, const std::string& torque_unit,
+                              const PayloadOptions& options) {
+  check_unit(torque_unit);
+  static_cast<void>(carrier_of(make_rigid_model(model), model, options.link));
+}
+
 PayloadEstimate estimate_payload(const DynamicModel& model, const TorqueSamples& loaded,
                                  const PayloadOptions& options) {
-  check_unit(loaded);
+  check_unit(loaded.torque_unit);
   const RigidModel rigid = make_rigid_model(model);
   const int body = carrier_of(rigid, model, options.link);
   return solve(against_model(rigid, body, loaded, options.drives),
@@ -333,7 +339,7 @@ PayloadEstimate estimate_payload(const DynamicModel& model, const TorqueSamples&
 
 PayloadEstimate estimate_payload(const DynamicModel& model, const TorqueSamples& loaded,
                                  const TorqueSamples& unloaded, const PayloadOptions& options) {
-  check_unit(loaded);
+  check_unit(loaded.torque_unit);
   const RigidModel rigid = make_rigid_model(model);
   const int body = carrier_of(rigid, model, options.link);
   return solve(against_log(rigid, body, loaded, unloaded, options.drives),
@@ -342,7 +348,7 @@ PayloadEstimate estimate_payload(const DynamicModel& model, const TorqueSamples&
 
 PayloadEstimate payload_at_rest(const DynamicModel& model, const RobustTorque& loaded,
                                 const RobustTorque* unloaded, const PayloadOptions& options) {
-  check_unit(loaded.samples);
+  check_unit(loaded.samples.torque_unit);
   const RigidModel rigid = make_rigid_model(model);
   const int body = carrier_of(rigid, model, options.link);
   const std::string& link = rigid.bodies[static_cast<std::size_t>(body)].name;

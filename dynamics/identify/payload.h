@@ -55,6 +55,11 @@ struct PayloadEstimate {
   [[nodiscard]] bool is_seen() const { return lower_kg > 0.0 || upper_kg < 0.0; }
 };
 
+/// Whether it can be asked at all: throws bad_request for torques in A, which say no mass, and for
+/// a link that is not there or not the only last one. The estimates below ask it themselves.
+void require_payload_question(const DynamicModel& model, const std::string& torque_unit,
+                              const PayloadOptions& options = {});
+
 /// The masses of the model are right but for the load. Throws undetermined where the motion does
 /// not show the mass, bad_request for a link that is not there or not the only last one.
 [[nodiscard]] PayloadEstimate estimate_payload(const DynamicModel& model,

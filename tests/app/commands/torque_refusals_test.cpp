@@ -202,6 +202,21 @@ TEST_F(TorqueRefusals, PayloadsThatCannotBeAskedFor) {
   refused(ExitCode::kBadRequest, "--unloaded", {"--payload"});
 }
 
+// Before tracing and the models, which would take minutes and leave files.
+TEST_F(TorqueRefusals, APayloadOfCurrentsIsRefusedBeforeAnyWork) {
+  write(samples_);
+  expect_refusal({"dynamics", path("log.csv"), "--robot", path("robot.urdf"), "--payload",
+                  "--torque-unit", "A", "--output", path("out"), "--quiet"},
+                 ExitCode::kBadRequest, "--torque-factor");
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path() / "out")) {
+    EXPECT_EQ(entry.path().filename(), "dynamics.json");
+    ++files;
+  }
+  EXPECT_EQ(files, 1U);
+  EXPECT_EQ(read_text_file(folder_.path() / "out/dynamics.json"), kEarlier);
+}
+
 // A joint whose torque has the other sign: the advice names that joint alone, and works.
 TEST_F(TorqueRefusals, TheAdviceForATurnedTorqueTurnsThatJoint) {
   TorqueSamples turned = samples_;
