@@ -85,8 +85,13 @@ Criterion make_criterion(const CutoffEvidence& evidence, int order) {
   out.shares = evidence.shares;
   out.end_hz.resize(static_cast<Eigen::Index>(evidence.motion.size()));
   for (const Spectrum& spectrum : evidence.motion) {
-    const MotionAndNoise parts = separate(spectrum, evidence.derivatives - 1);
-    out.end_hz(static_cast<Eigen::Index>(out.motion.size())) = parts.end_hz;
+    const auto joint = static_cast<Eigen::Index>(out.motion.size());
+    MotionAndNoise parts = separate(spectrum, evidence.derivatives - 1);
+    if (parts.end_hz == 0.0 && joint < evidence.travel_speed.size()) {
+      parts = steady_travel(spectrum, evidence.derivatives - 1, evidence.travel_speed(joint),
+                            evidence.travel_s);
+    }
+    out.end_hz(joint) = parts.end_hz;
     out.motion.push_back(make_term(spectrum, parts, evidence.derivatives));
     if (spectrum.frequency_hz.size() == 0) continue;
     out.highest_hz = std::min(out.highest_hz, 2.0 * kHighest * spectrum.frequency_hz.maxCoeff());

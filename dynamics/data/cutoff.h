@@ -31,6 +31,10 @@ struct CutoffEvidence {
   int derivatives = 2;           ///< between the motion's signal and the acceleration
   std::vector<Spectrum> torque;  ///< may be empty
   Eigen::VectorXd shares;        ///< of the torque that goes with the acceleration; 0: at rest
+  /// Mean speed of what a trajectory travels from its begin to its end, and how long it takes: the
+  /// motion of a joint whose spectrum shows none. Empty: not known.
+  Eigen::VectorXd travel_speed = {};
+  double travel_s = 0.0;
 };
 
 struct CutoffChoice {

@@ -134,6 +134,27 @@ class MotionDeriver {
     return spectra;
   }
 
+  /// From the begin to the end of the trajectories, by the time they take: noise is next to
+  /// nothing.
+  Eigen::VectorXd travel_speed() const {
+    Eigen::VectorXd way = Eigen::VectorXd::Zero(log_.q.cols());
+    double time_s = 0.0;
+    for (std::size_t b = 0; b + 1 < bounds_.size(); ++b) {
+      const Eigen::Index last = bounds_[b + 1] - 1;
+      way += (log_.q.row(last) - log_.q.row(bounds_[b])).cwiseAbs().transpose();
+      time_s += log_.t_s(last) - log_.t_s(bounds_[b]);
+    }
+    return time_s > 0.0 ? Eigen::VectorXd(way / time_s) : way;
+  }
+
+  double mean_duration_s() const {
+    double time_s = 0.0;
+    for (std::size_t b = 0; b + 1 < bounds_.size(); ++b) {
+      time_s += log_.t_s(bounds_[b + 1] - 1) - log_.t_s(bounds_[b]);
+    }
+    return time_s / std::max(1.0, static_cast<double>(bounds_.size()) - 1.0);
+  }
+
   /// The source and cut-off with the smallest expected error of the accelerations.
   void choose() {
     struct Candidate {
@@ -157,7 +178,11 @@ class MotionDeriver {
       if (!wanted || !there) continue;
       const CutoffEvidence evidence{
           spectra_of(*candidate.signal, std::max(0, candidate.derivatives - 1)),
-          candidate.derivatives, torques, shares};
+          candidate.derivatives,
+          torques,
+          shares,
+          travel_speed(),
+          mean_duration_s()};
       const CutoffChoice choice =
           choose_cutoff(evidence, order_of(options_.filter), options_.cutoff_hz);
       const double error = sum_of_squares(choice.expected_error);

@@ -156,4 +156,20 @@ MotionAndNoise separate(const Spectrum& spectrum, int to_velocity) {
   return out;
 }
 
+MotionAndNoise steady_travel(const Spectrum& spectrum, int to_velocity, double speed,
+                             double duration_s) {
+  const Eigen::Index n = spectrum.power.size();
+  MotionAndNoise out{Eigen::VectorXd::Zero(n), spectrum.power, 0.0};
+  if (n == 0 || !(duration_s > 0.0)) return out;
+  const Eigen::VectorXd noise = smooth_velocity_power(spectrum, to_velocity);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double omega = 2.0 * std::numbers::pi * spectrum.frequency_hz(k);
+    const double steps = 4.0 * speed * speed / (omega * omega * duration_s);
+    if (!(steps > kClearOfNoise * noise(k))) break;
+    out.end_hz = spectrum.frequency_hz(k);
+    out.motion(k) = steps / std::pow(omega, 2.0 * to_velocity);
+  }
+  return out;
+}
+
 }  // namespace kinescope

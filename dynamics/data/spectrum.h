@@ -42,4 +42,10 @@ struct MotionAndNoise {
 /// continued at the level it has above.
 [[nodiscard]] MotionAndNoise separate(const Spectrum& spectrum, int to_velocity);
 
+/// The same of a joint that travels at a steady speed, whose spectrum shows nothing but noise:
+/// begin and end of the travel are steps of the velocity (power 4 speed^2 / (w^2 duration)), seen
+/// up to where they no longer stand 2.5 times above that noise.
+[[nodiscard]] MotionAndNoise steady_travel(const Spectrum& spectrum, int to_velocity, double speed,
+                                           double duration_s);
+
 }  // namespace kinescope

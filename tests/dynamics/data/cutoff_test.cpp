@@ -116,6 +116,35 @@ TEST(Cutoff, FallsWithNoiseAndRisesWithTheBand) {
   EXPECT_GT(chosen(5.0, 1e-5), chosen(1.0, 1e-5));
 }
 
+// A sweep at constant speed: the velocity's spectrum is noise, the joint moves all the same.
+TEST(Cutoff, ASteadyTravelIsAMotion) {
+  constexpr double kDuration = 30.0;  // s
+  constexpr double kSpeed = 0.0175;   // rad/s: a degree a second
+  constexpr double kNoise = 3e-5;     // rad
+  const auto n = static_cast<Eigen::Index>(kDuration / kStepS);
+  const Eigen::VectorXd way = Eigen::VectorXd::LinSpaced(n, 0.0, kSpeed * kDuration);
+  const auto chosen_at = [&](double noise) {
+    const Eigen::VectorXd x = with_noise(way, noise, "steady travel");
+    return choose_cutoff({{power_spectrum({kStepS, {x}}, 1)},
+                          2,
+                          {},
+                          Eigen::VectorXd::Ones(1),
+                          Eigen::VectorXd::Constant(1, kSpeed),
+                          kDuration},
+                         3);
+  };
+  EXPECT_FALSE(choose(with_noise(way, kNoise, "steady travel")).chosen) << "without its travel";
+  const CutoffChoice choice = chosen_at(kNoise);
+  ASSERT_TRUE(choice.chosen);
+  EXPECT_FALSE(choice.at_edge);
+  // Where 4 v^2 / (w^2 T) is 2.5 times the noise's 2 sigma^2 dt w^2, within a third of an octave.
+  const double crossing_hz =
+      std::pow(4.0 * kSpeed * kSpeed / (2.5 * kDuration * 2.0 * kNoise * kNoise * kStepS), 0.25) /
+      kTurn;
+  EXPECT_NEAR(choice.motion_end_hz(0) / crossing_hz, 1.0, 0.26);
+  EXPECT_LT(chosen_at(10.0 * kNoise).cutoff_hz, choice.cutoff_hz);
+}
+
 TEST(Cutoff, IsNotChosenWhereNothingMoves) {
   const CutoffChoice choice = choose(with_noise(Eigen::VectorXd::Zero(8000), 1e-3, "Cutoff.still"));
   EXPECT_FALSE(choice.chosen);
