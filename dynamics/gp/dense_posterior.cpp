@@ -117,6 +117,8 @@ class DensePosterior : public Posterior {
     return out;
   }
 
+  [[nodiscard]] Eigen::VectorXd kernel_weights() const override { return alpha_; }
+
   // y - f = noise * alpha, var = noise - noise^2 B_ii.
   [[nodiscard]] Moments at_training(Workers& workers) const override {
     const Eigen::MatrixXd inverse = inverse_factor(workers);

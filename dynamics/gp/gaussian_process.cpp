@@ -79,6 +79,10 @@ Prediction predict(const FittedGp& fitted, const Inputs& inputs, const PredictOp
   return out;
 }
 
+Eigen::VectorXd kernel_weights(const FittedGp& fitted) {
+  return fitted.posterior->kernel_weights();
+}
+
 struct Predictor::State {
   const Posterior* posterior = nullptr;
   std::shared_ptr<const Posterior> owner;

@@ -76,6 +76,10 @@ struct PredictOptions {
 [[nodiscard]] Prediction predict(const FittedGp& fitted, const Inputs& inputs,
                                  const PredictOptions& options = {});
 
+/// Weights w of the normalised mean sum_i w_i k(x, x_i) of one output, over the training samples
+/// or, of fit_sparse(), the inducing inputs. Empty for the route kFeatures.
+[[nodiscard]] Eigen::VectorXd kernel_weights(const FittedGp& fitted);
+
 /// One sample after another at control rate: no allocation after the first call. One for each
 /// thread. Needs a model without mean function.
 class Predictor {

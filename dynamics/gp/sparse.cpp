@@ -70,6 +70,12 @@ class SparsePosterior : public Posterior {
                       "use fit() on a subset of the samples");
   }
 
+  [[nodiscard]] Eigen::VectorXd kernel_weights() const override {
+    Eigen::VectorXd out = system_.solution.weights;
+    solve_lower_transposed(system_.factor, out);
+    return out;
+  }
+
   [[nodiscard]] Moments at_training(Workers& workers) const override {
     Moments out = predict(workers, problem_.inputs, true);
     out.mean = problem_.targets - out.mean;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynamics/data/splits.h"
+#include "dynamics/gp/workers.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -212,11 +213,13 @@ double BandFactors::width_95(Index joint) const {
 }
 
 std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int folds,
-                                              Index most_rows, const FoldPredictor& predict) {
+                                              Index most_rows, const FoldPredictor& predict,
+                                              int threads) {
   const Index step = most_rows > 0 ? (samples.size() + most_rows - 1) / most_rows : 1;
   bool by_trajectory = false;
   std::vector<TorqueSamples> tests;
   std::vector<TorquePrediction> predictions;
+  std::vector<Eigen::RowVectorXd> means;
   Index rows = 0;
   try {
     const Folds split = split_folds(samples, {.folds = folds});
@@ -227,9 +230,17 @@ std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int 
         chosen.push_back(fold.test[k]);
       }
       tests.push_back(select_rows(samples, chosen));
-      predictions.push_back(predict(select_rows(samples, fold.train), tests.back()));
       rows += tests.back().size();
     }
+    predictions.resize(tests.size());
+    means.resize(tests.size());
+    gp::Workers workers(threads);
+    workers.run(std::ssize(tests), [&](Index task, gp::Scratch&) {
+      const auto f = static_cast<std::size_t>(task);
+      const TorqueSamples train = select_rows(samples, split.folds[f].train);
+      means[f] = train.torque.colwise().mean();
+      predictions[f] = predict(train, tests[f]);
+    });
   } catch (const Error& error) {
     if (error.code() != ExitCode::kUndetermined) throw;
     return std::nullopt;  // too short to leave something out
@@ -238,7 +249,7 @@ std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int 
   out.folds = static_cast<int>(tests.size());
   out.by_trajectory = by_trajectory;
   out.residual.resize(rows, samples.joints());
-  out.model_sigma = out.sigma = out.residual;
+  out.model_sigma = out.sigma = out.torque = out.constant_residual = out.residual;
   out.fold.resize(rows);
   Index row = 0;
   for (std::size_t f = 0; f < tests.size(); ++f) {
@@ -246,6 +257,8 @@ std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int 
     out.residual.middleRows(row, count) = tests[f].torque - predictions[f].mean;
     out.model_sigma.middleRows(row, count) = predictions[f].model_sigma;
     out.sigma.middleRows(row, count) = predictions[f].sigma;
+    out.torque.middleRows(row, count) = tests[f].torque;
+    out.constant_residual.middleRows(row, count) = tests[f].torque.rowwise() - means[f];
     out.fold.segment(row, count).setConstant(static_cast<int>(f));
     row += count;
   }

@@ -49,16 +49,20 @@ struct LeftOutTorques {
   Eigen::MatrixXd residual;
   Eigen::MatrixXd model_sigma;
   Eigen::MatrixXd sigma;
-  Eigen::VectorXi fold;  ///< of each row
+  Eigen::MatrixXd torque;             ///< measured
+  Eigen::MatrixXd constant_residual;  ///< of the mean of what was learned from
+  Eigen::VectorXi fold;               ///< of each row
   int folds = 0;
   bool by_trajectory = false;  ///< the folds are whole trajectories, not blocks
 };
 
 /// At most `folds` fits (dynamics/data/splits.h), and about `most_rows` predictions evenly spread
 /// over the samples; 0: all. Nothing where there are too few samples for two folds, or for a fit.
+/// `threads`: folds side by side, 0 all of the machine; never changes a result.
 [[nodiscard]] std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int folds,
                                                             Eigen::Index most_rows,
-                                                            const FoldPredictor& predict);
+                                                            const FoldPredictor& predict,
+                                                            int threads = 1);
 
 /// Quantiles of |residual| / sigma where sigma is finite. Each is widened by what it is in doubt
 /// itself, as Student's t is by the doubt of a sigma: its logarithm's variance by the jackknife

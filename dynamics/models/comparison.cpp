@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/models/comparison.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "dynamics/data/splits.h"
@@ -18,6 +20,18 @@ Eigen::VectorXd coverage(const Eigen::MatrixXd& error, const Eigen::MatrixXd& si
     out[j] = static_cast<double>(held) / static_cast<double>(error.rows());
   }
   return out;
+}
+
+// NaN where none is.
+double mean_of_finite(const Eigen::VectorXd& values) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    sum += value;
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
 Eigen::VectorXd share_beyond(const Eigen::MatrixXd& model_sigma, const BandFactors& bands) {
@@ -54,7 +68,37 @@ TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamp
                                                            : Eigen::VectorXi::Zero(error.cols());
   score.bands_by_trajectory = fitted.bands.by_trajectory;
   score.plainer_joints = fitted.plainer_joints;
+  score.constant_joints = fitted.constant_joints;
+  score.inducing_points = fitted.inducing_points;
+  score.left_out_nmse_percent = fitted.left_out_nmse_percent;
   return score;
+}
+
+std::vector<int> worse_than_constant(const TorqueScore& score) {
+  constexpr double kConstant = 100.0;
+  std::vector<int> out;
+  for (Eigen::Index j = 0; j < score.nmse_percent.size(); ++j) {
+    const auto joint = static_cast<int>(j);
+    if (std::ranges::count(score.constant_joints, joint) > 0) continue;
+    if (score.nmse_percent[j] > kConstant) out.push_back(joint);
+  }
+  return out;
+}
+
+int best_score(const std::vector<TorqueScore>& scores) {
+  int best = -1;
+  bool best_holds = false;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    if (!scores[k].failure.empty()) continue;
+    const bool holds = worse_than_constant(scores[k]).empty();
+    const double error = mean_of_finite(scores[k].left_out_nmse_percent);
+    if (best >= 0 && (best_holds != holds ? best_holds : !(error < least))) continue;
+    best = static_cast<int>(k);
+    best_holds = holds;
+    least = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
+  }
+  return std::max(best, 0);
 }
 
 std::vector<TorqueScore> compare_torque_models(const std::vector<TorqueModelKind>& kinds,

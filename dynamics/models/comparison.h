@@ -24,12 +24,25 @@ struct TorqueScore {
   /// Those residuals are of whole trajectories; else of blocks with motion learned from around
   /// them, which says less about what comes later.
   bool bands_by_trajectory = false;
-  std::vector<int> plainer_joints = {};  ///< FittedTorqueModel's
-  std::string failure;                   ///< why there is no score; empty where there is one
+  std::vector<int> plainer_joints = {};   ///< FittedTorqueModel's
+  std::vector<int> constant_joints = {};  ///< FittedTorqueModel's
+  int inducing_points = 0;                ///< FittedTorqueModel's
+  /// On motion left out of the training: what models are chosen by. Empty: not known.
+  Eigen::VectorXd left_out_nmse_percent = {};
+  std::string failure;  ///< why there is no score; empty where there is one
 };
 
 [[nodiscard]] TorqueScore score_torque_model(const FittedTorqueModel& fitted,
                                              const TorqueSamples& test);
+
+/// Joints of the test that the model predicts worse than a constant would (nMSE above 100 %); those
+/// at which it is one do not count.
+[[nodiscard]] std::vector<int> worse_than_constant(const TorqueScore& score);
+
+/// The score to rely on: the least mean error on motion left out of the training, never on the
+/// test, which only strikes out models that do worse than a constant there. The first, where
+/// nothing was left out; 0 where no model was fitted.
+[[nodiscard]] int best_score(const std::vector<TorqueScore>& scores);
 
 /// One score a kind, in the order of `kinds`. A model that cannot be fitted gets its reason.
 [[nodiscard]] std::vector<TorqueScore> compare_torque_models(

@@ -182,16 +182,29 @@ FittedTorqueModel fit_neural_network(const TorqueSamples& samples,
   Rng rng = Rng::from_name("neural network", seed);
   const Trained trained = train(data.inputs(samples.q, samples.dq, samples.ddq),
                                 data.targets(samples.torque), fold, options, rng);
-  const Eigen::RowVectorXd sigma = trained.error.cwiseProduct(data.torque_scale());
   FittedTorqueModel out{TorqueModelKind::kNeuralNetwork, static_cast<int>(samples.size()), {}};
-  out.predict = [data, net = std::make_shared<const Net>(trained.net), sigma](
-                    const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                    const Eigen::MatrixXd& ddq) {
-    const gp::SingleThreadedBlas one_thread;
-    Net own = *net;  // a pass through the network changes it
-    const Eigen::MatrixXd y = outputs(own, rows_of(data.inputs(q, dq, ddq)), q.cols());
-    return with_constant_sigma(data.torques(y), sigma);
-  };
+  Eigen::RowVectorXd error = trained.error;
+  out.left_out_nmse_percent.resize(error.size());
+  const Eigen::MatrixXd targets = data.targets(samples.torque);
+  for (Eigen::Index j = 0; j < error.size(); ++j) {
+    const Eigen::ArrayXd unseen = targets(fold.test, j).array();
+    const double mean = targets(fold.train, j).mean();
+    const double constant = std::sqrt((unseen - mean).square().mean());
+    if (error[j] > constant) out.constant_joints.push_back(static_cast<int>(j));
+    error[j] = std::min(error[j], constant);
+    out.left_out_nmse_percent[j] =
+        100.0 * error[j] * error[j] / (unseen - unseen.mean()).square().mean();
+  }
+  const Eigen::RowVectorXd sigma = error.cwiseProduct(data.torque_scale());
+  out.predict =
+      [data, net = std::make_shared<const Net>(trained.net), sigma, constant = out.constant_joints](
+          const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq) {
+        const gp::SingleThreadedBlas one_thread;
+        Net own = *net;  // a pass through the network changes it
+        Eigen::MatrixXd y = outputs(own, rows_of(data.inputs(q, dq, ddq)), q.cols());
+        for (const int joint : constant) y.col(joint).setZero();  // the mean, standardised
+        return with_constant_sigma(data.torques(y), sigma);
+      };
   return out;
 }
 

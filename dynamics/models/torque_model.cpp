@@ -52,12 +52,20 @@ const std::vector<TorqueModelKind>& all_torque_models() {
 }
 
 const std::vector<TorqueModelKind>& usual_torque_models() {
-  static const std::vector<TorqueModelKind> kinds = [] {
-    std::vector<TorqueModelKind> out = all_torque_models();
-    std::erase(out, TorqueModelKind::kNeuralNetwork);
-    return out;
-  }();
+  static const std::vector<TorqueModelKind> kinds{
+      TorqueModelKind::kParametric, TorqueModelKind::kGip, TorqueModelKind::kSemiParametric};
   return kinds;
+}
+
+TorqueModelOptions quick_options(TorqueModelOptions options) {
+  if (options.inducing_points == 0) {
+    options.inducing_points = 200;
+    options.inducing_samples = options.samples;
+  }
+  options.hyperparameter_samples = 250;
+  options.starts = 1;
+  options.search_tolerance = 1e-3;
+  return options;
 }
 
 FittedTorqueModel parametric_model(const Identification& found, const DynamicModel& model,
@@ -65,16 +73,38 @@ FittedTorqueModel parametric_model(const Identification& found, const DynamicMod
                                    const TorqueModelOptions& options) {
   const auto shared = std::make_shared<const Identification>(found);
   FittedTorqueModel out{TorqueModelKind::kParametric, static_cast<int>(samples.size()), {}};
-  out.predict = [shared](const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                         const Eigen::MatrixXd& ddq) {
-    return predict_torque(*shared, q, dq, ddq);
+  auto saved = std::make_shared<SavedTorqueModel>();
+  saved->kind = TorqueModelKind::kParametric;
+  saved->robot = model.tree.name;
+  saved->torque_unit = samples.torque_unit;
+  saved->rigid = found.rigid;
+  saved->drives = found.drives;
+  saved->samples = out.samples;
+  saved->parametric = saved_parametric(found);
+  saved->parts = {Eigen::VectorXd::Ones(found.sigma.size()), found.sigma};
+  saved->learned = span_of(samples);
+  std::optional<LeftOutTorques> left;
+  if (options.band_folds >= 2) {
+    left = leave_folds_out(
+        samples, options.band_folds, 0,
+        [&](const TorqueSamples& train, const TorqueSamples& test) {
+          return predict_torque(identify_dynamics(model, train, options.identify), test.q, test.dq,
+                                test.ddq);
+        },
+        options.threads);
+  }
+  if (left) {
+    saved->constants = give_way_to_constant(*left, samples.torque);
+    out.constant_joints = saved->constants.joints;
+    out.left_out_nmse_percent = left_out_nmse_percent(*left);
+    out.bands = saved->bands = bands_of(*left);
+  }
+  out.predict = [shared, constants = saved->constants](const Eigen::MatrixXd& q,
+                                                       const Eigen::MatrixXd& dq,
+                                                       const Eigen::MatrixXd& ddq) {
+    return with_constants(predict_torque(*shared, q, dq, ddq), constants);
   };
-  if (options.band_folds < 2) return out;
-  out.bands = cross_validated_bands(
-      samples, options.band_folds, [&](const TorqueSamples& train, const TorqueSamples& test) {
-        return predict_torque(identify_dynamics(model, train, options.identify), test.q, test.dq,
-                              test.ddq);
-      });
+  out.saved = std::move(saved);
   return out;
 }
 
@@ -114,8 +144,8 @@ void check_torque_memory(const std::vector<TorqueModelKind>& kinds, Eigen::Index
 }
 
 FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
-                                   const TorqueSamples& samples,
-                                   const TorqueModelOptions& options) {
+                                   const TorqueSamples& samples, const TorqueModelOptions& options,
+                                   const Progress& progress) {
   if (kind == TorqueModelKind::kParametric) {
     return parametric_model(identify_dynamics(model, samples, options.identify), model, samples,
                             options);
@@ -130,7 +160,7 @@ FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& mod
         options.seed);
   }
   check_torque_memory({kind}, samples.size(), samples.joints(), options);
-  return models::fit_gaussian_processes(kind, model, samples, options);
+  return models::fit_gaussian_processes(kind, model, samples, options, progress);
 }
 
 }  // namespace kinescope

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,8 @@
 #include "dynamics/identify/identify.h"
 #include "dynamics/identify/prediction.h"
 #include "dynamics/models/bands.h"
+#include "dynamics/models/torque_predictor.h"
+#include "kinematics/core/progress.h"
 #include "kinematics/model/dynamic_model.h"
 
 namespace kinescope {
@@ -40,7 +43,7 @@ enum class TorqueModelKind {
 /// Nothing for an unknown name.
 [[nodiscard]] std::optional<TorqueModelKind> torque_model_kind(std::string_view name);
 [[nodiscard]] const std::vector<TorqueModelKind>& all_torque_models();
-/// All but the network, which takes longer than the others together.
+/// Parametric, GIP, semi-parametric: those that quick_options() learn within seconds.
 [[nodiscard]] const std::vector<TorqueModelKind>& usual_torque_models();
 
 struct NeuralNetworkOptions {
@@ -59,9 +62,12 @@ struct TorqueModelOptions {
   /// > 0: Gaussian processes of single joints learn from all samples, through so many inducing
   /// points (dynamics/gp/sparse.h); for more samples than an exact one can hold.
   int inducing_points = 0;
+  int inducing_samples = 0;          ///< at most so many of them, evenly chosen; 0: all
   int samples_of_all_joints = 400;   ///< the same for kLip, whose matrix is joints times as wide
   int hyperparameter_samples = 600;  ///< of them, for the search
   int starts = 3;
+  /// The search ends where a step changes the likelihood by less than this share of it.
+  double search_tolerance = 1e-5;
   NeuralNetworkOptions network;
   std::uint64_t seed = 1;
   int band_folds = 8;  ///< of the parametric model's bands; below 2: the normal distribution's
@@ -70,7 +76,12 @@ struct TorqueModelOptions {
   int process_band_folds = 5;
   int threads = 0;                     ///< 0: all of the machine; never changes a result
   std::size_t memory_limit_bytes = 0;  ///< of a kernel matrix; 0: what the machine has available
+  /// FittedTorqueModel::saved is made; inducing points make it anyway.
+  bool keep_saved = false;
 };
+
+/// For an answer within seconds: few inducing points, hyperparameters from few samples.
+[[nodiscard]] TorqueModelOptions quick_options(TorqueModelOptions options = {});
 
 struct FittedTorqueModel {
   TorqueModelKind kind = TorqueModelKind::kParametric;
@@ -88,6 +99,14 @@ struct FittedTorqueModel {
   /// Joints at which a semi-parametric model is the parametric one up to a constant: what it
   /// learned beside that predicted motion left out worse.
   std::vector<int> plainer_joints = {};
+  /// Joints at which it is a constant: it predicted motion left out of the fit worse.
+  std::vector<int> constant_joints = {};
+  /// nMSE on motion left out of the fit, one a joint, NaN where the torque does not vary: what
+  /// models are chosen by. Empty: too short a log, or not asked for.
+  Eigen::VectorXd left_out_nmse_percent = {};
+  int inducing_points = 0;  ///< most of any joint; 0: none
+  /// The same as numbers, for files and controllers; null: not made, or of a kind that has none.
+  std::shared_ptr<const SavedTorqueModel> saved = {};
 };
 
 /// Throws bad_request where a Gaussian process of these kinds would not fit into memory, with what
@@ -98,7 +117,8 @@ void check_torque_memory(const std::vector<TorqueModelKind>& kinds, Eigen::Index
 /// Throws what check_torque_memory, identification and fit throw.
 [[nodiscard]] FittedTorqueModel fit_torque_model(TorqueModelKind kind, const DynamicModel& model,
                                                  const TorqueSamples& samples,
-                                                 const TorqueModelOptions& options = {});
+                                                 const TorqueModelOptions& options = {},
+                                                 const Progress& progress = {});
 
 /// The parametric model of an identification of these samples that is already there.
 [[nodiscard]] FittedTorqueModel parametric_model(const Identification& found,

@@ -58,8 +58,9 @@ TEST(TorqueModel, NamesGoBothWays) {
   }
   EXPECT_EQ(names.size(), all_torque_models().size());
   EXPECT_FALSE(torque_model_kind("perceptron"));
-  EXPECT_EQ(usual_torque_models().size() + 1, all_torque_models().size());
-  EXPECT_EQ(std::ranges::count(usual_torque_models(), TorqueModelKind::kNeuralNetwork), 0);
+  for (const TorqueModelKind kind : usual_torque_models()) {
+    EXPECT_EQ(std::ranges::count(all_torque_models(), kind), 1);
+  }
 }
 
 TEST(TorqueModel, EveryKindExplainsUnseenMotion) {
@@ -122,6 +123,79 @@ TEST(TorqueModel, SameSamplesSameNumbersWithAnyThreads) {
   const auto b = two.predict(e.test.q, e.test.dq, e.test.ddq);
   EXPECT_EQ(a.mean, b.mean);
   EXPECT_EQ(a.sigma, b.sigma);
+}
+
+// What is saved is the fit itself; joints are fitted side by side.
+TEST(TorqueModel, InducingPointsGiveSameNumbersWithAnyThreads) {
+  const Experiment e = two_joints();
+  for (const TorqueModelKind kind : {TorqueModelKind::kGip, TorqueModelKind::kSemiParametric}) {
+    TorqueModelOptions options = quick();
+    options.inducing_points = 60;
+    options.inducing_samples = 200;
+    options.threads = 1;
+    const auto one = fit_torque_model(kind, e.model, e.train, options);
+    options.threads = 3;
+    const auto three = fit_torque_model(kind, e.model, e.train, options);
+    EXPECT_EQ(one.samples, 200);
+    EXPECT_GT(one.inducing_points, 0);
+    EXPECT_LE(one.inducing_points, 60);
+    const auto a = one.predict(e.test.q, e.test.dq, e.test.ddq);
+    const auto b = three.predict(e.test.q, e.test.dq, e.test.ddq);
+    EXPECT_EQ(a.mean, b.mean);
+    EXPECT_EQ(a.sigma, b.sigma);
+    const auto saved = predict_torque(*one.saved, e.test.q, e.test.dq, e.test.ddq, 2);
+    EXPECT_EQ(a.mean, saved.mean);
+    EXPECT_EQ(a.sigma, saved.sigma);
+  }
+}
+
+// Bits of a batch of products and of one sample after another differ, their numbers do not; the
+// doubt of exact processes is kept through 256 points.
+TEST(TorqueModel, SavedModelsAreTheFit) {
+  const Experiment e = two_joints();
+  TorqueModelOptions options = quick();
+  options.keep_saved = true;
+  for (const TorqueModelKind kind : {TorqueModelKind::kParametric, TorqueModelKind::kRbf,
+                                     TorqueModelKind::kGip, TorqueModelKind::kSemiParametric}) {
+    SCOPED_TRACE(to_string(kind));
+    const FittedTorqueModel fitted = fit_torque_model(kind, e.model, e.train, options);
+    ASSERT_TRUE(fitted.saved);
+    const auto expected = fitted.predict(e.test.q, e.test.dq, e.test.ddq);
+    const auto saved = predict_torque(*fitted.saved, e.test.q, e.test.dq, e.test.ddq);
+    const double size = e.test.torque.cwiseAbs().maxCoeff();
+    EXPECT_LT((saved.mean - expected.mean).cwiseAbs().maxCoeff(), 1e-8 * size);
+    // Both sigmas are calibrated on the same residuals, with doubts of another shape.
+    constexpr double kShape = 0.3;
+    EXPECT_LT((saved.sigma.array() / expected.sigma.array()).log().abs().mean(), kShape);
+    const Eigen::ArrayXXd error = (e.test.torque - saved.mean).array().abs();
+    const BandFactors& bands = fitted.saved->bands;
+    for (Eigen::Index j = 0; j < e.test.joints(); ++j) {
+      const double held =
+          (error.col(j) <= bands.width_90(j) * saved.sigma.col(j).array()).cast<double>().mean();
+      EXPECT_NEAR(held, score_torque_model(fitted, e.test).coverage_90[j], 0.1) << j;
+    }
+  }
+  options.keep_saved = false;
+  EXPECT_FALSE(fit_torque_model(TorqueModelKind::kRbf, e.model, e.train, options).saved);
+  EXPECT_FALSE(fit_torque_model(TorqueModelKind::kSupportVectors, e.model, e.train, options).saved);
+}
+
+TEST(TorqueModel, ProgressCountsWhatIsDone) {
+  const Experiment e = two_joints();
+  std::vector<int> done;
+  int total = 0;
+  TorqueModelOptions options = quick();
+  options.threads = 1;
+  (void)fit_torque_model(TorqueModelKind::kSemiParametric, e.model, e.train, options,
+                         [&](std::string_view stage, int now, int of) {
+                           EXPECT_EQ(stage, "semi_parametric model");
+                           done.push_back(now);
+                           total = of;
+                         });
+  ASSERT_FALSE(done.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(done));
+  EXPECT_LE(done.back(), total);
+  EXPECT_GE(static_cast<int>(done.size()), total / 2);  // fewer folds where there are few paths
 }
 
 TEST(TorqueModel, LearnsFromMoreSamples) {
