@@ -64,7 +64,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     remedy = did_you_mean(argv[1], known_words(app, nullptr));
   } else if (command == nullptr) {
     message = "name a command";
-    remedy = "run, trace, correct, dynamics, contact, inspect or camera; see kinescope --help";
+    remedy =
+        "run, trace, correct, dynamics, predict, contact, inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -159,6 +160,13 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     }
     line.dynamics.data = log_settings(line, line.dynamics.logs.front(), line.dynamics.data);
     return dynamics_command(line.dynamics, console);
+  }
+  if (app.got_subcommand("predict")) {
+    if (line.predict.output.empty()) {
+      line.predict.output = log_name(line.predict.logs.front()) + "_predicted.csv";
+    }
+    line.predict.data = log_settings(line, line.predict.logs.front(), line.predict.data);
+    return predict_command(line.predict, console);
   }
   if (app.got_subcommand("contact")) {
     if (line.contact.output.empty()) {

@@ -278,6 +278,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_trace(app, line);
   add_correct(app, line);
   add_dynamics(app, line);
+  add_predict(app, line);
   add_contact(app, line);
   add_inspect(app, line);
   add_camera(app, line);

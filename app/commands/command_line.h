@@ -22,6 +22,7 @@ struct OutputOptions {
 struct CommandLine {
   RunOptions run;
   DynamicsOptions dynamics;
+  PredictOptions predict;
   ContactCommandOptions contact;
   InspectOptions inspect;
   CameraOptions camera;

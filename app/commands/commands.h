@@ -66,22 +66,35 @@ struct DynamicsOptions {
   std::filesystem::path output;                  ///< folder
   TorqueDataOptions data;
   TorqueModelOptions models_options;
-  std::vector<std::string> models;              ///< names; empty: all but the network
+  std::vector<std::string> models;              ///< names, "all"; empty: the usual ones, quickly
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   /// Where nobody declared it and the torques contradict the default, what they say is taken.
   bool gravity_from_torques = false;
   bool learning_curve = false;
-  bool robust = true;  ///< the robust regressions beside the models
+  /// The robust regressions beside the models, and of a payload at rest; nothing: where all models
+  /// are asked for, and of a payload.
+  std::optional<bool> robust;
   /// What the robot carries: against the URDF's masses, or against logs without the load.
   bool payload = false;
   std::vector<std::filesystem::path> unloaded_logs;  ///< ask for the payload too
   std::string payload_link;                          ///< empty: the last one
   bool trace = true;                      ///< close the loop: look for effects beyond rigid bodies
   std::string trace_file = "trace.json";  ///< in the output folder
-  std::string command_line;               ///< for the report
+  /// Where the best model goes (the one named, where it is one); empty: nowhere.
+  std::filesystem::path save_model;
+  std::string command_line;  ///< for the report
 };
 
 [[nodiscard]] ExitCode dynamics_command(const DynamicsOptions& options, const Console& console);
+
+struct PredictOptions {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path model;   ///< of dynamics --save-model
+  std::filesystem::path output;  ///< CSV
+  TorqueDataOptions data;
+};
+
+[[nodiscard]] ExitCode predict_command(const PredictOptions& options, const Console& console);
 
 struct ContactCommandOptions {
   std::vector<std::filesystem::path> logs;

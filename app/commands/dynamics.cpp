@@ -2,6 +2,7 @@
 //
 // `kinescope dynamics`: from a joint log with torques and a URDF to a model of the torque.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -17,6 +18,7 @@
 #include "app/commands/torque_stages.h"
 #include "app/commands/torque_trace_stage.h"
 #include "app/io/nearest_name.h"
+#include "app/io/torque_model_file.h"
 #include "app/report/trace_lines.h"
 #include "dynamics/data/splits.h"
 #include "dynamics/identify/gravity_from_torques.h"
@@ -31,20 +33,38 @@ namespace fs = std::filesystem;
 // Share of the samples that is held out where no log is named for it.
 constexpr double kHeldOut = 0.3;
 
-std::vector<TorqueModelKind> parse_models(const std::vector<std::string>& names) {
-  if (names.empty()) return usual_torque_models();
+// What is fitted, and how.
+struct Wanted {
   std::vector<TorqueModelKind> kinds;
-  for (const std::string& name : names) {
+  TorqueModelOptions options;
+  bool robust = false;
+};
+
+constexpr const char* kAllModels = "all";
+
+Wanted wanted_models(const DynamicsOptions& options) {
+  Wanted out{{}, options.models_options, options.robust.value_or(false)};
+  if (options.models.empty()) {
+    out.kinds = usual_torque_models();
+    out.options = quick_options(out.options);
+    return out;
+  }
+  for (const std::string& name : options.models) {
+    if (name == kAllModels) {
+      out.kinds = all_torque_models();
+      out.robust = options.robust.value_or(true);
+      return out;
+    }
     const auto kind = torque_model_kind(name);
     if (!kind) {
-      std::vector<std::string> known;
+      std::vector<std::string> known{kAllModels};
       for (const TorqueModelKind k : all_torque_models()) known.emplace_back(to_string(k));
       throw bad_request("--model", fmt::format("'{}' is no torque model", name),
                         did_you_mean(name, known));
     }
-    kinds.push_back(*kind);
+    out.kinds.push_back(*kind);
   }
-  return kinds;
+  return out;
 }
 
 void split_samples(const DynamicsOptions& options, const DynamicModel& model,
@@ -125,24 +145,10 @@ void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const Dynami
   }
 }
 
-// The least mean error; where no joint's torque varies, the first that could be fitted.
-int best_of(const std::vector<TorqueScore>& scores) {
-  int best = -1;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < scores.size(); ++k) {
-    if (!scores[k].failure.empty()) continue;
-    if (best < 0) best = static_cast<int>(k);
-    const double error = mean_nmse_percent(scores[k]);
-    if (!(error < least)) continue;
-    least = error;
-    best = static_cast<int>(k);
-  }
-  return std::max(best, 0);
-}
-
 // Every model on the held-out samples; the best one's prediction is kept.
-void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& model,
-             const TorqueModelOptions& options, const Progress& progress, TorqueSummary& summary) {
+std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds,
+                                       const DynamicModel& model, const TorqueModelOptions& options,
+                                       const Progress& progress, TorqueSummary& summary) {
   std::vector<FittedTorqueModel> fitted(kinds.size());
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     // A line for each: some take minutes.
@@ -152,35 +158,79 @@ void compare(const std::vector<TorqueModelKind>& kinds, const DynamicModel& mode
     try {
       fitted[k] = kinds[k] == TorqueModelKind::kParametric
                       ? parametric_model(summary.identification, model, summary.train, options)
-                      : fit_torque_model(kinds[k], model, summary.train, options);
+                      : fit_torque_model(kinds[k], model, summary.train, options, progress);
       score = score_torque_model(fitted[k], summary.test);
     } catch (const Error& error) {
       score.failure = error.what();
     }
     summary.scores.push_back(std::move(score));
   }
-  summary.best = best_of(summary.scores);
+  summary.best = best_score(summary.scores);
   const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];
   summary.bands = best.bands;
   if (best.predict) {
     summary.prediction = best.predict(summary.test.q, summary.test.dq, summary.test.ddq);
   }
+  return fitted;
 }
 
-void add_trace(const DynamicsOptions& options, const DynamicModel& model,
-               const TorqueLogReport& log, const OutputFolder& folder, const Progress& progress,
-               TorqueSummary& summary) {
-  const TorqueTrace traced =
-      trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
-  summary.trace = traced.trace;
-  for (const TracedEffect& effect : traced.trace.accepted) {
-    if (effect.id.effect != "gravity_direction") continue;
-    summary.traced_gravity_m_s2 = traced.corrected.model.gravity_m_s2;
+constexpr std::array kSavable = {TorqueModelKind::kParametric, TorqueModelKind::kRbf,
+                                 TorqueModelKind::kGip, TorqueModelKind::kSemiParametric};
+
+void check_savable(const DynamicsOptions& options, const std::vector<TorqueModelKind>& kinds) {
+  if (options.save_model.empty()) return;
+  const auto savable = [](TorqueModelKind kind) {
+    return std::ranges::find(kSavable, kind) != kSavable.end();
+  };
+  if (!std::ranges::any_of(kinds, savable)) {
+    throw bad_request("--save-model", fmt::format("{} cannot be saved", to_string(kinds.front())),
+                      "name parametric, rbf, gip or semi_parametric");
   }
+  const fs::path folder = options.save_model.parent_path();
+  require_writable_folder(folder.empty() ? "." : folder);  // before the long work
+}
+
+// The best of those that can be saved.
+std::string save_best(const DynamicsOptions& options, const std::vector<FittedTorqueModel>& fitted,
+                      const std::optional<SavedTrace>& traced, const TorqueSummary& summary) {
+  std::vector<TorqueScore> scores = summary.scores;
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    if (!fitted[k].saved && scores[k].failure.empty()) scores[k].failure = "cannot be saved";
+  }
+  const auto best = static_cast<std::size_t>(best_score(scores));
+  if (!fitted[best].saved) {
+    throw undetermined("--save-model",
+                       "no model that can be saved was learned: " + scores[best].failure,
+                       "record a longer motion of all joints");
+  }
+  TorqueModelFile file;
+  file.version = program_version();
+  file.model = *fitted[best].saved;
+  file.filter = {summary.data.filter, summary.data.cutoff.cutoff_hz};
+  file.source = summary.data.source;
+  if (file.model.kind == TorqueModelKind::kParametric) file.traced = traced;
+  write_file_atomically(options.save_model, torque_model_json(file));
+  return fmt::format("{}{}", to_string(file.model.kind),
+                     file.traced ? " with what tracing found" : "");
+}
+
+std::optional<SavedTrace> add_trace(const DynamicsOptions& options, const DynamicModel& model,
+                                    const TorqueLogReport& log, const OutputFolder& folder,
+                                    const Progress& progress, TorqueSummary& summary) {
+  const TracedLog traced =
+      trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
+  summary.trace = traced.trace.trace;
+  for (const TracedEffect& effect : summary.trace->accepted) {
+    if (effect.id.effect != "gravity_direction") continue;
+    summary.traced_gravity_m_s2 = traced.trace.corrected.model.gravity_m_s2;
+  }
+  // Without effects it would be the identified model again, less exactly.
+  if (traced.saved.corrected.effects.empty()) return std::nullopt;
+  return traced.saved;
 }
 
 void print_scores(const TorqueSummary& summary) {
-  fmt::print("nMSE on {}, %\n{:<16} {:>8}", summary.split, "model", "samples");
+  fmt::print("nMSE on {}, %\n{:<16} {:>8} {:>8}", summary.split, "model", "samples", "inducing");
   for (const std::string& joint : summary.joints) fmt::print(" {:>10}", joint);
   fmt::print("\n");
   for (const TorqueScore& score : summary.scores) {
@@ -188,12 +238,14 @@ void print_scores(const TorqueSummary& summary) {
       fmt::print("{:<16} {}\n", to_string(score.kind), score.failure);
       continue;
     }
-    fmt::print("{:<16} {:>8}", to_string(score.kind), score.training_samples);
+    fmt::print("{:<16} {:>8} {:>8}", to_string(score.kind), score.training_samples,
+               score.inducing_points > 0 ? fmt::format("{}", score.inducing_points) : "-");
     for (const double nmse : score.nmse_percent) {
       fmt::print(" {:>10}", std::isfinite(nmse) ? fmt::format("{:.3g}", nmse) : "-");
     }
     fmt::print("\n");
   }
+  for (const std::string& note : model_notes(summary)) fmt::print("{}\n", note);
 }
 
 void take_gravity_of(const TorqueSamples& samples, DynamicModel& model, TorqueSummary& summary) {
@@ -209,7 +261,9 @@ void take_gravity_of(const TorqueSamples& samples, DynamicModel& model, TorqueSu
 TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progress) {
   Stopwatch clock;
   TorqueSummary summary;
-  const std::vector<TorqueModelKind> kinds = parse_models(options.models);
+  auto [kinds, models_options, robust] = wanted_models(options);
+  models_options.keep_saved = !options.save_model.empty();
+  check_savable(options, kinds);
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   DynamicModel model = robot.model;
   const OutputFolder folder(options.output);
@@ -232,7 +286,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   }
   check_scale(model, summary);
   split_samples(options, model, summary);
-  check_torque_memory(kinds, summary.train.size(), summary.train.joints(), options.models_options);
+  check_torque_memory(kinds, summary.train.size(), summary.train.joints(), models_options);
   clock.lap("read", summary.times);
 
   // Refuses what it must before the slow fits.
@@ -243,31 +297,35 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     clock.lap("payload", summary.times);
   }
   report_progress(progress, "identify", 0, 0);
-  summary.identification = identify_dynamics(model, summary.train, options.models_options.identify);
+  summary.identification = identify_dynamics(model, summary.train, models_options.identify);
   summary.consistent = consistent_model(summary.identification);
   summary.drives = drives_of(summary);
   clock.lap("identify", summary.times);
   // What the model lacks stands in the folder before the slow models begin.
+  std::optional<SavedTrace> traced;
   if (options.trace) {
-    add_trace(options, model, log, folder, progress, summary);
+    traced = add_trace(options, model, log, folder, progress, summary);
     clock.lap("trace", summary.times);
   } else {
     remove_torque_trace(options.trace_file, folder);
   }
-  compare(kinds, model, options.models_options, progress, summary);
+  const std::vector<FittedTorqueModel> fitted =
+      compare(kinds, model, models_options, progress, summary);
   clock.lap("models", summary.times);
+  if (!options.save_model.empty())
+    summary.saved_model = save_best(options, fitted, traced, summary);
   if (options.learning_curve) {
     report_progress(progress, "learning curve", 0, 0);
-    add_learning_curves(kinds, model, options.models_options, summary);
+    add_learning_curves(kinds, model, models_options, summary);
     clock.lap("learning curve", summary.times);
   }
 
-  if (options.robust) {
+  if (robust) {
     report_progress(progress, "robust regression", 0, 0);
-    add_robust_regressions(model, options.models_options, summary);
+    add_robust_regressions(model, models_options, summary);
     clock.lap("robust regression", summary.times);
   }
-  if (summary.payload && options.robust) {
+  if (summary.payload && options.robust.value_or(true)) {
     report_progress(progress, "payload at rest", 0, 0);
     add_payload_at_rest(options, model, unloaded, summary);
     clock.lap("payload at rest", summary.times);
@@ -298,6 +356,10 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   if (summary.trace && summary.trace->verdict != TraceVerdict::kNothingToSay) {
     fmt::print("traced  {} (with what tracing found; contacts left out)\n",
                folder.file("robot_traced.urdf").string());
+  }
+  if (!options.save_model.empty()) {
+    fmt::print("model   {} ({}; for kinescope predict)\n", options.save_model.string(),
+               summary.saved_model);
   }
   fmt::print("report  {}\n", folder.file("dynamics.html").string());
   return ExitCode::kDone;

@@ -112,8 +112,10 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
   command
       .add_option(
           "--model", dynamics.models,
-          "parametric, rbf, gip, model_based, semi_parametric, lip, svr, network (default: all "
-          "but network, which takes a minute)")
+          "parametric, rbf, gip, model_based, semi_parametric, lip, svr, network, or all "
+          "(minutes); "
+          "default: parametric, gip and semi_parametric, the last two quickly, through inducing "
+          "points")
       ->delimiter(',')
       ->type_name("LIST");
   add_gravity(command, dynamics.gravity_m_s2);
@@ -133,8 +135,11 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
                   "Link that carries it (default: the last one)")
       ->type_name("LINK")
       ->group(load);
-  command.add_flag("!--no-robust", dynamics.robust,
-                   "No robust regressions (trimmed, Student's t) beside the models");
+  command.add_flag_callback(
+      "--robust", [&dynamics] { dynamics.robust = true; },
+      "Robust regressions (trimmed, Student's t) beside the models; with --model all anyway");
+  command.add_flag_callback(
+      "--no-robust", [&dynamics] { dynamics.robust = false; }, "None, nor a payload at rest");
   command.add_flag("!--no-trace", dynamics.trace,
                    "Do not look for effects beyond rigid bodies (trace.json)");
   command.add_flag("--learning-curve", dynamics.learning_curve,
@@ -147,9 +152,16 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       ->type_name("N");
   command
       .add_option("--inducing", dynamics.models_options.inducing_points,
-                  "Learn from all samples through so many inducing points")
+                  "Learn from all samples through so many inducing points (default models: from "
+                  "--samples through 200)")
       ->check(number_in(10, 20000))
       ->type_name("N");
+  command
+      .add_option_function<std::string>(
+          "--save-model", [&dynamics](const std::string& text) { dynamics.save_model = text; },
+          "Write the model to rely on, or the one named, for kinescope predict and controllers: "
+          "parametric (with what tracing found), rbf, gip, semi_parametric")
+      ->type_name("FILE");
   add_log_options(command, line, dynamics.data);
   add_cutoff(command, dynamics.data);
   command
@@ -163,6 +175,30 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
                   "  kinescope dynamics log.csv --robot robot.urdf --test log_test.csv\n"
                   "  kinescope dynamics loaded.csv --robot robot.urdf --unloaded empty.csv\n\n{}",
                   kExitCodes));
+}
+
+void add_predict(CLI::App& app, CommandLine& line) {
+  CLI::App& command = *app.add_subcommand(
+      "predict", "From a log and a learned torque model to predicted torques, bands and residuals");
+  PredictOptions& predict = line.predict;
+  add_files(command, "LOG", predict.logs, "Joint logs with torques: CSV, also gzipped", true);
+  command
+      .add_option_function<std::string>(
+          "--model", [&predict](const std::string& text) { predict.model = text; },
+          "The model, from kinescope dynamics --save-model; it knows the robot")
+      ->required()
+      ->type_name("FILE");
+  add_log_options(command, line, predict.data);
+  command
+      .add_option_function<std::string>(
+          "-o,--output", [&predict](const std::string& text) { predict.output = text; },
+          "Table of every sample and joint (default: <first log's name>_predicted.csv here)")
+      ->type_name("FILE");
+  add_output_options(command, line.output);
+  command.footer(fmt::format(
+      "Example:\n  kinescope dynamics log.csv --robot robot.urdf --save-model torque.json\n"
+      "  kinescope predict next_log.csv --model torque.json\n\n{}",
+      kExitCodes));
 }
 
 void add_contact(CLI::App& app, CommandLine& line) {

@@ -10,6 +10,7 @@ namespace kinescope {
 void add_dynamics(CLI::App& app, CommandLine& line);
 /// What `inspect` takes for a torque log in place of a recording.
 void add_inspect_log_options(CLI::App& inspect, CommandLine& line);
+void add_predict(CLI::App& app, CommandLine& line);
 void add_contact(CLI::App& app, CommandLine& line);
 
 }  // namespace kinescope

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/torque_trace_stage.h"
 
+#include <cmath>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -63,6 +64,13 @@ nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts,
   return list;
 }
 
+SavedTrace saved_trace(const TorqueTrace& trace, const TorqueSamples& samples,
+                       const TorqueFilter& filter) {
+  const Eigen::MatrixXd left = samples.torque - predict_torque(trace.corrected, samples, filter);
+  return {trace.corrected, filter,
+          left.colwise().norm().transpose() / std::sqrt(static_cast<double>(left.rows()))};
+}
+
 void remove_corrected(const OutputFolder& folder) {
   std::error_code error;
   for (const char* name : {"robot_traced.urdf", "torque_compensated.csv"}) {
@@ -81,9 +89,9 @@ void remove_torque_trace(const std::string& trace_file, const OutputFolder& fold
   if (document.is_object() && document.contains("left_out")) std::filesystem::remove(path, error);
 }
 
-TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,
-                               const TorqueLogReport& log, const CutoffChoice& cutoff,
-                               const OutputFolder& folder, const Progress& progress) {
+TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,
+                             const TorqueLogReport& log, const CutoffChoice& cutoff,
+                             const OutputFolder& folder, const Progress& progress) {
   MotionOptions motion = options.data.motion;
   if (motion.cutoff_hz <= 0.0) motion.cutoff_hz = tracing_cutoff_hz(cutoff);
   const TorqueData traced = filtered_data(log, motion);
@@ -98,7 +106,7 @@ TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicMode
   folder.write(options.trace_file, document.dump(1) + "\n");
   if (out.trace.verdict == TraceVerdict::kNothingToSay) {
     remove_corrected(folder);
-    return out;
+    return {std::move(out), {}};
   }
   folder.write("robot_traced.urdf", write_urdf(out.corrected.model));
   std::vector<std::string> joints;
@@ -106,7 +114,8 @@ TorqueTrace trace_torque_stage(const DynamicsOptions& options, const DynamicMode
   folder.write("torque_compensated.csv",
                compensated_csv(
                    compensate(out.corrected, traced.samples, trace_options.model.filter), joints));
-  return out;
+  SavedTrace saved = saved_trace(out, traced.samples, trace_options.model.filter);
+  return {std::move(out), std::move(saved)};
 }
 
 }  // namespace kinescope

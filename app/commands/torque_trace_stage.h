@@ -6,17 +6,23 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
+#include "app/io/torque_model_file.h"
 #include "dynamics/effects/trace_torque.h"
 
 namespace kinescope {
 
+struct TracedLog {
+  TorqueTrace trace;
+  SavedTrace saved;
+};
+
 /// Filters the log at the cut-off that tracing asks for, given the one chosen for identification.
 /// Writes trace.json (or the name given), robot_traced.urdf and torque_compensated.csv. Throws as
 /// filtered_data() and trace_torque().
-[[nodiscard]] TorqueTrace trace_torque_stage(const DynamicsOptions& options,
-                                             const DynamicModel& model, const TorqueLogReport& log,
-                                             const CutoffChoice& cutoff, const OutputFolder& folder,
-                                             const Progress& progress);
+[[nodiscard]] TracedLog trace_torque_stage(const DynamicsOptions& options,
+                                           const DynamicModel& model, const TorqueLogReport& log,
+                                           const CutoffChoice& cutoff, const OutputFolder& folder,
+                                           const Progress& progress);
 
 /// Removes what the above wrote in an earlier run; a trace that is no torque log's stays.
 void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder);

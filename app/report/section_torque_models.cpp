@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/report/html.h"
 #include "app/report/plot.h"
@@ -27,6 +26,9 @@ std::string score_table(const TorqueFacts& facts, std::string_view id, std::stri
                         std::string_view key, Quantity quantity) {
   Table table(id, caption, facts.result);
   std::vector<std::string> head = joint_header(facts.summary, "Model");
+  const bool inducing = std::ranges::any_of(
+      facts.summary.scores, [](const TorqueScore& score) { return score.inducing_points > 0; });
+  if (inducing) head.insert(head.begin() + 1, "Inducing points");
   head.insert(head.begin() + 1, "Samples");
   table.header(head);
   for (std::size_t m = 0; m < facts.summary.scores.size(); ++m) {
@@ -35,6 +37,7 @@ std::string score_table(const TorqueFacts& facts, std::string_view id, std::stri
     table.begin_row();
     table.text(to_string(score.kind));
     table.number(fmt::format("/models/{}/samples", m), Quantity::kCount);
+    if (inducing) table.number(fmt::format("/models/{}/inducing_points", m), Quantity::kCount);
     for (std::size_t j = 0; j < facts.summary.joints.size(); ++j) {
       table.number(fmt::format("/models/{}/{}/{}", m, key, j), quantity);
     }
@@ -110,20 +113,6 @@ std::string band_limits(const TorqueScore& score, const std::vector<std::string>
   return out;
 }
 
-// Joints of a semi-parametric model that stayed parametric; empty: none.
-std::string plainer_note(const TorqueScore& score, const std::vector<std::string>& joints) {
-  std::vector<std::string> names;
-  for (const int joint : score.plainer_joints) {
-    names.push_back(joints[static_cast<std::size_t>(joint)]);
-  }
-  if (names.empty()) return "";
-  return fmt::format(
-      "{} is the parametric one at {}: what it learned beside that predicted motion left out of "
-      "the "
-      "fit worse.",
-      to_string(score.kind), fmt::join(names, ", "));
-}
-
 std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.test.size();
   const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
@@ -176,9 +165,12 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
 std::string torque_models_section(const TorqueFacts& facts) {
   std::string out = section_head("models", "Models side by side");
   out += paragraph(
-      "nMSE: mean squared error over the variance of the measured torque, on the held-out part. "
+      "nMSE: mean squared error over the variance of the measured torque, on the held-out part; "
+      "below it, on motion left out of the training, by which the model to rely on is chosen. "
       "Coverage: share of the held-out samples within the model's own 90 % and 95 % bands.");
   out += score_table(facts, "nmse-table", "nMSE, %", "nmse_percent", Quantity::kPlain);
+  out += score_table(facts, "left-out-table", "nMSE on motion left out of the training, %",
+                     "left_out_nmse_percent", Quantity::kPlain);
   out += score_table(facts, "rms-table",
                      fmt::format("Rms error, {}",
                                  common_unit(facts.summary.train.torque_unit, facts.summary.types)),
@@ -193,10 +185,7 @@ std::string torque_models_section(const TorqueFacts& facts) {
                        "note");
     }
   }
-  for (const TorqueScore& score : facts.summary.scores) {
-    const std::string plainer = plainer_note(score, facts.summary.joints);
-    if (!plainer.empty()) out += paragraph(plainer, "note");
-  }
+  for (const std::string& note : model_notes(facts.summary)) out += paragraph(note, "note");
   for (const TorqueScore& score : facts.summary.scores) {
     const std::string limits = band_limits(score, facts.summary.joints);
     if (limits.empty()) continue;

@@ -49,7 +49,9 @@ json scores_json(const std::vector<TorqueScore>& scores) {
   for (const TorqueScore& score : scores) {
     out.push_back({{"model", to_string(score.kind)},
                    {"samples", score.training_samples},
+                   {"inducing_points", score.inducing_points},
                    {"nmse_percent", numbers(score.nmse_percent)},
+                   {"left_out_nmse_percent", numbers(score.left_out_nmse_percent)},
                    {"rms", numbers(score.rms)},
                    {"coverage_90", numbers(score.coverage_90)},
                    {"coverage_95", numbers(score.coverage_95)},
@@ -58,6 +60,7 @@ json scores_json(const std::vector<TorqueScore>& scores) {
                     std::vector<int>(score.band_residuals.begin(), score.band_residuals.end())},
                    {"bands_by_trajectory", score.bands_by_trajectory},
                    {"plainer_joints", score.plainer_joints},
+                   {"constant_joints", score.constant_joints},
                    {"failure", text(score.failure)}});
   }
   return out;
@@ -191,7 +194,8 @@ json payload_json(const TorqueSummary& summary) {
 json best_model(const TorqueSummary& summary) {
   if (summary.scores.empty()) return {};
   const TorqueScore& best = summary.scores[static_cast<std::size_t>(summary.best)];
-  return std::isfinite(mean_nmse_percent(best)) ? json(to_string(best.kind)) : json();
+  const bool holds = std::isfinite(mean_nmse_percent(best)) && worse_than_constant(best).empty();
+  return holds ? json(to_string(best.kind)) : json();
 }
 
 }  // namespace

@@ -87,6 +87,7 @@ struct TorqueSummary {
   TorquePrediction prediction;            ///< of `test`
   BandFactors bands;                      ///< of that model
   std::optional<Trace> trace;             ///< none where it was not asked for
+  std::string saved_model;                ///< which one a file was written of; empty: none
   std::vector<std::string> warnings;
 };
 
@@ -101,9 +102,11 @@ struct TorqueSummary {
 ///   data      rows_read, rows_used, log_rate_hz, rate_hz, filter, source, cutoff_hz, training,
 ///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
 ///             place, what, remedy]
-///   models    [model, samples, nmse_percent, rms, coverage_90, coverage_95, extrapolated,
-///             band_residuals, bands_by_trajectory, failure]
-///   best      name of the model with the smallest mean nMSE; null where there is none
+///   models    [model, samples, inducing_points, nmse_percent, left_out_nmse_percent, rms,
+///             coverage_90, coverage_95, extrapolated, band_residuals, bands_by_trajectory,
+///             plainer_joints, constant_joints, failure]
+///   best      name of the model with the smallest mean left_out_nmse_percent; null where there is
+///             none that predicts every joint better than a constant
 ///   learning  [model, points [samples, nmse_percent]]
 ///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
 ///   drives    [term, joint, value, sigma]
@@ -127,6 +130,10 @@ struct TorqueVerdict {
   std::string gravity;  ///< where it was taken to point and nobody said so; empty where declared
 };
 [[nodiscard]] TorqueVerdict torque_verdict(const TorqueSummary& summary);
+
+/// What the numbers of a table of models do not say, a sentence each: who is worse than a constant,
+/// who gave way to one or to the parametric model.
+[[nodiscard]] std::vector<std::string> model_notes(const TorqueSummary& summary);
 
 /// One self-contained page. Pure: the same summary gives the same bytes.
 [[nodiscard]] std::string torque_report_html(const TorqueSummary& summary);

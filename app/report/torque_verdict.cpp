@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/report/torque_summary.h"
 #include "app/report/torque_unit.h"
@@ -47,11 +48,21 @@ Eigen::Index worst_joint(const TorqueScore& score) {
   return worst;
 }
 
-// A choice among several is itself made on the test.
+// How it was chosen, which the test has no part in.
 std::string choice_words(const TorqueSummary& summary) {
   const auto fitted = std::ranges::count_if(
       summary.scores, [](const TorqueScore& score) { return score.failure.empty(); });
-  return fitted > 1 ? fmt::format(", the best of {} on this test,", fitted) : "";
+  if (fitted < 2) return "";
+  const bool known =
+      summary.scores[static_cast<std::size_t>(summary.best)].left_out_nmse_percent.size() > 0;
+  return known ? fmt::format(", chosen of {} by motion left out of the training,", fitted)
+               : fmt::format(", the first of {},", fitted);
+}
+
+std::string joint_names(const TorqueSummary& summary, const std::vector<int>& joints) {
+  std::vector<std::string> names;
+  for (const int joint : joints) names.push_back(summary.joints[static_cast<std::size_t>(joint)]);
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 std::string joints_words(const TorqueScore& score) {
@@ -158,6 +169,31 @@ double mean_nmse_percent(const TorqueScore& score) {
   const auto count = varies.count();
   if (count == 0) return std::numeric_limits<double>::quiet_NaN();
   return varies.select(score.nmse_percent.array(), 0.0).sum() / static_cast<double>(count);
+}
+
+std::vector<std::string> model_notes(const TorqueSummary& summary) {
+  std::vector<std::string> out;
+  for (const TorqueScore& score : summary.scores) {
+    const std::string name = name_of(score.kind);
+    if (const auto worse = worse_than_constant(score); !worse.empty()) {
+      out.push_back(
+          fmt::format("{} is worse than a constant at {}: of no use there, and never the best.",
+                      name, joint_names(summary, worse)));
+    }
+    if (!score.constant_joints.empty()) {
+      out.push_back(
+          fmt::format("{} is a constant at {}: it predicted motion left out of the training worse "
+                      "than one.",
+                      name, joint_names(summary, score.constant_joints)));
+    }
+    if (!score.plainer_joints.empty()) {
+      out.push_back(fmt::format(
+          "{} is the parametric one at {}: what it learned beside that predicted motion left out "
+          "of the training worse.",
+          name, joint_names(summary, score.plainer_joints)));
+    }
+  }
+  return out;
 }
 
 TorqueVerdict torque_verdict(const TorqueSummary& summary) {

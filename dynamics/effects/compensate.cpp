@@ -25,6 +25,13 @@ Part part_of(const TorqueEffect& effect) {
   return Part::kPhysical;
 }
 
+/// Effects come from files, too.
+Error foreign(const TorqueEffect& effect) {
+  return bad_input("traced effects",
+                   effect.id.effect + " at " + effect.id.place + " is none of this robot",
+                   "trace a log of the robot again");
+}
+
 /// A log at all of its samples, and its library.
 struct Applied {
   const CorrectedTorqueModel& corrected;
@@ -59,7 +66,7 @@ struct Applied {
     const auto found = std::ranges::find_if(names, [&](const std::string& name) {
       return effect.id.place == name || effect.id.place.starts_with(name + " ");
     });
-    KINESCOPE_CHECK(found != names.end(), "an effect at a joint of the model");
+    if (found == names.end()) throw foreign(effect);
     return found - names.begin();
   }
 
@@ -82,6 +89,7 @@ struct Applied {
       if (part_of(effect) != Part::kPhysical) continue;
       const Candidate* candidate = library.find(effect.id);
       if (candidate == nullptr) continue;  // a temperature that this log does not have
+      if (effect.values.size() != std::ssize(candidate->parameters)) throw foreign(effect);
       out += effect_torque(library.carriers, *candidate, effect.scan, effect.values, out.cols());
     }
     return out;

@@ -60,6 +60,36 @@ TEST_F(DynamicsCommand, GivesModelUrdfAndReport) {
   EXPECT_NE(page.find("Models side by side"), std::string::npos);
 }
 
+// By default: parametric, and two processes through inducing points; each says what it learned
+// from.
+TEST_F(DynamicsCommand, UsualModelsAreLearnedQuicklyAndSayFromWhat) {
+  const std::vector<std::string> usual{"dynamics",         path("log.csv"), "--robot",
+                                       path("robot.urdf"), "--samples",     "400",
+                                       "--output",         path("out"),     "--no-trace"};
+  const Outcome outcome = run(usual);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("samples inducing"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("chosen of 3 by motion left out of the training"), std::string::npos)
+      << outcome.out;
+  EXPECT_NE(outcome.err.find("gip model: 12 of 12"), std::string::npos) << outcome.err;
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  const auto& models = document.at("models");
+  ASSERT_EQ(models.size(), 3U);
+  EXPECT_EQ(models[0].at("model"), "parametric");
+  EXPECT_EQ(models[0].at("inducing_points"), 0);
+  for (const std::size_t k : {1U, 2U}) {
+    EXPECT_EQ(models[k].at("samples"), 400);
+    EXPECT_GT(models[k].at("inducing_points"), 0);
+    EXPECT_LE(models[k].at("inducing_points"), 200);
+    EXPECT_EQ(models[k].at("left_out_nmse_percent").size(), 2U);
+    for (const auto& nmse : models[k].at("nmse_percent")) EXPECT_LT(nmse.get<double>(), 5.0);
+  }
+  EXPECT_NE(read_text_file(folder_.path() / "out/dynamics.html").find("Inducing points"),
+            std::string::npos);
+  const ProductCheck check = check_products(folder_.path() / "out");
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
+}
+
 TEST_F(DynamicsCommand, TheSameLogGivesTheSameBytes) {
   ASSERT_EQ(run(words()).code, 0);
   const std::string first = read_text_file(folder_.path() / "out/dynamics.json");
@@ -107,6 +137,9 @@ TEST_F(DynamicsCommand, TorquesInTheWrongUnitAreNamed) {
 
 TEST_F(DynamicsCommand, RobustRegressionsAndPartsAreInTheResult) {
   ASSERT_EQ(run(words({"--no-trace"})).code, 0);
+  const auto without = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  EXPECT_TRUE(without.at("robust").is_null()) << "only when asked for";
+  ASSERT_EQ(run(words({"--no-trace", "--robust"})).code, 0);
   const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
   const auto& robust = document.at("robust");
   ASSERT_EQ(robust.at("methods").size(), 3U);
@@ -188,7 +221,7 @@ TEST(TorqueVerdictWords, AConstantChannelJudgesNoModel) {
   summary.best = 1;
   EXPECT_EQ(mean_nmse_percent(summary.scores[1]), 1.0);
   const std::string words = torque_verdict(summary).accurate;
-  EXPECT_NE(words.find("the best of 2 on this test"), std::string::npos) << words;
+  EXPECT_NE(words.find("the first of 2"), std::string::npos) << words;
   EXPECT_NE(words.find("the 1 of 2 joints"), std::string::npos) << words;
   EXPECT_NE(words.find("worst slide with 1 %"), std::string::npos) << words;
   for (TorqueScore& score : summary.scores) score.nmse_percent.setConstant(none);
@@ -219,6 +252,28 @@ TEST(TorqueVerdictWords, MassesThatNoRobotHasAskForTheUnit) {
   EXPECT_NE(limits_of(3000.0, 0.1).find("3e+03 kg on a reach of 0.5 m"), std::string::npos)
       << limits_of(3000.0, 0.1);
   EXPECT_NE(limits_of(0.003, 0.1).find("check the unit of the torques"), std::string::npos);
+}
+
+TEST(TorqueVerdictWords, WhoIsWorseThanAConstantIsNamedAndNeverTheBest) {
+  TorqueSummary summary;
+  summary.joints = {"turn", "slide"};
+  summary.types = {JointType::kRevolute, JointType::kPrismatic};
+  for (const double error : {18183.0, 2.0}) {
+    TorqueScore score;
+    score.kind = error > 100.0 ? TorqueModelKind::kRbf : TorqueModelKind::kGip;
+    score.nmse_percent = Eigen::Vector2d(error, 1.0);
+    summary.scores.push_back(score);
+  }
+  summary.scores[1].constant_joints = {1};
+  const std::vector<std::string> notes = model_notes(summary);
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_NE(notes[0].find("rbf is worse than a constant at turn"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[1].find("gip is a constant at slide"), std::string::npos) << notes[1];
+  summary.identification.white_covariance.resize(0, 0);
+  summary.best = 0;
+  EXPECT_TRUE(torque_json(summary).at("best").is_null());
+  summary.best = 1;
+  EXPECT_EQ(torque_json(summary).at("best"), "gip");
 }
 
 TEST(TorqueVerdictWords, WorseThanAConstantIsNothingLearned) {

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope predict`: a learned torque model on another log of the robot.
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
+#include "app/io/torque_model_file.h"
+#include "app/report/motion_words.h"
+#include "app/report/result_values.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/file.h"
+
+namespace kinescope {
+namespace {
+
+struct Predicted {
+  TorqueSamples samples;
+  TorquePrediction torque;
+  BandFactors bands;
+  bool traced = false;
+};
+
+std::vector<WantedJoint> wanted(const RigidModel& rigid) {
+  std::vector<WantedJoint> out;
+  for (const RigidBody& body : rigid.bodies) {
+    out.push_back({body.joint, body.type == JointType::kPrismatic});
+  }
+  return out;
+}
+
+TorquePrediction by_trace(const SavedTrace& traced, const TorqueSamples& samples) {
+  TorquePrediction out;
+  out.mean = predict_torque(traced.corrected, samples, traced.filter);
+  out.model_sigma = Eigen::MatrixXd::Zero(out.mean.rows(), out.mean.cols());
+  out.sigma = traced.sigma.transpose().replicate(out.mean.rows(), 1);
+  return out;
+}
+
+Predicted predict(const PredictOptions& options, const TorqueModelFile& file) {
+  TorqueDataOptions data = options.data;
+  const TorqueFilter& filter = file.traced ? file.traced->filter : file.filter;
+  data.motion.filter = filter.kind;
+  data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
+  Predicted out;
+  out.samples = read_torque_data(options.logs, wanted(file.model.rigid), data).samples;
+  if (out.samples.torque_unit != file.model.torque_unit) {
+    throw bad_input(options.logs.front().string(),
+                    fmt::format("its torques are in {}, the model's in {}", out.samples.torque_unit,
+                                file.model.torque_unit),
+                    "state --torque-unit and --torque-factor as for the log it was learned from");
+  }
+  out.traced = file.traced.has_value();
+  if (out.traced) {
+    out.torque = by_trace(*file.traced, out.samples);
+  } else {
+    out.torque = predict_torque(file.model, out.samples.q, out.samples.dq, out.samples.ddq);
+    out.bands = file.model.bands;
+  }
+  return out;
+}
+
+// t, trajectory, then of every joint: measured, mean, half the 90 % band, residual.
+std::string table(const Predicted& predicted, const RigidModel& rigid) {
+  std::string out = "t,trajectory";
+  for (const RigidBody& body : rigid.bodies) {
+    out += fmt::format(",torque_{0},mean_{0},band90_{0},residual_{0}", body.joint);
+  }
+  out += "\n";
+  const TorqueSamples& samples = predicted.samples;
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    out += fmt::format("{},{}", samples.t_s[i], samples.trajectory[i]);
+    for (Eigen::Index j = 0; j < samples.joints(); ++j) {
+      const double mean = predicted.torque.mean(i, j);
+      out += fmt::format(",{:.9g},{:.9g},{:.9g},{:.9g}", samples.torque(i, j), mean,
+                         predicted.bands.width_90(j) * predicted.torque.sigma(i, j),
+                         samples.torque(i, j) - mean);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+struct JointResult {
+  double nmse_percent = 0.0;
+  double rms = 0.0;
+  double within_90 = 0.0;
+};
+
+std::vector<JointResult> results(const Predicted& predicted) {
+  const Eigen::MatrixXd error = predicted.samples.torque - predicted.torque.mean;
+  const Eigen::VectorXd nmse =
+      normalised_error_percent(predicted.samples.torque, predicted.torque.mean);
+  const auto count = static_cast<double>(error.rows());
+  std::vector<JointResult> out;
+  for (Eigen::Index j = 0; j < error.cols(); ++j) {
+    const auto held = (error.col(j).array().abs() <=
+                       predicted.bands.width_90(j) * predicted.torque.sigma.col(j).array())
+                          .count();
+    out.push_back(
+        {nmse[j], error.col(j).norm() / std::sqrt(count), static_cast<double>(held) / count});
+  }
+  return out;
+}
+
+}  // namespace
+
+ExitCode predict_command(const PredictOptions& options, const Console& console) {
+  const TorqueModelFile file = read_torque_model(options.model);
+  const Predicted predicted = predict(options, file);
+  const RigidModel& rigid = file.model.rigid;
+  write_file_atomically(options.output, table(predicted, rigid));
+  const std::vector<std::string> words = motion_words(file.model.learned, predicted.samples, rigid);
+  const std::vector<JointResult> joints = results(predicted);
+  if (console.json) {
+    nlohmann::json document{
+        {"model", to_string(file.model.kind)}, {"traced", predicted.traced},
+        {"samples", predicted.samples.size()}, {"unit", predicted.samples.torque_unit},
+        {"joints", nlohmann::json::array()},   {"motion", report::texts(words)}};
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      document["joints"].push_back({{"name", report::text(rigid.bodies[j].joint)},
+                                    {"nmse_percent", report::number(joints[j].nmse_percent)},
+                                    {"rms", report::number(joints[j].rms)},
+                                    {"within_90", report::number(joints[j].within_90)}});
+    }
+    fmt::print("{}\n", document.dump(2));
+    return ExitCode::kDone;
+  }
+  fmt::print("The {} model{} of {}, learned from {} samples, on {} samples.\n",
+             to_string(file.model.kind), predicted.traced ? " with what tracing found" : "",
+             file.model.robot, file.model.samples, predicted.samples.size());
+  fmt::print("{:<16} {:>10} {:>10} {:>16}\n", "joint", "nMSE, %",
+             fmt::format("rms, {}", predicted.samples.torque_unit), "in 90 % band, %");
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    fmt::print(
+        "{:<16} {:>10} {:>10.3g} {:>16.1f}\n", rigid.bodies[j].joint,
+        std::isfinite(joints[j].nmse_percent) ? fmt::format("{:.3g}", joints[j].nmse_percent) : "-",
+        joints[j].rms, 100.0 * joints[j].within_90);
+  }
+  for (const std::string& word : words) fmt::print("{}.\n", word);
+  if (words.empty()) fmt::print("The motion stays within what was learned.\n");
+  fmt::print("table   {}\n", options.output.string());
+  return ExitCode::kDone;
+}
+
+}  // namespace kinescope
