@@ -126,6 +126,15 @@ class Explainer {
     return out;
   }
 
+  // Of a part or a change of the evidence, which may lack what was declared.
+  [[nodiscard]] std::optional<Structure> proposed_structure(const PoseTracks& tracks) const {
+    try {
+      return structure_of(tracks);
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  }
+
   /// The best of what the moves propose, one after the other until one is of one piece.
   [[nodiscard]] Explanation improved(Explanation now) const {
     now = asked_again(std::move(now));
@@ -178,12 +187,14 @@ class Explainer {
   [[nodiscard]] Explanation asked_again(Explanation now) const {
     if (!now.fitted || !now.structure || now.fitted->effects.empty() || is_structure_clear(now))
       return now;
-    Structure again = structure_of(with_effects_undone(now.fitted->calibration, evidence_.tracks));
-    if (shape_of(again) == shape_of(*now.structure)) {
+    std::optional<Structure> again =
+        proposed_structure(with_effects_undone(now.fitted->calibration, evidence_.tracks));
+    if (!again) return now;
+    if (shape_of(*again) == shape_of(*now.structure)) {
       now.structure = std::move(again);
       return now;
     }
-    Explanation other = of_structure(std::move(again), now.fitted->trace.added);
+    Explanation other = of_structure(std::move(*again), now.fitted->trace.added);
     return is_better(other, now) ? other : now;
   }
 
@@ -198,9 +209,9 @@ class Explainer {
       for (PoseTrack& track : half.tracks)
         std::erase_if(track.samples,
                       [&](const PoseSample& sample) { return (sample.frame < middle) != first; });
-      Structure structure = structure_of(half);
-      if (structure.status == StructureStatus::kDetermined)
-        out.push_back({std::move(structure), {}});
+      std::optional<Structure> structure = proposed_structure(half);
+      if (structure && structure->status == StructureStatus::kDetermined)
+        out.push_back({std::move(*structure), {}});
     }
     return out;
   }
@@ -218,8 +229,11 @@ class Explainer {
       const std::optional<CameraModel> found =
           camera_from_motion(recording(), evidence_.observed, begin, options_.calibrate);
       if (!found) continue;
+      std::optional<Structure> structure =
+          proposed_structure(pose_tracks_from_tags(tags, *found, recording().markers));
+      if (!structure) continue;
       return {
-          {structure_of(pose_tracks_from_tags(tags, *found, recording().markers)),
+          {std::move(*structure),
            {{{"lens_distortion", "camera"}, 0.0}, {{"lens_distortion", "camera pinhole"}, 0.0}}}};
     }
     return {};
@@ -292,7 +306,12 @@ Explanation explain(const Evidence& evidence, const ExplainOptions& options,
   const Evidence rest{changed.recording, changed.observed, changed.tracks, evidence.camera};
   std::vector<std::string> said;
   std::vector<std::string> said_with_them;
-  Explanation without_them = Explainer(rest, options).explained(said);
+  Explanation without_them;
+  try {
+    without_them = Explainer(rest, options).explained(said);
+  } catch (const Error& error) {
+    without_them.failure = error;
+  }
   // What needed no sighting to be given up has nothing against it.
   const bool cost_nothing =
       sightings_in(changed.observed.measurements) == sightings_in(evidence.observed.measurements);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/effects/joint_shares.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -63,6 +64,28 @@ TEST(PlayState, TheSamePlaceFromBothSidesDiffersByTheWidth) {
   const Eigen::VectorXd link = drive + kWidth * play_state(drive, kWidth);
   EXPECT_NEAR(link[3] - link[1], kWidth, kExact);
   EXPECT_NEAR(link[5], link[1], kExact);
+}
+
+// With the place in its gap at which it began beside it, a play that begins in the middle is exact
+// at every instant, from whichever side the first motion comes.
+TEST(PlayState, WithTheShareOfItsStartAPlayMayBeginInTheMiddle) {
+  constexpr double kWidth = 0.2;
+  for (const double sign : {1.0, -1.0}) {
+    const Eigen::VectorXd drive =
+        sign * values({0.0, 0.0, 0.04, 0.08, 0.15, 0.4, 0.3, 0.1, 0.0, 0.2});
+    double link = 0.0;
+    const Eigen::VectorXd state = play_state(drive, kWidth);
+    const Eigen::VectorXd start = share_of_start(drive, kWidth);
+    for (Eigen::Index i = 0; i < drive.size(); ++i) {
+      link = std::clamp(link, drive[i] - 0.5 * kWidth, drive[i] + 0.5 * kWidth);
+      EXPECT_NEAR(drive[i] + kWidth * state[i] + sign * 0.5 * kWidth * start[i], link, kExact) << i;
+    }
+  }
+}
+
+TEST(PlayState, TheShareOfTheStartEndsOnceTheGapIsCrossed) {
+  const Eigen::VectorXd start = share_of_start(values({1.0, 1.0, 1.05, 1.2, 1.0, 1.0}), 0.2);
+  EXPECT_LT((start - values({1.0, 1.0, 0.5, 0.0, 0.0, 0.0})).norm(), kExact);
 }
 
 TEST(ReadAt, IsLinearBetweenStampsAndKeepsTheEnds) {

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/bundle/undone.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/truth/camera_world.h"
+
+namespace kinescope {
+namespace {
+
+// A camera that shifts in the middle, as a calibration with that correction: what its tracks would
+// have been without.
+TEST(Undone, TracksOfABumpedCameraAreThoseOfOneThatStoodStill) {
+  truth::WorldOptions options;
+  options.sigma_px = 0.0;
+  const truth::World world = truth::make_world(options);
+  const Pose bump{exp_rotation({0.0, 0.01, 0.0}), {0.005, 0.0, 0.0}};
+  Calibration calibration;
+  calibration.kind = MeasurementKind::kPose;
+  calibration.tree = world.tree;
+  calibration.T_camera_base = world.T_camera_base;
+  calibration.joint_values = world.joint_values;
+  calibration.times_s = world.measurements.times_s;
+  PoseTracks seen;
+  seen.times_s = world.measurements.times_s;
+  PoseTracks truth = seen;
+  const int frames = static_cast<int>(seen.times_s.size());
+  for (const Marker& marker : world.tree.markers) {
+    PoseTrack bumped{marker.id, {}};
+    PoseTrack still{marker.id, {}};
+    for (int f = 0; f < frames; ++f) {
+      const auto links = forward_kinematics(world.tree, world.joint_values.row(f));
+      PoseSample sample;
+      sample.frame = f;
+      sample.T_camera_marker =
+          world.T_camera_base * links[marker.link.index()] * marker.T_link_marker;
+      sample.T_camera_marker_alternative = sample.T_camera_marker;
+      SightingResidual residual;  // nothing is left of a model with the effect in it
+      residual.frame = f;
+      residual.id = marker.id;
+      residual.used = f != 3;
+      calibration.residuals.push_back(residual);
+      if (residual.used) still.samples.push_back(sample);
+      if (f > frames / 2) sample.T_camera_marker = bump * sample.T_camera_marker;
+      bumped.samples.push_back(sample);
+    }
+    seen.tracks.push_back(bumped);
+    truth.tracks.push_back(still);
+  }
+  const PoseTracks undone = with_effects_undone(calibration, seen);
+  ASSERT_EQ(undone.tracks.size(), truth.tracks.size());
+  for (std::size_t t = 0; t < truth.tracks.size(); ++t) {
+    const auto& a = undone.tracks[t].samples;
+    const auto& b = truth.tracks[t].samples;
+    ASSERT_EQ(a.size(), b.size()) << "a sighting that was left out says nothing";
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].frame, b[i].frame);
+      EXPECT_LT((a[i].T_camera_marker.translation - b[i].T_camera_marker.translation).norm(),
+                1e-12);
+      EXPECT_FALSE(a[i].T_camera_marker_alternative);
+    }
+  }
+}
+
+TEST(Undone, MarkersThatAreNotOnTheRobotStayAsTheyAre) {
+  PoseTracks tracks;
+  tracks.times_s = {0.0};
+  tracks.tracks = {{TagId{99}, {PoseSample{}}}};
+  const PoseTracks undone = with_effects_undone(Calibration{}, tracks);
+  ASSERT_EQ(undone.tracks.size(), 1U);
+  EXPECT_EQ(undone.tracks[0].samples.size(), 1U);
+}
+
+}  // namespace
+}  // namespace kinescope
