@@ -182,6 +182,13 @@ void happens_at_a_time(const EffectWorld& world, CorrectedPart part, int index, 
       length / static_cast<double>(std::max<std::size_t>(1, world.frames.times_s.size() - 1));
   c.scan_name = "at";
   c.scan_unit = "s";
+  if (world.postures) {
+    // Their stamps may be any numbers.
+    c.scan_words = [times_s = world.frames.times_s](double at_s) {
+      const auto first = std::ranges::lower_bound(times_s, at_s);
+      return fmt::format("posture {} of {}", first - times_s.begin() + 1, times_s.size());
+    };
+  }
   const Eigen::VectorXd time = frame_times(world);
   out.corrections = [like = out, part, index, time](double at_s) {
     std::vector<Correction> corrections;
