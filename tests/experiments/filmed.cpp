@@ -28,7 +28,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
-#include "tests/acceptance/truth_robot.h"
+#include "tests/acceptance/truth_of_world.h"
 #include "tests/experiments/trace_camera_worlds.h"
 #include "tests/truth/film.h"
 #include "tests/truth/temporary_path.h"
@@ -84,16 +84,6 @@ std::optional<InjectedEffect> pick(const std::string& effect, double strength,
                                    const truth::EffectWorldOptions& options) {
   return one_of(truth::weakest_effects(effect, truth::robot_of(options)), strength,
                 Rng::from_name("place of " + effect, options.seed));
-}
-
-acceptance::TruthRobot truth_of(const truth::World& world) {
-  acceptance::TruthRobot truth;
-  truth.tree = world.tree;
-  for (Eigen::Index j = 0; j < world.joint_values.cols(); ++j) {
-    const auto values = world.joint_values.col(j);
-    truth.range.push_back({values.minCoeff(), values.maxCoeff()});
-  }
-  return truth;
 }
 
 std::string answer_of(const json& trace) {
@@ -164,7 +154,7 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
     fmt::print("exit {}: {}\n", static_cast<int>(code), words);
     return out;
   }
-  const acceptance::TruthRobot truth = truth_of(world);
+  const acceptance::TruthRobot truth = acceptance::truth_of(world);
   const KinematicTree learned = read_urdf(folder / "run" / "robot.urdf");
   const std::string difference = acceptance::structure_difference(truth, learned);
   const json trace = json::parse(read_text_file(folder / "run" / "trace.json"));

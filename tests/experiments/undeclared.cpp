@@ -22,7 +22,7 @@
 
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
-#include "tests/acceptance/truth_robot.h"
+#include "tests/acceptance/truth_of_world.h"
 #include "tests/experiments/command_line.h"
 #include "tests/experiments/trace_camera_worlds.h"
 #include "tests/experiments/undeclared_cases.h"
@@ -128,16 +128,6 @@ void judge_trace(const json& trace, const UndeclaredCase& of, Outcome& out) {
   });
 }
 
-acceptance::TruthRobot truth_of(const truth::World& world) {
-  acceptance::TruthRobot truth;
-  truth.tree = world.tree;
-  for (Eigen::Index j = 0; j < world.joint_values.cols(); ++j) {
-    const auto values = world.joint_values.col(j);
-    truth.range.push_back({values.minCoeff(), values.maxCoeff()});
-  }
-  return truth;
-}
-
 Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::path& folder) {
   fs::create_directories(folder);
   const truth::World world = write_case(of, folder, request.damage);
@@ -159,7 +149,7 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
     out.answer = words.substr(words.find_last_of('\n') + 1);
     return out;
   }
-  const acceptance::TruthRobot truth = truth_of(world);
+  const acceptance::TruthRobot truth = acceptance::truth_of(world);
   const std::string difference =
       acceptance::structure_difference(truth, read_urdf(run / "robot.urdf"));
   out.structure = difference.empty();

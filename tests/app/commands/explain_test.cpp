@@ -6,23 +6,13 @@
 
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
-#include "tests/acceptance/truth_robot.h"
+#include "tests/acceptance/truth_of_world.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/experiments/undeclared_cases.h"
 
 namespace kinescope {
 namespace {
-
-acceptance::TruthRobot truth_of(const truth::World& world) {
-  acceptance::TruthRobot truth;
-  truth.tree = world.tree;
-  for (Eigen::Index j = 0; j < world.joint_values.cols(); ++j) {
-    const auto values = world.joint_values.col(j);
-    truth.range.push_back({values.minCoeff(), values.maxCoeff()});
-  }
-  return truth;
-}
 
 struct Answered {
   Outcome outcome;
@@ -41,7 +31,7 @@ Answered run_case(int number, Damage damage = Damage::kNone) {
     return answered;
   }
   answered.difference =
-      acceptance::structure_difference(truth_of(world), read_urdf(out / "robot.urdf"));
+      acceptance::structure_difference(acceptance::truth_of(world), read_urdf(out / "robot.urdf"));
   answered.trace = nlohmann::json::parse(read_text_file(out / "trace.json"));
   return answered;
 }
