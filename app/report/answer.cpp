@@ -45,9 +45,8 @@ std::vector<std::string> unknown_axes(const Calibration& calibration) {
 
 // A geometry that is held says how far it is off, which is what was asked.
 bool is_geometry_held(const Calibration& calibration) {
-  return std::ranges::none_of(calibration.tree.joints, [&](const Joint& joint) {
-    return is_estimated(calibration, joint);
-  });
+  return std::ranges::none_of(calibration.tree.joints,
+                              [&](const Joint& joint) { return is_estimated(calibration, joint); });
 }
 
 // How far a model is from the measurements it did not leave out, and how far those move: root mean
