@@ -512,7 +512,7 @@ gp::GpModel function_of(const Processes& all, std::size_t joint, double step_s) 
 }
 
 // Points that carry the variance of an exact process that is saved: a band needs no more of them
-// (256 take 4 us a sample; 128 and 512 cover alike on the sample logs).
+// (256 take 4 us a sample).
 constexpr int kCarriers = 256;
 
 // One joint as numbers, with the doubt of the folds' processes under the hyperparameters of all
