@@ -47,6 +47,7 @@ void take_values(const Calibration& calibration, const std::vector<Correction>& 
       continue;
     }
     for (double& value : effect.values) value = values.at(next++);
+    if (!effect.table.empty()) effect.table.error = effect.table_shares * effect.values;
   }
   KINESCOPE_CHECK(next == values.size(), "a value for each number of the effects");
 }

@@ -33,10 +33,48 @@ std::string word(const json& entry, const char* key, const std::filesystem::path
   return entry.at(key).get<std::string>();
 }
 
+std::vector<double> numbers_of(const Eigen::VectorXd& values) {
+  return {values.begin(), values.end()};
+}
+
+Eigen::VectorXd column_of(const json& table, const char* key, const std::string& name,
+                          const std::filesystem::path& path) {
+  if (!table.is_object() || !table.contains(key) || !table.at(key).is_array()) {
+    throw wrong(path, fmt::format("{}: a table without '{}'", name, key));
+  }
+  Eigen::VectorXd out(std::ssize(table.at(key)));
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
+    out[i] = finite(table.at(key)[static_cast<std::size_t>(i)], path,
+                    fmt::format("{}: {} {}", name, key, i + 1));
+  }
+  return out;
+}
+
+ErrorTable table_of(const json& table, const std::string& name, const std::filesystem::path& path) {
+  ErrorTable out{column_of(table, "value", name, path), column_of(table, "error", name, path),
+                 column_of(table, "sigma", name, path)};
+  const bool alike = out.value.size() == out.error.size() && out.value.size() == out.sigma.size();
+  if (!alike || out.value.size() < 2) {
+    throw wrong(path, fmt::format("{}: columns of {}, {} and {} numbers", name, out.value.size(),
+                                  out.error.size(), out.sigma.size()));
+  }
+  for (Eigen::Index i = 1; i < out.value.size(); ++i) {
+    if (!(out.value[i] > out.value[i - 1])) {
+      throw wrong(path, fmt::format("{}: value {} is not above the one before", name, i + 1));
+    }
+  }
+  return out;
+}
+
 FittedEffect effect_of(const json& entry, const std::filesystem::path& path) {
   FittedEffect out;
   out.id = {word(entry, "effect", path), word(entry, "place", path)};
   const std::string name = fmt::format("{} at {}", out.id.effect, out.id.place);
+  if (const auto table = entry.find("table"); table != entry.end()) {
+    out.scan = finite(entry.value("at", json()), path, name + ": at");
+    out.table = table_of(*table, name, path);
+    return out;
+  }
   if (!entry.contains("at") || !entry.contains("parameters") ||
       !entry.at("parameters").is_array() || entry.at("parameters").empty()) {
     throw wrong(path, fmt::format("{} has no parameters", name));
@@ -89,6 +127,7 @@ json effects_json(const std::vector<FittedEffect>& effects) {
   json list = json::array();
   for (const FittedEffect& effect : effects) {
     json parameters = json::array();
+    // None of a table.
     for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
       const auto at = static_cast<Eigen::Index>(k);
       parameters.push_back({{"name", effect.parameters[k].name},
@@ -96,10 +135,16 @@ json effects_json(const std::vector<FittedEffect>& effects) {
                             {"value", effect.values[at]},
                             {"reference", effect.references[at]}});
     }
-    list.push_back({{"effect", effect.id.effect},
-                    {"place", effect.id.place},
-                    {"at", effect.scan},
-                    {"parameters", std::move(parameters)}});
+    json entry{{"effect", effect.id.effect},
+               {"place", effect.id.place},
+               {"at", effect.scan},
+               {"parameters", std::move(parameters)}};
+    if (!effect.table.empty()) {
+      entry["table"] = {{"value", numbers_of(effect.table.value)},
+                        {"error", numbers_of(effect.table.error)},
+                        {"sigma", numbers_of(effect.table.sigma)}};
+    }
+    list.push_back(std::move(entry));
   }
   return list;
 }

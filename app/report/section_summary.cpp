@@ -67,8 +67,8 @@ std::string geometry_light(const Facts& facts) {
                rule);
 }
 
-std::string_view trace_word(TraceVerdict verdict) {
-  switch (verdict) {
+std::string_view trace_word(const Trace& trace) {
+  switch (trace.verdict) {
     case TraceVerdict::kClean:
       return "noise, nothing else";
     case TraceVerdict::kEffects:
@@ -76,7 +76,8 @@ std::string_view trace_word(TraceVerdict verdict) {
     case TraceVerdict::kAmbiguous:
       return "traced, but to one of several causes";
     case TraceVerdict::kUnknown:
-      return "structure left that no known effect explains";
+      return trace.rest.empty() ? "repeats with joints' values, cause unknown, corrected"
+                                : "structure left that no known effect explains";
     case TraceVerdict::kNothingToSay:
     case TraceVerdict::kNotRun:
       break;
@@ -91,14 +92,14 @@ std::string residual_light(const Trace& trace, double sigma_scale) {
       "{:.0f} would be told one",
       100.0 * trace.false_alarm_rate);
   if (trace.verdict != TraceVerdict::kClean)
-    return light("Residual", "fair", trace_word(trace.verdict), rule);
+    return light("Residual", "fair", trace_word(trace), rule);
   if (sigma_scale > kNoiseLimit) {
     return light(
         "Residual", "fair",
         fmt::format("nothing known is left, but {:.1f} times the declared noise", sigma_scale),
         rule);
   }
-  return light("Residual", "good", trace_word(trace.verdict), rule);
+  return light("Residual", "good", trace_word(trace), rule);
 }
 
 std::string verdict_line(std::string_view label, std::string_view words) {

@@ -54,6 +54,11 @@ json effect_json(const TracedEffect& effect) {
                  {"unit", text(effect.scan_unit)},
                  {"words", text(effect.scan_words)}};
   }
+  if (effect.is_curve()) {
+    out["curve"] = {{"at", curve_json(effect.picture.at)},
+                    {"mean", curve_json(effect.picture.effect)},
+                    {"sigma", curve_json(effect.picture.sigma)}};
+  }
   return out;
 }
 

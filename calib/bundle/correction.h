@@ -42,6 +42,9 @@ struct Correction {
   double reference = 1.0;
   /// What nobody asks for and yet has to be known beside an effect: where in its gap a joint began.
   bool is_nuisance = false;
+  /// Standard deviation of a Gaussian prior about zero, in the unit of the value and beside rows
+  /// that are whitened; 0: none.
+  double prior_sigma = 0.0;
 };
 
 }  // namespace kinescope

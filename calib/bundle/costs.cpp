@@ -186,6 +186,37 @@ Matrix6d whitening_of(const NominalSigmas& sigmas) {
   return weights.asDiagonal();
 }
 
+// Values of corrections over their priors' sigmas.
+class CorrectionPrior final : public ceres::CostFunction {
+ public:
+  explicit CorrectionPrior(const std::vector<Correction>& corrections) {
+    for (std::size_t c = 0; c < corrections.size(); ++c) {
+      if (corrections[c].prior_sigma > 0.0) rows_.emplace_back(c, 1.0 / corrections[c].prior_sigma);
+    }
+    width_ = corrections.size();
+    set_num_residuals(static_cast<int>(rows_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(width_));
+  }
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const auto& [column, weight] = rows_[i];
+      residuals[i] = weight * parameters[0][column];
+    }
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      std::fill_n(jacobians[0], rows_.size() * width_, 0.0);
+      for (std::size_t i = 0; i < rows_.size(); ++i) {
+        jacobians[0][i * width_ + rows_[i].first] = rows_[i].second;
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::vector<std::pair<std::size_t, double>> rows_;  // of the corrections, over sigma
+  std::size_t width_ = 0;
+};
+
 // A measured distance between two targets.
 class DistanceCost final : public ceres::SizedCostFunction<1, 3, 3> {
  public:
@@ -227,6 +258,10 @@ ceres::CostFunction* make_frame_prior(const NominalSigmas& sigmas, const Joint& 
 ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas, const Joint& nominal) {
   return new FramePrior(nominal.T_parent_joint,
                         motion_of(nominal).transpose() * whitening_of(sigmas));
+}
+
+ceres::CostFunction* make_correction_prior(const std::vector<Correction>& corrections) {
+  return new CorrectionPrior(corrections);
 }
 
 ceres::CostFunction* make_distance_cost(const TargetPair& pair) {

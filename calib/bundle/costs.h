@@ -22,6 +22,9 @@ namespace kinescope::bundle {
 /// Its zero: the frame's turn about (shift along) the axis.
 [[nodiscard]] ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas,
                                                    const Joint& nominal);
+/// Values that should stay near zero, each by its own prior. Block: all corrections.
+[[nodiscard]] ceres::CostFunction* make_correction_prior(
+    const std::vector<Correction>& corrections);
 /// A measured distance. Blocks: both targets' places (3, 3).
 [[nodiscard]] ceres::CostFunction* make_distance_cost(const TargetPair& pair);
 

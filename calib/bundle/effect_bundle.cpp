@@ -232,6 +232,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   }
   std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
   for (const Correction& correction : with.corrections) key.push_back(correction.name);
+  key.push_back(fmt::format("{} corrections", with.corrections.size()));
   for (const std::size_t coupling : change.without_couplings) {
     key.push_back(fmt::format("without coupling {}", coupling));
   }
@@ -243,6 +244,9 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   out.converged = summary.converged;
   out.reason = summary.message;
   out.time_offset_s = state.time_offset[0];
+  int rows = 0;
+  for (const int index : used) rows += with.sightings[static_cast<std::size_t>(index)].dimension();
+  out.variance = 2.0 * summary.final_cost / std::max(1, rows);
   out.values = Eigen::Map<const Eigen::VectorXd>(
       state.corrections.data(), static_cast<Eigen::Index>(state.corrections.size()));
   if (change.time_offset) {
@@ -315,13 +319,20 @@ BundleFit EffectBundle::fit(const BundleChange& change,
   out.first_row.push_back(row);
   out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
   out.probes.setFromTriplets(entries.begin(), entries.end());
-  if (spec.prior) out.prior_information = linear.prior_information(model, model);
+  const bool weighed = std::ranges::any_of(change.corrections,
+                                           [](const Correction& c) { return c.prior_sigma > 0.0; });
+  if (spec.prior || weighed) {
+    out.prior_information = linear.prior_information(model, model);
+    out.prior_gradient = linear.prior_gradient(model);
+  }
   if (const auto distances = linear.frames.find(-1); distances != linear.frames.end()) {
     const Eigen::MatrixXd J = distances->second.J(Eigen::all, model);
     if (out.prior_information.size() == 0) {
       out.prior_information = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+      out.prior_gradient = Eigen::VectorXd::Zero(J.cols());
     }
     out.prior_information += J.transpose() * J;
+    out.prior_gradient += J.transpose() * distances->second.r;
   }
   out.correlation_time_s = spec.postures ? 0.0 : bundle::correlation_time(spec, state, impl_->used);
   return out;

@@ -38,6 +38,7 @@ struct BundleSolution {
   std::string reason;
   Eigen::VectorXd values;  ///< of the change's parameters: corrections, then the time offset
   double time_offset_s = 0.0;
+  double variance = 0.0;  ///< of a whitened row, priors' squares counted in
 };
 
 /// A solution, and how its residual answers to the parameters and to probes.
@@ -46,6 +47,7 @@ struct BundleFit : BundleSolution {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
       jacobian;                       ///< rows x parameters, d predicted; the change's columns last
   Eigen::MatrixXd prior_information;  ///< of the parameters; empty without priors
+  Eigen::VectorXd prior_gradient;     ///< of half the priors' squares; empty likewise
   Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant

@@ -34,17 +34,22 @@ Eigen::MatrixXd dense_rows(const ceres::CRSMatrix& m, int first, int count, int 
   return out;
 }
 
-Eigen::MatrixXd information_of_priors(BuiltProblem& built, const std::vector<double*>& parameters,
-                                      int width) {
-  if (built.prior_ids().empty()) return Eigen::MatrixXd::Zero(width, width);
+void add_priors(BuiltProblem& built, const std::vector<double*>& parameters, int width,
+                LinearBundle& out) {
+  out.prior_information = Eigen::MatrixXd::Zero(width, width);
+  out.prior_gradient = Eigen::VectorXd::Zero(width);
+  if (built.prior_ids().empty()) return;
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = parameters;
   options.residual_blocks = built.prior_ids();
+  std::vector<double> residuals;
   ceres::CRSMatrix jacobian;
-  KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, nullptr, nullptr, &jacobian),
+  KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
                   "priors can be evaluated");
   const Eigen::MatrixXd J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
-  return J.transpose() * J;
+  out.prior_information = J.transpose() * J;
+  out.prior_gradient =
+      J.transpose() * Eigen::Map<const Eigen::VectorXd>(residuals.data(), jacobian.num_rows);
 }
 
 // Takes the frame's own unknowns out: J <- J - L (L'L)^-1 L' J.
@@ -121,7 +126,7 @@ LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& u
     eliminate(rows, dense_rows(jacobian, 0, jacobian.num_rows, width, local_width));
     out.frames.emplace(frame, std::move(rows));
   }
-  out.prior_information = information_of_priors(built, data_of(out.blocks), width);
+  add_priors(built, data_of(out.blocks), width, out);
   return out;
 }
 

@@ -22,6 +22,7 @@ struct LinearBundle {
   std::vector<FreeBlock> blocks;    ///< of the columns
   std::map<int, FrameRows> frames;  ///< by frame; distances between targets under -1
   Eigen::MatrixXd prior_information;
+  Eigen::VectorXd prior_gradient;  ///< of half the priors' squares
 };
 
 [[nodiscard]] int width_of(const std::vector<FreeBlock>& blocks);

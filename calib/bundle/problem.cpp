@@ -225,6 +225,12 @@ void BuiltProblem::add_priors(const Spec& spec, State& state) {
     // A measurement, not a prior: it counts among the data.
     ids_.push_back(problem_->AddResidualBlock(make_distance_cost(pair), nullptr, from, to));
   }
+  const bool weighed = std::ranges::any_of(spec.corrections,
+                                           [](const Correction& c) { return c.prior_sigma > 0.0; });
+  if (weighed && problem_->HasParameterBlock(state.corrections.data())) {
+    prior_ids_.push_back(problem_->AddResidualBlock(make_correction_prior(spec.corrections),
+                                                    nullptr, state.corrections.data()));
+  }
   if (!spec.prior) return;
   for (std::size_t j = 0; j < state.joint_frames.size(); ++j) {
     double* frame = state.joint_frames[j].data();

@@ -223,6 +223,19 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
          total_scale.asDiagonal();
 }
 
+// A correction with a prior is one that the data need not show.
+Eigen::MatrixXd with_known_corrections(Eigen::MatrixXd data, const LinearBundle& linear) {
+  Eigen::Index at = 0;
+  for (const FreeBlock& block : linear.blocks) {
+    const Eigen::Index n = std::ssize(block.names);
+    if (block.block == "effects") {
+      data.block(at, at, n, n) += linear.prior_information.block(at, at, n, n);
+    }
+    at += n;
+  }
+  return data;
+}
+
 }  // namespace
 
 Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vector<int>& used) {
@@ -247,7 +260,8 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
 
   std::vector<bool> unseen(static_cast<std::size_t>(n), false);
   const Eigen::MatrixXd white =
-      observe(data, data + linear.prior_information, out.parameters, out.observability, unseen);
+      observe(with_known_corrections(data, linear), data + linear.prior_information, out.parameters,
+              out.observability, unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
   const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
   const Eigen::VectorXd factor = inflation(linear, stretch, white).cwiseSqrt();

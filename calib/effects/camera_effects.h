@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/bundle/effect_bundle.h"
+#include "calib/effects/error_table.h"
 #include "calib/trace/traced_model.h"
 
 namespace kinescope::effects {
@@ -37,11 +38,15 @@ struct CameraEffect {
   std::function<std::vector<Correction>(double scan)> corrections;
   /// Nuisance parameters that the model has while the effect is in it. Empty: none.
   std::function<std::vector<Correction>(double scan)> nuisances;
+  /// Of a curve: where it is tabulated and how certain it is there, by its parameters' covariance;
+  /// its values there are `shares` times the parameters.
+  std::function<ErrorTable(double scan, const Eigen::MatrixXd& covariance, Eigen::MatrixXd& shares)>
+      table;
   bool is_time_offset = false;
 };
 
 /// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,
-/// coupling, helical, curved_slider, axis_wobble.
+/// coupling, helical, curved_slider, axis_wobble, joint_map.
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,

@@ -133,11 +133,25 @@ Eigen::VectorXd missing_value(const FittedEffect& effect,
   return out;
 }
 
+// `missing` in the unit of the joint's value.
+void add_to_channel(const Eigen::VectorXd& missing, const KinematicTree& tree, const Joint& joint,
+                    const JointLog& log, JointLog& corrected) {
+  const Eigen::VectorXd change = missing / joint.scale;
+  corrected.values.col(value_of(log.channel(joint.channel))) += change;
+  hold_followers(tree, joint, change, corrected);
+}
+
 // Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
 bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
                 const std::vector<effects::CameraEffect>& library, const JointMotion& motion,
                 const JointLog& log, JointLog& corrected) {
   check_place(effect, tree, log);
+  if (!effect.table.empty()) {
+    const std::size_t j = value_of(tree.joint(effect.id.place)).index();
+    const Eigen::VectorXd value = motion.value.col(static_cast<Eigen::Index>(j));
+    add_to_channel(effect.table.at(value), tree, tree.joints[j], log, corrected);
+    return true;
+  }
   const auto found = std::ranges::find_if(
       library, [&](const effects::CameraEffect& known) { return known.candidate.id == effect.id; });
   if (found == library.end()) return false;
@@ -155,10 +169,7 @@ bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
   if (drives_another(tree, joint)) return false;
-  // In the channel's unit.
-  const Eigen::VectorXd change = missing_value(effect, corrections, motion) / joint.scale;
-  corrected.values.col(value_of(log.channel(joint.channel))) += change;
-  hold_followers(tree, joint, change, corrected);
+  add_to_channel(missing_value(effect, corrections, motion), tree, joint, log, corrected);
   return true;
 }
 

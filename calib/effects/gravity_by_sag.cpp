@@ -100,7 +100,7 @@ Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle, const std::vector<Add
   const FittedEffect single = [&] {
     std::vector<AddedEffect> with = start;
     with.push_back({sag, 0.0});
-    return bundle.corrected(with).effects.back();
+    return bundle.corrected(with, {}).effects.back();
   }();
   const Eigen::VectorXd pull = single.values.cwiseQuotient(single.references);
   return pull.dot(best) < 0.0 ? Eigen::Vector3d(-best) : best;

@@ -28,7 +28,7 @@ CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOption
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
   effects::add_couplings_by_design(bundle, options, out.trace);
-  effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added);
+  effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added, out.trace.accepted);
   out.effects = std::move(corrected.effects);
   out.corrections = std::move(corrected.corrections);
   out.gravity_base = options.gravity_base;

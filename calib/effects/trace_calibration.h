@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "calib/bundle/calibrate.h"
+#include "calib/effects/error_table.h"
 #include "calib/trace/trace.h"
 
 namespace kinescope {
@@ -33,6 +34,9 @@ struct FittedEffect {
   /// Of each parameter: what its share was divided by (compliance: the largest load's arm, m; clock
   /// drift: the time at which it is zero, s).
   Eigen::VectorXd references;
+  /// Of a joint_map, whose parameters mean nothing one by one: what they make, and of which shares.
+  ErrorTable table;
+  Eigen::MatrixXd table_shares;  ///< points of the table x values
 };
 
 struct CalibrationTrace {

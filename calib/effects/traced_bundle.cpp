@@ -104,9 +104,12 @@ std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<Camera
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);
     std::vector<Eigen::Index>& places = out.emplace_back();
-    for (std::size_t k = 0; k < effect.candidate.parameters.size(); ++k) {
-      places.push_back(effect.is_time_offset ? corrections : next++);
+    if (effect.is_time_offset) {
+      places.push_back(corrections);
+      continue;
     }
+    const std::size_t count = effect.corrections(added.scan).size();
+    for (std::size_t k = 0; k < count; ++k) places.push_back(next++);
   }
   return out;
 }
@@ -197,6 +200,7 @@ BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
       continue;
     }
     for (Correction& correction : effect.corrections(added.scan)) {
+      correction.prior_sigma = added.spread;
       out.corrections.push_back(std::move(correction));
     }
   }
@@ -273,7 +277,10 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   }
   Linearisation& linear = out.linear;
   linear.jacobian = fit.jacobian(Eigen::all, order);
-  if (fit.prior_information.size() > 0) linear.prior = fit.prior_information(order, order);
+  if (fit.prior_information.size() > 0) {
+    linear.prior = fit.prior_information(order, order);
+    linear.prior_gradient = fit.prior_gradient(order);
+  }
   linear.residual = std::move(fit.residual);
   linear.carriers.swap(fit.probes);
   linear.first_row = std::move(fit.first_row);
@@ -305,7 +312,8 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   return out;
 }
 
-TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& effects) const {
+TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& effects,
+                                                const std::vector<TracedEffect>& traced) const {
   Corrected out;
   if (effects.empty()) return out;
   std::vector<CameraEffect> library = all_effects(world_at(0.0));
@@ -317,7 +325,7 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);
-    FittedEffect fitted{added.id, added.scan, effect.candidate.parameters, {}, {}};
+    FittedEffect fitted{added.id, added.scan, effect.candidate.parameters, {}, {}, {}, {}};
     if (effect.is_time_offset) {
       fitted.values = Eigen::VectorXd::Constant(1, fit.time_offset_s);
       fitted.references = Eigen::VectorXd::Ones(1);
@@ -332,7 +340,16 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
       corrections[k].value = fit.values[next++];
       fitted.values[at] = corrections[k].value;
       fitted.references[at] = corrections[k].reference;
+      // There the noise is that of the model with the effects.
+      corrections[k].prior_sigma = added.spread * std::sqrt(fit.variance);
       out.corrections.push_back(std::move(corrections[k]));
+    }
+    if (effect.candidate.is_curve()) {
+      const auto known = std::ranges::find_if(
+          traced, [&](const TracedEffect& t) { return t.id == added.id && t.scan == added.scan; });
+      KINESCOPE_CHECK(known != traced.end(), "tracing knows its curves");
+      fitted.table = effect.table(added.scan, known->covariance, fitted.table_shares);
+      fitted.table.error = fitted.table_shares * fitted.values;
     }
     out.effects.push_back(std::move(fitted));
   }

@@ -20,7 +20,9 @@ class TracedBundle final : public TracedModel {
     std::vector<FittedEffect> effects;
     std::vector<Correction> corrections;  ///< of all effects but the time offset, then nuisances
   };
-  [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects) const;
+  /// `traced`: the same effects as tracing has them, which knows how certain curves are.
+  [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects,
+                                    const std::vector<TracedEffect>& traced) const;
 
   /// The robot and its motion, the log read that much later than the plain model reads it.
   [[nodiscard]] EffectWorld world_at(double time_offset_s) const;

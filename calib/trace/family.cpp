@@ -114,7 +114,9 @@ double best_scan(const NormalSystem& system, const Candidate& candidate) {
 }
 
 double number_of_tests(const std::vector<Candidate>& candidates, const Candidate& candidate) {
-  return static_cast<double>(candidates.size()) *
+  const auto named =
+      std::ranges::count_if(candidates, [](const Candidate& c) { return !c.is_curve(); });
+  return static_cast<double>(named) *
          static_cast<double>(std::max<std::size_t>(1, candidate.scan.size()));
 }
 
@@ -123,6 +125,7 @@ std::vector<TestedMember> test_family(const NormalSystem& system,
   std::vector<std::optional<TestedMember>> members(candidates.size());
   parallel_for(candidates.size(), [&](std::size_t i) {
     const Candidate& candidate = candidates[i];
+    if (candidate.is_curve()) return;
     const CoarseScan coarse = coarse_scan(system, candidate);
     const bool refined = is_refined(candidate);
     if ((refined ? kMostRefined : 1.0) * coarse.gain < least_gain) return;

@@ -27,7 +27,7 @@ struct TestedMember {
                                      const Candidate& candidate);
 
 /// Scans are searched between their values where that can matter. Candidates that cannot make the
-/// sum of squares fall by `least_gain` are left out.
+/// sum of squares fall by `least_gain` are left out, and curves.
 [[nodiscard]] std::vector<TestedMember> test_family(const NormalSystem& system,
                                                     const std::vector<Candidate>& candidates,
                                                     double least_gain = 0.0);

@@ -39,6 +39,8 @@ NormalEquations total_of(const NormalSystem& system, const std::vector<NormalEqu
   for (const NormalEquations& cell : cells) total += cell;
   const Eigen::MatrixXd& prior = system.linear().prior;
   if (prior.size() > 0) total.H.topLeftCorner(prior.rows(), prior.cols()) += prior;
+  const Eigen::VectorXd& pull = system.linear().prior_gradient;
+  if (pull.size() > 0) total.g.head(pull.size()) -= pull;
   return total;
 }
 

@@ -57,6 +57,7 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
     total_.g += cell.g;
     total_.rr += cell.rr;
   }
+  if (linear.prior_gradient.size() > 0) total_.g -= linear.prior_gradient;
   inverse_ = scaled_pseudo_inverse(
       linear.prior.size() == 0 ? total_.H : Eigen::MatrixXd(total_.H + linear.prior), kUnseen);
 }

@@ -12,7 +12,7 @@
 
 namespace kinescope::trace {
 
-/// J'J, J'r and r'r over the rows of a cell.
+/// J'J, J'r and r'r over the rows of a cell; over all of them J'r less what priors pull.
 struct CellSums {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;

@@ -137,7 +137,8 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
       out.effect += theta * column.share;
     }
   }
-  std::string unit = candidate.parameters.front().unit;
+  std::string unit =
+      candidate.parameters.empty() ? candidate.size_unit : candidate.parameters.front().unit;
   for (const RestPlace& place : without.fit.rest_places) {
     if (place.carrier == carrier) unit = place.unit;
   }

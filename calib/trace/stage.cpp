@@ -69,6 +69,10 @@ Linearisation extend(const Linearisation& linear, const Eigen::MatrixXd& columns
   out.prior = Eigen::MatrixXd::Zero(p + k, p + k);
   if (linear.prior.size() > 0) out.prior.topLeftCorner(p, p) = linear.prior;
   if (prior.size() > 0) out.prior.bottomRightCorner(k, k) = prior;
+  if (linear.prior_gradient.size() > 0) {
+    out.prior_gradient.conservativeResize(p + k);
+    out.prior_gradient.tail(k).setZero();
+  }
   return out;
 }
 

@@ -54,6 +54,7 @@ struct EffectPicture {
   Eigen::VectorXd before;  ///< without the effect
   Eigen::VectorXd after;   ///< with all effects
   Eigen::VectorXd effect;  ///< what the effect is
+  Eigen::VectorXd sigma;   ///< of a curve: standard uncertainty of that; else empty
 };
 
 struct TracedEffect {
@@ -73,6 +74,10 @@ struct TracedEffect {
   HeldOutError held_out_before;  ///< with all the others, without this one
   HeldOutError held_out_after;   ///< with all
   EffectPicture picture;
+  /// Of a curve (joint_map): of its parameters, which are no numbers to be read (`values` is
+  /// empty).
+  Eigen::MatrixXd covariance;
+  [[nodiscard]] bool is_curve() const { return covariance.size() > 0; }
 };
 
 /// Several effects, each of which explains what the others explain.

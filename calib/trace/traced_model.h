@@ -20,10 +20,12 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 
 /// A model at its solution. Rows are grouped by instant, instants in the order of time.
 struct Linearisation {
-  Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
-  RowMatrix jacobian;        ///< rows x parameters: d predicted / d parameter; the parameters
-                             ///< of added effects stand last, in their order
-  Eigen::MatrixXd prior;     ///< parameters x parameters: information of priors; empty: none
+  Eigen::VectorXd residual;        ///< rows, whitened: observed minus predicted
+  RowMatrix jacobian;              ///< rows x parameters: d predicted / d parameter; the parameters
+                                   ///< of added effects stand last, in their order
+  Eigen::MatrixXd prior;           ///< parameters x parameters: information of priors; empty: none
+  Eigen::VectorXd prior_gradient;  ///< what the priors pull at the solution, as the residual does
+                                   ///< by J'r; empty: nothing
   Eigen::SparseMatrix<double> carriers;  ///< rows x carriers: what effects act through, as
                                          ///< d predicted / d (a joint's value, a marker's shift ..)
   std::vector<Eigen::Index> first_row;   ///< of every instant, and one past the last
@@ -96,6 +98,12 @@ struct Candidate {
   std::string scan_name;
   std::string scan_unit;
   std::function<std::string(double scan)> scan_words;  ///< "joint2"; empty: the number says it
+  /// Of a curve, the name of the covariate it is a smooth function of: it says no cause, only what
+  /// repeats, and takes the place of a rest that was found there (`id.place`, this covariate). Its
+  /// scan lists lengths over which it is smooth; it has as many parameters as that length asks for,
+  /// each with a prior (AddedEffect::spread). Empty: no curve.
+  std::string curve_over;
+  [[nodiscard]] bool is_curve() const { return !curve_over.empty(); }
   /// One column a parameter, at a value of the scan (0 where there is none). Threads call it at the
   /// same time.
   std::function<std::vector<EffectColumn>(double scan)> columns;
@@ -130,6 +138,8 @@ struct RestField {
 struct AddedEffect {
   EffectId id;
   double scan = 0.0;
+  /// Of a curve: standard deviation of the prior on each of its parameters, beside whitened rows.
+  double spread = 0.0;
   [[nodiscard]] bool operator==(const AddedEffect&) const = default;
 };
 

@@ -43,6 +43,8 @@ void Tracer::search() {
   do {
     look_for_rest();
   } while (name_the_rest());
+  while (take_the_rest_as_curves()) look_beside_curves();
+  describe_curves();
   summarise();
   list_not_found();
   conclude();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The search: forward selection (tracer.cpp), backward check and what cannot be told apart
-// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp).
+// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp), what is left and repeats
+// (tracer_curves.cpp).
 #pragma once
 
 #include <cstddef>
@@ -20,6 +21,11 @@ namespace kinescope::trace {
 
 // Several waves at one place are what any function is made of: a rest, not effects.
 inline constexpr std::ptrdiff_t kMostAlike = 3;
+// Of what several waves explain, held out, that a curve in their stead may leave.
+inline constexpr double kSmallLoss = 0.05;
+// A rest that explains this much of what a named effect at its place explains puts that name in
+// doubt.
+inline constexpr double kDoubtfulShare = 0.1;
 
 class Tracer {
  public:
@@ -61,11 +67,19 @@ class Tracer {
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
+  [[nodiscard]] std::vector<AddedEffect> curves_for_rests() const;
+  void tune_curves();
+  [[nodiscard]] bool take_the_rest_as_curves();
+  [[nodiscard]] bool is_part_of_a_curve(std::size_t wave, std::size_t curve, const Stage& without);
+  void drop_what_curves_contain();
+  void look_beside_curves();
+  void describe_curves();
   void replace_waves_by_a_curve();
   void look_for_rest();
   /// True where an effect that is small in the mean over the rows it touches says as much as what
   /// was found to be left.
   [[nodiscard]] bool name_the_rest();
+  [[nodiscard]] std::optional<FoundRest> next_rest() const;
   void look_for_curves();
   [[nodiscard]] bool look_for_field();
   [[nodiscard]] double rest_level() const;

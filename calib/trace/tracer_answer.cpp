@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/trace/curve.h"
 #include "calib/trace/distribution.h"
 #include "calib/trace/field.h"
 #include "calib/trace/tracer.h"
@@ -16,11 +17,6 @@ namespace kinescope::trace {
 namespace {
 
 constexpr std::size_t kMostRests = 3;
-// A rest that explains this much of what a named effect at its place explains puts that name in
-// doubt.
-constexpr double kDoubtfulShare = 0.1;
-// Of what several waves explain, held out, that a curve in their stead may leave.
-constexpr double kSmallLoss = 0.05;
 // Less than this of what named effects explain at its place is the imperfection of their shapes.
 constexpr double kSlightShare = 1e-3;
 
@@ -28,6 +24,21 @@ Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRes
   Linearisation out = linear;
   for (const FoundRest& found : rests) out = extend(out, found);
   return out;
+}
+
+// Its largest value where it was seen, and how certain that is.
+void size_up_curve(const std::vector<EffectColumn>& columns, double t, TracedEffect& effect) {
+  EffectPicture& picture = effect.picture;
+  Eigen::MatrixXd shares(picture.effect.size(), std::ssize(columns));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    shares.col(static_cast<Eigen::Index>(k)) = columns[k].share;
+  }
+  picture.sigma =
+      (shares * effect.covariance).cwiseProduct(shares).rowwise().sum().cwiseMax(0.0).cwiseSqrt();
+  Eigen::Index largest = 0;
+  effect.size = picture.effect.cwiseAbs().maxCoeff(&largest);
+  const double half = t * picture.sigma[largest];
+  effect.interval = {std::max(0.0, effect.size - half), effect.size + half};
 }
 
 bool same_place(const std::string& rest, const std::string& effect) {
@@ -99,14 +110,18 @@ bool Tracer::name_the_rest() {
   return true;
 }
 
+// Beside those that were found.
+std::optional<FoundRest> Tracer::next_rest() const {
+  if (rests_.size() >= kMostRests) return std::nullopt;
+  const Linearisation linear = with_rests(now_->fit.linear, rests_);
+  const NormalSystem system(linear, now_->system.partition());
+  return find_rest(system, now_->fit.rest_places, now_->fit.covariates, rests_, rest_level(),
+                   options_);
+}
+
 void Tracer::look_for_curves() {
   rests_.clear();
-  while (rests_.size() < kMostRests) {
-    const Linearisation linear = with_rests(now_->fit.linear, rests_);
-    const NormalSystem system(linear, now_->system.partition());
-    std::optional<FoundRest> found = find_rest(system, now_->fit.rest_places, now_->fit.covariates,
-                                               rests_, rest_level(), options_);
-    if (!found) break;
+  while (std::optional<FoundRest> found = next_rest()) {
     if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
     add_step(
         round_,
@@ -252,6 +267,7 @@ void Tracer::summarise() {
   for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
   if (count == 0) return;
   const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  const Eigen::MatrixXd posterior = posterior_covariance(now_->system, count);
   const double t = t_quantile(0.025, std::max(2.0, trace_.stretches - 1.0));
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
@@ -259,13 +275,24 @@ void Tracer::summarise() {
     const Eigen::VectorXd& values = now_->fit.values[i];
     const Candidate& candidate = *find_candidate(base_->fit, added.id);
     const Eigen::MatrixXd block = covariance.block(at, at, values.size(), values.size());
-    at += values.size();
     TracedEffect effect = details_[i].effect;
     effect.id = added.id;
     effect.words = candidate.words;
     effect.check = candidate.check;
-    effect.size = size_of(candidate, values);
     effect.unit = candidate.size_unit;
+    effect.scan = added.scan;
+    effect.scan_name = candidate.scan_name;
+    effect.scan_unit = candidate.scan_unit;
+    if (candidate.is_curve()) {
+      effect.covariance = posterior.block(at, at, values.size(), values.size());
+      at += values.size();
+      size_up_curve(find_candidate(now_->fit, added.id)->columns(added.scan), t, effect);
+      trace_.accepted.push_back(std::move(effect));
+      trace_.added.push_back(added);
+      continue;
+    }
+    at += values.size();
+    effect.size = size_of(candidate, values);
     // Where few stretches carry the effect their scatter may be small by chance.
     const Score& score = details_[i].score;
     double half = t * size_sigma(candidate, values, block);
@@ -279,9 +306,6 @@ void Tracer::summarise() {
       effect.values.push_back({candidate.parameters[static_cast<std::size_t>(k)], values[k],
                                std::sqrt(std::max(0.0, block(k, k)))});
     }
-    effect.scan = added.scan;
-    effect.scan_name = candidate.scan_name;
-    effect.scan_unit = candidate.scan_unit;
     if (candidate.scan_words) effect.scan_words = candidate.scan_words(added.scan);
     trace_.accepted.push_back(std::move(effect));
     trace_.added.push_back(added);
@@ -359,6 +383,20 @@ bool Tracer::is_slight(const Rest& rest) const {
   return rest.explained * now_->system.total().rr < kSlightShare * named * base_->system.total().rr;
 }
 
+namespace {
+
+// "the error of joint2, joint3 repeats with its value"; empty without curves.
+std::string curve_words(const std::vector<TracedEffect>& accepted) {
+  std::string names;
+  for (const TracedEffect& effect : accepted) {
+    if (!effect.is_curve() || names.find(effect.id.place) != std::string::npos) continue;
+    names += (names.empty() ? "" : ", ") + effect.id.place;
+  }
+  return names.empty() ? names : fmt::format("the error of {} repeats with its value", names);
+}
+
+}  // namespace
+
 void Tracer::conclude() {
   const bool slight =
       std::ranges::all_of(trace_.rest, [&](const Rest& rest) { return is_slight(rest); });
@@ -367,6 +405,11 @@ void Tracer::conclude() {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
                                 trace_.rest.front().place, trace_.rest.front().covariate);
+  } else if (const std::string curves = curve_words(trace_.accepted); !curves.empty()) {
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason = fmt::format(
+        "{}, for a reason that no known effect has the shape of; it is part of the model as it is",
+        curves);
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();

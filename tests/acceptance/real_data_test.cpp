@@ -141,5 +141,17 @@ TEST_F(RealData, PosesOfATargetCalibrateAUr10) {
   EXPECT_LT(o.errors.held_out.mm, 0.5 * o.errors.before.mm) << "geometry, not offsets, is wrong";
 }
 
+// The error that is left of geometry repeats with the large joints' values, in no known shape.
+TEST_F(RealData, WhatRepeatsWithTheJointsOfAUr10IsPartOfItsModel) {
+  NEEDS("ur10_tracker_sessions");
+  RecordingPaths paths;
+  paths.folder = data_ / "B";
+  const Outcome o = calibrated(paths, FreeGeometry::kGeometry);
+  ASSERT_TRUE(o.trace.contains("accepted"));
+  EXPECT_TRUE(std::ranges::any_of(
+      o.trace["accepted"], [](const auto& effect) { return effect["effect"] == "joint_map"; }));
+  EXPECT_LT(o.errors.held_out.mm, 0.146) << "an independent fit with 40 harmonics a joint";
+}
+
 }  // namespace
 }  // namespace kinescope::real

@@ -32,6 +32,16 @@ FittedEffect clock_drift() {
   return out;
 }
 
+FittedEffect joint_map() {
+  FittedEffect out;
+  out.id = {"joint_map", "joint1"};
+  out.scan = 1.0 / 3.0;
+  out.table.value = Eigen::Vector3d(-0.1, 1.0 / 7.0, 2.0);
+  out.table.error = Eigen::Vector3d(0.0, 1e-3 / 3.0, 0.0);
+  out.table.sigma = Eigen::Vector3d(1e-5, 2e-5, 1e-5);
+  return out;
+}
+
 json document_of(const std::vector<FittedEffect>& effects) {
   return {{"schema", "kinescope.calibration"},
           {"robot",
@@ -88,6 +98,32 @@ TEST_F(EffectsFile, ComesBackToTheLastBit) {
   EXPECT_EQ(back.channels[1].couplings, (std::vector<ChannelShare>{{"a", -1.0}}));
   ASSERT_TRUE(back.gravity_base);
   EXPECT_EQ(*back.gravity_base, Eigen::Vector3d(0.0, 0.6, -0.8));
+}
+
+TEST_F(EffectsFile, AMapsTableComesBackToTheLastBit) {
+  const CalibratedEffects back = read(document_of({joint_map()}).dump(1));
+  ASSERT_EQ(back.effects.size(), 1U);
+  EXPECT_EQ(back.effects[0].id, joint_map().id);
+  EXPECT_EQ(back.effects[0].scan, joint_map().scan);
+  EXPECT_EQ(back.effects[0].table.value, joint_map().table.value);
+  EXPECT_EQ(back.effects[0].table.error, joint_map().table.error);
+  EXPECT_EQ(back.effects[0].table.sigma, joint_map().table.sigma);
+}
+
+TEST_F(EffectsFile, AMapThatIsNoneIsRefused) {
+  json document = document_of({joint_map()});
+  json& table = document["effects"][0]["table"];
+  table["value"][1] = 5.0;
+  refused(document, "joint_map at joint1: value 3 is not above the one before");
+  table["value"] = {1.0, 2.0};
+  refused(document, "joint_map at joint1: columns of 2, 3 and 3 numbers");
+  table["value"][1] = "far";
+  refused(document, "joint_map at joint1: value 2 is no number");
+  table = document_of({joint_map()})["effects"][0]["table"];
+  table.erase("error");
+  refused(document, "joint_map at joint1: a table without 'error'");
+  document["effects"][0]["table"] = 3;
+  refused(document, "joint_map at joint1");
 }
 
 TEST_F(EffectsFile, ACalibrationWithoutEffectsHasNone) {

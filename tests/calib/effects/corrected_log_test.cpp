@@ -104,6 +104,18 @@ TEST(CorrectedLog, AnEccentricityIsUndone) {
   expect_values(undo({fitted("eccentricity", "q1", {0.004, -0.003}, 2.0)}, log_of(logged)), truth);
 }
 
+TEST(CorrectedLog, AMapIsUndoneWithinItsRange) {
+  const Eigen::MatrixXd logged = values_as_logged();
+  FittedEffect map;
+  map.id = {"joint_map", "q2"};
+  map.table.value = Eigen::Vector3d(-0.5, 0.0, 0.5);
+  map.table.error = Eigen::Vector3d(0.0, 0.01, 0.0);
+  map.table.sigma = Eigen::Vector3d::Zero();
+  Eigen::MatrixXd truth = logged;
+  for (double& q : truth.col(1)) q += std::max(0.0, 0.01 * (1.0 - std::abs(q) / 0.5));
+  expect_values(undo({map}, log_of(logged)), truth);
+}
+
 // What an encoder's ring adds depends on where the joint is, not on its channel alone.
 TEST(CorrectedLog, AJointThatTwoChannelsMoveStandsWhereBothPutIt) {
   constexpr double kRatio = -1.0;

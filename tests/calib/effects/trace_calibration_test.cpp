@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/bundle/effect_bundle.h"
+#include "calib/effects/corrected_log.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 #include "kinematics/model/kinematic_tree.h"
@@ -333,6 +334,50 @@ TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
   EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
   ASSERT_FALSE(trace.rest.empty());
   EXPECT_EQ(trace.rest.front().place, "q2");
+}
+
+// An error of no known shape that repeats with the joint's value is no riddle to who uses the
+// robot: it is measured, said over which range, and undone.
+TEST(TraceCalibration, WhatRepeatsWithAJointsValueIsAMapOfIt) {
+  constexpr double kStep = 0.01;  // rad, of a smooth step about 0
+  const World world = make_effect_world(filmed({{"own_tanh", "q2", kStep, 0.0, "q2"}}, 400));
+  const CalibrationTrace found = trace_of(world);
+  const Trace& trace = found.trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& map = trace.accepted.front();
+  EXPECT_EQ(map.id, (EffectId{"joint_map", "q2"}));
+  EXPECT_LT(map.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  EXPECT_GT(map.held_out_before.value, 3.0 * map.held_out_after.value);
+
+  ASSERT_EQ(found.effects.size(), 1U);
+  const ErrorTable& table = found.effects.front().table;
+  const CorrectedLog corrected = corrected_log(world.log, world.tree, found.effects, std::nullopt);
+  ASSERT_EQ(corrected.undone.size(), 1U);
+  const int channel = value_of(world.log.channel("q2"));
+  const Eigen::VectorXd logged = world.log.values.col(channel);
+  const double reach = logged.cwiseAbs().maxCoeff();
+  const Eigen::ArrayXd truth = kStep * (5.0 * logged.array() / reach).tanh();
+  const Eigen::ArrayXd undone = corrected.log.values.col(channel) - logged;
+  // A constant is the joint's zero, and a slope nearly the links' lengths.
+  Eigen::MatrixXd line(logged.size(), 2);
+  line << Eigen::VectorXd::Ones(logged.size()), logged;
+  const Eigen::VectorXd miss = (undone - truth).matrix();
+  const Eigen::VectorXd left = miss - line * line.colPivHouseholderQr().solve(miss);
+  EXPECT_LT(left.cwiseAbs().maxCoeff(), 0.05 * kStep);
+
+  // Beyond what was seen it says nothing.
+  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, 10.0))[0], 0.0);
+  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, -10.0))[0], 0.0);
+}
+
+// Named shapes are not taken for maps, nor maps invented beside them.
+TEST(TraceCalibration, AWaveWithANameIsNoMap) {
+  const Trace trace = trace_of(make_effect_world(filmed({strong("eccentricity", "q2")}))).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"eccentricity", "q2"}));
+  EXPECT_FALSE(trace.accepted.front().is_curve());
 }
 
 // At the place seen, a corner's error would be explained by itself, held out or not.
