@@ -319,9 +319,7 @@ BundleFit EffectBundle::fit(const BundleChange& change,
   out.first_row.push_back(row);
   out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
   out.probes.setFromTriplets(entries.begin(), entries.end());
-  const bool weighed = std::ranges::any_of(change.corrections,
-                                           [](const Correction& c) { return c.prior_sigma > 0.0; });
-  if (spec.prior || weighed) {
+  if (!linear.prior_information.isZero(0.0)) {
     out.prior_information = linear.prior_information(model, model);
     out.prior_gradient = linear.prior_gradient(model);
   }

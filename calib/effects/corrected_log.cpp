@@ -133,12 +133,14 @@ Eigen::VectorXd missing_value(const FittedEffect& effect,
   return out;
 }
 
-// `missing` in the unit of the joint's value.
-void add_to_channel(const Eigen::VectorXd& missing, const KinematicTree& tree, const Joint& joint,
+// `missing` in the unit of the joint's value. False where the channel drives a second joint.
+bool add_to_channel(const Eigen::VectorXd& missing, const KinematicTree& tree, const Joint& joint,
                     const JointLog& log, JointLog& corrected) {
+  if (drives_another(tree, joint)) return false;
   const Eigen::VectorXd change = missing / joint.scale;
   corrected.values.col(value_of(log.channel(joint.channel))) += change;
   hold_followers(tree, joint, change, corrected);
+  return true;
 }
 
 // Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
@@ -149,8 +151,7 @@ bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
   if (!effect.table.empty()) {
     const std::size_t j = value_of(tree.joint(effect.id.place)).index();
     const Eigen::VectorXd value = motion.value.col(static_cast<Eigen::Index>(j));
-    add_to_channel(effect.table.at(value), tree, tree.joints[j], log, corrected);
-    return true;
+    return add_to_channel(effect.table.at(value), tree, tree.joints[j], log, corrected);
   }
   const auto found = std::ranges::find_if(
       library, [&](const effects::CameraEffect& known) { return known.candidate.id == effect.id; });
@@ -168,9 +169,7 @@ bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
         log, effect,
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
-  if (drives_another(tree, joint)) return false;
-  add_to_channel(missing_value(effect, corrections, motion), tree, joint, log, corrected);
-  return true;
+  return add_to_channel(missing_value(effect, corrections, motion), tree, joint, log, corrected);
 }
 
 }  // namespace

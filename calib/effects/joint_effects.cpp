@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <string>
 #include <tuple>
@@ -9,9 +8,9 @@
 #include <fmt/format.h>
 
 #include "calib/effects/camera_effects.h"
+#include "calib/effects/joint_map.h"
 #include "calib/effects/joint_shares.h"
-#include "calib/effects/smooth_basis.h"
-#include "kinematics/core/median.h"
+#include "calib/effects/suspect.h"
 
 namespace kinescope::effects {
 namespace {
@@ -22,60 +21,7 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFewestPeriods = 3.0;
 constexpr double kMostPeriods = 250.0;
 
-// By unit: an effect as large as that nobody overlooks. A fit that asks for it makes a wave or a
-// ratio of some other small thing, seen over a small range.
-const std::map<std::string, double> kLargest = {{"rad", 0.2}, {"m", 0.05}, {"", 0.25}};
 constexpr double kLargestCoupling = 1.5;
-
-// A joint under suspicion and what is needed to suspect it.
-struct Suspect {
-  int joint = 0;
-  std::string name;
-  std::string unit;  // of its value
-  bool turns = true;
-  Vector6d axis = Vector6d::Zero();  // as a twist in the link's frame
-  Eigen::VectorXd value;             // frames
-};
-
-Suspect suspect(const EffectWorld& world, int joint) {
-  const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
-  Suspect out;
-  out.joint = joint;
-  out.name = j.name;
-  out.turns = j.type == JointType::kRevolute;
-  out.unit = out.turns ? "rad" : "m";
-  (out.turns ? out.axis.head<3>() : out.axis.tail<3>()) = j.axis;
-  out.value = world.frames.value.col(joint);
-  return out;
-}
-
-Correction turn(const Suspect& s, std::string name, std::string unit, Eigen::VectorXd share) {
-  Correction out;
-  out.name = s.name + " " + std::move(name);
-  out.block = s.name;
-  out.unit = std::move(unit);
-  out.index = s.joint;
-  out.direction = s.axis;
-  out.share = std::move(share);
-  return out;
-}
-
-CameraEffect effect(const Suspect& s, std::string name, std::string words,
-                    std::vector<EffectParameter> parameters, std::string size_unit) {
-  CameraEffect out;
-  Candidate& c = out.candidate;
-  c.id = {std::move(name), s.name};
-  c.words = std::move(words);
-  c.size_weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(parameters.size()));
-  c.parameters = std::move(parameters);
-  c.size_unit = std::move(size_unit);
-  if (const auto most = kLargest.find(c.size_unit); most != kLargest.end()) {
-    c.possible = [limit = most->second](const Eigen::VectorXd& theta) {
-      return theta.norm() < limit;
-    };
-  }
-  return out;
-}
 
 // Of one joint against the others; of all of them it is the clock's.
 CameraEffect late_reading(const Suspect& s) {
@@ -133,27 +79,12 @@ CameraEffect eccentricity(const Suspect& s) {
   return out;
 }
 
-// How far apart the joint's values stand: a wave shorter than twice that cannot be followed, it
-// looks like a longer one. From one frame to the next; of postures, between those that differ.
-double sampling_step(const EffectWorld& world, const Suspect& s) {
-  std::vector<double> values(s.value.begin(), s.value.end());
-  if (world.postures) std::ranges::sort(values);
-  // Encoders at rest tremble.
-  const double least = world.postures ? 1e-3 * (values.back() - values.front()) : -1.0;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const double step = std::abs(values[i] - values[i - 1]);
-    if (step > least) steps.push_back(step);
-  }
-  return steps.empty() ? 0.0 : median_of(std::move(steps));
-}
-
 // Periods a turn (or a metre) whose waves the recording can tell from slow drifts and from noise.
-std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
+std::vector<double> wave_numbers(const Suspect& s) {
   const double range = s.value.maxCoeff() - s.value.minCoeff();
   if (!(range > 0.0)) return {};
   const double turns = s.turns ? range / kTurn : range;
-  const double step = sampling_step(world, s) / (s.turns ? kTurn : 1.0);
+  const double step = s.step / (s.turns ? kTurn : 1.0);
   const double fewest = s.turns ? std::max(kFewestPeriods, 1.0 / turns) : 1.0 / turns;
   double most = s.turns ? kMostPeriods : kMostPeriods / range;
   if (step > 0.0) most = std::min(most, 0.5 / step);
@@ -163,11 +94,11 @@ std::vector<double> wave_numbers(const EffectWorld& world, const Suspect& s) {
   return out;
 }
 
-CameraEffect gear_error(const EffectWorld& world, const Suspect& s) {
+CameraEffect gear_error(const Suspect& s) {
   CameraEffect out =
       effect(s, "gear_error", fmt::format("the gear of {} runs unevenly, in waves", s.name),
              {{"sine", s.unit}, {"cosine", s.unit}}, s.unit);
-  out.candidate.scan = wave_numbers(world, s);
+  out.candidate.scan = wave_numbers(s);
   out.candidate.scan_name = "periods";
   out.candidate.scan_unit = s.turns ? "per turn" : "per m";
   out.candidate.check =
@@ -181,7 +112,7 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "backlash", fmt::format("{} has play", s.name), {{"width", s.unit}}, s.unit);
   // A link ahead of its drive has no play: its reading is late.
-  out.candidate.possible = [limit = kLargest.at(s.unit)](const Eigen::VectorXd& width) {
+  out.candidate.possible = [limit = largest_size(s.unit)](const Eigen::VectorXd& width) {
     return width[0] > 0.0 && width[0] < limit;
   };
   const double range = s.value.maxCoeff() - s.value.minCoeff();
@@ -248,60 +179,9 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
     return (shares * theta).cwiseAbs().maxCoeff();
   };
   // Loads can be alike: large parts of either sign may stand for a small sag.
-  out.candidate.possible = [size = out.candidate.size, limit = kLargest.at(s.unit)](
+  out.candidate.possible = [size = out.candidate.size, limit = largest_size(s.unit)](
                                const Eigen::VectorXd& theta) { return size(theta) < limit; };
   out.corrections = [corrections](double) { return corrections; };
-  return out;
-}
-
-// What a joint's error is as a function of its value, whatever the cause.
-CameraEffect joint_map(const EffectWorld& world, const Suspect& s) {
-  // Down to the shortest wave that the values can follow.
-  constexpr double kFinest = 64.0;
-  CameraEffect out = effect(
-      s, "joint_map", fmt::format("the error of {} repeats with its value", s.name), {}, s.unit);
-  const double low = s.value.minCoeff();
-  const double high = s.value.maxCoeff();
-  const double range = high - low;
-  const double finest = std::max(range / kFinest, sampling_step(world, s));
-  out.candidate.scan.push_back(range);
-  while (out.candidate.scan.back() >= std::numbers::sqrt2 * finest) {
-    out.candidate.scan.push_back(out.candidate.scan.back() / std::numbers::sqrt2);
-  }
-  out.candidate.scan_name = "smooth over";
-  out.candidate.scan_unit = s.unit;
-  out.candidate.curve_over = "value of " + s.name;
-  out.candidate.contains = {
-      {"gear_error", s.name}, {"eccentricity", s.name}, {"encoder_scale", s.name}};
-  out.candidate.check = "encoder, gear, cable drag: what turns with the joint";
-  out.candidate.record = fmt::format("move {} slowly over its range", s.name);
-  out.corrections = [s, low, high](double length) {
-    const Eigen::MatrixXd shares = SmoothBasis(low, high, length).at(s.value);
-    std::vector<Correction> corrections;
-    for (Eigen::Index k = 0; k < shares.cols(); ++k) {
-      corrections.push_back(
-          turn(s, fmt::format("map, {} of length {:.3g}", k, length), s.unit, shares.col(k)));
-    }
-    return corrections;
-  };
-  out.table = [low, high](double length, const Eigen::MatrixXd& covariance,
-                          Eigen::MatrixXd& shares) {
-    // So close that straight lines between them miss the curve by 1 % of its spread, and as far as
-    // it reaches.
-    constexpr double kStep = 0.25;
-    constexpr double kReach = 3.0;
-    const auto steps = static_cast<Eigen::Index>(
-        std::ceil((high - low + 2.0 * kReach * length) / (kStep * length)));
-    ErrorTable table;
-    table.value =
-        Eigen::VectorXd::LinSpaced(steps + 1, low - kReach * length, high + kReach * length);
-    shares = SmoothBasis(low, high, length).at(table.value);
-    shares.row(0).setZero();
-    shares.row(steps).setZero();
-    table.sigma =
-        (shares * covariance).cwiseProduct(shares).rowwise().sum().cwiseMax(0.0).cwiseSqrt();
-    return table;
-  };
   return out;
 }
 
@@ -438,7 +318,7 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     if (!world.postures && world.driven.size() > 1) out.push_back(late_reading(s));
     out.push_back(encoder_scale(s));
     if (s.turns) out.push_back(eccentricity(s));
-    if (CameraEffect gear = gear_error(world, s); world.known || !gear.candidate.scan.empty()) {
+    if (CameraEffect gear = gear_error(s); world.known || !gear.candidate.scan.empty()) {
       out.push_back(std::move(gear));
     }
     if (!world.postures) out.push_back(backlash(world, s));
@@ -446,7 +326,7 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     if (world.known || world.driven.size() > 1) out.push_back(coupling(world, s));
     out.push_back(helical(s));
     out.push_back(s.turns ? axis_wobble(s) : curved_slider(s));
-    if (!world.known) out.push_back(joint_map(world, s));
+    if (!world.known) out.push_back(joint_map(s));
   }
   return out;
 }

@@ -16,8 +16,7 @@ class SmoothBasis {
   /// low <= high, length > 0, all in the unit of the values.
   SmoothBasis(double low, double high, double length);
 
-  [[nodiscard]] Eigen::Index size() const { return nodes_.size(); }
-  /// Values x size.
+  /// Values x coefficients.
   [[nodiscard]] Eigen::MatrixXd at(const Eigen::VectorXd& values) const;
 
  private:

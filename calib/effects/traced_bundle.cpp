@@ -108,7 +108,8 @@ std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<Camera
       places.push_back(corrections);
       continue;
     }
-    const std::size_t count = effect.corrections(added.scan).size();
+    const std::size_t count = effect.candidate.is_curve() ? effect.corrections(added.scan).size()
+                                                          : effect.candidate.parameters.size();
     for (std::size_t k = 0; k < count; ++k) places.push_back(next++);
   }
   return out;

@@ -4,78 +4,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/trace/smoothness.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
 namespace {
 
-// The variance of the process is looked for from a thousandth to 1e9 times its natural scale.
-constexpr int kVariances = 49;
 constexpr double kVarianceStep = 0.25;  // decades
 constexpr int kNoiseSteps = 4;
-
-// How many rows say the same because noise lasts.
-double memory_of(const Linearisation& linear) {
-  const Eigen::Index n = linear.instants();
-  if (linear.independent_instants || n < 2) return 1.0;
-  const double step = (linear.time_s[n - 1] - linear.time_s[0]) / static_cast<double>(n - 1);
-  return std::max(1.0, 2.0 * linear.correlation_time_s / step);
-}
 
 double freedom_of(const NormalSystem& system) {
   return std::max(1.0, static_cast<double>(system.linear().residual.size() - system.parameters()));
 }
-
-// A curve of one length, in coordinates in which prior and data are both diagonal.
-struct Smoothness {
-  double length = 0.0;
-  Eigen::VectorXd shown;  // data: information of each
-  Eigen::VectorXd score;
-};
 
 Smoothness diagonalise(const NormalSystem& system, const Candidate& candidate, double length) {
   const EffectSums sums = system.sums(candidate.columns(length));
   const Eigen::MatrixXd B = system.inverse() * sums.JE;
   const SymmetricEigen eigen = symmetric_eigen(sums.EE - sums.JE.transpose() * B);
   const Eigen::VectorXd score = sums.Er - B.transpose() * system.total().g;
-  return {length, eigen.values.cwiseMax(0.0), eigen.vectors.transpose() * score};
-}
-
-struct Choice {
-  const Smoothness* smoothness = nullptr;
-  double variance = 0.0;
-  double log_evidence = 0.0;  // that of no curve
-};
-
-Choice choose(const std::vector<Smoothness>& all, double noise) {
-  Choice best;
-  for (const Smoothness& s : all) {
-    const double natural =
-        noise * static_cast<double>(s.shown.size()) / std::max(1e-300, s.shown.sum());
-    for (int v = 0; v < kVariances; ++v) {
-      const double variance = natural * std::pow(10.0, -3.0 + kVarianceStep * v);
-      const Eigen::ArrayXd gain = 1.0 + variance / noise * s.shown.array();
-      const double log_evidence =
-          0.5 * (variance / (noise * noise) * s.score.array().square() / gain).sum() -
-          0.5 * gain.log().sum();
-      if (log_evidence > best.log_evidence) best = {&s, variance, log_evidence};
-    }
-  }
-  return best;
-}
-
-// Of a whitened row beside this curve, without its memory.
-double white_beside(const NormalSystem& system, const Choice& choice, double noise) {
-  const double whole = system.total().rr;
-  if (choice.smoothness == nullptr) return whole / freedom_of(system);
-  const Smoothness& s = *choice.smoothness;
-  const Eigen::ArrayXd weight =
-      choice.variance / (noise + choice.variance * s.shown.array());  // coefficients = weight score
-  const Eigen::ArrayXd z = weight * s.score.array();
-  const double left =
-      whole - 2.0 * (z * s.score.array()).sum() + (z.square() * s.shown.array()).sum();
-  const double spent = (weight * s.shown.array()).sum();
-  return std::max(left, 0.0) / std::max(1.0, freedom_of(system) - spent);
+  return {length, eigen.values.cwiseMax(0.0), eigen.vectors.transpose() * score, {}};
 }
 
 // The model without some of its last parameters, at whose values `taken` the residual stands.
@@ -100,14 +47,16 @@ std::optional<AddedEffect> likeliest_curve(const NormalSystem& system, const Can
   for (const double length : candidate.scan) {
     all.push_back(diagonalise(system, candidate, length));
   }
-  const double memory = memory_of(system.linear());
-  double noise = memory * system.total().rr / freedom_of(system);
-  Choice choice;
+  const double whole = system.total().rr;
+  const double freedom = freedom_of(system);
+  double noise = system.memory() * whole / freedom;
+  SmoothnessChoice choice;
   for (int i = 0; i < kNoiseSteps; ++i) {
-    choice = choose(all, noise);
-    noise = memory * white_beside(system, choice, noise);
+    choice = likeliest_smoothness(all, noise, kVarianceStep);
+    if (!(choice.log_evidence > 0.0)) return std::nullopt;
+    noise = system.memory() * noise_beside(choice, noise, whole, freedom);
   }
-  if (choice.smoothness == nullptr || !(noise > 0.0)) return std::nullopt;
+  if (!(noise > 0.0)) return std::nullopt;
   return AddedEffect{candidate.id, choice.smoothness->length, std::sqrt(choice.variance / noise)};
 }
 
@@ -128,8 +77,22 @@ std::vector<AddedEffect> tuned_curves(const Stage& stage) {
   return out;
 }
 
+void size_up_curve(const std::vector<EffectColumn>& columns, double t, TracedEffect& effect) {
+  EffectPicture& picture = effect.picture;
+  Eigen::MatrixXd shares(picture.effect.size(), std::ssize(columns));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    shares.col(static_cast<Eigen::Index>(k)) = columns[k].share;
+  }
+  picture.sigma =
+      (shares * effect.covariance).cwiseProduct(shares).rowwise().sum().cwiseMax(0.0).cwiseSqrt();
+  Eigen::Index largest = 0;
+  effect.size = picture.effect.cwiseAbs().maxCoeff(&largest);
+  const double half = t * picture.sigma[largest];
+  effect.interval = {std::max(0.0, effect.size - half), effect.size + half};
+}
+
 Eigen::MatrixXd posterior_covariance(const NormalSystem& system, Eigen::Index count) {
-  const double noise = memory_of(system.linear()) * system.total().rr / freedom_of(system);
+  const double noise = system.memory() * system.total().rr / freedom_of(system);
   return noise * system.inverse().bottomRightCorner(count, count);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/trace/stage.h"
+#include "calib/trace/trace_result.h"
 
 namespace kinescope::trace {
 
@@ -23,5 +24,9 @@ namespace kinescope::trace {
 /// Posterior covariance of the last `count` parameters of the model, its noise widened for its
 /// memory.
 [[nodiscard]] Eigen::MatrixXd posterior_covariance(const NormalSystem& system, Eigen::Index count);
+
+/// Size, interval and band of a curve of these columns, from its picture and covariance; `t`:
+/// quantile of the interval.
+void size_up_curve(const std::vector<EffectColumn>& columns, double t, TracedEffect& effect);
 
 }  // namespace kinescope::trace

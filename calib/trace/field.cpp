@@ -8,6 +8,7 @@
 
 #include "calib/trace/distribution.h"
 #include "calib/trace/own_space.h"
+#include "calib/trace/smoothness.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::trace {
@@ -17,8 +18,7 @@ constexpr int kMostNodes = 240;  // of a component
 constexpr int kRowsANode = 16;   // fewer nodes where few rows judge them
 // Smoothness, in spacings of the grid: what is finer the grid does not show.
 constexpr std::array<double, 4> kLengths{1.0, 2.0, 4.0, 8.0};
-// The variance of the process is looked for from a thousandth of its natural scale upwards.
-constexpr int kVariances = 25;
+constexpr double kVarianceStep = 0.5;  // decades
 constexpr int kNoiseSteps = 6;
 constexpr double kMostWidening = 100.0;
 // Of the directions of the field the data show those by more than this part of their prior, and at
@@ -98,14 +98,6 @@ Eigen::MatrixXd projected_by_stretch(const NormalSystem& system, const FieldGrid
          evidence.QE.transpose() * evidence.own.solve(own);
 }
 
-// A field of this smoothness, in coordinates in which prior and data are both diagonal.
-struct Smoothness {
-  double length = 0.0;
-  Eigen::MatrixXd directions;  // nodes' values of each; prior variance 1
-  Eigen::VectorXd shown;       // data: information of each
-  Eigen::VectorXd score;
-};
-
 Smoothness diagonalise(const FieldGrid& grid, const Evidence& evidence, double length) {
   const Eigen::Index n = grid.nodes.rows();
   const Eigen::MatrixXd factor = CholeskyFactor(grid.correlation(length)).lower();
@@ -121,51 +113,14 @@ Smoothness diagonalise(const FieldGrid& grid, const Evidence& evidence, double l
   return out;
 }
 
-// The likeliest smoothness and variance at a level of noise.
-struct Choice {
-  const Smoothness* smoothness = nullptr;
-  double variance = 0.0;
-  double log_evidence = -std::numeric_limits<double>::infinity();
-};
-
-// Rasmussen and Williams 2006, eq. 2.30.
-Choice choose(const std::vector<Smoothness>& all, double noise) {
-  Choice best;
-  for (const Smoothness& smoothness : all) {
-    const double natural =
-        noise * static_cast<double>(smoothness.shown.size()) / smoothness.shown.sum();
-    for (int v = 0; v < kVariances; ++v) {
-      const double variance = natural * std::pow(10.0, -3.0 + 0.5 * v);
-      const Eigen::ArrayXd gain = 1.0 + variance / noise * smoothness.shown.array();
-      const double log_evidence =
-          0.5 * (variance / (noise * noise) * smoothness.score.array().square() / gain).sum() -
-          0.5 * gain.log().sum();
-      if (log_evidence > best.log_evidence) best = {&smoothness, variance, log_evidence};
-    }
-  }
-  return best;
-}
-
-// Posterior mean in the coordinates of the choice.
-Eigen::VectorXd mean_of(const Choice& choice, double noise) {
-  return choice.variance * (choice.smoothness->score.array() /
-                            (noise + choice.variance * choice.smoothness->shown.array()))
-                               .matrix();
-}
-
 // Of a whitened row, when the field that it makes likeliest is taken away: the noise and the field
 // in turn.
-double noise_beside(const std::vector<Smoothness>& all, const Evidence& evidence) {
+double noise_without_field(const std::vector<Smoothness>& all, const Evidence& evidence) {
   const double whole = evidence.residual.squaredNorm();
   double noise = whole / evidence.freedom;
   for (int i = 0; i < kNoiseSteps; ++i) {
-    const Choice choice = choose(all, noise);
-    const Smoothness& s = *choice.smoothness;
-    const Eigen::VectorXd z = mean_of(choice, noise);
-    const double left = whole - 2.0 * z.dot(s.score) + z.cwiseAbs2().dot(s.shown);
-    const double spent =
-        (choice.variance * s.shown.array() / (noise + choice.variance * s.shown.array())).sum();
-    noise = std::max(left, 0.0) / std::max(1.0, evidence.freedom - spent);
+    noise = noise_beside(likeliest_smoothness(all, noise, kVarianceStep), noise, whole,
+                         evidence.freedom);
   }
   return noise;
 }
@@ -186,7 +141,7 @@ double widening(const NormalSystem& system, const FieldGrid& grid, const Evidenc
   return std::clamp(ratio / std::max(noise, 1e-300), 1.0, kMostWidening);
 }
 
-FieldMap map_of(const FieldGrid& grid, const Choice& choice, double noise) {
+FieldMap map_of(const FieldGrid& grid, const SmoothnessChoice& choice, double noise) {
   const Smoothness& s = *choice.smoothness;
   const Eigen::Index n = grid.nodes.rows();
   const Eigen::VectorXd mean = s.directions * mean_of(choice, noise);
@@ -220,11 +175,11 @@ FoundRest fit_field(const NormalSystem& system, const FieldGrid& grid, const Evi
     if (length * grid.spacing > grid.extent) break;
     all.push_back(diagonalise(grid, evidence, length * grid.spacing));
   }
-  const double white = noise_beside(all, evidence);
-  const Choice first = choose(all, white);
+  const double white = noise_without_field(all, evidence);
+  const SmoothnessChoice first = likeliest_smoothness(all, white, kVarianceStep);
   const Eigen::VectorXd nodes = first.smoothness->directions * mean_of(first, white);
   const double noise = white * widening(system, grid, evidence, nodes, white);
-  const Choice choice = choose(all, noise);
+  const SmoothnessChoice choice = likeliest_smoothness(all, noise, kVarianceStep);
   const Smoothness& s = *choice.smoothness;
   // Eigenvalues grow.
   Eigen::Index kept = 0;

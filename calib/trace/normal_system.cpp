@@ -62,6 +62,13 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
       linear.prior.size() == 0 ? total_.H : Eigen::MatrixXd(total_.H + linear.prior), kUnseen);
 }
 
+double NormalSystem::memory() const {
+  const Eigen::Index n = linear_->instants();
+  if (linear_->independent_instants || n < 2) return 1.0;
+  const double step = (linear_->time_s[n - 1] - linear_->time_s[0]) / static_cast<double>(n - 1);
+  return std::max(1.0, 2.0 * linear_->correlation_time_s / step);
+}
+
 const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
   return carriers_.get(index, [&] { return carrier_sums(index); });
 }

@@ -106,12 +106,7 @@ PooledNoise pooled_noise(const NormalSystem& system, const Projected& p,
                      static_cast<double>(linear.residual.size());
   const double freedom = touched.rows - own - k;
   if (freedom < 1.0) return {};
-  double memory = 1.0;
-  if (!linear.independent_instants && linear.instants() > 1) {
-    const double step = (linear.time_s[linear.instants() - 1] - linear.time_s[0]) /
-                        static_cast<double>(linear.instants() - 1);
-    memory = std::max(1.0, 2.0 * linear.correlation_time_s / step);
-  }
+  const double memory = system.memory();
   return {touched.squares / freedom * memory, std::max(1.0, freedom / memory)};
 }
 

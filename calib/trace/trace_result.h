@@ -18,7 +18,7 @@ enum class TraceVerdict {
   kNotRun,
   kEffects,      ///< named, sized, corrected; nothing else is left
   kAmbiguous,    ///< one of several effects; this recording cannot tell which
-  kUnknown,      ///< structure is left that no known effect explains
+  kUnknown,      ///< structure is left that no known effect explains, or a curve carries it
   kClean,        ///< the residual is noise
   kNothingToSay  ///< the recording is too short, or the model did not converge
 };

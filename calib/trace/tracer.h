@@ -63,6 +63,8 @@ class Tracer {
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
   [[nodiscard]] bool drop_without_size();
+  /// What an effect does, from the model without it.
+  void compare_without(const Stage& without, TracedEffect& detail) const;
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
@@ -80,6 +82,7 @@ class Tracer {
   /// was found to be left.
   [[nodiscard]] bool name_the_rest();
   [[nodiscard]] std::optional<FoundRest> next_rest() const;
+  void add_rest(FoundRest found);
   void look_for_curves();
   [[nodiscard]] bool look_for_field();
   [[nodiscard]] double rest_level() const;

@@ -26,21 +26,6 @@ Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRes
   return out;
 }
 
-// Its largest value where it was seen, and how certain that is.
-void size_up_curve(const std::vector<EffectColumn>& columns, double t, TracedEffect& effect) {
-  EffectPicture& picture = effect.picture;
-  Eigen::MatrixXd shares(picture.effect.size(), std::ssize(columns));
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    shares.col(static_cast<Eigen::Index>(k)) = columns[k].share;
-  }
-  picture.sigma =
-      (shares * effect.covariance).cwiseProduct(shares).rowwise().sum().cwiseMax(0.0).cwiseSqrt();
-  Eigen::Index largest = 0;
-  effect.size = picture.effect.cwiseAbs().maxCoeff(&largest);
-  const double half = t * picture.sigma[largest];
-  effect.interval = {std::max(0.0, effect.size - half), effect.size + half};
-}
-
 bool same_place(const std::string& rest, const std::string& effect) {
   return rest == effect || rest.starts_with(effect + " ") || effect.starts_with(rest + " ");
 }
@@ -119,15 +104,18 @@ std::optional<FoundRest> Tracer::next_rest() const {
                    options_);
 }
 
+void Tracer::add_rest(FoundRest found) {
+  add_step(round_,
+           fmt::format("structure is left at {}, over {}", found.rest.place, found.rest.covariate),
+           *now_);
+  rests_.push_back(std::move(found));
+}
+
 void Tracer::look_for_curves() {
   rests_.clear();
   while (std::optional<FoundRest> found = next_rest()) {
     if (rests_.empty() && rest_replaces_an_effect(*found)) continue;
-    add_step(
-        round_,
-        fmt::format("structure is left at {}, over {}", found->rest.place, found->rest.covariate),
-        *now_);
-    rests_.push_back(std::move(*found));
+    add_rest(std::move(*found));
   }
 }
 

@@ -132,6 +132,13 @@ bool Tracer::drop_without_size() {
   return false;
 }
 
+void Tracer::compare_without(const Stage& without, TracedEffect& detail) const {
+  detail.held_out_before = without.error;
+  detail.held_out_after = now_->error;
+  detail.explained =
+      (without.system.total().rr - now_->system.total().rr) / base_->system.total().rr;
+}
+
 bool Tracer::check(std::size_t index) {
   const AddedEffect effect = now_->added[index];
   const StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
@@ -146,10 +153,7 @@ bool Tracer::check(std::size_t index) {
   details_[index].score = own.score;
   TracedEffect& detail = details_[index].effect;
   detail.p_value = own.p_value;
-  detail.held_out_before = stage->error;
-  detail.held_out_after = now_->error;
-  detail.explained =
-      (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
+  compare_without(*stage, detail);
   // What clearly helps to predict stays, however few stretches judge its parameters.
   const bool needed = predicts_clearly_worse(stage->held_out.whitened, now_->held_out.whitened);
   const bool slight = now_->added.size() > 1 && detail.explained < kImperfection;

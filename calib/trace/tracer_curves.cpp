@@ -103,13 +103,7 @@ void Tracer::drop_what_curves_contain() {
 
 void Tracer::look_beside_curves() {
   rests_.clear();
-  while (std::optional<FoundRest> found = next_rest()) {
-    add_step(
-        round_,
-        fmt::format("structure is left at {}, over {}", found->rest.place, found->rest.covariate),
-        *now_);
-    rests_.push_back(std::move(*found));
-  }
+  while (std::optional<FoundRest> found = next_rest()) add_rest(std::move(*found));
 }
 
 void Tracer::describe_curves() {
@@ -121,10 +115,7 @@ void Tracer::describe_curves() {
     TracedEffect& detail = details_[i].effect;
     detail.p_value =
         paired_p_value(now_->system.partition(), stage->held_out.whitened, now_->held_out.whitened);
-    detail.held_out_before = stage->error;
-    detail.held_out_after = now_->error;
-    detail.explained =
-        (stage->system.total().rr - now_->system.total().rr) / base_->system.total().rr;
+    compare_without(*stage, detail);
     detail.picture =
         picture_of(*stage, *now_, *candidate, candidate->columns(added.scan), now_->fit.values[i]);
   }
