@@ -23,9 +23,9 @@ CLI::Validator length_m() {
 }
 
 /// One word of several.
-template <typename Enum>
+template <typename Enum, typename Value>
 CLI::Option* add_choice(CLI::App& command, const char* name,
-                        const std::map<std::string, Enum>& words, Enum& value, const char* help) {
+                        const std::map<std::string, Enum>& words, Value& value, const char* help) {
   const auto check = [words](const std::string& text) -> std::string {
     std::vector<std::string> known;
     for (const auto& [word, meaning] : words) known.push_back(word);
@@ -78,8 +78,9 @@ void add_estimation_options(CLI::App& run, CommandLine& line) {
   CalibrateOptions& calibrate = line.run.calibrate;
   const char* group = "What is estimated";
   add_choice(
-      run, "--free", kFree, calibrate.free,
-      "placement: base and markers; offsets: + joint zeros; geometry: + joint axes (default)")
+      run, "--free", kFree, line.run.free,
+      "placement: base and markers; offsets: + joint zeros; geometry: + joint axes; default: with "
+      "--nominal the one that predicts unseen postures best, else geometry")
       ->type_name("LEVEL")
       ->group(group);
   run.add_flag("--intrinsics", line.run.estimate_intrinsics,

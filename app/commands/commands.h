@@ -34,6 +34,8 @@ struct RunOptions {
       output;  ///< the run folder; default: <recording's name>_run in the current folder
   DetectOptions detect;
   CalibrateOptions calibrate;
+  /// Of the robot; none: all of it, and of a nominal robot what predicts unseen postures best.
+  std::optional<FreeGeometry> free;
   bool estimate_intrinsics = false;
   bool trace = true;        ///< close the loop: look for effects that the calibration lacks
   bool must_trace = false;  ///< tracing is what was asked for: exit code 4 where it says nothing

@@ -2,6 +2,7 @@
 #include "app/commands/explain.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <utility>
@@ -56,6 +57,20 @@ bool is_settled(const Explanation& of) {
          (of.fitted->trace.verdict == TraceVerdict::kNotRun || is_all_explained(of.fitted->trace));
 }
 
+// What tracing says of a robot whose geometry is better held than free: nothing but noise, or that
+// it bent a geometry that so few postures do not bear.
+Trace without_effects(const Trace& traced, const FreedomLevel& exported) {
+  if (traced.verdict == TraceVerdict::kClean || traced.verdict == TraceVerdict::kNotRun)
+    return traced;
+  Trace out;
+  out.verdict = TraceVerdict::kNothingToSay;
+  out.reason = fmt::format(
+      "effects are looked for beside a free geometry, and unseen postures are predicted better "
+      "with the robot {}: too few postures, or too much alike",
+      words_of(exported));
+  return out;
+}
+
 /// A structure, and effects to begin with beside it.
 struct Proposal {
   Structure structure;
@@ -71,7 +86,7 @@ class Explainer {
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first = of_structure(structure_of(evidence_.tracks), {});
+    Explanation first = with_couplings_doubted(of_structure(structure_of(evidence_.tracks), {}));
     return is_settled(first) ? first : improved(std::move(first));
   }
 
@@ -101,7 +116,59 @@ class Explainer {
     lap("structure");
     out.nominal_faults = std::move(checked.faults);
     out.start = std::move(checked.start);
-    fit(out, {});
+    fit_levels(out);
+    return out;
+  }
+
+  [[nodiscard]] Calibration calibrated(const CalibrationStart& start, FreeGeometry free) const {
+    CalibrateOptions options = options_.calibrate;
+    options.free = free;
+    return calibrate(evidence_.observed.measurements, recording().markers, recording().log, start,
+                     options, options_.progress);
+  }
+
+  // How much of a nominal robot is free: all levels are rivals, and effects stand beside the
+  // freest.
+  void fit_levels(Explanation& out) const {
+    using enum FreeGeometry;
+    const Measurements& measurements = evidence_.observed.measurements;
+    constexpr std::array kLevels{kPlacement, kOffsets, kGeometry};
+    std::vector<Calibration> plain;
+    std::vector<LevelFit> fits;
+    for (const FreeGeometry free : kLevels) plain.push_back(calibrated(out.start, free));
+    for (std::size_t k = 0; k < plain.size(); ++k) fits.push_back({kLevels[k], 0, &plain[k]});
+    lap("calibrate");
+    const auto traced = static_cast<std::size_t>(options_.free.value_or(kGeometry));
+    TracedCalibration whole = closed_loop(out, kLevels[traced], plain[traced]);
+    std::size_t exported = traced;
+    if (!whole.effects.empty()) {
+      exported = fits.size();
+      fits.push_back({kLevels[traced], static_cast<int>(whole.effects.size()), &whole.calibration});
+    }
+    if (!options_.free) {
+      const std::size_t best = best_level({fits[0], fits[1], fits[exported]}, measurements);
+      if (best < traced) exported = best;
+    }
+    out.levels = compare_levels(fits, exported, measurements);
+    if (exported >= traced) {
+      out.fitted = std::move(whole);
+    } else {
+      out.fitted = TracedCalibration{without_effects(whole.trace, out.levels[exported]),
+                                     std::move(plain[exported]),
+                                     {},
+                                     {},
+                                     0.0};
+    }
+  }
+
+  [[nodiscard]] TracedCalibration closed_loop(const Explanation& of, FreeGeometry free,
+                                              const Calibration& plain) const {
+    if (!options_.trace) return {{}, plain, {}, {}, 0.0};
+    CalibrateOptions options = options_.calibrate;
+    options.free = free;
+    TracedCalibration out = trace_stage(recording(), evidence_.observed, of.start, plain, {},
+                                        options, options_.progress);
+    lap("trace");
     return out;
   }
 
@@ -195,6 +262,20 @@ class Explainer {
       return now;
     }
     Explanation other = of_structure(std::move(*again), now.fitted->trace.added);
+    return is_better(other, now) ? other : now;
+  }
+
+  // Joints that move in proportion may be coupled; or only one of them moves as it should not.
+  [[nodiscard]] Explanation with_couplings_doubted(Explanation now) const {
+    if (!now.fitted || !now.structure || !options_.trace) return now;
+    Structure free = *now.structure;
+    bool any = false;
+    for (StructureJoint& joint : free.joints) {
+      any = any || !joint.couplings.empty();
+      joint.couplings.clear();
+    }
+    if (!any) return now;
+    Explanation other = of_structure(std::move(free), {});
     return is_better(other, now) ? other : now;
   }
 

@@ -18,6 +18,7 @@
 
 #include "app/commands/pipeline.h"
 #include "app/commands/trace_stage.h"
+#include "calib/quality/freedom_levels.h"
 
 namespace kinescope {
 
@@ -26,6 +27,7 @@ struct Explanation {
   PoseTracks tracks;                   ///< without the sightings that they would have explained
   std::optional<Structure> structure;  ///< none: a nominal robot was given
   std::vector<NominalFault> nominal_faults;  ///< mended before the fit
+  std::vector<FreedomLevel> levels;          ///< of a nominal robot: what each freedom predicts
   CalibrationStart start;
   std::optional<TracedCalibration> fitted;  ///< none where nothing could be fitted
   std::optional<Error> failure;             ///< why
@@ -40,6 +42,8 @@ struct Evidence {
 
 struct ExplainOptions {
   CalibrateOptions calibrate;
+  /// Of a nominal robot; none: what predicts best.
+  std::optional<FreeGeometry> free = {};
   bool trace = true;
   /// Called at the end of a stage, with its name.
   std::function<void(std::string_view)> lap;

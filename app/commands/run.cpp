@@ -57,6 +57,7 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();
   run.log = recording.log;
   run.nominal = recording.nominal;
+  run.free_asked = options.free.has_value();
 }
 
 // What is odd about the input, beside the result: the report has it, too.
@@ -192,6 +193,8 @@ ExplainOptions explain_options(const RunOptions& options, RunSummary& run, Stopw
   ExplainOptions out;
   out.calibrate = options.calibrate;
   out.calibrate.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
+  out.calibrate.free = options.free.value_or(FreeGeometry::kGeometry);
+  out.free = options.free;
   out.trace = options.trace;
   out.lap = [&](std::string_view stage) { clock.lap(std::string(stage), run.times); };
   out.progress = progress;
@@ -244,6 +247,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   run.log = std::move(best.log);
   run.structure = std::move(best.structure);
   run.nominal_faults = std::move(best.nominal_faults);
+  run.levels = std::move(best.levels);
   if (!answered) write_structure(run, folder);
   if (best.failure) throw Error(*best.failure);
   run.tracks = std::move(best.tracks);

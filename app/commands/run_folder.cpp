@@ -37,8 +37,9 @@ std::set<std::string> products_of(const fs::path& run_json) {
   return out;
 }
 
-std::string describe_geometry(FreeGeometry free) {
-  switch (free) {
+std::string describe_geometry(const std::optional<FreeGeometry>& free) {
+  if (!free) return "what predicts best";
+  switch (*free) {
     case FreeGeometry::kPlacement:
       return "placement";
     case FreeGeometry::kOffsets:
@@ -189,7 +190,7 @@ std::vector<InputFile> hash_inputs(const Recording& recording) {
 std::vector<std::pair<std::string, std::string>> list_options(const RunOptions& options) {
   const CalibrateOptions& c = options.calibrate;
   const DetectorOptions& d = options.detect.detector;
-  return {{"free", describe_geometry(c.free)},
+  return {{"free", describe_geometry(options.free)},
           {"estimate intrinsics", options.estimate_intrinsics ? "yes" : "when not declared"},
           {"estimate time offset", c.estimate_time_offset ? "yes" : "no"},
           {"estimate scales", c.estimate_scales ? "yes" : "when the unit is unknown"},

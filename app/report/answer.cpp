@@ -43,7 +43,7 @@ std::vector<std::string> unknown_axes(const Calibration& calibration) {
   return out;
 }
 
-// A geometry that is held says how far it is off, which is what was asked.
+// A geometry that is held says how far it is off; where the user holds it, that is what was asked.
 bool is_geometry_held(const Calibration& calibration) {
   return std::ranges::none_of(calibration.tree.joints,
                               [&](const Joint& joint) { return is_estimated(calibration, joint); });
@@ -119,6 +119,21 @@ Answer structure_answer(const Structure& structure) {
                    "record every joint moving at its own time");
 }
 
+// Joints without a channel, where those are most of a robot whose log does move: it is the log of
+// something else.
+std::vector<std::string> undriven_joints(const RunSummary& run) {
+  std::vector<std::string> out;
+  if (!run.structure || run.log.empty() || run.structure->idle_channels.empty()) return out;
+  std::size_t moving = 0;
+  for (const Joint& joint : run.calibration.tree.joints) {
+    if (joint.type == JointType::kFixed) continue;
+    ++moving;
+    if (joint.channel.empty()) out.push_back(joint.name);
+  }
+  if (2 * out.size() <= moving) out.clear();
+  return out;
+}
+
 }  // namespace
 
 Answer judge(const RunSummary& run) {
@@ -126,7 +141,7 @@ Answer judge(const RunSummary& run) {
   if (calibration.status == CalibrationStatus::kUndetermined)
     return no_answer("calibration", calibration.status_reason, calibration.status_remedy);
   const Missed missed = missed_motion(calibration);
-  if (missed.by > kAnotherRobot * missed.of && !is_geometry_held(calibration)) {
+  if (missed.by > kAnotherRobot * missed.of && !(run.free_asked && is_geometry_held(calibration))) {
     return no_answer(
         "calibration",
         fmt::format("the robot misses its markers by {} where they move by {}",
@@ -139,6 +154,16 @@ Answer judge(const RunSummary& run) {
   if (calibration.status == CalibrationStatus::kNotConverged) {
     return no_answer("calibration", "the fit did not settle: " + calibration.status_reason,
                      "record more different postures; check units and nominal values");
+  }
+  if (run.trace && !run.trace->converged) {
+    return no_answer("calibration", run.trace->reason,
+                     "check that log, markers and camera belong together; record more different "
+                     "postures");
+  }
+  if (const std::vector<std::string> undriven = undriven_joints(run); !undriven.empty()) {
+    return no_answer("structure",
+                     fmt::format("no channel of the log drives {}", report::joined(undriven)),
+                     "check that the log belongs to this recording, and its clock");
   }
   if (const std::vector<std::string> unknown = unknown_axes(calibration); !unknown.empty()) {
     return no_answer("calibration",

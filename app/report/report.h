@@ -53,6 +53,8 @@ struct Verdict {
 ///                  couplings, offset, travel, rotation_rms_rad, translation_rms_m,
 ///                  unexplained, unexplained_across (shares of its link's squared motion),
 ///                  log_odds, runner_up]
+///   nominal_levels [words, effects, status, held_out_{px, m, rad}, log_odds, exported]: a nominal
+///                  robot with more and more of it free, over the same sightings; empty without
 ///   calibration    status, reason, gauge, time_offset_s (joint-log time = frame time + offset) and
 ///                  time_offset_expanded_s, sightings_used, sightings_rejected, sigma_scale (noise
 ///                  found over declared), before_rms, training_rms, held_out_rms, final_rms (one

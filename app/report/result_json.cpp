@@ -247,6 +247,22 @@ json nominal_faults_json(const RunSummary& run) {
   return list;
 }
 
+json nominal_levels_json(const RunSummary& run) {
+  json list = json::array();
+  for (const FreedomLevel& level : run.levels) {
+    const ErrorRow& all = level.errors;
+    list.push_back({{"words", words_of(level)},
+                    {"effects", level.effects},
+                    {"status", to_string(level.status)},
+                    {"held_out_px", statistics_json(all.held_out_px)},
+                    {"held_out_m", statistics_json(all.held_out_m)},
+                    {"held_out_rad", statistics_json(all.held_out_rad)},
+                    {"log_odds", number(level.log_odds)},
+                    {"exported", level.exported}});
+  }
+  return list;
+}
+
 }  // namespace
 
 json make_result(const RunSummary& run, const Analysis& analysis, const Verdict& verdict) {
@@ -265,6 +281,7 @@ json make_result(const RunSummary& run, const Analysis& analysis, const Verdict&
           {"data", data_json(run, analysis)},
           {"structure", structure_json(run)},
           {"nominal_faults", nominal_faults_json(run)},
+          {"nominal_levels", nominal_levels_json(run)},
           {"calibration", calibration_json(run)},
           {"errors", errors_json(run.errors)},
           {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},

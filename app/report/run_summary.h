@@ -13,6 +13,7 @@
 #include "calib/camera/marker_set.h"
 #include "calib/effects/trace_calibration.h"
 #include "calib/quality/error_summary.h"
+#include "calib/quality/freedom_levels.h"
 #include "calib/trace/trace_result.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/structure/pose_tracks.h"
@@ -62,6 +63,8 @@ struct RunSummary {
   std::optional<Structure> structure;  ///< none when a nominal robot was given
   std::optional<KinematicTree> nominal;
   std::vector<NominalFault> nominal_faults;  ///< mended before the fit
+  std::vector<FreedomLevel> levels;          ///< of the nominal robot; empty without one
+  bool free_asked = false;                   ///< how much is free was the user's choice
   Calibration calibration;
   std::optional<Trace> trace;                   ///< none where it was not asked for
   std::vector<FittedEffect> effects;            ///< that the calibration has in it

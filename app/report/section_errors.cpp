@@ -47,6 +47,31 @@ std::vector<State> states(const RunSummary& run) {
       {"held_out", "after, held out"}};
 }
 
+/// What each freedom of a nominal robot predicts.
+std::string levels_table(const Facts& facts) {
+  const std::vector<FreedomLevel>& levels = facts.run.levels;
+  if (levels.empty()) return "";
+  Table table("levels-table",
+              "The nominal robot at postures not seen: root mean square error, and the logarithm "
+              "of the odds against the one that is exported",
+              facts.result);
+  std::vector<std::string> head = {"What is free"};
+  for (const Measure& measure : measures(facts.run.calibration.kind))
+    head.emplace_back(measure.name);
+  head.insert(head.end(), {"Log odds", "Exported"});
+  table.header(head);
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    const std::string at = fmt::format("/nominal_levels/{}", k);
+    table.begin_row();
+    table.text(words_of(levels[k]));
+    for (const Measure& measure : measures(facts.run.calibration.kind))
+      table.number(fmt::format("{}/held_out_{}/rms", at, measure.key), measure.quantity);
+    table.number(at + "/log_odds", Quantity::kPlain);
+    table.text(levels[k].exported ? "yes" : "");
+  }
+  return table.str();
+}
+
 std::string overall_table(const Facts& facts) {
   Table table("errors-table", "Length of the error vector, all markers", facts.result);
   table.header({"Measure", "Model", "Count", "Rms", "Median", "95 %", "Largest"});
@@ -158,7 +183,7 @@ std::string errors_section(const Facts& facts) {
       "Held out: predicted by a model that was fitted without that part of the recording. Outliers "
       "left out of the "
       "fit are in none of these figures; they are counted under data quality.");
-  out += overall_table(facts);
+  out += levels_table(facts) + overall_table(facts);
   const std::string plot = distribution_plot(facts);
   if (!plot.empty()) out += figure(plot, "Distribution of the error's length.", "half");
   out += rows_table(facts, "errors-links-table", "Rms of the error, per link", "links",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Verdict, identity, method, how to reproduce: the sections of words.
+#include <algorithm>
 #include <string>
 
 #include <fmt/format.h>
@@ -76,8 +77,10 @@ std::string_view trace_word(const Trace& trace) {
     case TraceVerdict::kAmbiguous:
       return "traced, but to one of several causes";
     case TraceVerdict::kUnknown:
-      return trace.rest.empty() ? "repeats with joints' values, cause unknown, corrected"
-                                : "structure left that no known effect explains";
+      if (!trace.rest.empty()) return "structure left that no known effect explains";
+      return std::ranges::any_of(trace.accepted, &TracedEffect::is_curve)
+                 ? "repeats with joints' values, cause unknown, corrected"
+                 : "what is left lasts, cause unknown";
     case TraceVerdict::kNothingToSay:
     case TraceVerdict::kNotRun:
       break;

@@ -53,6 +53,12 @@ json effect_json(const TracedEffect& effect) {
                  {"value", number(effect.scan)},
                  {"unit", text(effect.scan_unit)},
                  {"words", text(effect.scan_words)}};
+    out["at"]["as_likely"] = json::array();
+    for (const ScanAlternative& other : effect.as_likely) {
+      out["at"]["as_likely"].push_back({{"value", number(other.scan)},
+                                        {"words", text(other.words)},
+                                        {"interval", interval_json(other.size)}});
+    }
   }
   if (effect.is_curve()) {
     out["curve"] = {{"at", curve_json(effect.picture.at)},
@@ -141,6 +147,7 @@ json trace_json(const Trace& trace) {
           {"false_alarm_rate", number(trace.false_alarm_rate)},
           {"stretches", trace.stretches},
           {"noise", number(trace.noise)},
+          {"over_neighbours", number(trace.over_neighbours)},
           {"held_out_before", error_json(trace.held_out_before)},
           {"held_out_after", error_json(trace.held_out_after)},
           {"accepted", list_of(trace.accepted, effect_json)},

@@ -77,20 +77,25 @@ std::string limit_text(const NotFoundEffect& missing) {
   return two_digits(100.0 * missing.smallest_size) + " %";
 }
 
+namespace {
+
+// "periods 2 per turn", "at 3.20 s", "joint2" of a coupling.
+std::string scan_text(const TracedEffect& effect, double scan, const std::string& words) {
+  if (!words.empty()) return words;
+  if (effect.scan_unit.starts_with("per ")) return fmt::format("{:.4g} {}", scan, effect.scan_unit);
+  if (effect.scan_unit == "s" && effect.scan_name == "at") return fmt::format("{:.2f} s", scan);
+  return amount_text(scan, effect.scan_unit);
+}
+
+}  // namespace
+
 std::string effect_name(const TracedEffect& effect) {
-  std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
+  const std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
   if (effect.scan_name.empty()) return name;
-  if (!effect.scan_words.empty()) {
-    return fmt::format("{} ({} {})", name, effect.scan_name, effect.scan_words);
-  }
-  if (effect.scan_unit.starts_with("per ")) {
-    return fmt::format("{} ({} {:.4g} {})", name, effect.scan_name, effect.scan, effect.scan_unit);
-  }
-  if (effect.scan_unit == "s" && effect.scan_name == "at") {
-    return fmt::format("{} (at {:.2f} s)", name, effect.scan);
-  }
-  return fmt::format("{} ({} {})", name, effect.scan_name,
-                     amount_text(effect.scan, effect.scan_unit));
+  std::string at = scan_text(effect, effect.scan, effect.scan_words);
+  for (const ScanAlternative& other : effect.as_likely)
+    at += " or " + scan_text(effect, other.scan, other.words);
+  return fmt::format("{} ({} {})", name, effect.scan_name, at);
 }
 
 std::string size_words(const TracedEffect& effect) {

@@ -52,11 +52,25 @@ std::string declared_words(const Calibration& calibration) {
                      : ", and what the declared intrinsics are wrong by comes on top.");
 }
 
+/// " Of the nominal robot, only placed: 9.6 mm; joint zeros free: 1.2 mm; .."
+std::string level_words(const RunSummary& run) {
+  std::string text;
+  for (const FreedomLevel& level : run.levels) {
+    const ErrorRow& all = level.errors;
+    const std::string error = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
+    if (error.empty()) continue;
+    text += fmt::format("{}{}: {}{}", text.empty() ? "" : "; ", words_of(level), error,
+                        level.exported ? " (this one)" : "");
+  }
+  if (text.empty()) return text;
+  return fmt::format(" The nominal robot{} at unseen postures: {}.",
+                     run.nominal_faults.empty() ? "" : ", mended,", text);
+}
+
 std::string prediction_words(const RunSummary& run) {
   const ErrorRow& all = run.errors.all;
   const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
   const std::string training = error_words(all.training_px, all.training_m, all.training_rad);
-  const std::string before = error_words(all.before_px, all.before_m, all.before_rad);
   // Depth is seen far worse, and is in no figure in mm.
   const std::string_view direction =
       run.calibration.kind == MeasurementKind::kCorners ? " across the line of sight" : "";
@@ -74,14 +88,7 @@ std::string prediction_words(const RunSummary& run) {
   } else {
     return "No error can be given: nothing was fitted.";
   }
-  if (run.nominal && !before.empty()) {
-    // All but the geometry is fitted for this figure, too.
-    text += fmt::format(
-        "; with the nominal geometry{}{}, but markers, camera and clock placed anew, it was {}",
-        run.nominal_faults.empty() ? "" : ", so mended,",
-        run.effects.empty() ? "" : " and the effects found", before);
-  }
-  return text + ".";
+  return text + "." + level_words(run);
 }
 
 double median(std::vector<double> values) {
@@ -125,8 +132,20 @@ struct AxisFigures {
   }
 };
 
+const FreedomLevel* exported_level(const RunSummary& run) {
+  const auto level = std::ranges::find_if(run.levels, &FreedomLevel::exported);
+  return level == run.levels.end() ? nullptr : &*level;
+}
+
 /// Where the base is far less certain than the axes, it is told apart from them.
-std::string axis_words(const Calibration& calibration) {
+std::string axis_words(const RunSummary& run) {
+  const FreedomLevel* level = exported_level(run);
+  if (level != nullptr && level->free != FreeGeometry::kGeometry) {
+    return fmt::format(" Its axes{} are held as drawn{}.",
+                       level->free == FreeGeometry::kPlacement ? " and joint zeros" : "",
+                       run.free_asked ? "" : ": freed, they predict unseen postures worse");
+  }
+  const Calibration& calibration = run.calibration;
   constexpr double kFarLess = 2.0;
   AxisFigures in_base, among;
   std::vector<std::string> unknown;
@@ -179,7 +198,7 @@ std::string clock_words(const RunSummary& run) {
 }  // namespace
 
 std::string accuracy_words(const RunSummary& run) {
-  return prediction_words(run) + axis_words(run.calibration) + declared_words(run.calibration) +
+  return prediction_words(run) + axis_words(run) + declared_words(run.calibration) +
          clock_words(run);
 }
 

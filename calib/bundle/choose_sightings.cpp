@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -239,7 +240,51 @@ void widen(Sighting& sighting, double factor) {
   sighting.whitening /= factor;
 }
 
+// One marker's sightings in the order of the frames, and which of them were rejected.
+struct Rejections {
+  std::vector<int> indices;
+  std::vector<bool> rejected;
+};
+
+// How many at the end were rejected one after the other, where at the rate of the others that would
+// not happen by chance; else none.
+std::size_t lasting_end(const std::vector<bool>& rejected) {
+  constexpr double kChance = 1e-6;
+  const auto run_end = std::find(rejected.rbegin(), rejected.rend(), false);
+  const auto run = static_cast<std::size_t>(run_end - rejected.rbegin());
+  const auto others = static_cast<double>(rejected.size() - run);
+  const auto outliers = static_cast<double>(std::count(run_end, rejected.rend(), true));
+  // Laplace's rule of succession.
+  const double rate = (outliers + 1.0) / (others + 2.0);
+  return std::pow(rate, static_cast<double>(run)) < kChance ? run : 0;
+}
+
 }  // namespace
+
+std::vector<int> with_what_lasts(const Spec& spec, const RobustSolution& solution) {
+  std::map<int, Rejections> by_marker;
+  std::vector<int> all = solution.used;
+  all.insert(all.end(), solution.rejected.begin(), solution.rejected.end());
+  std::ranges::stable_sort(all, {}, [&](int index) {
+    return std::pair(spec.sightings[static_cast<std::size_t>(index)].frame, index);
+  });
+  for (const int index : all) {
+    Rejections& of = by_marker[spec.sightings[static_cast<std::size_t>(index)].marker];
+    of.indices.push_back(index);
+    of.rejected.push_back(!std::ranges::binary_search(solution.used, index));
+  }
+  std::vector<int> out = solution.used;
+  for (auto& [marker, of] : by_marker) {
+    const auto last = static_cast<std::ptrdiff_t>(lasting_end(of.rejected));
+    if (std::cmp_equal(last, of.indices.size())) continue;  // nothing of it was explained
+    out.insert(out.end(), of.indices.end() - last, of.indices.end());
+    std::reverse(of.rejected.begin(), of.rejected.end());
+    const auto first = static_cast<std::ptrdiff_t>(lasting_end(of.rejected));
+    out.insert(out.end(), of.indices.begin(), of.indices.begin() + first);
+  }
+  std::ranges::sort(out);
+  return out;
+}
 
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
                                      double reject_sigma) {

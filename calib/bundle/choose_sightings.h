@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/bundle/problem.h"
+#include "calib/bundle/solve.h"
 
 namespace kinescope::bundle {
 
@@ -25,5 +26,10 @@ struct ChosenSightings {
 [[nodiscard]] ChosenSightings choose_by_neighbours(Spec& spec, const State& state,
                                                    const std::vector<int>& usable,
                                                    double reject_sigma);
+
+/// What a robust solution used, and what it rejected of a marker up to an end of the recording and
+/// not by chance: the marker may have slipped, the camera may have been bumped. Of postures, whose
+/// neighbours in time say nothing.
+[[nodiscard]] std::vector<int> with_what_lasts(const Spec& spec, const RobustSolution& solution);
 
 }  // namespace kinescope::bundle

@@ -2,6 +2,7 @@
 #include "calib/effects/trace_calibration.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -12,14 +13,24 @@
 namespace kinescope {
 namespace {
 
-// The joint whose sag explains most.
-const TracedEffect* largest_sag(const Trace& trace) {
-  const TracedEffect* out = nullptr;
+// The sag that may say where gravity points: the one that explains most; where something may be
+// left and none was named, the likeliest. What one mass in the middle of the links does is a poor
+// picture of a large sag, and what lasts as long leaves few stretches to judge it by.
+std::optional<EffectId> telling_sag(const Trace& trace) {
+  constexpr double kHint = 0.2;
+  const TracedEffect* named = nullptr;
   for (const TracedEffect& accepted : trace.accepted) {
     if (accepted.id.effect != "compliance") continue;
-    if (out == nullptr || accepted.explained > out->explained) out = &accepted;
+    if (named == nullptr || accepted.explained > named->explained) named = &accepted;
   }
-  return out;
+  if (named != nullptr) return named->id;
+  if (trace.verdict != TraceVerdict::kClean && trace.verdict != TraceVerdict::kUnknown) return {};
+  const TestedCandidate* hint = nullptr;
+  for (const TestedCandidate& tested : trace.candidates) {
+    if (tested.id.effect != "compliance" || tested.p_value > kHint) continue;
+    if (hint == nullptr || tested.p_value < hint->p_value) hint = &tested;
+  }
+  return hint == nullptr ? std::optional<EffectId>() : hint->id;
 }
 
 CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOptions& options,
@@ -55,20 +66,20 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   if (options.gravity_base) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects.
-  const TracedEffect* sag = largest_sag(out.trace);
-  if (sag == nullptr) return out;
+  const std::optional<EffectId> sag = telling_sag(out.trace);
+  if (!sag) return out;
   CalibrationTraceOptions upright = options;
   upright.gravity_base =
-      effects::gravity_by_sag(effects::TracedBundle(bundle, options), trace_options.start, sag->id);
-  trace_options.start.push_back({sag->id, 0.0});
+      effects::gravity_by_sag(effects::TracedBundle(bundle, options), trace_options.start, *sag);
+  trace_options.start.push_back({*sag, 0.0});
   CalibrationTrace again = traced(bundle, upright, trace_options, progress);
   if (again.trace.verdict == TraceVerdict::kNothingToSay ||
-      again.trace.accepted.size() > out.trace.accepted.size() ||
+      again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size()) ||
       again.trace.held_out_after.value >= out.trace.held_out_after.value) {
     return out;
   }
   again.trace.steps.front().words =
-      fmt::format("the model as it is; gravity points where the sag of {} says", sag->id.place);
+      fmt::format("the model as it is; gravity points where the sag of {} says", sag->place);
   return again;
 }
 

@@ -289,6 +289,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";
   linear.coordinates = world.kind == MeasurementKind::kCorners ? 2 : 3;
   linear.independent_instants = world.postures;
+  linear.whitened_by_neighbours = !world.postures;
   linear.correlation_time_s = fit.correlation_time_s;
   linear.time_s.resize(static_cast<Eigen::Index>(fit.frames.size()));
   for (std::size_t i = 0; i < fit.frames.size(); ++i) {

@@ -57,19 +57,27 @@ struct EffectPicture {
   Eigen::VectorXd sigma;   ///< of a curve: standard uncertainty of that; else empty
 };
 
+/// Another value of an effect's scan that says the same.
+struct ScanAlternative {
+  double scan = 0.0;
+  std::string words;  ///< as TracedEffect::scan_words
+  Interval size;
+};
+
 struct TracedEffect {
   EffectId id;
   std::string words;
   std::string check;
   double size = 0.0;
   std::string unit;
-  Interval interval;       ///< 95 %
+  Interval interval;       ///< 95 %; covers those of `as_likely`
   double explained = 0.0;  ///< share of the base model's sum of squares that it alone takes away
   std::vector<EffectValue> values;
   double scan = 0.0;
   std::string scan_name;  ///< empty: none
   std::string scan_unit;
-  std::string scan_words;        ///< "joint2"; empty: the number says it
+  std::string scan_words;  ///< "joint2"; empty: the number says it
+  std::vector<ScanAlternative> as_likely;
   double p_value = 1.0;          ///< over the whole family of tests
   HeldOutError held_out_before;  ///< with all the others, without this one
   HeldOutError held_out_after;   ///< with all
@@ -161,6 +169,7 @@ struct TraceStep {
 struct Trace {
   TraceVerdict verdict = TraceVerdict::kNotRun;
   std::string reason;                  ///< in one sentence
+  bool converged = true;               ///< the model without any effect did
   std::vector<TracedEffect> accepted;  ///< in the order in which they were found
   std::vector<AddedEffect> added;      ///< what the search found, as TracedModel::fit takes it
   std::vector<Ambiguity> ambiguities;
@@ -171,7 +180,10 @@ struct Trace {
   HeldOutError held_out_before;
   HeldOutError held_out_after;
   double noise = 0.0;  ///< rms distance that is left, in the residual's unit
-  int stretches = 0;   ///< of time, over which the noise was judged
+  /// Of what is left over what rows differ by from their neighbours in time, rms: noise makes it 1
+  /// or less, what lasts more; 0 where rows were not weighted so.
+  double over_neighbours = 0.0;
+  int stretches = 0;  ///< of time, over which the noise was judged
   double false_alarm_rate = 0.0;
 };
 

@@ -39,6 +39,8 @@ struct Linearisation {
   int coordinates = 1;
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.
   bool independent_instants = false;
+  /// Rows are whitened by how much they differ from their neighbours in time.
+  bool whitened_by_neighbours = false;
   double correlation_time_s = 0.0;  ///< integral time of the residual's autocorrelation
 
   [[nodiscard]] Eigen::Index instants() const { return time_s.size(); }

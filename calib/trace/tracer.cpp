@@ -13,6 +13,9 @@ namespace {
 // Effects that may be hidden by another one: p-values up to this, so many of them.
 constexpr double kHint = 0.2;
 constexpr std::size_t kMostHints = 3;
+// Of the squares that are left: what explains as much may be one of several that hide each other.
+constexpr double kLargeShare = 0.05;
+constexpr int kLongestChain = 5;
 
 }  // namespace
 
@@ -63,6 +66,7 @@ StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
 bool Tracer::can_say(const Stage& stage) {
   trace_.stretches = stage.system.partition().stretches;
   if (!stage.fit.converged) {
+    trace_.converged = false;
     trace_.reason = fmt::format("the model itself did not converge: {}", stage.fit.reason);
   } else if (trace_.stretches < options_.fewest_stretches) {
     trace_.reason = fmt::format(
@@ -131,7 +135,70 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
     if (shown.p_value * number_of_tests(second->fit.candidates, *first) > level_) continue;
     if (second->held_out_sum() > both->held_out_sum()) best = std::move(both);
   }
+  if (best) return best;
+  for (const TestedMember* hint : hints) {
+    if (hint->score.gain < kLargeShare * now->system.total().rr) continue;
+    StagePtr several = chain(*now, {now->fit.candidates[hint->index].id, hint->scan});
+    if (several && (!best || several->held_out_sum() < best->held_out_sum()))
+      best = std::move(several);
+  }
   return best;
+}
+
+StagePtr Tracer::without_idle(StagePtr stage, std::size_t known) {
+  for (std::size_t i = stage->added.size(); i-- > known;) {
+    StagePtr less = stage_of(kinescope::trace::without(stage->added, i));
+    if (!less->fit.converged || less->held_out_sum() > stage->held_out_sum()) continue;
+    stage = std::move(less);
+    i = stage->added.size();
+  }
+  return stage;
+}
+
+bool Tracer::all_needed(const Stage& stage, std::size_t known) {
+  for (std::size_t i = known; i < stage.added.size(); ++i) {
+    const StagePtr less = stage_of(kinescope::trace::without(stage.added, i));
+    const Candidate* candidate = find_candidate(less->fit, stage.added[i].id);
+    if (candidate == nullptr || !is_possible(*candidate, stage.fit.values[i])) return false;
+    const double p_value =
+        paired_p_value(stage.system.partition(), less->held_out.whitened, stage.held_out.whitened);
+    if (p_value * number_of_tests(less->fit.candidates, *candidate) > level_) return false;
+  }
+  return true;
+}
+
+// Large effects together last so long that hardly a stretch is free of any of them, and each is
+// noise to the others.
+StagePtr Tracer::chain(const Stage& from, const AddedEffect& first) {
+  const StagePtr now = now_;
+  const std::size_t known = from.added.size();
+  std::vector<AddedEffect> effects = from.added;
+  effects.push_back(first);
+  StagePtr found;
+  double last = from.held_out_sum();
+  for (int step = 0; step < kLongestChain; ++step) {
+    StagePtr stage = stage_of(effects);
+    if (!stage->fit.converged || stage->held_out_sum() >= last) break;
+    stage = without_idle(std::move(stage), known);
+    effects = stage->added;
+    if (effects.size() <= known) break;
+    last = stage->held_out_sum();
+    if (all_needed(*stage, known)) {
+      found = stage;
+      break;
+    }
+    now_ = stage;
+    const TestedMember* best = nullptr;
+    const std::vector<TestedMember> family = test_family(stage->system, stage->fit.candidates);
+    for (const TestedMember& member : family) {
+      if (!may_be_added(stage->fit.candidates[member.index], member.score)) continue;
+      if (best == nullptr || member.score.gain > best->score.gain) best = &member;
+    }
+    if (best == nullptr || best->score.gain < kLargeShare * stage->system.total().rr) break;
+    effects.push_back({stage->fit.candidates[best->index].id, best->scan});
+  }
+  now_ = now;
+  return found;
 }
 
 // The value of a scan was the best beside the effects that were known then. Everywhere, or at one

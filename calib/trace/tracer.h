@@ -59,12 +59,22 @@ class Tracer {
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
+  /// The best effects one after the other, from this one on, until all are needed to predict.
+  [[nodiscard]] StagePtr chain(const Stage& from, const AddedEffect& first);
+  /// Without those beyond the first `known` that predict no better for being there.
+  [[nodiscard]] StagePtr without_idle(StagePtr stage, std::size_t known);
+  /// All effects beyond the first `known` are: what is left with all in judges.
+  [[nodiscard]] bool all_needed(const Stage& stage, std::size_t known);
   void search_again(const std::optional<std::string>& place);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
   [[nodiscard]] bool drop_without_size();
   /// What an effect does, from the model without it.
   void compare_without(const Stage& without, TracedEffect& detail) const;
+  /// Other values of the scan that explain what `own` explains, with the size they would have.
+  [[nodiscard]] std::vector<ScanAlternative> as_likely(const Stage& without,
+                                                       const Candidate& candidate,
+                                                       const TestedMember& own) const;
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool superfluous);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,

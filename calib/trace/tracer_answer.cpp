@@ -19,6 +19,9 @@ namespace {
 constexpr std::size_t kMostRests = 3;
 // Less than this of what named effects explain at its place is the imperfection of their shapes.
 constexpr double kSlightShare = 1e-3;
+// What is left over what differs between neighbours in time. Noise, with the sensor's own errors
+// counted in, makes it 0.6 to 1.0 (`undeclared`); what lasts is no noise.
+constexpr double kLasts = 3.0;
 
 Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRest>& rests) {
   Linearisation out = linear;
@@ -249,6 +252,11 @@ void Tracer::summarise() {
   trace_.held_out_before = base_->error;
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
+  if (now_->fit.linear.whitened_by_neighbours) {
+    const auto freedom =
+        static_cast<double>(now_->fit.linear.residual.size() - now_->system.parameters());
+    trace_.over_neighbours = std::sqrt(now_->system.total().rr / std::max(1.0, freedom));
+  }
   trace_.stretches = now_->system.partition().stretches;
   for (FoundRest& found : rests_) trace_.rest.push_back(std::move(found.rest));
   Eigen::Index count = 0;
@@ -289,6 +297,10 @@ void Tracer::summarise() {
                                 size_sigma(candidate, values, score.pooled));
     }
     effect.interval = {effect.size - half, effect.size + half};
+    for (const ScanAlternative& other : effect.as_likely) {
+      effect.interval.low = std::min(effect.interval.low, other.size.low);
+      effect.interval.high = std::max(effect.interval.high, other.size.high);
+    }
     if (values.size() > 1) effect.interval.low = std::max(0.0, effect.interval.low);
     for (Eigen::Index k = 0; k < values.size(); ++k) {
       effect.values.push_back({candidate.parameters[static_cast<std::size_t>(k)], values[k],
@@ -398,6 +410,13 @@ void Tracer::conclude() {
     trace_.reason = fmt::format(
         "{}, for a reason that no known effect has the shape of; it is part of the model as it is",
         curves);
+  } else if (trace_.over_neighbours > kLasts) {
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason = fmt::format(
+        "{}what is left, {:.3g} {}, is {:.1f} times what differs from one frame to the next: it "
+        "lasts, and no known effect explains it",
+        trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ",
+        trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();

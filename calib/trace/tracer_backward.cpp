@@ -139,6 +139,28 @@ void Tracer::compare_without(const Stage& without, TracedEffect& detail) const {
       (without.system.total().rr - now_->system.total().rr) / base_->system.total().rr;
 }
 
+std::vector<ScanAlternative> Tracer::as_likely(const Stage& without, const Candidate& candidate,
+                                               const TestedMember& own) const {
+  std::vector<ScanAlternative> out;
+  if (!candidate.scan_listed) return out;
+  for (const double scan : candidate.scan) {
+    if (scan == own.scan) continue;
+    const std::vector<EffectColumn> columns = candidate.columns(scan);
+    if (score_test(without.system, columns).gain < kRivalShare * own.score.gain) continue;
+    const Score score = jackknife_test(without.system, columns);
+    if (score.hidden() || !is_possible(candidate, score.theta) ||
+        compare_effects(without.system, own.columns, columns) == Comparison::kFirst) {
+      continue;
+    }
+    const double size = size_of(candidate, score.theta);
+    const double half = t_quantile(0.025, std::max(2.0, score.freedom)) *
+                        size_sigma(candidate, score.theta, score.covariance);
+    out.push_back(
+        {scan, candidate.scan_words ? candidate.scan_words(scan) : "", {size - half, size + half}});
+  }
+  return out;
+}
+
 bool Tracer::check(std::size_t index) {
   const AddedEffect effect = now_->added[index];
   const StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
@@ -181,6 +203,7 @@ bool Tracer::check(std::size_t index) {
                           own.tests);
     return false;
   }
+  detail.as_likely = as_likely(*stage, *candidate, own);
   return settle_rivals(index, *stage, own);
 }
 

@@ -62,14 +62,38 @@ CalibrationStart start_of(const World& world, const TraceCase& of) {
   return truth::perturbed_start(world, 0.005, 0.001, static_cast<std::uint64_t>(of.seed));
 }
 
+namespace {
+
+void as_a_tracker_sees(Measurements& measurements) {
+  measurements.corners.clear();
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(kTrackerSigmaRad * kTrackerSigmaRad);
+  covariance.diagonal().tail<3>().setConstant(kTrackerSigmaM * kTrackerSigmaM);
+  for (PoseTrack& track : measurements.poses.tracks) {
+    for (PoseSample& sample : track.samples) sample.covariance = covariance;
+  }
+}
+
+}  // namespace
+
 double visibility(const InjectedEffect& effect, const TraceCase& of) {
+  EffectWorldOptions options = world_options(of);
+  options.effects = {};
+  return visibility(effect, options, of.sigma_px);
+}
+
+double visibility(const InjectedEffect& effect, const EffectWorldOptions& world, double sigma_px) {
   CalibrateOptions options;
   options.folds = 0;
   options.reject_sigma = 1e9;  // what an effect throws off is the effect
-  options.estimate_time_offset = effect.place != "clock";
+  options.estimate_time_offset = effect.place != "clock" && !world.poses;
   const auto calibrated = [&](const std::vector<InjectedEffect>& effects) {
-    const World world = world_with(of, effects);
-    return calibrate(world.measurements, world.markers, world.log, start_of(world, of), options);
+    EffectWorldOptions with = world;
+    with.effects = effects;
+    World made = truth::make_effect_world(with);
+    if (with.poses) as_a_tracker_sees(made.measurements);
+    return calibrate(made.measurements, made.markers, made.log,
+                     truth::perturbed_start(made, 0.005, 0.001, world.seed), options);
   };
   const Calibration clean = calibrated({});
   const Calibration with = calibrated({effect});
@@ -82,10 +106,15 @@ double visibility(const InjectedEffect& effect, const TraceCase& of) {
   for (const SightingResidual& r : with.residuals) {
     const auto twin = there.find({r.frame, r.id});
     if (!r.used || twin == there.end()) continue;
+    const Vector6d moved = r.displacement - twin->second->displacement;
+    if (world.poses) {
+      sum += moved.head<3>().squaredNorm() / (kTrackerSigmaRad * kTrackerSigmaRad) +
+             moved.tail<3>().squaredNorm() / (kTrackerSigmaM * kTrackerSigmaM);
+    }
     for (std::size_t c = 0; c < r.corners_px.size(); ++c)
-      sum += (r.corners_px[c] - twin->second->corners_px[c]).squaredNorm();
+      sum += (r.corners_px[c] - twin->second->corners_px[c]).squaredNorm() / (sigma_px * sigma_px);
   }
-  return std::sqrt(sum) / of.sigma_px;
+  return std::sqrt(sum);
 }
 
 }  // namespace kinescope

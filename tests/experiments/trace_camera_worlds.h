@@ -42,6 +42,14 @@ struct TraceCase {
 /// up: what a perfect detector sees of the effect, in standard deviations of the noise.
 [[nodiscard]] double visibility(const truth::InjectedEffect& effect, const TraceCase& of);
 
+/// The same of corners with this noise, or of the poses that a tracker has of a world with `poses`.
+[[nodiscard]] double visibility(const truth::InjectedEffect& effect,
+                                const truth::EffectWorldOptions& world, double sigma_px);
+
+/// Noise of a tracker: of one coordinate, and of a rotation about one axis.
+inline constexpr double kTrackerSigmaM = 2e-4;
+inline constexpr double kTrackerSigmaRad = 1e-3;
+
 /// The truth as a structure search hands it on: moved by 0.3 deg and 1 mm.
 [[nodiscard]] CalibrationStart start_of(const truth::World& world, const TraceCase& of);
 

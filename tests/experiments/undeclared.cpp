@@ -42,6 +42,8 @@ constexpr int kLastExitCode = 5;
 // Held-out error over that of the noise alone, from where on a model is called right, and absurd.
 constexpr double kRight = 1.3;
 constexpr double kAbsurd = 10.0;
+// Standard deviations of the noise from where on an effect is one that can be seen.
+constexpr double kSeen = 6.0;
 
 struct Request {
   int first = 0;
@@ -59,12 +61,17 @@ struct Outcome {
   int exit_code = -1;
   bool crashed = false;
   bool structure = false;
-  bool exact = false;  ///< every effect at its place, and nothing else
-  bool sized = false;  ///< every interval holds the truth, or the size is right to 10 %
+  bool exact = false;   ///< every effect at its place, and nothing else
+  bool one_of = false;  ///< not exact, but every effect is named or among those that say the same
+  bool sized = false;   ///< every interval holds the truth, or the size is right to 10 %
   bool wrong_name = false;
-  double error = 0.0;  ///< held out, over that of the noise
+  std::vector<double> visible;  ///< of each effect, in standard deviations of the noise
+  double error = 0.0;           ///< held out, over that of the noise
   double seconds = 0.0;
   std::string answer;
+  [[nodiscard]] bool all_visible() const {
+    return std::ranges::all_of(visible, [](double sigmas) { return sigmas >= kSeen; });
+  }
   [[nodiscard]] bool refused() const {
     return exit_code == kUndetermined && structure && error > 0.0 && error < kRight;
   }
@@ -122,6 +129,21 @@ void judge_trace(const json& trace, const UndeclaredCase& of, Outcome& out) {
     out.exact = out.exact && found != accepted.end();
     out.sized = out.sized && found != accepted.end() && is_sized(*found, effect);
   }
+  const auto is_told = [&](const json& found) {
+    return std::ranges::any_of(injected, [&](const InjectedEffect& effect) {
+      return found.at("effect") == effect.effect && found.at("place") == effect.place;
+    });
+  };
+  out.one_of = trace.at("verdict") == "ambiguous" && accepted.size() == injected.size() &&
+               std::ranges::all_of(accepted, [&](const json& found) {
+                 return is_told(found) ||
+                        std::ranges::any_of(trace.at("ambiguous"), [&](const json& ambiguity) {
+                          const json& effects = ambiguity.at("effects");
+                          return effects[0].at("effect") == found.at("effect") &&
+                                 effects[0].at("place") == found.at("place") &&
+                                 std::ranges::any_of(effects, is_told);
+                        });
+               });
   out.wrong_name = std::ranges::any_of(accepted, [&](const json& found) {
     return std::ranges::none_of(injected,
                                 [&](const InjectedEffect& effect) { return is_at(found, effect); });
@@ -140,6 +162,8 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
                               (folder / "out.txt").string(), (folder / "err.txt").string())
                       .c_str());
   Outcome out;
+  for (const InjectedEffect& effect : of.world.effects)
+    out.visible.push_back(visibility(effect, of.world, of.world.sigma_px));
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   out.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   out.crashed = out.exit_code < 0 || out.exit_code == 1 || out.exit_code > kLastExitCode;
@@ -161,7 +185,6 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
   if (fs::exists(run / "trace.json"))
     judge_trace(json::parse(read_text_file(run / "trace.json")), of, out);
   // A corner's (point's) distance from where it is, in two (three) coordinates.
-  constexpr double kTrackerSigmaM = 2e-4;
   out.error /= of.postures ? std::sqrt(3.0) * kTrackerSigmaM : std::sqrt(2.0) * of.world.sigma_px;
   if (!out.structure) out.answer = difference + "; " + out.answer;
   return out;
@@ -169,10 +192,15 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
 
 struct Count {
   int n = 0, exact = 0, sized = 0, wrong = 0, structure = 0, refused = 0, absurd = 0, crashed = 0;
+  int visible = 0, exact_visible = 0, one_of = 0;
   double longest_s = 0.0;
   void add(const Outcome& o) {
     ++n;
-    exact += o.exact && o.structure && o.exit_code == kDone ? 1 : 0;
+    const bool right = o.exact && o.structure && o.exit_code == kDone;
+    exact += right ? 1 : 0;
+    visible += o.all_visible() ? 1 : 0;
+    one_of += o.one_of ? 1 : 0;
+    exact_visible += right && o.all_visible() ? 1 : 0;
     sized += o.exact && o.sized && o.structure && o.exit_code == kDone ? 1 : 0;
     wrong += o.wrong_name ? 1 : 0;
     structure += o.structure ? 1 : 0;
@@ -198,19 +226,24 @@ void print(const UndeclaredCase& of, const Outcome& out) {
   if (out.refused()) flags += " REFUSED";
   if (out.absurd()) flags += " ABSURD";
   if (!out.structure) flags += " STRUCTURE";
-  if (flags.empty() && !out.exact) flags = out.wrong_name ? " WRONG" : " MISSED";
+  if (flags.empty() && !out.exact)
+    flags = out.one_of ? " ONE OF" : out.wrong_name ? " WRONG" : " MISSED";
   if (flags.empty() && !out.sized) flags = " SIZE";
-  fmt::print("{} exit {} err {:6.2f} {:5.1f} s{} : {}\n", words_of(of), out.exit_code, out.error,
-             out.seconds, flags, out.answer);
+  std::string visible;
+  for (const double sigmas : out.visible) visible += fmt::format(" {:.1f}", sigmas);
+  fmt::print("{} visible{} exit {} err {:6.2f} {:5.1f} s{} : {}\n", words_of(of), visible,
+             out.exit_code, out.error, out.seconds, flags, out.answer);
   std::fflush(stdout);
 }
 
 void print_table(const std::map<std::string, Count>& counts) {
-  fmt::print("{:16} {:>4} {:>6} {:>6} {:>6} {:>9} {:>8} {:>7} {:>6} {:>8}\n", "", "n", "exact",
-             "sized", "wrong", "structure", "refused", "absurd", "crash", "longest");
+  fmt::print("{:16} {:>4} {:>6} {:>10} {:>7} {:>6} {:>6} {:>9} {:>8} {:>7} {:>6} {:>8}\n", "", "n",
+             "exact", "of visible", "one of", "sized", "wrong", "structure", "refused", "absurd",
+             "crash", "longest");
   for (const auto& [name, c] : counts)
-    fmt::print("{:16} {:4} {:6} {:6} {:6} {:9} {:8} {:7} {:6} {:6.1f} s\n", name, c.n, c.exact,
-               c.sized, c.wrong, c.structure, c.refused, c.absurd, c.crashed, c.longest_s);
+    fmt::print("{:16} {:4} {:6} {:>10} {:7} {:6} {:6} {:9} {:8} {:7} {:6} {:6.1f} s\n", name, c.n,
+               c.exact, fmt::format("{}/{}", c.exact_visible, c.visible), c.one_of, c.sized,
+               c.wrong, c.structure, c.refused, c.absurd, c.crashed, c.longest_s);
 }
 
 void run(const Request& request) {

@@ -22,8 +22,6 @@ using truth::World;
 
 constexpr double kFrameRate = 30.0;
 constexpr double kSigmaPx = 0.03;
-constexpr double kSigmaM = 2e-4;  // of a tracker
-constexpr double kSigmaRad = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kWeakest = 3.0;  // times what tracing is asked to see
 constexpr double kStrongest = 100.0;
@@ -142,8 +140,8 @@ std::string poses_csv(const UndeclaredCase& of, const World& world) {
   for (const PoseTrack& track : world.measurements.poses.tracks) {
     for (const PoseSample& sample : track.samples) {
       Pose T = sample.T_camera_marker;
-      T.translation += rng.normal3(kSigmaM);
-      T.rotation = T.rotation * exp_rotation(rng.normal3(kSigmaRad));
+      T.translation += rng.normal3(kTrackerSigmaM);
+      T.rotation = T.rotation * exp_rotation(rng.normal3(kTrackerSigmaRad));
       const Eigen::Quaterniond& q = T.rotation;
       out += fmt::format("{:.6f},{},{:.7f},{:.7f},{:.7f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
                          world.measurements.times_s[static_cast<std::size_t>(sample.frame)],

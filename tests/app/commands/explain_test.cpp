@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Recordings that no stage alone explains, through the user's command.
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -75,6 +79,45 @@ TEST(Explain, AReadingThatTheFitLeftOutIsNamed) {
   EXPECT_EQ(answered.difference, "");
   EXPECT_NE(answered.outcome.err.find("'q7' reads 13.0056"), std::string::npos)
       << answered.outcome.err;
+}
+
+// "name place" of all effects, sorted.
+std::vector<std::string> effects(const Answered& answered) {
+  std::vector<std::string> out;
+  if (!answered.trace.is_object()) return out;
+  for (const nlohmann::json& effect : answered.trace["accepted"])
+    out.push_back(effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>());
+  std::ranges::sort(out);
+  return out;
+}
+
+// Postures before a tracker that was bumped after a third of them: the fit of the others leaves
+// these out as outliers, of every marker.
+TEST(Explain, WhatIsLeftOutUpToAnEndIsExplained) {
+  const Answered answered = run_case(48);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(effects(answered),
+            (std::vector<std::string>{"camera_bump camera", "encoder_scale q5", "helical q2"}));
+}
+
+// Each of the three is hidden by the two others, and lasts as long as they do.
+TEST(Explain, LargeEffectsThatHideEachOtherAreFoundTogether) {
+  const Answered answered = run_case(328);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(effects(answered),
+            (std::vector<std::string>{"backlash q1", "gear_error q2", "rolling_shutter camera"}));
+}
+
+// A guide on a curve makes another joint seem to follow the slide.
+TEST(Explain, ACouplingThatTheStructureSawGivesWayToWhatExplainsMore) {
+  const Answered answered = run_case(317);
+  EXPECT_EQ(answered.difference, "");
+  const std::vector<std::string> found = effects(answered);
+  EXPECT_TRUE(std::ranges::binary_search(found, "curved_slider q2"));
+  EXPECT_TRUE(std::ranges::binary_search(found, "eccentricity q4"));
+  EXPECT_FALSE(std::ranges::binary_search(found, "coupling q4"));
 }
 
 }  // namespace

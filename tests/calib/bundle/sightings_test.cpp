@@ -108,5 +108,34 @@ TEST_F(Sightings, ARunThatEndsIsLeftOutAndOneThatLastsIsKept) {
   EXPECT_GT(lasting, after / 2);
 }
 
+// Of postures, where the model says what stands out.
+TEST_F(Sightings, WhatIsRejectedUpToAnEndIsNotByChance) {
+  look();
+  const int slipped = 1;
+  const int with_outliers = 2;
+  RobustSolution solution;
+  std::size_t seen = 0;
+  std::vector<int> of_slipped;
+  for (const int index : usable_) {
+    if (spec_.sightings[static_cast<std::size_t>(index)].marker == slipped)
+      of_slipped.push_back(index);
+  }
+  const std::size_t last = of_slipped.size() * 7 / 10;
+  const std::set<int> after(of_slipped.begin() + static_cast<std::ptrdiff_t>(last),
+                            of_slipped.end());
+  std::set<int> outliers;
+  for (const int index : usable_) {
+    const int marker = spec_.sightings[static_cast<std::size_t>(index)].marker;
+    if (marker == with_outliers && seen++ % 7 == 0) outliers.insert(index);
+    const bool rejected = after.contains(index) || outliers.contains(index);
+    (rejected ? solution.rejected : solution.used).push_back(index);
+  }
+  ASSERT_GT(outliers.size(), 20U);
+  const std::vector<int> used = with_what_lasts(spec_, solution);
+  EXPECT_EQ(used.size(), usable_.size() - outliers.size());
+  for (const int index : used) EXPECT_FALSE(outliers.contains(index)) << index;
+  EXPECT_TRUE(std::ranges::is_sorted(used));
+}
+
 }  // namespace
 }  // namespace kinescope::bundle
