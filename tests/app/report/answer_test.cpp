@@ -46,7 +46,8 @@ TEST(Answer, ARobotThatMissesItsMarkersIsAnother) {
   for (SightingResidual& sighting : run.calibration.residuals) {
     for (Eigen::Vector2d& corner : sighting.corners_px) corner *= 1e4;
   }
-  // Of a geometry that is held, that is what was asked.
+  // Of a geometry that the user holds, that is what was asked.
+  run.free_asked = true;
   EXPECT_TRUE(judge(run).given);
   add_turns(run.calibration);
   const Answer answer = judge(run);

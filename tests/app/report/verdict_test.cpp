@@ -120,12 +120,12 @@ TEST(Verdict, SaysWhenUnseenDataAreWorse) {
 }
 
 TEST(Verdict, OfPointsWithANominalRobot) {
-  const Verdict verdict =
-      make_verdict(synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true}));
+  RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true});
+  run.levels = {{.free = FreeGeometry::kPlacement, .errors = run.errors.all}};
+  const Verdict verdict = make_verdict(run);
   EXPECT_TRUE(has(verdict.found, "Nominal robot bench_arm: 3 joints (R R P), 4 points calibrated"))
       << verdict.found;
-  EXPECT_TRUE(has(verdict.accurate,
-                  "with the nominal geometry, but markers, camera and clock placed anew, it was"))
+  EXPECT_TRUE(has(verdict.accurate, "The nominal robot at unseen postures: only placed: "))
       << verdict.accurate;
   EXPECT_FALSE(has(verdict.accurate, "px")) << verdict.accurate;
   EXPECT_FALSE(has(verdict.found, "probability")) << verdict.found;
@@ -133,6 +133,7 @@ TEST(Verdict, OfPointsWithANominalRobot) {
 
 TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
   RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint, .nominal = true});
+  run.levels = {{.free = FreeGeometry::kPlacement, .errors = run.errors.all}};
   KinematicTree& nominal = *run.nominal;
   nominal.joints[0].axis = Eigen::Vector3d::UnitX();
   run.nominal_faults = {{.joint = 0,
@@ -146,7 +147,8 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
                   "Q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
                   "(typical error of tag_4 in a first fit 20.0 mm → 1.00 mm)."))
       << verdict.found;
-  EXPECT_TRUE(has(verdict.accurate, "with the nominal geometry, so mended,")) << verdict.accurate;
+  EXPECT_TRUE(has(verdict.accurate, "The nominal robot, mended, at unseen postures"))
+      << verdict.accurate;
   EXPECT_TRUE(has(verdict.found, "The channels of q2 and q3 are exchanged; taken so"))
       << verdict.found;
 }
