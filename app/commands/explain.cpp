@@ -139,7 +139,7 @@ class Explainer {
     for (std::size_t k = 0; k < plain.size(); ++k) fits.push_back({kLevels[k], 0, &plain[k]});
     lap("calibrate");
     const auto traced = static_cast<std::size_t>(options_.free.value_or(kGeometry));
-    TracedCalibration whole = closed_loop(out, kLevels[traced], plain[traced]);
+    TracedCalibration whole = closed_loop(out.start, kLevels[traced], plain[traced], {});
     std::size_t exported = traced;
     if (!whole.effects.empty()) {
       exported = fits.size();
@@ -161,12 +161,14 @@ class Explainer {
     }
   }
 
-  [[nodiscard]] TracedCalibration closed_loop(const Explanation& of, FreeGeometry free,
-                                              const Calibration& plain) const {
+  /// `known`: effects that it begins with.
+  [[nodiscard]] TracedCalibration closed_loop(const CalibrationStart& start, FreeGeometry free,
+                                              const Calibration& plain,
+                                              const std::vector<AddedEffect>& known) const {
     if (!options_.trace) return {{}, plain, {}, {}, 0.0};
     CalibrateOptions options = options_.calibrate;
     options.free = free;
-    TracedCalibration out = trace_stage(recording(), evidence_.observed, of.start, plain, {},
+    TracedCalibration out = trace_stage(recording(), evidence_.observed, start, plain, known,
                                         options, options_.progress);
     lap("trace");
     return out;
@@ -233,17 +235,10 @@ class Explainer {
   }
 
   void fit(Explanation& out, const std::vector<AddedEffect>& known) const {
-    const Measurements& measurements = evidence_.observed.measurements;
-    Calibration plain = calibrate(measurements, recording().markers, recording().log, out.start,
-                                  options_.calibrate, options_.progress);
+    const FreeGeometry free = options_.calibrate.free;
+    const Calibration plain = calibrated(out.start, free);
     lap("calibrate");
-    if (!options_.trace) {
-      out.fitted = TracedCalibration{{}, std::move(plain), {}, {}, 0.0};
-      return;
-    }
-    out.fitted = trace_stage(recording(), evidence_.observed, out.start, plain, known,
-                             options_.calibrate, options_.progress);
-    lap("trace");
+    out.fitted = closed_loop(out.start, free, plain, known);
   }
 
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {

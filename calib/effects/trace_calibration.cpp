@@ -9,6 +9,7 @@
 #include "calib/effects/coupling_by_design.h"
 #include "calib/effects/gravity_by_sag.h"
 #include "calib/effects/traced_bundle.h"
+#include "calib/trace/family.h"
 
 namespace kinescope {
 namespace {
@@ -17,7 +18,6 @@ namespace {
 // left and none was named, the likeliest. What one mass in the middle of the links does is a poor
 // picture of a large sag, and what lasts as long leaves few stretches to judge it by.
 std::optional<EffectId> telling_sag(const Trace& trace) {
-  constexpr double kHint = 0.2;
   const TracedEffect* named = nullptr;
   for (const TracedEffect& accepted : trace.accepted) {
     if (accepted.id.effect != "compliance") continue;
@@ -27,7 +27,7 @@ std::optional<EffectId> telling_sag(const Trace& trace) {
   if (trace.verdict != TraceVerdict::kClean && trace.verdict != TraceVerdict::kUnknown) return {};
   const TestedCandidate* hint = nullptr;
   for (const TestedCandidate& tested : trace.candidates) {
-    if (tested.id.effect != "compliance" || tested.p_value > kHint) continue;
+    if (tested.id.effect != "compliance" || tested.p_value > trace::kHint) continue;
     if (hint == nullptr || tested.p_value < hint->p_value) hint = &tested;
   }
   return hint == nullptr ? std::optional<EffectId>() : hint->id;

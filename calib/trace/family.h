@@ -10,6 +10,9 @@
 
 namespace kinescope::trace {
 
+/// A p-value over the family, up to which an effect may be there and hidden.
+inline constexpr double kHint = 0.2;
+
 struct TestedMember {
   std::size_t index = 0;  ///< into the candidates
   double scan = 0.0;

@@ -10,8 +10,7 @@
 namespace kinescope::trace {
 namespace {
 
-// Effects that may be hidden by another one: p-values up to this, so many of them.
-constexpr double kHint = 0.2;
+// So many effects that may be hidden by another one are tried.
 constexpr std::size_t kMostHints = 3;
 // Of the squares that are left: what explains as much may be one of several that hide each other.
 constexpr double kLargeShare = 0.05;
@@ -138,7 +137,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   if (best) return best;
   for (const TestedMember* hint : hints) {
     if (hint->score.gain < kLargeShare * now->system.total().rr) continue;
-    StagePtr several = chain(*now, {now->fit.candidates[hint->index].id, hint->scan});
+    StagePtr several = chain({now->fit.candidates[hint->index].id, hint->scan});
     if (several && (!best || several->held_out_sum() < best->held_out_sum()))
       best = std::move(several);
   }
@@ -169,13 +168,13 @@ bool Tracer::all_needed(const Stage& stage, std::size_t known) {
 
 // Large effects together last so long that hardly a stretch is free of any of them, and each is
 // noise to the others.
-StagePtr Tracer::chain(const Stage& from, const AddedEffect& first) {
+StagePtr Tracer::chain(const AddedEffect& first) {
   const StagePtr now = now_;
-  const std::size_t known = from.added.size();
-  std::vector<AddedEffect> effects = from.added;
+  const std::size_t known = now->added.size();
+  std::vector<AddedEffect> effects = now->added;
   effects.push_back(first);
   StagePtr found;
-  double last = from.held_out_sum();
+  double last = now->held_out_sum();
   for (int step = 0; step < kLongestChain; ++step) {
     StagePtr stage = stage_of(effects);
     if (!stage->fit.converged || stage->held_out_sum() >= last) break;

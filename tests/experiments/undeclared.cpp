@@ -162,9 +162,9 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
                               (folder / "out.txt").string(), (folder / "err.txt").string())
                       .c_str());
   Outcome out;
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   for (const InjectedEffect& effect : of.world.effects)
     out.visible.push_back(visibility(effect, of.world, of.world.sigma_px));
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   out.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   out.crashed = out.exit_code < 0 || out.exit_code == 1 || out.exit_code > kLastExitCode;
   if (!fs::exists(run / "robot.urdf")) {

@@ -40,11 +40,20 @@ Answered run_case(int number, Damage damage = Damage::kNone) {
   return answered;
 }
 
-// The one effect found, as "name place".
+// "name place" of all effects, sorted.
+std::vector<std::string> effects(const Answered& answered) {
+  std::vector<std::string> out;
+  if (!answered.trace.is_object()) return out;
+  for (const nlohmann::json& effect : answered.trace["accepted"])
+    out.push_back(effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>());
+  std::ranges::sort(out);
+  return out;
+}
+
+// The one effect found; empty where there are several or none.
 std::string only_effect(const Answered& answered) {
-  if (!answered.trace.is_object() || answered.trace["accepted"].size() != 1) return "";
-  const nlohmann::json& effect = answered.trace["accepted"][0];
-  return effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>();
+  const std::vector<std::string> found = effects(answered);
+  return found.size() == 1 ? found.front() : "";
 }
 
 // A marker 4 % too large bends the tracks: the structure is in doubt until its size is known.
@@ -79,16 +88,6 @@ TEST(Explain, AReadingThatTheFitLeftOutIsNamed) {
   EXPECT_EQ(answered.difference, "");
   EXPECT_NE(answered.outcome.err.find("'q7' reads 13.0056"), std::string::npos)
       << answered.outcome.err;
-}
-
-// "name place" of all effects, sorted.
-std::vector<std::string> effects(const Answered& answered) {
-  std::vector<std::string> out;
-  if (!answered.trace.is_object()) return out;
-  for (const nlohmann::json& effect : answered.trace["accepted"])
-    out.push_back(effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>());
-  std::ranges::sort(out);
-  return out;
 }
 
 // Postures before a tracker that was bumped after a third of them: the fit of the others leaves
