@@ -38,7 +38,7 @@ std::set<std::string> products_of(const fs::path& run_json) {
 }
 
 std::string describe_geometry(const std::optional<FreeGeometry>& free) {
-  if (!free) return "what predicts best";
+  if (!free) return "geometry; of a nominal robot what predicts best";
   switch (*free) {
     case FreeGeometry::kPlacement:
       return "placement";
