@@ -10,13 +10,14 @@
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
 #include "kinematics/core/file.h"
+#include "kinematics/log/header_units.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
 namespace {
 
 std::string log_csv(const JointLog& log) {
-  std::string out = log.time_column;
+  std::string out = without_unit(log.time_column);  // the reader has brought it to s
   for (const std::string& channel : log.channels) out += "," + channel;
   out += "\n";
   for (std::size_t i = 0; i < log.size(); ++i) {

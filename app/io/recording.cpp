@@ -30,6 +30,7 @@ void convert_channel(JointLog& log, int channel, std::string& unit) {
 }
 
 void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& settings_file) {
+  std::map<std::string, std::string> by_channel;  // a name may have been written with its unit
   for (auto& [name, unit] : settings.units) {
     const std::optional<int> channel = log.channel(name);
     if (!channel) {
@@ -38,7 +39,9 @@ void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& s
                       did_you_mean(name, log.channels));
     }
     convert_channel(log, *channel, unit);
+    by_channel[log.channels[static_cast<std::size_t>(*channel)]] = unit;
   }
+  settings.units = std::move(by_channel);
 }
 
 /// Where a nominal robot stands can be seen without a log only when nothing of it moves.

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/log/header_units.h"
 
 namespace kinescope {
 namespace {
@@ -32,8 +33,10 @@ SignalColumns listed_signal(const ChannelTable& table, const std::vector<std::st
   out.named = true;
   for (const std::string& pattern : listed) {
     const std::size_t before = out.columns.size();
+    const bool whole_name = std::ranges::find(table.names, pattern) != table.names.end();
     for (std::size_t c = 0; c < table.names.size(); ++c) {
-      if (!fits(pattern, table.names[c])) continue;
+      const bool without = !whole_name && without_unit(table.names[c]) == pattern;
+      if (!without && !fits(pattern, table.names[c])) continue;
       const std::optional<ColumnMeaning> meaning = read_column_name(table.names[c]);
       out.columns.push_back(static_cast<Eigen::Index>(c));
       out.keys.push_back(meaning ? meaning->joint : words_of(table.names[c]));

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <unordered_set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "kinematics/core/error.h"
 #include "kinematics/core/gzip.h"
 
 namespace kinescope {
@@ -21,45 +21,212 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-std::vector<std::string> split(std::string_view line) {
+/// The lines of a text, also of one whose lines all end in CR alone.
+class Lines {
+ public:
+  explicit Lines(std::string_view text)
+      : rest_(text), end_(text.find('\n') == std::string_view::npos ? '\r' : '\n') {}
+
+  std::optional<std::string_view> next() {
+    if (rest_.empty()) return std::nullopt;
+    const std::size_t end = rest_.find(end_);
+    const std::string_view line = rest_.substr(0, end);
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    ++number_;
+    return line;
+  }
+  /// The next line that is neither blank nor a comment.
+  std::optional<std::string_view> next_content() {
+    while (const auto line = next()) {
+      const std::string_view content = trim(*line);
+      if (!content.empty() && !content.starts_with('#')) return line;
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] std::size_t number() const { return number_; }
+
+ private:
+  std::string_view rest_;
+  char end_;
+  std::size_t number_ = 0;
+};
+
+std::size_t count_cells(std::string_view line, char delimiter) {
+  return static_cast<std::size_t>(std::ranges::count(line, delimiter)) + 1;
+}
+
+std::vector<std::string> split(std::string_view line, char delimiter) {
   std::vector<std::string> cells;
+  cells.reserve(count_cells(line, delimiter));
   std::size_t begin = 0;
   while (true) {
-    const std::size_t comma = line.find(',', begin);
-    cells.emplace_back(trim(line.substr(begin, comma - begin)));
-    if (comma == std::string_view::npos) return cells;
-    begin = comma + 1;
+    const std::size_t end = line.find(delimiter, begin);
+    cells.emplace_back(trim(line.substr(begin, end - begin)));
+    if (end == std::string_view::npos) return cells;
+    begin = end + 1;
   }
 }
 
-void check_header(const CsvTable& table) {
-  const std::string where = fmt::format("{}:{}", table.source, table.header_line);
-  if (table.header.size() == 1) {
-    for (const char delimiter : {';', '\t', ' '}) {
-      if (table.header[0].find(delimiter) == std::string::npos) continue;
-      throw bad_input(where,
-                      fmt::format("columns are separated by '{}'",
-                                  delimiter == '\t' ? "tab" : std::string(1, delimiter)),
-                      "separate them by commas, with a point in decimal numbers");
-    }
-  }
-  const bool all_numbers = std::ranges::all_of(
-      table.header, [](const std::string& name) { return parse_number(name).has_value(); });
-  if (all_numbers) {
-    throw bad_input(where, "the first line holds numbers, not column names",
-                    "add a header line such as t,joint1,joint2");
-  }
-  for (std::size_t i = 0; i < table.header.size(); ++i) {
-    if (table.header[i].empty()) {
-      throw bad_input(where, fmt::format("column {} has no name", i + 1), "name every column");
-    }
-    if (std::find(table.header.begin(), table.header.begin() + static_cast<std::ptrdiff_t>(i),
-                  table.header[i]) != table.header.begin() + static_cast<std::ptrdiff_t>(i)) {
-      throw bad_input(where, fmt::format("two columns are named '{}'", table.header[i]),
-                      "give every column its own name");
-    }
-  }
+/// Control characters stand in no text: within the first few thousand bytes of a binary file there
+/// are some.
+bool looks_binary(std::string_view text) {
+  constexpr std::size_t kLooked = 4096;
+  return std::ranges::any_of(text.substr(0, kLooked), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x20U && c != '\t' && c != '\r' && c != '\n' && c != '\f' && c != '\v';
+  });
 }
+
+/// "1,5" as "1.5"; nothing for what is no number with a decimal comma.
+std::optional<std::string> with_decimal_point(const std::string& cell) {
+  const std::size_t comma = cell.find(',');
+  if (comma == std::string::npos) return std::nullopt;
+  std::string text = cell;
+  text[comma] = '.';
+  if (!parse_number(text)) return std::nullopt;
+  return text;
+}
+
+bool holds_only_numbers(std::string_view line, char delimiter) {
+  std::vector<std::string> cells = split(line, delimiter);
+  if (cells.size() > 1 && cells.back().empty()) cells.pop_back();
+  return std::ranges::all_of(cells, [](const std::string& cell) {
+    return parse_number(cell).has_value() || with_decimal_point(cell).has_value();
+  });
+}
+
+/// Parses one text: header, rows, decimal commas.
+class TableParser {
+ public:
+  TableParser(std::string_view text, CsvTable& table)
+      : table_(table), lines_(text), binary_(looks_binary(text)) {}
+
+  void read_header() {
+    const auto line = lines_.next_content();
+    if (!line) throw bad_input(table_.source, "is empty", "record it again");
+    table_.header_line = lines_.number();
+    delimiter_ = find_delimiter(trim(*line));
+    if (count_cells(*line, delimiter_) > kMostColumns + 1) {
+      refuse(
+          fmt::format("has {} columns, more than {}", count_cells(*line, delimiter_), kMostColumns),
+          "is this the right file?");
+    }
+    table_.header = split(*line, delimiter_);
+    unnamed_end_ = table_.header.size() > 1 && table_.header.back().empty();
+    if (unnamed_end_) table_.header.pop_back();
+    check_header(*line);
+  }
+
+  void read_rows(RaggedRows ragged) {
+    while (const auto line = lines_.next_content()) add_row(*line, ragged);
+    if (!table_.rows.empty()) return;
+    if (!table_.ragged.empty()) throw table_.ragged_error(table_.ragged.front());
+    throw bad_input(table_.source, "has a header but no rows", "record it again");
+  }
+
+  /// One way of writing numbers a table: "1,234" beside "5.678" may be a thousand.
+  void read_decimal_commas() {
+    if (delimiter_ == ',') return;
+    std::optional<std::size_t> with_comma;
+    std::optional<std::size_t> with_point;
+    for (std::size_t r = 0; r < table_.rows.size(); ++r) {
+      for (std::string& cell : table_.rows[r]) {
+        if (auto text = with_decimal_point(cell)) {
+          cell = *std::move(text);
+          with_comma = with_comma.value_or(r);
+        } else if (cell.find('.') != std::string::npos && parse_number(cell)) {
+          with_point = with_point.value_or(r);
+        }
+      }
+      if (with_comma && with_point) {
+        throw bad_input(table_.place(r),
+                        fmt::format("decimal commas (line {}) beside decimal points (line {})",
+                                    table_.lines[*with_comma], table_.lines[*with_point]),
+                        "write all numbers with a point, and none with a separator of thousands");
+      }
+    }
+  }
+
+ private:
+  [[noreturn]] void refuse(std::string_view what, std::string_view remedy) const {
+    refuse_binary();
+    throw bad_input(fmt::format("{}:{}", table_.source, table_.header_line), what, remedy);
+  }
+
+  void refuse_binary() const {
+    if (!binary_) return;
+    throw bad_input(table_.source, "is a binary file or damaged, not UTF-8 text",
+                    "export the table as CSV (UTF-8)");
+  }
+
+  [[nodiscard]] char find_delimiter(std::string_view header) const {
+    if (header.find(',') != std::string_view::npos) return ',';
+    const bool semicolon = header.find(';') != std::string_view::npos;
+    const bool tab = header.find('\t') != std::string_view::npos;
+    if (semicolon && tab) {
+      refuse("columns are separated by ';' or by tabs: both stand in the header",
+             "use one of them, or commas");
+    }
+    return semicolon ? ';' : tab ? '\t' : ',';
+  }
+
+  void check_header(std::string_view line) const {
+    const std::vector<std::string>& header = table_.header;
+    if (header.size() == 1 && header[0].find(' ') != std::string::npos) {
+      refuse("columns are separated by ' '",
+             "separate them by commas, with a point in decimal numbers");
+    }
+    // "1,5;2,5" has decimal commas and no names.
+    if (holds_only_numbers(line, delimiter_) || holds_only_numbers(line, ';') ||
+        holds_only_numbers(line, '\t')) {
+      refuse("the first line holds numbers, not column names",
+             "add a header line such as t,joint1,joint2");
+    }
+    std::unordered_set<std::string_view> known;
+    for (std::size_t i = 0; i < header.size(); ++i) {
+      if (header[i].empty()) refuse_unnamed(i + 1);
+      if (!known.insert(header[i]).second) {
+        refuse(fmt::format("two columns are named '{}'", header[i]),
+               "give every column its own name");
+      }
+    }
+  }
+
+  [[noreturn]] void refuse_unnamed(std::size_t column) const {
+    refuse(fmt::format("column {} has no name", column), "name every column");
+  }
+
+  void add_row(std::string_view line, RaggedRows ragged) {
+    const std::size_t columns = table_.header.size();
+    const std::size_t cells = count_cells(line, delimiter_);
+    std::vector<std::string> row;
+    if (cells == columns || cells == columns + 1) row = split(line, delimiter_);
+    // Some loggers end every line with a delimiter.
+    if (row.size() == columns + 1 && row.back().empty()) row.pop_back();
+    if (row.size() == columns + 1 && unnamed_end_) refuse_unnamed(row.size());
+    if (row.size() == columns) {
+      table_.rows.push_back(std::move(row));
+      table_.lines.push_back(lines_.number());
+      refuse_too_many_cells();
+      return;
+    }
+    refuse_binary();
+    table_.ragged.push_back({lines_.number(), cells});
+    if (ragged == RaggedRows::kRefuse) throw table_.ragged_error(table_.ragged.back());
+  }
+
+  void refuse_too_many_cells() const {
+    if (table_.rows.size() * table_.header.size() <= kMostCells) return;
+    throw bad_input(table_.source, fmt::format("has more than {} cells", kMostCells),
+                    "is this the right file? A longer log is cut into several");
+  }
+
+  CsvTable& table_;
+  Lines lines_;
+  bool binary_;
+  char delimiter_ = ',';
+  bool unnamed_end_ = false;
+};
 
 }  // namespace
 
@@ -79,6 +246,12 @@ std::string CsvTable::place(std::size_t row) const {
   return fmt::format("{}:{}", source, lines[row]);
 }
 
+Error CsvTable::ragged_error(const RaggedRow& row) const {
+  return bad_input(fmt::format("{}:{}", source, row.line),
+                   fmt::format("{} cells where the header has {}", row.cells, header.size()),
+                   "is the file cut off, or a comma missing?");
+}
+
 double CsvTable::number(std::size_t row, std::size_t column) const {
   const std::string& cell = rows[row][column];
   const std::optional<double> value = parse_number(cell);
@@ -88,7 +261,7 @@ double CsvTable::number(std::size_t row, std::size_t column) const {
         fmt::format("column '{}' holds '{}', not a finite number", header[column], cell),
         "correct or remove the line");
   }
-  return *value;
+  return factors.empty() ? *value : *value * factors[column];
 }
 
 std::optional<double> CsvTable::optional_number(std::size_t row, std::size_t column) const {
@@ -107,7 +280,7 @@ int CsvTable::integer(std::size_t row, std::size_t column) const {
   return static_cast<int>(value);
 }
 
-CsvTable parse_csv(std::string_view text, std::string source) {
+CsvTable parse_csv(std::string_view text, std::string source, RaggedRows ragged) {
   CsvTable table;
   table.source = std::move(source);
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -115,49 +288,15 @@ CsvTable parse_csv(std::string_view text, std::string source) {
     throw bad_input(table.source, "holds NUL bytes, so it is not a text table",
                     "export the table as CSV (UTF-8)");
   }
-  std::size_t line_number = 0;
-  bool unnamed_end = false;
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    ++line_number;
-    const std::string_view content = trim(line);
-    if (content.empty() || content.starts_with('#')) continue;
-    std::vector<std::string> cells = split(line);
-    if (table.header.empty()) {
-      unnamed_end = cells.size() > 1 && cells.back().empty();
-      if (unnamed_end) cells.pop_back();
-      table.header = std::move(cells);
-      table.header_line = line_number;
-      check_header(table);
-      continue;
-    }
-    // Some loggers end every line with a comma.
-    const bool one_more = cells.size() == table.header.size() + 1;
-    if (one_more && cells.back().empty()) cells.pop_back();
-    if (one_more && cells.size() > table.header.size() && unnamed_end) {
-      throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
-                      fmt::format("column {} has no name", cells.size()), "name every column");
-    }
-    if (cells.size() != table.header.size()) {
-      throw bad_input(
-          fmt::format("{}:{}", table.source, line_number),
-          fmt::format("{} cells where the header has {}", cells.size(), table.header.size()),
-          "is the file cut off, or a comma missing?");
-    }
-    table.rows.push_back(std::move(cells));
-    table.lines.push_back(line_number);
-  }
-  if (table.header.empty()) throw bad_input(table.source, "is empty", "record it again");
-  if (table.rows.empty()) {
-    throw bad_input(table.source, "has a header but no rows", "record it again");
-  }
+  TableParser parser(text, table);
+  parser.read_header();
+  parser.read_rows(ragged);
+  parser.read_decimal_commas();
   return table;
 }
 
-CsvTable read_csv(const std::filesystem::path& path) {
-  return parse_csv(read_plain_or_gzip(path), path.string());
+CsvTable read_csv(const std::filesystem::path& path, RaggedRows ragged) {
+  return parse_csv(read_plain_or_gzip(path), path.string(), ragged);
 }
 
 std::optional<double> parse_number(std::string_view text) {

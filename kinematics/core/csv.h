@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reading tables: comma separated values with one header line. Numbers only, except in the columns
-// the caller reads as text. Every complaint names file, line and column.
+// Reading tables: values separated by commas, semicolons or tabs, with one header line. Numbers
+// only, except in the columns the caller reads as text. Every complaint names file, line and
+// column.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +12,15 @@
 #include <string_view>
 #include <vector>
 
+#include "kinematics/core/error.h"
+
 namespace kinescope {
+
+/// A row of another length than the header.
+struct RaggedRow {
+  std::size_t line = 0;   ///< in the file, from 1
+  std::size_t cells = 0;  ///< that it has
+};
 
 /// A table as text. Rows are as long as the header; blank lines and lines that begin with '#' are
 /// passed over.
@@ -21,12 +30,17 @@ struct CsvTable {
   std::size_t header_line = 1;                 ///< line in the file of the header, from 1
   std::vector<std::vector<std::string>> rows;  ///< trimmed cells
   std::vector<std::size_t> lines;              ///< line in the file of each row, from 1
+  std::vector<RaggedRow> ragged;               ///< rows set aside (RaggedRows::kSetAside)
+  /// What number() multiplies each column by, from the unit in its name; empty: nothing.
+  std::vector<double> factors = {};
 
   [[nodiscard]] std::optional<std::size_t> column(std::string_view name) const;
   /// Column that must be there; throws bad_input that names the columns that are.
   [[nodiscard]] std::size_t require_column(std::string_view name) const;
   /// "file:line" of a row.
   [[nodiscard]] std::string place(std::size_t row) const;
+  /// The complaint about a row of another length.
+  [[nodiscard]] Error ragged_error(const RaggedRow& row) const;
   /// A finite number. Throws bad_input that names line and column; an empty cell is no number.
   [[nodiscard]] double number(std::size_t row, std::size_t column) const;
   /// As number(), but an empty cell gives nothing.
@@ -35,12 +49,24 @@ struct CsvTable {
   [[nodiscard]] int integer(std::size_t row, std::size_t column) const;
 };
 
-/// Parses text. Throws bad_input for: nothing in it, another delimiter than the comma, two columns
-/// of one name, an unnamed column, a row shorter or longer than the header, a NUL byte. A comma at
-/// the end of a line opens no column.
-[[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source);
+/// What becomes of rows of another length than the header.
+enum class RaggedRows { kRefuse, kSetAside };
+
+/// The most that is read of one table: more is another file than a log, and would fill the memory.
+inline constexpr std::size_t kMostColumns = 10'000;
+inline constexpr std::size_t kMostCells = 100'000'000;
+
+/// Parses text. A header without a comma may separate its columns by semicolons or by tabs; then
+/// the numbers may have decimal commas, all of them or none. Lines end in LF, CR LF or CR. A
+/// delimiter at the end of a line opens no column.
+/// Throws bad_input for: nothing in it, columns separated otherwise, decimal commas beside decimal
+/// points, two columns of one name, an unnamed column, more than kMostColumns or kMostCells, a NUL
+/// byte, and, unless they are set aside, for rows shorter or longer than the header.
+[[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source,
+                                 RaggedRows ragged = RaggedRows::kRefuse);
 /// The same from a file, also from one packed with gzip.
-[[nodiscard]] CsvTable read_csv(const std::filesystem::path& path);
+[[nodiscard]] CsvTable read_csv(const std::filesystem::path& path,
+                                RaggedRows ragged = RaggedRows::kRefuse);
 
 /// The whole of the text as a number ("1.5", "-2e-3"), or nothing. NaN and infinities are numbers
 /// here.

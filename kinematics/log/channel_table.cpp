@@ -9,6 +9,7 @@
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/log/header_units.h"
 
 namespace kinescope {
 namespace {
@@ -78,7 +79,8 @@ ChannelTable from_csv(const CsvTable& csv) {
 }  // namespace
 
 std::optional<Eigen::Index> ChannelTable::column(std::string_view name) const {
-  const auto found = std::ranges::find(names, name);
+  auto found = std::ranges::find(names, name);
+  if (found == names.end()) found = std::ranges::find(names, name, without_unit);
   if (found == names.end()) return std::nullopt;
   return found - names.begin();
 }

@@ -29,6 +29,7 @@ struct ChannelTable {
   std::vector<std::size_t> lines;                          ///< line in the file of each row, from 1
 
   [[nodiscard]] Eigen::Index rows() const { return values.rows(); }
+  /// The column of that name, else the one whose name with a unit in brackets it is.
   [[nodiscard]] std::optional<Eigen::Index> column(std::string_view name) const;
   /// "file:line" of a row.
   [[nodiscard]] std::string place(Eigen::Index row) const;

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include <fmt/format.h>
 
+#include "kinematics/core/bad_rows.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/log/header_units.h"
 #include "kinematics/log/unwrap.h"
 
 namespace kinescope {
@@ -39,6 +42,11 @@ bool holds_a_number(const CsvTable& table, std::size_t column) {
   });
 }
 
+bool is_listed(const std::vector<std::string>& names, const std::string& column) {
+  return std::ranges::find(names, column) != names.end() ||
+         std::ranges::find(names, column, without_unit) != names.end();
+}
+
 // The columns of the channels; names them, the torques and what is no channel in `log`.
 std::vector<std::size_t> channel_columns(const CsvTable& table, std::size_t time,
                                          const std::vector<std::string>& torque_channels,
@@ -47,8 +55,7 @@ std::vector<std::size_t> channel_columns(const CsvTable& table, std::size_t time
   for (std::size_t c = 0; c < table.header.size(); ++c) {
     const std::string& name = table.header[c];
     if (c == time) continue;
-    if (name.starts_with("tau") ||
-        std::ranges::find(torque_channels, name) != torque_channels.end()) {
+    if (name.starts_with("tau") || is_listed(torque_channels, name)) {
       log.torque_columns.push_back(name);
     } else if (!holds_a_number(table, c)) {
       log.left_out.push_back(name);
@@ -90,11 +97,114 @@ void unwrap_channels(JointLog& log) {
   }
 }
 
-JointLog from_table(const CsvTable& table, const std::vector<std::string>& torque_channels) {
+// The rows from `first` on, without those that hold no numbers and those that repeat the one
+// before; gives the line of each.
+std::vector<std::size_t> read_samples(const CsvTable& table, std::size_t time, std::size_t first,
+                                      const std::vector<std::size_t>& columns, BadRows& bad,
+                                      JointLog& log) {
+  std::vector<std::size_t> lines;
+  int repeated = 0;
+  log.values.resize(static_cast<Eigen::Index>(table.rows.size() - first),
+                    static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t r = first; r < table.rows.size(); ++r) {
+    const auto row = static_cast<Eigen::Index>(log.size());
+    double time_s = 0.0;
+    try {
+      time_s = table.number(r, time);
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        log.values(row, static_cast<Eigen::Index>(c)) = table.number(r, columns[c]);
+      }
+    } catch (const Error& error) {
+      bad.add(table.lines[r], error);
+      continue;
+    }
+    if (!log.empty() && time_s == log.times_s.back() &&
+        log.values.row(row) == log.values.row(row - 1)) {
+      ++repeated;
+      continue;
+    }
+    log.times_s.push_back(time_s);
+    lines.push_back(table.lines[r]);
+  }
+  if (repeated > 0) {
+    log.warnings.push_back(
+        fmt::format("{}: {} rows repeat the row before and are left out", table.source, repeated));
+  }
+  return lines;
+}
+
+// The most samples whose stamps increase (longest increasing subsequence by patience sorting,
+// Fredman 1975): one stamp far ahead is left out, not all that follow it.
+std::vector<Eigen::Index> increasing(const std::vector<double>& times_s) {
+  std::vector<std::size_t> ends;  // of the best sequence of each length
+  std::vector<std::size_t> before(times_s.size());
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const auto place = std::ranges::lower_bound(ends, times_s[i], {},
+                                                [&](std::size_t end) { return times_s[end]; });
+    before[i] = place == ends.begin() ? i : *std::prev(place);
+    if (place == ends.end()) {
+      ends.push_back(i);
+    } else if (times_s[i] < times_s[*place]) {  // of two alike the first stays
+      *place = i;
+    }
+  }
+  std::vector<Eigen::Index> out(ends.size());
+  std::size_t at = ends.empty() ? 0 : ends.back();
+  for (auto slot = out.rbegin(); slot != out.rend(); ++slot) {
+    *slot = static_cast<Eigen::Index>(at);
+    at = before[at];
+  }
+  return out;
+}
+
+Error stamp_error(const std::string& source, std::size_t line, const std::string& what) {
+  return bad_input(fmt::format("{}:{}", source, line), what,
+                   "sort the rows by time and remove repeated stamps");
+}
+
+// Throws at the first stamp that does not come after the one before.
+[[noreturn]] void throw_first_descent(const JointLog& log, const std::vector<std::size_t>& lines) {
+  const auto at = std::ranges::adjacent_find(log.times_s, std::greater_equal{});
+  const auto i = static_cast<std::size_t>(at - log.times_s.begin());
+  throw stamp_error(log.source, lines[i + 1],
+                    fmt::format("time {:.6f} s does not come after {:.6f} s", log.times_s[i + 1],
+                                log.times_s[i]));
+}
+
+void sort_out_stamps(const std::vector<std::size_t>& lines, BadRows& bad, JointLog& log) {
+  const std::vector<Eigen::Index> kept = increasing(log.times_s);
+  const std::size_t out_of_order = log.size() - kept.size();
+  if (out_of_order == 0) return;
+  if (bad.too_many(bad.size() + out_of_order)) throw_first_descent(log, lines);
+  std::vector<double> times_s;
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const std::size_t next = times_s.size();
+    if (next < kept.size() && kept[next] == static_cast<Eigen::Index>(i)) {
+      times_s.push_back(log.times_s[i]);
+      continue;
+    }
+    const bool late = !times_s.empty() && log.times_s[i] <= times_s.back();
+    const double other = late ? times_s.back() : log.times_s[static_cast<std::size_t>(kept[next])];
+    bad.add(lines[i], stamp_error(log.source, lines[i],
+                                  fmt::format("time {:.6f} s does not come {} {:.6f} s",
+                                              log.times_s[i], late ? "after" : "before", other)));
+  }
+  log.times_s = std::move(times_s);
+  log.values = log.values(kept, Eigen::all).eval();
+}
+
+void to_seconds(double factor, JointLog& log) {
+  if (factor == 1.0) return;
+  for (double& time_s : log.times_s) time_s *= factor;
+}
+
+JointLog from_table(CsvTable table, const std::vector<std::string>& torque_channels) {
   JointLog log;
   log.source = table.source;
+  const std::vector<std::string> names_in_file = table.header;
+  strip_units(table);
   const std::size_t time = time_column(table);
-  log.time_column = table.header[time];
+  log.time_column = names_in_file[time];
   const std::vector<std::size_t> columns = channel_columns(table, time, torque_channels, log);
   const std::size_t first = first_whole_row(table, columns);
   if (first > 0) {
@@ -103,33 +213,13 @@ JointLog from_table(const CsvTable& table, const std::vector<std::string>& torqu
                     "left out",
                     table.source, first));
   }
-  const auto most = static_cast<Eigen::Index>(table.rows.size() - first);
-  log.values.resize(most, static_cast<Eigen::Index>(columns.size()));
-  int repeated = 0;
-  for (std::size_t r = first; r < table.rows.size(); ++r) {
-    const auto row = static_cast<Eigen::Index>(log.size());
-    const double time_s = table.number(r, time);
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      const double value = table.number(r, columns[c]);
-      log.values(row, static_cast<Eigen::Index>(c)) = value;
-    }
-    if (!log.times_s.empty() && time_s <= log.times_s.back()) {
-      if (time_s == log.times_s.back() && log.values.row(row) == log.values.row(row - 1)) {
-        ++repeated;
-        continue;
-      }
-      throw bad_input(
-          table.place(r),
-          fmt::format("time {:.6f} s does not come after {:.6f} s", time_s, log.times_s.back()),
-          "sort the rows by time and remove repeated stamps");
-    }
-    log.times_s.push_back(time_s);
-  }
+  BadRows bad(table);
+  const std::vector<std::size_t> lines = read_samples(table, time, first, columns, bad, log);
+  sort_out_stamps(lines, bad, log);
   log.values.conservativeResize(static_cast<Eigen::Index>(log.size()), Eigen::NoChange);
-  if (repeated > 0) {
-    log.warnings.push_back(
-        fmt::format("{}: {} rows repeat the row before and are left out", table.source, repeated));
-  }
+  to_seconds(header_factor(log.time_column), log);
+  const std::vector<std::string> left_out = bad.warnings();
+  log.warnings.insert(log.warnings.end(), left_out.begin(), left_out.end());
   unwrap_channels(log);
   return log;
 }
@@ -224,19 +314,20 @@ Eigen::MatrixXd resample_quantity(const JointLog& log, const std::vector<double>
 }  // namespace
 
 std::optional<int> JointLog::channel(std::string_view name) const {
-  const auto found = std::ranges::find(channels, name);
+  auto found = std::ranges::find(channels, name);
+  if (found == channels.end()) found = std::ranges::find(channels, without_unit(name));
   if (found == channels.end()) return std::nullopt;
   return static_cast<int>(found - channels.begin());
 }
 
 JointLog read_joint_log(const std::filesystem::path& path,
                         const std::vector<std::string>& torque_channels) {
-  return from_table(read_csv(path), torque_channels);
+  return from_table(read_csv(path, RaggedRows::kSetAside), torque_channels);
 }
 
 JointLog parse_joint_log(std::string_view text, const std::string& source,
                          const std::vector<std::string>& torque_channels) {
-  return from_table(parse_csv(text, source), torque_channels);
+  return from_table(parse_csv(text, source, RaggedRows::kSetAside), torque_channels);
 }
 
 std::optional<ChannelValue> interpolate(const JointLog& log, int channel, double time_s,

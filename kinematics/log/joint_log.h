@@ -47,11 +47,11 @@ struct ChannelValue {
 };
 
 /// Reads joints.csv. `torque_channels` and columns that begin with "tau" are left out. Without a
-/// column `t` one named time, stamp or timestamp (any case) is the time. Left out with a warning:
-/// rows that repeat the one before, columns without any number, first rows in which a channel is
-/// still blank.
-/// Throws bad_input: missing or empty file, no time, a cell that is no finite number, stamps that
-/// do not increase, no channel. Each names file, line and remedy.
+/// column `t` one named time, stamp or timestamp is the time; a unit in brackets is no part of a
+/// name (header_units.h). Left out with a warning: rows that repeat the one before, columns without
+/// any number, first rows in which a channel is blank, a few bad rows (bad_rows.h).
+/// Throws bad_input: missing or empty file, no time, many rows with a cell that is no finite
+/// number, or out of the order of time, no channel. Each names file, line and remedy.
 [[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
                                       const std::vector<std::string>& torque_channels = {});
 [[nodiscard]] JointLog parse_joint_log(std::string_view text, const std::string& source,

@@ -42,10 +42,10 @@ TEST(Csv, RefusesWithPlaceAndRemedy) {
   EXPECT_EQ(parse_refusal(""), "a.csv: is empty (record it again)");
   EXPECT_EQ(parse_refusal("\n# only this\n"), "a.csv: is empty (record it again)");
   EXPECT_EQ(parse_refusal("t,x\n"), "a.csv: has a header but no rows (record it again)");
-  EXPECT_EQ(parse_refusal("t;x\n1;2\n"),
-            "a.csv:1: columns are separated by ';' (separate them by commas, with a point in "
+  EXPECT_EQ(parse_refusal("t x\n1 2\n"),
+            "a.csv:1: columns are separated by ' ' (separate them by commas, with a point in "
             "decimal numbers)");
-  EXPECT_NE(parse_refusal("t\tx\n1\t2\n").find("'tab'"), std::string::npos);
+  EXPECT_NE(parse_refusal("t;x\ty\n1;2\t3\n").find("by ';' or by tabs"), std::string::npos);
   EXPECT_EQ(parse_refusal("t,x,x\n1,2,3\n"),
             "a.csv:1: two columns are named 'x' (give every column its own name)");
   EXPECT_EQ(parse_refusal("t,,x\n1,2,3\n"), "a.csv:1: column 2 has no name (name every column)");
@@ -64,6 +64,68 @@ TEST(Csv, ACommaAtTheEndOfALineOpensNoColumn) {
     EXPECT_EQ(table.header, (std::vector<std::string>{"t", "x"})) << text;
     EXPECT_EQ(table.rows[0], (std::vector<std::string>{"1", "2"})) << text;
   }
+}
+
+TEST(Csv, ReadsSemicolonsTabsAndDecimalCommas) {
+  for (const char* text :
+       {"t;x y;n\n1.5;-2e-3;a,b\n;4;\n", "t;x y;n\n1,5;-2e-3;a,b\n;4;\n",
+        "t\tx y\tn\n1,5\t-2e-3\ta,b\n\t4\t\n", "t;x y;n;\r\n1,5;-2e-3;a,b;\r\n;4;;\r\n"}) {
+    const CsvTable table = parse_csv(text, "a.csv");
+    EXPECT_EQ(table.header, (std::vector<std::string>{"t", "x y", "n"})) << text;
+    ASSERT_EQ(table.rows.size(), 2U) << text;
+    EXPECT_EQ(table.number(0, 0), 1.5) << text;
+    EXPECT_EQ(table.number(0, 1), -2e-3) << text;
+    EXPECT_EQ(table.rows[0][2], "a,b") << text;
+    EXPECT_FALSE(table.optional_number(1, 0)) << text;
+    EXPECT_EQ(table.number(1, 1), 4.0) << text;
+  }
+  EXPECT_NE(parse_refusal("1,5;2\n1;2\n").find("not column names"), std::string::npos);
+}
+
+TEST(Csv, DecimalCommasBesidePointsAreAmbiguous) {
+  EXPECT_EQ(parse_refusal("t;x\n1.5;2\n1.6;1,234\n"),
+            "a.csv:3: decimal commas (line 3) beside decimal points (line 2) (write all numbers "
+            "with a point, and none with a separator of thousands)");
+  // A comma in the header separates the columns, whatever else stands there.
+  EXPECT_EQ(parse_csv("t,x;y\n1,2\n", "a.csv").header[1], "x;y");
+}
+
+TEST(Csv, LinesMayEndInCarriageReturnsAlone) {
+  const CsvTable table = parse_csv("t,x\r1,2\r3,4\r", "a.csv");
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_EQ(table.number(1, 1), 4.0);
+  EXPECT_EQ(table.lines[1], 3U);
+}
+
+TEST(Csv, SaysThatItIsNoText) {
+  for (const char* text : {"\x89PNG\x1a\n1,2\n", "a\x01,a\x01\n1,2\n", "a\x02 b\n1,2\n"}) {
+    EXPECT_EQ(parse_refusal(text),
+              "a.csv: is a binary file or damaged, not UTF-8 text (export the table as CSV "
+              "(UTF-8))");
+  }
+  EXPECT_EQ(parse_csv("t,Winkel \xB0\n1,2\n", "a.csv").rows.size(), 1U) << "Latin-1 is read";
+}
+
+TEST(Csv, AMillionColumnsAreRefusedAtOnce) {
+  std::string header = "t";
+  std::string names = "t";
+  for (std::size_t i = 1; i < 1'000'000; ++i) header += ",c" + std::to_string(i);
+  EXPECT_EQ(parse_refusal(header + "\n1,2\n"),
+            "a.csv:1: has 1000000 columns, more than 10000 (is this the right file?)");
+  for (std::size_t i = 1; i < kMostColumns; ++i) names += ",c" + std::to_string(i);
+  EXPECT_NE(parse_refusal(names + "\n1,2\n").find("2 cells where"), std::string::npos);
+}
+
+TEST(Csv, SetsRowsOfAnotherLengthAside) {
+  const CsvTable table = parse_csv("t,x\n1,2\n3\n4,5,6\n7,8", "a.csv", RaggedRows::kSetAside);
+  EXPECT_EQ(table.lines, (std::vector<std::size_t>{2, 5}));
+  ASSERT_EQ(table.ragged.size(), 2U);
+  EXPECT_EQ(table.ragged[0].line, 3U);
+  EXPECT_EQ(table.ragged[1].cells, 3U);
+  EXPECT_NE(refusal([] {
+              static_cast<void>(parse_csv("t,x\n1\n", "a.csv", RaggedRows::kSetAside));
+            }).find("1 cells where the header has 2"),
+            std::string::npos);
 }
 
 TEST(Csv, NamesTheLineOfAHeaderBelowComments) {

@@ -2,7 +2,9 @@
 #include "kinematics/log/joint_log.h"
 
 #include <cmath>
+#include <map>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "kinematics/core/error.h"
@@ -49,7 +51,7 @@ TEST(JointLog, KeepsChannelsAndLeavesTorquesOut) {
 
 TEST(JointLog, RefusesWithLineAndRemedy) {
   EXPECT_EQ(
-      refusal("t,a\n0,1\n0.1,2\n0.1,3\n"),
+      refusal("t,a\n0,1\n0.1,2\n0.1,3\n0.1,4\n"),
       "joints.csv:4: time 0.100000 s does not come after 0.100000 s (sort the rows by time and "
       "remove repeated stamps)");
   EXPECT_NE(refusal("t,a\n0,1\n-1,2\n").find("joints.csv:3:"), std::string::npos);
@@ -61,7 +63,7 @@ TEST(JointLog, RefusesWithLineAndRemedy) {
   EXPECT_NE(refusal("t,tau1\n0,1\n").find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,x\n0,1\n", {"x"}).find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,a,a\n0,1,2\n").find("two columns"), std::string::npos);
-  EXPECT_NE(refusal("t;a\n0;1\n").find("separated by ';'"), std::string::npos);
+  EXPECT_NE(refusal("t a\n0 1\n").find("separated by ' '"), std::string::npos);
   EXPECT_NE(refusal("").find("is empty"), std::string::npos);
 }
 
@@ -100,10 +102,72 @@ TEST(JointLog, LeavesOutRepeatedRowsAndTheFirstBlankOnes) {
   ASSERT_EQ(log.warnings.size(), 2U);
   EXPECT_EQ(log.warnings[0], "j: the first 3 rows, in which a channel is blank, are left out");
   EXPECT_EQ(log.warnings[1], "j: 1 rows repeat the row before and are left out");
-  EXPECT_NE(refusal("t,a,b\n0,1,1\n1,,1\n2,2,1\n").find("joints.csv:3: column 'a' holds ''"),
+  EXPECT_NE(refusal("t,a,b\n0,1,1\n1,,1\n").find("joints.csv:3: column 'a' holds ''"),
             std::string::npos);
   EXPECT_NE(refusal("t,a,b\n0,1,\n1,,1\n").find("joints.csv:2: column 'b' holds ''"),
             std::string::npos);
+}
+
+/// A log of 40 rows at 0, 0.1, .. s with some lines (counted from 2) written otherwise.
+std::string forty_rows(const std::map<std::size_t, std::string>& otherwise) {
+  std::string text = "t,a\n";
+  for (std::size_t line = 2; line < 42; ++line) {
+    const auto other = otherwise.find(line);
+    text += other != otherwise.end()
+                ? other->second
+                : fmt::format("{:.1f},{}", 0.1 * static_cast<double>(line - 2), line);
+    text += "\n";
+  }
+  return text;
+}
+
+TEST(JointLog, LeavesOutAFewBadRows) {
+  const std::map<std::string, std::string> bad = {
+      {"1.0,nan", "column 'a' holds 'nan', not a finite number"},
+      {"1.0,-inf", "column 'a' holds '-inf', not a finite number"},
+      {"1.0,ERR (7)", "column 'a' holds 'ERR (7)', not a finite number"},
+      {"1.0,", "column 'a' holds '', not a finite number"},
+      {",12", "column 't' holds '', not a finite number"},
+      {"1.0", "1 cells where the header has 2"},
+      {"1.0,12,3", "3 cells where the header has 2"},
+      {"0.9,12", "time 0.900000 s does not come after 0.900000 s"},
+      {"0.1,12", "time 0.100000 s does not come after 0.900000 s"},
+      {"1e9,12", "time 1000000000.000000 s does not come before 1.100000 s"}};
+  for (const auto& [row, complaint] : bad) {
+    const JointLog log = parse_joint_log(forty_rows({{12, row}}), "j");
+    ASSERT_EQ(log.size(), 39U) << row;
+    EXPECT_EQ(log.values.rows(), 39) << row;
+    EXPECT_EQ(log.values(10, 0), 13.0) << row;
+    EXPECT_EQ(log.times_s[10], 1.1) << row;
+    EXPECT_EQ(log.warnings, std::vector<std::string>{"j:12: " + complaint + ": left out"});
+  }
+}
+
+TEST(JointLog, SumsSeveralBadRowsUp) {
+  const std::string text = forty_rows({{30, "2.8,nan"}, {12, "1.0,"}, {41, "3."}});
+  EXPECT_EQ(parse_joint_log(text, "j").warnings,
+            std::vector<std::string>{"j: 3 of 40 rows are left out, the first: j:12: column 'a' "
+                                     "holds '', not a finite number"});
+}
+
+TEST(JointLog, RefusesManyBadRows) {
+  EXPECT_NE(refusal(forty_rows({{12, "1.0,"}, {15, "x"}, {16, "x"}, {17, "1,nan"}}))
+                .find("joints.csv:12: column 'a' holds ''"),
+            std::string::npos)
+      << "four of forty";
+  EXPECT_NE(refusal("t,a\n0,1\n1,x\n2,3\n3,\n").find("joints.csv:3:"), std::string::npos)
+      << "half of them";
+}
+
+TEST(JointLog, UnitsInBracketsAreNoPartOfANameAndThatOfTheTimeIsUsed) {
+  const JointLog log =
+      parse_joint_log("t [ms];ch0 [rad];tau_0 [Nm];i [A]\n0;1,5;7;1\n100;2;7;1\n", "j", {"i [A]"});
+  EXPECT_EQ(log.channels, std::vector<std::string>{"ch0"});
+  EXPECT_EQ(log.channel("ch0 [rad]"), 0);
+  EXPECT_EQ(log.torque_columns, (std::vector<std::string>{"tau_0", "i"}));
+  EXPECT_EQ(log.time_column, "t [ms]");
+  EXPECT_EQ(log.times_s, (std::vector<double>{0.0, 0.1}));
+  EXPECT_EQ(log.values(0, 0), 1.5);
 }
 
 TEST(Interpolation, IsExactOnParabolasBetweenEvenOrUnevenSamples) {
