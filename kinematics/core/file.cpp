@@ -3,7 +3,7 @@
 
 #include <cstdio>
 #include <fstream>
-#include <sstream>
+#include <istream>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -20,6 +20,25 @@ fs::path temporary_beside(const fs::path& path) {
   return path.parent_path() / fmt::format(".{}.{}.tmp", path.filename().string(), ::getpid());
 }
 
+Error too_large(const fs::path& path, std::uintmax_t bytes, std::uintmax_t max_bytes) {
+  return bad_input(path.string(), fmt::format("{} bytes, more than {}", bytes, max_bytes),
+                   "is this the right file?");
+}
+
+// Up to one byte beyond the most: a file may grow, and those of /proc have no size.
+std::string read_at_most(std::istream& stream, std::uintmax_t expected, std::uintmax_t max_bytes) {
+  constexpr std::size_t kBlock = std::size_t{1} << 16U;
+  std::string text;
+  text.reserve(expected + 1);
+  while (stream && text.size() <= max_bytes) {
+    const std::size_t before = text.size();
+    text.resize(before + kBlock);
+    stream.read(text.data() + before, kBlock);
+    text.resize(before + static_cast<std::size_t>(stream.gcount()));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string read_text_file(const fs::path& path, std::uintmax_t max_bytes) {
@@ -29,16 +48,20 @@ std::string read_text_file(const fs::path& path, std::uintmax_t max_bytes) {
   if (fs::is_directory(status)) {
     throw bad_input(path.string(), "is a folder, not a file", "name a file");
   }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (!error && size > max_bytes) {
-    throw bad_input(path.string(), fmt::format("{} bytes, more than {}", size, max_bytes),
-                    "is this the right file?");
+  // A pipe without a writer would be waited for, a device may never end.
+  if (!fs::is_regular_file(status)) {
+    throw bad_input(path.string(), "is a pipe or a device, not a file", "name a file");
   }
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) throw bad_input(path.string(), "cannot be read", "check its permissions");
+  if (size > max_bytes) throw too_large(path, size, max_bytes);
   std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream) throw bad_input(path.string(), "cannot be read", "check its permissions");
-  return std::move(text).str();
+  std::string text = read_at_most(stream, size, max_bytes);
+  if (stream.bad() || !stream.is_open()) {
+    throw bad_input(path.string(), "cannot be read", "check its permissions");
+  }
+  if (text.size() > max_bytes) throw too_large(path, text.size(), max_bytes);
+  return text;
 }
 
 void write_file_atomically(const fs::path& path, std::string_view content) {

@@ -10,7 +10,7 @@
 
 namespace kinescope {
 
-/// The file's bytes. Throws bad_input when it is missing, a folder, unreadable or over `max_bytes`.
+/// The file's bytes. Throws bad_input: missing, a folder, pipe or device, unreadable, too large.
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
                                          std::uintmax_t max_bytes = std::uintmax_t{1} << 30U);
 

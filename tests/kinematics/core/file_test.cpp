@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "kinematics/core/error.h"
 #include "tests/truth/temporary_path.h"
@@ -45,6 +46,27 @@ TEST_F(FileTest, RefusesWhatCannotBeRead) {
   EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(folder_ / "big", 4)); }),
             ExitCode::kBadInput);
   EXPECT_EQ(read_text_file(folder_ / "big", 5), "12345");
+}
+
+TEST_F(FileTest, WaitsForNoPipeAndReadsNoDevice) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  fs::create_symlink(folder_ / "nowhere", folder_ / "dangling");
+  fs::create_symlink(folder_ / "loop", folder_ / "loop");
+  for (const fs::path& path : {folder_ / "pipe", fs::path("/dev/zero"), fs::path("/dev/null"),
+                               folder_ / "dangling", folder_ / "loop"}) {
+    EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(path)); }), ExitCode::kBadInput)
+        << path;
+  }
+  fs::create_symlink(folder_ / "a", folder_ / "link");
+  write_file_atomically(folder_ / "a", "12345");
+  EXPECT_EQ(read_text_file(folder_ / "link"), "12345");
+}
+
+TEST_F(FileTest, BoundsFilesThatTellNoSize) {
+  const fs::path no_size = "/proc/self/status";
+  if (!fs::exists(no_size)) GTEST_SKIP();
+  EXPECT_FALSE(read_text_file(no_size).empty());
+  EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(no_size, 10)); }), ExitCode::kBadInput);
 }
 
 TEST_F(FileTest, RefusesWhatCannotBeWritten) {
