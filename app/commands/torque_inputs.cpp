@@ -3,19 +3,39 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "app/io/sha256.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/mass_matrix.h"
+#include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Such a link is no body, and the robot that was learnt could not be written.
+void refuse_massless_moments(const DynamicModel& model, const fs::path& urdf) {
+  for (std::size_t l = 0; l < model.links.size(); ++l) {
+    const InertialParameters& link = model.links[l];
+    if (link.mass_kg > 0.0 || link.vector().isZero(0.0)) continue;
+    throw bad_input(
+        urdf.string(),
+        fmt::format("link '{}' has moments of inertia and no mass", model.tree.links[l].name),
+        "give it its mass, or take its <inertial> away");
+  }
+}
+
+}  // namespace
+
 TorqueRobot read_torque_robot(const fs::path& urdf,
                               const std::optional<Eigen::Vector3d>& gravity_m_s2) {
   TorqueRobot out;
   out.model = read_dynamic_urdf(urdf);
+  refuse_massless_moments(out.model, urdf);
   if (gravity_m_s2) out.model.gravity_m_s2 = *gravity_m_s2;
   const KinematicTree& tree = out.model.tree;
   for (const JointId id : moving_joints(tree)) {

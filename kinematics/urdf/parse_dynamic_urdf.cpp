@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
@@ -46,6 +48,16 @@ Pose read_origin(const XMLElement& parent, const XmlOwner& owner) {
   return pose;
 }
 
+/// No body of a robot comes near 1e6 kg, kg m^2, m or N m: beyond it is a slip of the pen (1e300),
+/// or grams and millimetres, and covariances made of it are no longer positive definite.
+void check_size(const XMLElement& element, const char* what, double value, const XmlOwner& owner) {
+  constexpr double kLargest = 1e6;
+  if (std::abs(value) <= kLargest) return;
+  throw bad_input(xml_place(element, owner.source),
+                  fmt::format("{}: {} is {:g}, more than {:g}", owner.owner, what, value, kLargest),
+                  "URDF is in kg, m and s: correct it");
+}
+
 InertialParameters read_inertial(const XMLElement& inertial, const XmlOwner& owner) {
   CentralInertia central{.mass_kg = required_number(inertial, "mass", "value", owner)};
   if (central.mass_kg < 0.0) {
@@ -53,8 +65,11 @@ InertialParameters read_inertial(const XMLElement& inertial, const XmlOwner& own
                     fmt::format("{}: the mass is {} kg", owner.owner, central.mass_kg),
                     "a mass is not negative");
   }
+  check_size(inertial, "the mass", central.mass_kg, owner);
   const auto moment = [&](const char* name) {
-    return required_number(inertial, "inertia", name, owner);
+    const double value = required_number(inertial, "inertia", name, owner);
+    check_size(inertial, name, value, owner);
+    return value;
   };
   const double xx = moment("ixx");
   const double yy = moment("iyy");
@@ -63,7 +78,10 @@ InertialParameters read_inertial(const XMLElement& inertial, const XmlOwner& own
   const double xz = moment("ixz");
   const double yz = moment("iyz");
   central.inertia_kgm2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return in_frame(read_origin(inertial, owner), from_central(central));
+  const Pose origin = read_origin(inertial, owner);
+  check_size(inertial, "a coordinate of the centre of mass",
+             origin.translation.lpNorm<Eigen::Infinity>(), owner);
+  return in_frame(origin, from_central(central));
 }
 
 /// Adds the link's inertia to the link of the tree that it is, or that carries it as a marker.
@@ -86,6 +104,7 @@ double not_negative(const XMLElement& dynamics, const char* attribute, const Xml
                     fmt::format("{}: {} is {}", owner.owner, attribute, value[0]),
                     "it takes energy out: use a value of 0 or more");
   }
+  check_size(dynamics, attribute, value[0], owner);
   return value[0];
 }
 

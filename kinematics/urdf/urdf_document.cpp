@@ -248,6 +248,17 @@ void keep_children(XMLElement& element, const std::set<std::string>& names) {
   }
 }
 
+/// urdfdom refuses a hinge or slide without limits; here they are optional. A range without width
+/// is none.
+void fill_in_limit(XMLElement& joint) {
+  const std::string_view type = joint.Attribute("type");
+  if (type != "revolute" && type != "prismatic") return;
+  XMLElement* limit = joint.FirstChildElement("limit");
+  if (limit == nullptr) limit = joint.InsertNewChildElement("limit");
+  if (limit->Attribute("effort") == nullptr) limit->SetAttribute("effort", kAnyEffort);
+  if (limit->Attribute("velocity") == nullptr) limit->SetAttribute("velocity", kAnyVelocity);
+}
+
 std::string cut_down(XMLDocument& document) {
   XMLElement& robot = *document.FirstChildElement("robot");
   keep_children(robot, {"link", "joint"});
@@ -263,6 +274,7 @@ std::string cut_down(XMLDocument& document) {
   for (auto* joint = robot.FirstChildElement("joint"); joint != nullptr;
        joint = joint->NextSiblingElement("joint")) {
     keep_children(*joint, {"parent", "child", "origin", "axis", "limit", "mimic"});
+    fill_in_limit(*joint);
   }
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);

@@ -106,6 +106,21 @@ TEST(DynamicUrdf, RefusesWithLineAndRemedy) {
                   .starts_with("robot.urdf:7: joint 'j' follows another joint (mimic)"));
 }
 
+TEST(DynamicUrdf, RefusesSizesThatNoRobotHas) {
+  EXPECT_EQ(refusal(robot(fmt::format("<inertial><mass value=\"1e300\"/>{}</inertial>", kInertia))),
+            "robot.urdf:4: link 'b': the mass is 1e+300, more than 1e+06 (URDF is in kg, m and s: "
+            "correct it)");
+  EXPECT_TRUE(refusal(robot(R"(<inertial><mass value="1"/>
+      <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="2e6"/></inertial>)"))
+                  .starts_with("robot.urdf:4: link 'b': izz is 2e+06"));
+  EXPECT_TRUE(refusal(robot(fmt::format(R"(<inertial><origin xyz="0 0 1e200"/><mass value="1"/>{})"
+                                        "</inertial>",
+                                        kInertia)))
+                  .starts_with("robot.urdf:4: link 'b': a coordinate of the centre of mass"));
+  EXPECT_TRUE(refusal(robot("", R"(<dynamics armature="1e7"/>)"))
+                  .starts_with("robot.urdf:7: joint 'j': armature is 1e+07"));
+}
+
 TEST(DynamicUrdf, RefusesToWriteWhatUrdfCannotSay) {
   Rng rng = Rng::from_name("DynamicUrdf.RefusesToWrite");
   DynamicModel model = without_masses(random_tree(rng, 2, 0));

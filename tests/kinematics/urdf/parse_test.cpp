@@ -148,11 +148,17 @@ TEST(UrdfRefuses, NumbersThatAreNone) {
             std::string::npos);
 }
 
-TEST(UrdfRefuses, WhatUrdfdomRefusesAndPrintsNothing) {
-  // Only urdfdom knows that a revolute joint needs its limit.
-  const std::string message = refusal(joint(""));
-  EXPECT_TRUE(message.starts_with("robot.urdf: urdfdom refuses it: ")) << message;
-  EXPECT_NE(message.find("limits"), std::string::npos) << message;
+TEST(Urdf, AHingeWithoutLimitsHasNone) {
+  for (const char* limit :
+       {"", R"(<limit effort="5" velocity="1"/>)", R"(<limit velocity="2"/>)"}) {
+    for (const char* type : {"revolute", "prismatic"}) {
+      const KinematicTree tree = parse_urdf(joint(limit, type), "robot.urdf");
+      ASSERT_EQ(tree.joints.size(), 1U);
+      EXPECT_FALSE(tree.joints[0].limits) << limit;
+    }
+  }
+  const KinematicTree tree = parse_urdf(joint(R"(<limit lower="-1" upper="1"/>)"), "robot.urdf");
+  EXPECT_EQ(tree.joints[0].limits, (JointLimits{-1.0, 1.0}));
 }
 
 TEST(UrdfRefuses, AFileThatIsNotThere) {
