@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,6 +13,7 @@
 #include "app/io/nearest_name.h"
 #include "app/io/recording_files.h"
 #include "calib/camera/camera_file.h"
+#include "kinematics/core/bad_rows.h"
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/urdf.h"
 
@@ -103,36 +105,103 @@ void add_distances(Recording& recording, const RecordingFiles& files) {
   value_of(recording.points).distances = recording.settings.target_distances;
 }
 
+/// Stamps of tables are on the log's clock already; a start beside them is one too many.
+void refuse_video_start(const Recording& recording, const RecordingFiles& files) {
+  if (recording.entry == RecordingEntry::kVideo || recording.settings.video_start_s == 0.0) return;
+  throw bad_input(value_of(files.settings).string(),
+                  fmt::format("video_start is {} s, but the recording is read from {}.csv, whose t "
+                              "is on the log's clock",
+                              recording.settings.video_start_s, to_string(recording.entry)),
+                  "remove video_start, or add it to the column t");
+}
+
+/// A corner outside the image, if there is one. A corner is extrapolated from the marker's edges,
+/// so that it may lie a little outside: by 1 % of the size.
+std::optional<Eigen::Vector2d> corner_outside(const TagObservation& tag,
+                                              const CameraModel& camera) {
+  constexpr double kSlack = 0.01;
+  const Eigen::Vector2d size(camera.width, camera.height);
+  for (const Eigen::Vector2d& corner : tag.corners_px) {
+    const bool inside = (corner.array() >= -kSlack * size.array()).all() &&
+                        (corner.array() <= (1.0 + kSlack) * size.array()).all();
+    if (!inside) return corner;
+  }
+  return std::nullopt;
+}
+
+/// Leaves a few markers outside the images out; more of them are of other images than the camera's.
+void leave_out_outside(TagObservations& corners, const CameraModel& camera,
+                       const RecordingFiles& files, std::vector<std::string>& warnings) {
+  if (camera.width <= 0 || camera.height <= 0) return;  // its file tells no size
+  BadRows bad(value_of(files.corners).string(), corners.observations.size(), "sightings");
+  std::vector<TagObservation> inside;
+  for (TagObservation& tag : corners.observations) {
+    const auto corner = corner_outside(tag, camera);
+    if (!corner) {
+      inside.push_back(std::move(tag));
+      continue;
+    }
+    bad.add(
+        bad.size(),
+        bad_input(value_of(files.corners).string(),
+                  fmt::format("tag {} at t = {} has a corner at ({:.1f}, {:.1f}), outside the "
+                              "images of {} x {} px of {}",
+                              tag.id.value, corners.times_s[static_cast<std::size_t>(tag.frame)],
+                              corner->x(), corner->y(), camera.width, camera.height,
+                              value_of(files.camera).string()),
+                  "give the intrinsics of the images that the corners were found in"));
+  }
+  corners.observations = std::move(inside);
+  const std::vector<std::string> left_out = bad.warnings();
+  warnings.insert(warnings.end(), left_out.begin(), left_out.end());
+}
+
+void take_image_size(Recording& recording, const RecordingFiles& files) {
+  if (!files.camera) {
+    throw bad_input((recording.folder / "camera.yaml").string(),
+                    "no such file, and corners.csv does not say how large the images were",
+                    "add the camera's intrinsics, or name them with --camera");
+  }
+  if (!recording.camera) return;  // it was refused
+  TagObservations& corners = value_of(recording.corners);
+  corners.width = recording.camera->width;
+  corners.height = recording.camera->height;
+  leave_out_outside(corners, *recording.camera, files, recording.warnings);
+}
+
 void read_sightings(Recording& recording, const RecordingFiles& files) {
+  const auto warn = [&](const std::vector<std::string>& warnings) {
+    recording.warnings.insert(recording.warnings.end(), warnings.begin(), warnings.end());
+  };
+  refuse_video_start(recording, files);
   switch (recording.entry) {
     case RecordingEntry::kVideo:
       recording.video = value_of(files.video);
       break;
     case RecordingEntry::kCorners:
       recording.corners = read_corners(value_of(files.corners), recording.markers);
-      if (!files.camera) {
-        throw bad_input((recording.folder / "camera.yaml").string(),
-                        "no such file, and corners.csv does not say how large the images were",
-                        "add the camera's intrinsics, or name them with --camera");
-      }
-      if (recording.camera) {
-        value_of(recording.corners).width = recording.camera->width;
-        value_of(recording.corners).height = recording.camera->height;
-      }
+      warn(std::exchange(value_of(recording.corners).warnings, {}));
+      take_image_size(recording, files);
       require_time_overlap(recording.log, value_of(recording.corners).times_s,
                            value_of(files.corners).string());
       break;
-    case RecordingEntry::kPoses:
-      recording.poses = read_poses(value_of(files.poses));
+    case RecordingEntry::kPoses: {
+      ReadSightings<PoseTracks> read = read_poses(value_of(files.poses));
+      recording.poses = std::move(read.found);
+      warn(read.warnings);
       require_time_overlap(recording.log, value_of(recording.poses).times_s,
                            value_of(files.poses).string());
       break;
-    case RecordingEntry::kPoints:
-      recording.points = read_points(value_of(files.points));
+    }
+    case RecordingEntry::kPoints: {
+      ReadSightings<PointObservations> read = read_points(value_of(files.points));
+      recording.points = std::move(read.found);
+      warn(read.warnings);
       add_distances(recording, files);
       require_time_overlap(recording.log, value_of(recording.points).times_s,
                            value_of(files.points).string());
       break;
+    }
   }
 }
 
@@ -216,8 +285,8 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
       log.source.empty() ? "joints.csv" : log.source,
       fmt::format("runs from {:.3f} to {:.3f} s and {} from {:.3f} to {:.3f} s: no common time",
                   log.times_s.front(), log.times_s.back(), source, first, last),
-      "use one clock for both, or set video_start in recording.yaml to the log's time at the "
-      "video's first frame");
+      "use one clock for both; of a video, video_start in recording.yaml is the log's time at its "
+      "first frame");
 }
 
 std::string recording_name(const fs::path& folder) {

@@ -88,7 +88,8 @@ struct ReadAttempt {
 void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
                           const std::string& source);
 
-/// The single readers, for the same files anywhere.
+/// The single readers, for the same files anywhere. Those of tables leave a few bad rows out
+/// (bad_rows.h) and say so; those of corners in the observations' warnings.
 /// tags.yaml: family, default_size, sizes (id: size), tags (list of id, size), boards (id: columns,
 /// rows, square: the inner corners of a chessboard row by row, x right, y down), only_listed.
 [[nodiscard]] MarkerSet read_marker_set(const std::filesystem::path& path);
@@ -96,11 +97,17 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
 /// corners.csv: t,tag,corner,u,v[,sigma] (px; corner from 0), one row a corner.
 [[nodiscard]] TagObservations read_corners(const std::filesystem::path& path,
                                            const MarkerSet& markers);
+/// What a reader gives, and one line each for what it left out.
+template <typename Found>
+struct ReadSightings {
+  Found found;
+  std::vector<std::string> warnings;
+};
 /// poses.csv: t,body,x,y,z,qx,qy,qz,qw[,sigma_m,sigma_rad] (m; body in the camera's or tracker's
-/// frame).
-[[nodiscard]] PoseTracks read_poses(const std::filesystem::path& path);
+/// frame). Positions that span more than a hall are taken as mm, with a warning.
+[[nodiscard]] ReadSightings<PoseTracks> read_poses(const std::filesystem::path& path);
 /// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place
 /// is unknown.
-[[nodiscard]] PointObservations read_points(const std::filesystem::path& path);
+[[nodiscard]] ReadSightings<PointObservations> read_points(const std::filesystem::path& path);
 
 }  // namespace kinescope

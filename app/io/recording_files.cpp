@@ -29,7 +29,8 @@ std::vector<fs::path> sorted_files(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_regular_file(error)) files.push_back(entry.path());
+    std::error_code dangling;  // a link to nothing is no file, and no fault of the folder
+    if (entry.is_regular_file(dangling)) files.push_back(entry.path());
   }
   if (error) throw bad_input(folder.string(), "cannot be listed", "check its permissions");
   std::ranges::sort(files);
@@ -43,6 +44,19 @@ void check_folder(const fs::path& folder) {
   if (fs::is_directory(folder, error)) return;
   throw bad_input(folder.string(), "is a file, not a recording's folder",
                   "name the folder that holds the video, tags.yaml and joints.csv");
+}
+
+/// Something of a file's name that cannot be read as one is not the same as nothing.
+void refuse_no_file(const fs::path& path) {
+  std::error_code error;
+  const fs::file_type entry = fs::symlink_status(path, error).type();
+  if (entry == fs::file_type::not_found || entry == fs::file_type::none) return;
+  const fs::file_type target = fs::status(path, error).type();
+  const char* what = "is a pipe or a device, not a file";
+  if (target == fs::file_type::directory) what = "is a folder, not a file";
+  if (target == fs::file_type::not_found) what = "is a link to a file that is not there";
+  if (error == std::errc::too_many_symbolic_link_levels) what = "is a link that leads to itself";
+  throw bad_input(path.string(), what, "put the file there, or remove it");
 }
 
 /// The video: the one named video.*, else the only one, else a folder of images.
@@ -61,6 +75,7 @@ MaybePath find_video(const fs::path& folder) {
                     "name one with --video");
   }
   if (candidates.size() == 1) return candidates.front();
+  for (const char* ending : kVideoEndings) refuse_no_file(folder / (std::string("video") + ending));
   for (const char* name : {"images", "video"}) {
     std::error_code error;
     if (fs::is_directory(folder / name, error)) return folder / name;
@@ -77,6 +92,7 @@ MaybePath find_file(const MaybePath& declared, const fs::path& folder, const cha
     throw bad_input(declared->string(), "no such file", fmt::format("correct {}", option));
   }
   if (fs::is_regular_file(folder / name, error)) return folder / name;
+  refuse_no_file(folder / name);
   return std::nullopt;
 }
 

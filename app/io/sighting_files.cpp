@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // corners.csv, poses.csv and points.csv: rows in any order, one frame for all rows of the same `t`.
+// A few bad rows are left out; of corners.csv the sightings that they belong to.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,8 +9,10 @@
 #include <fmt/format.h>
 
 #include "app/io/recording.h"
+#include "kinematics/core/bad_rows.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/log/header_units.h"
 
 namespace kinescope {
 namespace {
@@ -22,44 +25,78 @@ constexpr double kPoseSigmaM = 1e-3;
 constexpr double kPoseSigmaRad = 2e-3;
 constexpr double kPointSigmaM = 1e-4;
 
-/// The distinct times of a table and the frame of each row.
-struct Frames {
-  std::vector<double> times_s;
-  std::vector<int> of_row;
-};
+// Further off than any robot or image: what a broken sensor or an unset variable writes.
+constexpr double kFarthestM = 1e6;
+constexpr double kFarthestPx = 1e7;
 
-Frames group_by_time(const CsvTable& table) {
-  const std::size_t t = table.require_column("t");
-  std::vector<double> row_times;
-  row_times.reserve(table.rows.size());
-  for (std::size_t r = 0; r < table.rows.size(); ++r) row_times.push_back(table.number(r, t));
-  Frames frames;
-  frames.times_s = row_times;
-  std::ranges::sort(frames.times_s);
-  const auto repeated = std::ranges::unique(frames.times_s);
-  frames.times_s.erase(repeated.begin(), repeated.end());
-  for (const double time_s : row_times) {
-    const auto frame = std::ranges::lower_bound(frames.times_s, time_s);
-    frames.of_row.push_back(static_cast<int>(frame - frames.times_s.begin()));
-  }
-  return frames;
+/// A table by its columns' names without units; its numbers come in s, m, rad and px.
+CsvTable read_sighting_table(const std::filesystem::path& path) {
+  CsvTable table = read_csv(path, RaggedRows::kSetAside);
+  for (const std::string& column : table.header) table.factors.push_back(header_factor(column));
+  strip_units(table);
+  return table;
 }
 
-/// Rows by frame, then id, each pair's rows in the file's order.
-std::map<std::pair<int, TagId>, std::vector<std::size_t>> group_by_sighting(const CsvTable& table,
-                                                                            const Frames& frames,
-                                                                            const char* id_column) {
-  const std::size_t column = table.require_column(id_column);
-  std::map<std::pair<int, TagId>, std::vector<std::size_t>> groups;
+/// A row whose time and id can be read.
+struct KeyedRow {
+  std::size_t row = 0;
+  double time_s = 0.0;
+  TagId id;
+};
+
+TagId read_id(const CsvTable& table, std::size_t row, std::size_t column) {
+  const TagId id{table.integer(row, column)};
+  if (id.value >= 0) return id;
+  throw bad_input(table.place(row),
+                  fmt::format("column '{}' holds {}", table.header[column], id.value),
+                  "numbers begin at 0");
+}
+
+std::vector<KeyedRow> read_keys(const CsvTable& table, const char* id_column, BadRows& bad) {
+  const std::size_t t = table.require_column("t");
+  const std::size_t id = table.require_column(id_column);
+  std::vector<KeyedRow> keys;
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    const TagId id{table.integer(r, column)};
-    if (id.value < 0) {
-      throw bad_input(table.place(r), fmt::format("column '{}' holds {}", id_column, id.value),
-                      "numbers begin at 0");
+    try {
+      keys.push_back({r, table.number(r, t), read_id(table, r, id)});
+    } catch (const Error& error) {
+      bad.add(table.lines[r], error);
     }
-    groups[{frames.of_row[r], id}].push_back(r);
+  }
+  return keys;
+}
+
+std::vector<double> distinct_times(const std::vector<KeyedRow>& keys) {
+  std::vector<double> times_s;
+  times_s.reserve(keys.size());
+  for (const KeyedRow& key : keys) times_s.push_back(key.time_s);
+  std::ranges::sort(times_s);
+  const auto repeated = std::ranges::unique(times_s);
+  times_s.erase(repeated.begin(), repeated.end());
+  return times_s;
+}
+
+using Groups = std::map<std::pair<int, TagId>, std::vector<std::size_t>>;
+
+/// Rows by frame, then id, each pair's rows in the file's order.
+Groups group_by_sighting(const std::vector<KeyedRow>& keys, const std::vector<double>& times_s) {
+  Groups groups;
+  for (const KeyedRow& key : keys) {
+    const auto frame = std::ranges::lower_bound(times_s, key.time_s) - times_s.begin();
+    groups[{static_cast<int>(frame), key.id}].push_back(key.row);
   }
   return groups;
+}
+
+/// A number no further from zero than `most`.
+double bounded_number(const CsvTable& table, std::size_t row, std::string_view name, double most) {
+  const std::size_t column = table.require_column(name);
+  const double value = table.number(row, column);
+  if (std::abs(value) <= most) return value;
+  throw bad_input(
+      table.place(row),
+      fmt::format("column '{}' holds {}, which is out of all reach", name, table.rows[row][column]),
+      "correct or remove the line");
 }
 
 /// A sigma, where the column is there and the cell is filled.
@@ -76,9 +113,8 @@ std::optional<double> sigma(const CsvTable& table, std::size_t row, std::string_
 }
 
 Eigen::Vector3d vector3(const CsvTable& table, std::size_t row) {
-  return {table.number(row, table.require_column("x")),
-          table.number(row, table.require_column("y")),
-          table.number(row, table.require_column("z"))};
+  return {bounded_number(table, row, "x", kFarthestM), bounded_number(table, row, "y", kFarthestM),
+          bounded_number(table, row, "z", kFarthestM)};
 }
 
 std::string marker_in_frame(const char* kind, TagId id, double time_s) {
@@ -89,8 +125,6 @@ std::string marker_in_frame(const char* kind, TagId id, double time_s) {
 TagObservation read_sighting(const CsvTable& table, const std::vector<std::size_t>& rows,
                              std::size_t corner_count, const std::string& who) {
   const std::size_t corner_column = table.require_column("corner");
-  const std::size_t u = table.require_column("u");
-  const std::size_t v = table.require_column("v");
   TagObservation out;
   out.corners_px.resize(corner_count);
   std::vector<bool> seen(corner_count, false);
@@ -107,7 +141,8 @@ TagObservation read_sighting(const CsvTable& table, const std::vector<std::size_
                       "keep one of the rows");
     }
     seen[index] = true;
-    out.corners_px[index] = {table.number(row, u), table.number(row, v)};
+    out.corners_px[index] = {bounded_number(table, row, "u", kFarthestPx),
+                             bounded_number(table, row, "v", kFarthestPx)};
     const double sigma_px = sigma(table, row, "sigma").value_or(kCornerSigmaPx);
     variance_sum += sigma_px * sigma_px;
   }
@@ -130,7 +165,7 @@ bool has_corners(const MarkerSet& markers, TagId id) {
   return markers.size_m(id) > 0.0 || markers.boards.contains(id);
 }
 
-/// Unit quaternion of a row. The columns' order is x, y, z, w.
+/// The quaternion of a row as it stands there. The columns' order is x, y, z, w.
 Eigen::Quaterniond quaternion(const CsvTable& table, std::size_t row) {
   Eigen::Quaterniond q;
   const char* const columns[] = {"qx", "qy", "qz", "qw"};
@@ -142,13 +177,27 @@ Eigen::Quaterniond quaternion(const CsvTable& table, std::size_t row) {
     throw bad_input(table.place(row), fmt::format("the quaternion has length {}", q.norm()),
                     "columns qx, qy, qz, qw hold a unit quaternion; leave rows without a pose out");
   }
-  return q.normalized();
+  return q;
 }
 
-PoseSample read_pose(const CsvTable& table, std::size_t row, int frame) {
+/// What rounding to two decimals leaves of a unit quaternion; more is another thing in the columns.
+bool is_unit(const Eigen::Quaterniond& q) {
+  constexpr double kRounded = 0.01;
+  return std::abs(q.norm() - 1.0) <= kRounded;
+}
+
+Error not_unit(const CsvTable& table, std::size_t row, const Eigen::Quaterniond& q) {
+  return bad_input(table.place(row), fmt::format("the quaternion has length {:.4g}", q.norm()),
+                   "columns qx, qy, qz, qw hold a unit quaternion");
+}
+
+/// Throws for a quaternion that is no unit one where `unit` is asked for.
+PoseSample read_pose(const CsvTable& table, std::size_t row, int frame, bool unit) {
   PoseSample sample;
   sample.frame = frame;
-  sample.T_camera_marker = {quaternion(table, row), vector3(table, row)};
+  const Eigen::Quaterniond q = quaternion(table, row);
+  if (unit && !is_unit(q)) throw not_unit(table, row, q);
+  sample.T_camera_marker = {q.normalized(), vector3(table, row)};
   const double sigma_m = sigma(table, row, "sigma_m").value_or(kPoseSigmaM);
   const double sigma_rad = sigma(table, row, "sigma_rad").value_or(kPoseSigmaRad);
   Vector6d variances;
@@ -156,6 +205,55 @@ PoseSample read_pose(const CsvTable& table, std::size_t row, int frame) {
       Eigen::Vector3d::Constant(sigma_m * sigma_m);
   sample.covariance = variances.asDiagonal();
   return sample;
+}
+
+/// One odd quaternion is a bad row. Where most are, a whole file was scaled, which changes no
+/// rotation: then they are normalised, with a warning.
+std::optional<std::string> scaled_quaternions(const CsvTable& table, const BadRows& bad) {
+  std::size_t odd = 0;
+  std::string first;
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    try {
+      const Eigen::Quaterniond q = quaternion(table, r);
+      if (is_unit(q)) continue;
+      if (odd++ == 0) first = not_unit(table, r, q).what();
+    } catch (const Error&) {
+      continue;  // told where the row is read
+    }
+  }
+  if (odd == 0 || !bad.too_many(bad.size() + odd)) return std::nullopt;
+  return fmt::format("{}: {} of {} quaternions are normalised, the first: {}", table.source, odd,
+                     table.rows.size(), first);
+}
+
+/// Width of the middle nine tenths of the positions along the axis where it is largest.
+double span_m(const PoseTracks& tracks) {
+  double widest = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const PoseTrack& track : tracks.tracks) {
+      for (const PoseSample& sample : track.samples) {
+        along.push_back(sample.T_camera_marker.translation[axis]);
+      }
+    }
+    if (along.empty()) return 0.0;
+    std::ranges::sort(along);
+    widest =
+        std::max(widest, along[along.size() - 1 - along.size() / 20] - along[along.size() / 20]);
+  }
+  return widest;
+}
+
+/// No camera or tracker sees a robot over 100 m; one of half a metre spans more than that in mm.
+void read_as_metres(ReadSightings<PoseTracks>& poses, const std::string& source) {
+  constexpr double kNoHall = 100.0;
+  const double span = span_m(poses.found);
+  if (span <= kNoHall) return;
+  for (PoseTrack& track : poses.found.tracks) {
+    for (PoseSample& sample : track.samples) sample.T_camera_marker.translation *= 1e-3;
+  }
+  poses.warnings.push_back(fmt::format(
+      "{}: the positions span {:.0f} m: they are taken as mm (write x, y, z in m)", source, span));
 }
 
 PointObservation read_point(const CsvTable& table, std::size_t row) {
@@ -179,20 +277,47 @@ PointObservation read_point(const CsvTable& table, std::size_t row) {
   return out;
 }
 
-[[noreturn]] void throw_twice(const CsvTable& table, std::size_t row, const std::string& who) {
-  throw bad_input(table.place(row), who + " stands there twice", "keep one of the rows");
+Error twice(const CsvTable& table, std::size_t row, const std::string& who) {
+  return bad_input(table.place(row), who + " stands there twice", "keep one of the rows");
+}
+
+/// Sightings of one row each: reads the first row of every group; further ones are bad.
+template <typename Read>
+void read_each(const CsvTable& table, const Groups& groups, const std::vector<double>& times_s,
+               const char* kind, BadRows& bad, const Read& read) {
+  for (const auto& [key, rows] : groups) {
+    const auto [frame, id] = key;
+    const double time_s = times_s[static_cast<std::size_t>(frame)];
+    for (std::size_t k = 1; k < rows.size(); ++k) {
+      bad.add(table.lines[rows[k]], twice(table, rows[k], marker_in_frame(kind, id, time_s)));
+    }
+    try {
+      read(rows.front(), frame, id);
+    } catch (const Error& error) {
+      bad.add(table.lines[rows.front()], error);
+    }
+  }
+}
+
+void append(std::vector<std::string>& warnings, const BadRows& bad) {
+  const std::vector<std::string> more = bad.warnings();
+  warnings.insert(warnings.end(), more.begin(), more.end());
 }
 
 }  // namespace
 
 TagObservations read_corners(const std::filesystem::path& path, const MarkerSet& markers) {
-  const CsvTable table = read_csv(path);
-  const Frames frames = group_by_time(table);
+  const CsvTable table = read_sighting_table(path);
+  for (const char* name : {"corner", "u", "v"}) static_cast<void>(table.require_column(name));
+  BadRows bad_rows(table);
+  const std::vector<KeyedRow> keys = read_keys(table, "tag", bad_rows);
   TagObservations out;
-  out.times_s = frames.times_s;
-  for (const auto& [key, rows] : group_by_sighting(table, frames, "tag")) {
+  out.times_s = distinct_times(keys);
+  const Groups groups = group_by_sighting(keys, out.times_s);
+  BadRows bad(table.source, groups.size(), "sightings");
+  for (const auto& [key, rows] : groups) {
     const auto [frame, id] = key;
-    const double time_s = frames.times_s[static_cast<std::size_t>(frame)];
+    const double time_s = out.times_s[static_cast<std::size_t>(frame)];
     if (!has_corners(markers, id)) {
       if (!markers.only_listed) {
         throw bad_input(table.place(rows.front()),
@@ -202,51 +327,65 @@ TagObservations read_corners(const std::filesystem::path& path, const MarkerSet&
       out.rejected.push_back({.frame = frame, .id = id, .reason = "not listed in tags.yaml"});
       continue;
     }
-    TagObservation sighting = read_sighting(table, rows, markers.corners_m(id).size(),
-                                            marker_in_frame("tag", id, time_s));
-    sighting.frame = frame;
-    sighting.id = id;
-    out.observations.push_back(std::move(sighting));
+    try {
+      TagObservation sighting = read_sighting(table, rows, markers.corners_m(id).size(),
+                                              marker_in_frame("tag", id, time_s));
+      sighting.frame = frame;
+      sighting.id = id;
+      out.observations.push_back(std::move(sighting));
+    } catch (const Error& error) {
+      bad.add(table.lines[rows.front()], error);
+    }
   }
   if (out.observations.empty()) {
     throw bad_input(table.source, "holds no tag that tags.yaml lists", "correct tags.yaml");
   }
+  append(out.warnings, bad_rows);
+  append(out.warnings, bad);
   return out;
 }
 
-PoseTracks read_poses(const std::filesystem::path& path) {
-  const CsvTable table = read_csv(path);
-  const Frames frames = group_by_time(table);
-  PoseTracks out;
-  out.times_s = frames.times_s;
-  std::map<TagId, PoseTrack> tracks;
-  for (const auto& [key, rows] : group_by_sighting(table, frames, "body")) {
-    const auto [frame, id] = key;
-    const double time_s = frames.times_s[static_cast<std::size_t>(frame)];
-    if (rows.size() > 1) throw_twice(table, rows[1], marker_in_frame("body", id, time_s));
-    tracks[id].samples.push_back(read_pose(table, rows.front(), frame));
+ReadSightings<PoseTracks> read_poses(const std::filesystem::path& path) {
+  const CsvTable table = read_sighting_table(path);
+  for (const char* name : {"x", "y", "z", "qx", "qy", "qz", "qw"}) {
+    static_cast<void>(table.require_column(name));
   }
+  BadRows bad(table);
+  const std::vector<KeyedRow> keys = read_keys(table, "body", bad);
+  ReadSightings<PoseTracks> out;
+  const std::optional<std::string> scaled = scaled_quaternions(table, bad);
+  if (scaled) out.warnings.push_back(*scaled);
+  out.found.times_s = distinct_times(keys);
+  std::map<TagId, PoseTrack> tracks;
+  read_each(table, group_by_sighting(keys, out.found.times_s), out.found.times_s, "body", bad,
+            [&](std::size_t row, int frame, TagId id) {
+              PoseSample sample = read_pose(table, row, frame, !scaled);
+              tracks[id].samples.push_back(std::move(sample));
+            });
   for (auto& [id, track] : tracks) {
     track.id = id;
-    out.tracks.push_back(std::move(track));
+    out.found.tracks.push_back(std::move(track));
   }
+  append(out.warnings, bad);
+  read_as_metres(out, table.source);
   return out;
 }
 
-PointObservations read_points(const std::filesystem::path& path) {
-  const CsvTable table = read_csv(path);
-  const Frames frames = group_by_time(table);
-  PointObservations out;
-  out.times_s = frames.times_s;
-  for (const auto& [key, rows] : group_by_sighting(table, frames, "point")) {
-    const auto [frame, id] = key;
-    const double time_s = frames.times_s[static_cast<std::size_t>(frame)];
-    if (rows.size() > 1) throw_twice(table, rows[1], marker_in_frame("point", id, time_s));
-    PointObservation point = read_point(table, rows.front());
-    point.frame = frame;
-    point.id = id;
-    out.observations.push_back(std::move(point));
-  }
+ReadSightings<PointObservations> read_points(const std::filesystem::path& path) {
+  const CsvTable table = read_sighting_table(path);
+  for (const char* name : {"x", "y", "z"}) static_cast<void>(table.require_column(name));
+  BadRows bad(table);
+  const std::vector<KeyedRow> keys = read_keys(table, "point", bad);
+  ReadSightings<PointObservations> out;
+  out.found.times_s = distinct_times(keys);
+  read_each(table, group_by_sighting(keys, out.found.times_s), out.found.times_s, "point", bad,
+            [&](std::size_t row, int frame, TagId id) {
+              PointObservation point = read_point(table, row);
+              point.frame = frame;
+              point.id = id;
+              out.found.observations.push_back(std::move(point));
+            });
+  append(out.warnings, bad);
   return out;
 }
 

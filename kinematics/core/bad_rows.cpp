@@ -22,12 +22,13 @@ std::string_view complaint_of(const Error& error) {
 
 }  // namespace
 
-BadRows::BadRows(const CsvTable& table, std::size_t count, std::string unit)
-    : source_(table.source), unit_(std::move(unit)), count_(count) {
+BadRows::BadRows(std::string source, std::size_t count, std::string unit)
+    : source_(std::move(source)), unit_(std::move(unit)), count_(count) {}
+
+BadRows::BadRows(const CsvTable& table)
+    : BadRows(table.source, table.rows.size() + table.ragged.size(), "rows") {
   for (const RaggedRow& row : table.ragged) add(row.line, table.ragged_error(row));
 }
-
-BadRows::BadRows(const CsvTable& table) : BadRows(table, table.rows.size() + table.ragged.size()) {}
 
 bool BadRows::too_many(std::size_t bad) const {
   constexpr std::size_t kInShortTables = 3;

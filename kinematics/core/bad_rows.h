@@ -18,10 +18,10 @@ namespace kinescope {
 /// Interpolation bridges a sample in twenty; a reader that guesses a column wrong spoils all.
 class BadRows {
  public:
-  /// Begins with the table's ragged rows. `unit` is what is counted, `count` how many there are of
-  /// it, good or bad.
-  BadRows(const CsvTable& table, std::size_t count, std::string unit = "rows");
+  /// Begins with the table's ragged rows.
   explicit BadRows(const CsvTable& table);
+  /// `unit` is what is counted, `count` how many there are of it, good or bad.
+  BadRows(std::string source, std::size_t count, std::string unit);
 
   /// One more, in this line of the file. Throws the error of the first when they are too many.
   void add(std::size_t line, const Error& error);

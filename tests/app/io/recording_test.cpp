@@ -141,20 +141,95 @@ TEST_F(ReadRecording, JointLogsRefused) {
   EXPECT_EQ(with("joints.csv", ""), "joints.csv: is empty (record it again)");
   EXPECT_NE(with("joints.csv", "t,a\n").find("joints.csv: has a header but no rows"),
             std::string::npos);
-  EXPECT_NE(with("joints.csv", "t,a\n0,1\n1,1\n0.5,1\n")
+  EXPECT_NE(with("joints.csv", "t,a\n0,1\n1,1\n0.5,1\n0.2,1\n")
                 .find("joints.csv:4: time 0.500000 s does not come after"),
             std::string::npos);
   EXPECT_NE(with("joints.csv", "t,a\n0,1\n1,nan\n").find("joints.csv:3: column 'a' holds 'nan'"),
             std::string::npos);
-  EXPECT_NE(with("joints.csv", "t;a\n0;1\n").find("joints.csv:1: columns are separated by ';'"),
+  EXPECT_NE(with("joints.csv", "t a\n0 1\n").find("joints.csv:1: columns are separated by ' '"),
             std::string::npos);
   EXPECT_NE(with("joints.csv", "t,a,a\n0,1,1\n").find("joints.csv:1: two columns are named 'a'"),
             std::string::npos);
   EXPECT_EQ(with("joints.csv", "t,a\n10,1\n12,1\n"),
             "joints.csv: runs from 10.000 to 12.000 s and poses.csv from 0.000 to 2.000 s: no "
             "common time (use one "
-            "clock for both, or set video_start in recording.yaml to the log's time at the video's "
+            "clock for both; of a video, video_start in recording.yaml is the log's time at its "
             "first frame)");
+}
+
+TEST_F(ReadRecording, WhatIsNamedLikeAFileAndIsNone) {
+  const auto joints = folder_.path() / "joints.csv";
+  folder_.remove("joints.csv");
+  std::filesystem::create_directory(joints);
+  EXPECT_EQ(folder_.refusal(),
+            "joints.csv: is a folder, not a file (put the file there, or remove it)");
+  std::filesystem::remove(joints);
+  std::filesystem::create_symlink("gone.csv", joints);
+  EXPECT_NE(folder_.refusal().find("joints.csv: is a link to a file that is not there"),
+            std::string::npos);
+  std::filesystem::remove(joints);
+  std::filesystem::create_symlink("joints.csv", joints);
+  EXPECT_NE(folder_.refusal().find("joints.csv: is a link that leads to itself"),
+            std::string::npos);
+  std::filesystem::remove(joints);
+  std::filesystem::create_symlink("gone.mp4", folder_.path() / "video.mp4");
+  EXPECT_NE(folder_.refusal().find("video.mp4: is a link to a file that is not there"),
+            std::string::npos);
+}
+
+TEST_F(ReadRecording, AStartOfTheVideoWithoutAVideo) {
+  EXPECT_EQ(with("recording.yaml", "video_start: 0.5\n"),
+            "recording.yaml: video_start is 0.5 s, but the recording is read from poses.csv, whose "
+            "t is on the log's clock (remove video_start, or add it to the column t)");
+  EXPECT_EQ(with("recording.yaml", "video_start: 0\n"), "accepted");
+}
+
+class CornersOfACamera : public ReadRecording {
+ protected:
+  CornersOfACamera() {
+    folder_.remove("poses.csv");
+    folder_.write("tags.yaml", "default_size: 0.05\n");
+    folder_.write("camera.yaml",
+                  "image_width: 640\nimage_height: 480\ncamera_matrix: {rows: 3, cols: 3, data: "
+                  "[500, 0, 320, 0, 500, 240, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
+                  "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
+  }
+  void sightings_at(const std::vector<double>& us) {
+    std::string text = "t,tag,corner,u,v\n";
+    for (std::size_t i = 0; i < us.size(); ++i) {
+      for (int c = 0; c < 4; ++c) {
+        text += fmt::format("{},1,{},{},{}\n", 0.1 * static_cast<double>(i), c, us[i] - c % 2,
+                            100 + c / 2);
+      }
+    }
+    folder_.write("corners.csv", text);
+  }
+};
+
+TEST_F(CornersOfACamera, ALittleOutsideIsInside) {
+  sightings_at({645.0, 100.0, -4.0});
+  const Recording recording = read_recording(folder_.paths());
+  EXPECT_EQ(recording.corners->observations.size(), 3U);
+  EXPECT_TRUE(recording.warnings.empty());
+}
+
+TEST_F(CornersOfACamera, OneOutsideIsLeftOut) {
+  sightings_at({100.0, 900.0, 100.0});
+  const Recording recording = read_recording(folder_.paths());
+  EXPECT_EQ(recording.corners->observations.size(), 2U);
+  ASSERT_EQ(recording.warnings.size(), 1U);
+  EXPECT_NE(recording.warnings[0].find("tag 1 at t = 0.1 has a corner at (900.0, 100.0), outside"),
+            std::string::npos);
+}
+
+TEST_F(CornersOfACamera, OfOtherImagesAreRefused) {
+  sightings_at({100.0, 900.0, 1000.0});
+  const std::string refusal = folder_.refusal();
+  EXPECT_TRUE(
+      refusal.starts_with("corners.csv: tag 1 at t = 0.1 has a corner at (900.0, 100.0), "
+                          "outside the images of 640 x 480 px of "))
+      << refusal;
+  EXPECT_NE(refusal.find("camera.yaml (give the intrinsics of the images"), std::string::npos);
 }
 
 TEST_F(ReadRecording, HugeFileRefused) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <map>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/app/io/recording_folder.h"
@@ -16,13 +18,14 @@ class SightingFiles : public testing::Test {
     folder_.write("corners.csv", text);
     return read_corners(folder_.path() / "corners.csv", markers_);
   }
-  PoseTracks poses(std::string_view text) {
+  ReadSightings<PoseTracks> read_poses_of(std::string_view text) {
     folder_.write("poses.csv", text);
     return read_poses(folder_.path() / "poses.csv");
   }
+  PoseTracks poses(std::string_view text) { return read_poses_of(text).found; }
   PointObservations points(std::string_view text) {
     folder_.write("points.csv", text);
-    return read_points(folder_.path() / "points.csv");
+    return read_points(folder_.path() / "points.csv").found;
   }
   std::string corners_refusal(std::string_view text) {
     return folder_.refusal_of([&] { static_cast<void>(corners(text)); });
@@ -106,7 +109,8 @@ TEST_F(SightingFiles, CornersRefused) {
 
 TEST_F(SightingFiles, PosesWithTheirNoise) {
   const PoseTracks found = poses(
-      "t,body,x,y,z,qx,qy,qz,qw,sigma_m,sigma_rad\n1,5,1,2,3,0,0,2,2,0.01,0.02\n0,5,0,0,0,0,0,0,-1,"
+      "t,body,x,y,z,qx,qy,qz,qw,sigma_m,sigma_rad\n1,5,1,2,3,0,0,0.71,0.71,0.01,0.02\n0,5,0,0,0,0,"
+      "0,0,-1,"
       ",\n"
       "0,2,0,0,0,1,0,0,0,,\n");
   EXPECT_EQ(found.times_s, (std::vector<double>{0.0, 1.0}));
@@ -139,6 +143,104 @@ TEST_F(SightingFiles, PosesRefused) {
   EXPECT_NE(poses_refusal("t,body,x,y,z,qx,qy,qz,qw,sigma_m\n0,1,0,0,0,0,0,0,1,-1\n")
                 .find("'sigma_m' holds -1"),
             std::string::npos);
+}
+
+/// Forty good rows of a body that moves, and one more.
+std::string forty_poses(std::string_view row, double unit_m = 1.0) {
+  std::string text = "t,body,x,y,z,qx,qy,qz,qw\n";
+  for (int i = 0; i < 40; ++i) text += fmt::format("{},1,{},0,0,0,0,0,1\n", i, 0.01 * i * unit_m);
+  return text + std::string(row) + "\n";
+}
+
+TEST_F(SightingFiles, AFewBadPosesAreLeftOut) {
+  const std::map<std::string, std::string> bad = {
+      {"41,1,nan,0,0,0,0,0,1", "column 'x' holds 'nan', not a finite number"},
+      {"41,1,0,-2e6,0,0,0,0,1", "column 'y' holds -2e6, which is out of all reach"},
+      {"41,1,0,0,0,0,0,0,1.02", "the quaternion has length 1.02"},
+      {"41,ERR,0,0,0,0,0,0,1", "column 'body' holds 'ERR', not a finite number"},
+      {"41,1,0,0,0", "5 cells where the header has 9"},
+      {"39,1,0,0,0,0,0,0,1", "body 1 at t = 39 stands there twice"}};
+  for (const auto& [row, complaint] : bad) {
+    const ReadSightings<PoseTracks> read = read_poses_of(forty_poses(row));
+    ASSERT_EQ(read.found.tracks.size(), 1U) << row;
+    EXPECT_EQ(read.found.tracks[0].samples.size(), 40U) << row;
+    ASSERT_EQ(read.warnings.size(), 1U) << row;
+    EXPECT_TRUE(read.warnings[0].ends_with("poses.csv:42: " + complaint + ": left out"))
+        << read.warnings[0];
+  }
+}
+
+TEST_F(SightingFiles, ManyBadPosesAreRefused) {
+  std::string rows;
+  for (int i = 41; i < 45; ++i) rows += fmt::format("{},1,1e7,0,0,0,0,0,1\n", i);
+  EXPECT_NE(poses_refusal(forty_poses(rows)).find("poses.csv:42: column 'x' holds 1e7"),
+            std::string::npos);
+}
+
+TEST_F(SightingFiles, QuaternionsThatAreAllScaledAreNormalised) {
+  const ReadSightings<PoseTracks> read = read_poses_of(
+      "t,body,x,y,z,qx,qy,qz,qw\n0,1,0,0,0,0,0,0,2\n1,1,0,0,0,0,0,2,0\n2,1,0,0,0,0,2,0,0\n");
+  EXPECT_EQ(read.found.tracks[0].samples.size(), 3U);
+  EXPECT_EQ(read.found.tracks[0].samples[0].T_camera_marker.rotation.w(), 1.0);
+  ASSERT_EQ(read.warnings.size(), 1U);
+  EXPECT_NE(read.warnings[0].find("3 of 3 quaternions are normalised"), std::string::npos);
+}
+
+TEST_F(SightingFiles, PositionsThatSpanAHallAreMillimetres) {
+  const ReadSightings<PoseTracks> read = read_poses_of(forty_poses("41,1,0,0,0,0,0,0,1", 1e3));
+  EXPECT_NEAR(read.found.tracks[0].samples[10].T_camera_marker.translation.x(), 0.1, 1e-12);
+  ASSERT_EQ(read.warnings.size(), 1U);
+  EXPECT_NE(read.warnings[0].find("they are taken as mm"), std::string::npos);
+  EXPECT_TRUE(read_poses_of(forty_poses("41,1,5e5,0,0,0,0,0,1")).warnings.empty())
+      << "one position far off changes no unit";
+}
+
+TEST_F(SightingFiles, UnitsInTheHeaderAreUsed) {
+  const PoseTracks found =
+      poses("t [ms],body,x [mm],y [mm],z [m],qx,qy,qz,qw\n500,1,10,20,3,0,0,0,1\n");
+  EXPECT_EQ(found.times_s, std::vector<double>{0.5});
+  EXPECT_LT(
+      (found.tracks[0].samples[0].T_camera_marker.translation - Eigen::Vector3d(0.01, 0.02, 3.0))
+          .norm(),
+      1e-15);
+}
+
+std::string twenty_sightings(const std::map<int, std::string>& rows_of) {
+  std::string text = "t,tag,corner,u,v\n";
+  for (int i = 0; i < 20; ++i) {
+    const auto other = rows_of.find(i);
+    if (other != rows_of.end()) {
+      text += other->second;
+      continue;
+    }
+    for (int c = 0; c < 4; ++c) text += fmt::format("{},1,{},{},{}\n", i, c, c, c % 2);
+  }
+  return text;
+}
+
+TEST_F(SightingFiles, SightingsWithABadRowAreLeftOut) {
+  const std::map<std::string, std::string> bad = {
+      {"3,1,0,nan,0\n3,1,1,1,1\n3,1,2,2,0\n3,1,3,3,1\n",
+       "14: column 'u' holds 'nan', not a finite number"},
+      {"3,1,0,0,1e8\n3,1,1,1,1\n3,1,2,2,0\n3,1,3,3,1\n",
+       "14: column 'v' holds 1e8, which is out of all reach"},
+      {"3,1,0,0,0\n3,1,1,1,1\n3,1,2,2,0\n", "16: tag 1 at t = 3 has 3 corners of 4"}};
+  for (const auto& [rows, complaint] : bad) {
+    const TagObservations found = corners(twenty_sightings({{3, rows}}));
+    EXPECT_EQ(found.observations.size(), 19U) << rows;
+    EXPECT_EQ(found.times_s.size(), 20U) << rows;
+    ASSERT_EQ(found.warnings.size(), 1U) << rows;
+    EXPECT_TRUE(found.warnings[0].ends_with("corners.csv:" + complaint + ": left out"))
+        << found.warnings[0];
+  }
+  EXPECT_EQ(corners(twenty_sightings({{19, "19,1,0,0,0\n19,1,1,1"}})).observations.size(), 19U)
+      << "a file that is cut off";
+  const std::string one = "3,1,0,0,0\n";
+  EXPECT_NE(
+      corners_refusal(
+          twenty_sightings({{3, one}, {4, "4,1,0,0,0\n"}, {5, "5,1,0,0,0\n"}, {6, "6,1,0,0,0\n"}}))
+          .find("corners of 4"),
+      std::string::npos);
 }
 
 TEST_F(SightingFiles, PointsInTheTrackersFrameOrInATarget) {
