@@ -154,6 +154,12 @@ CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
   if (!document.is_object() || document.value("schema", json()) != "kinescope.calibration") {
     throw wrong(calibration_json, "this is no calibration");
   }
+  const json version = document.value("schema_version", json());
+  if (version != 1) {
+    throw wrong(calibration_json,
+                fmt::format("this program reads version 1 of calibrations, not {}",
+                            version.is_null() ? "none" : version.dump()));
+  }
   CalibratedEffects out;
   out.unit_factors = unit_factors(document, calibration_json);
   if (const auto gravity = document.find("gravity_base"); gravity != document.end()) {

@@ -85,6 +85,7 @@ class Correct : public testing::Test {
     scale.values = Eigen::VectorXd::Constant(1, 0.01);
     scale.references = Eigen::VectorXd::Ones(1);
     calibration_ = {{"schema", "kinescope.calibration"},
+                    {"schema_version", 1},
                     {"robot",
                      {{"joints",
                        {{{"name", "joint1"}, {"channel", "a"}, {"scale", 1.0}, {"offset", 0.0}},

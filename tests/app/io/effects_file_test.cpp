@@ -44,6 +44,7 @@ FittedEffect joint_map() {
 
 json document_of(const std::vector<FittedEffect>& effects) {
   return {{"schema", "kinescope.calibration"},
+          {"schema_version", 1},
           {"robot",
            {{"joints",
              {{{"name", "joint1"}, {"channel", "a"}, {"scale", 1.0}, {"offset", 0.0}},
@@ -134,6 +135,14 @@ TEST_F(EffectsFile, ACalibrationWithoutEffectsHasNone) {
   const CalibratedEffects back = read(document.dump());
   EXPECT_TRUE(back.effects.empty());
   EXPECT_FALSE(back.gravity_base);
+}
+
+TEST_F(EffectsFile, AnotherVersionIsRefused) {
+  json document = document_of({});
+  document["schema_version"] = 2;
+  refused(document, "this program reads version 1 of calibrations, not 2");
+  document.erase("schema_version");
+  refused(document, "this program reads version 1 of calibrations, not none");
 }
 
 TEST_F(EffectsFile, WhatIsNoCalibrationIsRefused) {
