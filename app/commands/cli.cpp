@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iostream>
 
 #include <fmt/format.h>
 
@@ -202,14 +203,32 @@ int run_guarded(const CLI::App& app, CommandLine& line) {
   } catch (const std::bad_alloc&) {
     message = "out of memory (a shorter video, or a machine with more of it)";
   } catch (const std::exception& error) {
-    message =
-        fmt::format("internal error: {} (please report it with the command line)", error.what());
+    // fmt throws where standard output cannot be written; after_output() tells that.
+    if (std::ferror(stdout) == 0)
+      message =
+          fmt::format("internal error: {} (please report it with the command line)", error.what());
   } catch (...) {
     message = "internal error of unknown kind (please report it with the command line)";
   }
   progress.finish();
   if (!message.empty()) print_error(message);
   return static_cast<int>(code);
+}
+
+/// The exit code, unless what was printed did not arrive (a full disk, a closed output).
+int after_output(int code) {
+  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.flush();
+  const bool failed_otherwise = code == static_cast<int>(ExitCode::kBadRequest) ||
+                                code == static_cast<int>(ExitCode::kBadInput) ||
+                                code == static_cast<int>(ExitCode::kUndetermined);
+  if (written || failed_otherwise) return code;
+  print_error("standard output: cannot be written (free some space, or write to another place)");
+  return static_cast<int>(ExitCode::kBadRequest);
+}
+
+/// A first word that is no command is said to be none, also before --help.
+bool names_no_command(const CLI::App& app, int argc, const char* const* argv) {
+  return argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty();
 }
 
 }  // namespace
@@ -225,10 +244,11 @@ int run_program(int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+    const bool asked = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+    if (asked && !names_no_command(app, argc, argv)) return after_output(app.exit(error));
     return report_parse_error(app, error, argc, argv);
   }
-  return run_guarded(app, line);
+  return after_output(run_guarded(app, line));
 }
 
 }  // namespace kinescope

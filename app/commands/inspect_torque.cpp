@@ -74,6 +74,18 @@ void note_missing_torques(const std::filesystem::path& log, TorqueLogFacts& fact
                          log.string())});
 }
 
+/// The robot, where one is named and can be read; else its problem is noted, apart from the log's.
+std::optional<TorqueRobot> robot_of(const InspectOptions& options, TorqueLogFacts& facts) {
+  if (!options.robot) return std::nullopt;
+  try {
+    return read_torque_robot(*options.robot, std::nullopt);
+  } catch (const Error& error) {
+    if (error.code() == ExitCode::kBadRequest) throw;
+    facts.findings.push_back({true, error.what()});
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 bool TorqueLogFacts::ready() const { return std::ranges::none_of(findings, &Finding::problem); }
@@ -83,8 +95,7 @@ TorqueLogFacts look_at_torques(const InspectOptions& options) {
   TorqueLogFacts facts;
   facts.log = file.filename().string();
   try {
-    std::optional<TorqueRobot> robot;
-    if (options.robot) robot = read_torque_robot(*options.robot, std::nullopt);
+    const std::optional<TorqueRobot> robot = robot_of(options, facts);
     const TorqueLogReport report = look_at_torque_log(
         {file}, robot ? wanted_joints(robot->model.tree) : std::vector<WantedJoint>{},
         options.data);

@@ -3,9 +3,13 @@
 // The program as a function: exit codes, one line for an error, help that a newcomer can use.
 #include "app/commands/cli.h"
 
+#include <cstdio>
+#include <iostream>
 #include <string>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "tests/app/commands/program.h"
 #include "tests/app/io/recording_folder.h"
@@ -27,10 +31,30 @@ TEST(Cli, VersionAndHelp) {
   EXPECT_NE(run({"--help"}).out.find("inspect"), std::string::npos);
 }
 
+TEST(Cli, OutputThatCannotBeWritten) {
+  const int full = ::open("/dev/full", O_WRONLY);
+  if (full < 0) GTEST_SKIP() << "no /dev/full on this machine";
+  std::fflush(stdout);
+  const int before = ::dup(STDOUT_FILENO);
+  ::dup2(full, STDOUT_FILENO);
+  testing::internal::CaptureStderr();
+  const char* const argv[] = {"kinescope", "--version", nullptr};
+  const int code = run_program(2, argv);
+  std::clearerr(stdout);
+  std::cout.clear();
+  ::dup2(before, STDOUT_FILENO);
+  ::close(before);
+  ::close(full);
+  EXPECT_EQ(code, static_cast<int>(ExitCode::kBadRequest));
+  EXPECT_TRUE(testing::internal::GetCapturedStderr().starts_with(
+      "kinescope: standard output: cannot be written"));
+}
+
 TEST(Cli, WrongCommandLines) {
   const ExitCode code = ExitCode::kBadRequest;
   expect_refusal({}, code, "name a command");
   expect_refusal({"rnu"}, code, "'rnu' is no command (did you mean 'run'?");
+  expect_refusal({"rnu", "--help"}, code, "'rnu' is no command (did you mean 'run'?");
   expect_refusal({"--frobnicate"}, code, "name a command");
   expect_refusal({"run"}, code, "RECORDING");
   expect_refusal({"run", "x", "--outptu", "y"}, code,

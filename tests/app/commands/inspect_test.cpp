@@ -92,11 +92,11 @@ TEST(Inspect, NamesEveryProblemAndEndsWithThree) {
   const RecordingFolder folder;
   folder.write("video.mp4", "no video")
       .write("tags.yaml", "family: tag99\n")
-      .write("joints.csv", "t;a\n0;1\n");
+      .write("joints.csv", "t a\n0 1\n");
   const Inspection inspection = inspect_recording(folder.paths());
   EXPECT_FALSE(inspection.ready());
   EXPECT_TRUE(says(inspection.findings, "'tag99' is not known")) << all(inspection.findings);
-  EXPECT_TRUE(says(inspection.findings, "separated by ';'")) << all(inspection.findings);
+  EXPECT_TRUE(says(inspection.findings, "separated by ' '")) << all(inspection.findings);
   EXPECT_TRUE(says(inspection.findings, "video.mp4")) << all(inspection.findings);
   testing::internal::CaptureStdout();
   EXPECT_EQ(inspect_command({.recording = folder.paths(), .data = {}, .robot = {}}, {}),

@@ -192,6 +192,27 @@ TEST_F(TorqueRefusals, WhatIsNotThere) {
   refused(ExitCode::kBadInput, "robot.urdf");
 }
 
+TEST_F(TorqueRefusals, MomentsWithoutMass) {
+  write(samples_);
+  std::string urdf = write_urdf(model_);
+  const std::size_t mass = urdf.find("<mass value=\"") + 13;
+  urdf.replace(mass, urdf.find('"', mass) - mass, "0");
+  folder_.write("robot.urdf", urdf);
+  const std::string line = refused(ExitCode::kBadInput, "has moments of inertia and no mass");
+  EXPECT_NE(line.find("robot.urdf: link '"), std::string::npos) << line;
+}
+
+// The log's rows and the robot's problem are two things.
+TEST_F(TorqueRefusals, InspectSaysWhatTheLogHoldsBesideABrokenRobot) {
+  write(samples_);
+  folder_.write("robot.urdf", "<robot name='r'><link");
+  const Outcome outcome = run({"inspect", path("log.csv"), "--robot", path("robot.urdf")});
+  EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kBadInput)) << outcome.err;
+  EXPECT_NE(outcome.out.find("log.csv: 1200 rows"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("robot.urdf:1: is not well-formed XML"), std::string::npos)
+      << outcome.out;
+}
+
 TEST_F(TorqueRefusals, PayloadsThatCannotBeAskedFor) {
   write(samples_);
   refused(ExitCode::kBadRequest, "'wing'", {"--payload", "--payload-link", "wing"});
