@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/file.h"
 
@@ -102,9 +103,21 @@ void print_words(const IntrinsicCalibration& result, const CameraOptions& option
   fmt::print("written   {}\n", options.output.string());
 }
 
+// A video, or the files of a folder of images.
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& source) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(source, error)) return {source};
+  std::vector<std::filesystem::path> out;
+  for (const auto& entry : std::filesystem::directory_iterator(source, error)) {
+    out.push_back(entry.path());
+  }
+  return out;
+}
+
 }  // namespace
 
 ExitCode camera_command(const CameraOptions& options, const Console& console) {
+  require_new_file(options.output, "--output", files_of(options.source), options.force);
   const std::filesystem::path folder = options.output.parent_path();
   require_writable_folder(folder.empty() ? "." : folder);  // before the long work
   const IntrinsicCalibration result =
@@ -112,7 +125,7 @@ ExitCode camera_command(const CameraOptions& options, const Console& console) {
   write_file_atomically(options.output, write_camera_info(result.camera));
   if (console.json) {
     fmt::print("{}\n", result_to_json(result, options).dump(2));
-  } else if (!console.quiet) {
+  } else {
     print_words(result, options);
   }
   return ExitCode::kDone;

@@ -146,6 +146,7 @@ ExitCode run_again(const CommandLine& line, const Console& console) {
   options.output = folder;
   options.trace = true;
   options.must_trace = true;
+  options.force = false;  // detection is taken from the folder, and others' files stay
   options.arguments = again.arguments;
   options.command_line = "kinescope trace " + folder.string();
   return run_command(options, console);

@@ -136,7 +136,10 @@ void add_run(CLI::App& app, CommandLine& line) {
       ->allow_extra_args(false);
   run.add_flag("!--no-trace", line.run.trace,
                "Do not look for effects that the calibration lacks (trace.json)");
-  run.add_flag("--force", line.run.force, "Run every stage again, also where nothing changed");
+  add_force(
+      run, line.run.force,
+      "Run every stage again, also where nothing changed, and replace what others wrote in the "
+      "output folder");
   add_output_options(run, line.output);
   run.footer(fmt::format(
       "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}", kExitCodes));
@@ -172,6 +175,7 @@ void add_correct(CLI::App& app, CommandLine& line) {
           "-o,--output", [&line](const std::string& text) { line.correct.output = text; },
           "File to write (default: joints_corrected.csv)")
       ->type_name("FILE");
+  add_force(correct, line.correct.force, kReplaceFile);
   add_output_options(correct, line.output);
   correct.footer(fmt::format(
       "Example:\n  kinescope correct ur6_run new_joints.csv --output corrected.csv\n\n{}",
@@ -258,6 +262,7 @@ void add_camera(CLI::App& app, CommandLine& line) {
           "-o,--output", [&line](const std::string& text) { line.camera.output = text; },
           "ROS camera_info file to write (default: camera.yaml)")
       ->type_name("FILE");
+  add_force(camera, line.camera.force, kReplaceFile);
   add_output_options(camera, line.output);
   camera.footer(fmt::format(
       "Example:\n  kinescope camera board_images --board chessboard --columns 9 --rows 6 "

@@ -18,9 +18,13 @@ CLI::Validator number_in(double least, double most) {
           fmt::format("{} to {}", least, most)};
 }
 
+void add_force(CLI::App& command, bool& force, const char* help) {
+  command.add_flag("--force", force, help);
+}
+
 void add_output_options(CLI::App& command, OutputOptions& output) {
   command.add_flag("--json", output.json, "Print the result as JSON");
-  command.add_flag("--quiet", output.quiet, "No progress on standard error");
+  command.add_flag("--quiet", output.quiet, "No progress on standard error (warnings stay)");
 }
 
 }  // namespace kinescope

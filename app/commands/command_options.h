@@ -20,6 +20,12 @@ inline constexpr const char* kExitCodes =
 /// A finite number in a range. CLI::Range lets NaN through.
 [[nodiscard]] CLI::Validator number_in(double least, double most);
 
+/// --force of a command that writes a file, and of one that writes into a folder.
+inline constexpr const char* kReplaceFile = "Replace the file that is there";
+inline constexpr const char* kReplaceOthers =
+    "Replace what others wrote: files in the output folder, and files that were named";
+void add_force(CLI::App& command, bool& force, const char* help);
+
 /// --json and --quiet.
 void add_output_options(CLI::App& command, OutputOptions& output);
 

@@ -39,7 +39,8 @@ struct RunOptions {
   bool estimate_intrinsics = false;
   bool trace = true;        ///< close the loop: look for effects that the calibration lacks
   bool must_trace = false;  ///< tracing is what was asked for: exit code 4 where it says nothing
-  bool force = false;       ///< run every stage again, also where nothing changed
+  /// Run every stage again, also where nothing changed, and replace what others wrote.
+  bool force = false;
   std::vector<std::string>
       fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5
   std::string command_line;  ///< for the report
@@ -57,6 +58,7 @@ struct CorrectOptions {
   std::filesystem::path run_folder;
   std::filesystem::path log;
   std::filesystem::path output = "joints_corrected.csv";
+  bool force = false;  ///< replace a file that is there
 };
 
 [[nodiscard]] ExitCode correct_command(const CorrectOptions& options, const Console& console);
@@ -84,7 +86,9 @@ struct DynamicsOptions {
   std::string trace_file = "trace.json";  ///< in the output folder
   /// Where the best model goes (the one named, where it is one); empty: nowhere.
   std::filesystem::path save_model;
-  std::string command_line;  ///< for the report
+  std::string owner = "dynamics";  ///< the command whose products these are (OutputFolder)
+  bool force = false;              ///< replace what others wrote
+  std::string command_line;        ///< for the report
 };
 
 [[nodiscard]] ExitCode dynamics_command(const DynamicsOptions& options, const Console& console);
@@ -94,6 +98,7 @@ struct PredictOptions {
   std::filesystem::path model;   ///< of dynamics --save-model
   std::filesystem::path output;  ///< CSV
   TorqueDataOptions data;
+  bool force = false;  ///< replace a file that is there
 };
 
 [[nodiscard]] ExitCode predict_command(const PredictOptions& options, const Console& console);
@@ -107,6 +112,8 @@ struct ContactCommandOptions {
   ContactOptions contact;
   bool identify = false;  ///< masses and friction from the log although the URDF has some
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
+  std::string owner = "contact";                ///< as DynamicsOptions
+  bool force = false;                           ///< as DynamicsOptions
   std::string command_line;                     ///< for the report
 };
 
@@ -126,6 +133,7 @@ struct CameraOptions {
   BoardSpec board;
   BoardOptions calibration;
   std::filesystem::path output = "camera.yaml";
+  bool force = false;  ///< replace a file that is there
 };
 
 [[nodiscard]] ExitCode camera_command(const CameraOptions& options, const Console& console);

@@ -119,14 +119,24 @@ void apply_gains(const Eigen::VectorXd& gains, ContactSummary& summary) {
   noise.model_sigma = noise.model_sigma.cwiseProduct(gains);
 }
 
-void print_result(const ContactSummary& summary, const OutputFolder& folder,
-                  const Console& console) {
+Writer writer_of(const ContactCommandOptions& options) {
+  std::vector<fs::path> inputs{options.robot};
+  for (const auto* logs : {&options.logs, &options.learn_logs}) {
+    inputs.insert(inputs.end(), logs->begin(), logs->end());
+  }
+  return {.command = options.owner,
+          .products = contact_products(),
+          .inputs = std::move(inputs),
+          .force = options.force};
+}
+
+void print_result(const ContactSummary& summary, const fs::path& folder, const Console& console) {
   if (console.json) {
     fmt::print("{}\n", contact_json(summary).dump(2));
     return;
   }
   fmt::print("{}\ncontacts  {}\nreport    {}\n", contact_verdict(summary),
-             folder.file("contacts.csv").string(), folder.file("contact.html").string());
+             (folder / "contacts.csv").string(), (folder / "contact.html").string());
 }
 
 }  // namespace
@@ -136,7 +146,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   const DynamicModel& model = robot.model;
   validate(options.contact);
-  const OutputFolder folder(options.output);
+  const OutputFolder folder(options.output, writer_of(options));
   summary.robot = model.tree.name;
   summary.log = "Log " + file_list(options.logs);
   summary.version = program_version();
@@ -186,7 +196,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
 
 ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
   const ContactSummary summary = find_contacts(options);
-  print_result(summary, OutputFolder(options.output), console);
+  print_result(summary, options.output, console);
   return ExitCode::kDone;
 }
 

@@ -1,31 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope correct`: a joint log without the effects that a run found.
+#include <algorithm>
 #include <cstdio>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/commands.h"
+#include "app/commands/log_range.h"
+#include "app/commands/output_folder.h"
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
 #include "kinematics/core/file.h"
 #include "kinematics/log/header_units.h"
+#include "kinematics/log/joint_log_table.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
 namespace {
 
-std::string log_csv(const JointLog& log) {
-  std::string out = without_unit(log.time_column);  // the reader has brought it to s
-  for (const std::string& channel : log.channels) out += "," + channel;
-  out += "\n";
+// The column under the name that the reader gives a channel.
+std::optional<std::size_t> column_of(const CsvTable& table, const std::string& channel) {
+  if (const auto exact = table.column(channel)) return exact;
+  const auto found = std::ranges::find(table.header, channel, without_unit);
+  if (found == table.header.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - table.header.begin());
+}
+
+// The stamps and the channels that drive the robot; other columns are none of our business.
+CsvTable columns_of_run(const CsvTable& table, const std::vector<JointChannel>& channels) {
+  std::set<std::string> wanted;
+  for (const JointChannel& joint : channels) {
+    if (!joint.channel.empty()) wanted.insert(joint.channel);
+    for (const ChannelShare& share : joint.couplings) wanted.insert(share.channel);
+  }
+  std::set<std::size_t> columns;
+  for (const std::string& channel : wanted) {
+    if (const auto column = column_of(table, channel)) columns.insert(*column);
+  }
+  if (columns.empty()) {
+    throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
+                    "has none of the run's channels",
+                    fmt::format("its columns should be {}", fmt::join(wanted, ", ")));
+  }
+  columns.insert(time_column(table));
+  CsvTable out = table;
+  const auto chosen = [&](const std::vector<std::string>& cells) {
+    std::vector<std::string> part;
+    for (const std::size_t c : columns) part.push_back(cells[c]);
+    return part;
+  };
+  out.header = chosen(table.header);
+  for (std::vector<std::string>& row : out.rows) row = chosen(row);
+  return out;
+}
+
+// The table with the corrected numbers in their places, in its own units; rows that are no sample
+// are left out. A number that did not change keeps its digits.
+std::string corrected_csv(CsvTable table, const TableLog& before, const JointLog& corrected) {
+  const JointLog& log = before.log;
+  const std::size_t time = time_column(table);
+  const double time_unit_s = header_factor(table.header[time]);
+  std::string out = fmt::format("{}\n", fmt::join(table.header, ","));
   for (std::size_t i = 0; i < log.size(); ++i) {
-    out += fmt::format("{}", log.times_s[i]);
-    for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
-      out += fmt::format(",{}", log.values(static_cast<Eigen::Index>(i), c));
+    std::vector<std::string>& cells = table.rows[before.rows[i]];
+    const auto write = [&cells](std::size_t column, double was, double is, double unit) {
+      if (is != was) cells[column] = fmt::format("{}", is / unit);
+    };
+    write(time, log.times_s[i], corrected.times_s[i], time_unit_s);
+    for (std::size_t c = 0; c < log.channels.size(); ++c) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const auto column = static_cast<Eigen::Index>(c);
+      write(*column_of(table, log.channels[c]), log.values(row, column),
+            corrected.values(row, column), 1.0);
     }
-    out += "\n";
+    out += fmt::format("{}\n", fmt::join(cells, ","));
   }
   return out;
 }
@@ -79,24 +131,32 @@ void from_si(JointLog& log, const JointLog& before, const std::map<std::string, 
 }  // namespace
 
 ExitCode correct_command(const CorrectOptions& options, const Console& console) {
-  const CalibratedEffects found = read_effects(options.run_folder / "calibration.json");
+  const std::filesystem::path calibration = options.run_folder / "calibration.json";
+  require_new_file(options.output, "--output",
+                   {options.log, calibration, options.run_folder / "robot.urdf"}, options.force);
+  const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
-  const JointLog log = read_joint_log(options.log);
+  const CsvTable table = read_csv(options.log, RaggedRows::kSetAside);
+  const TableLog read = joint_log_of(columns_of_run(table, found.channels));
+  const JointLog& log = read.log;
   JointLog in_si = log;
   to_si(in_si, found.unit_factors);
+  std::vector<std::string> warnings = log.warnings;
+  for (std::string& warning : range_warnings(in_si, tree, found)) {
+    warnings.push_back(std::move(warning));
+  }
   CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   from_si(corrected.log, log, found.unit_factors);
-  write_file_atomically(options.output, log_csv(corrected.log));
+  write_file_atomically(options.output, corrected_csv(table, read, corrected.log));
+  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   if (console.json) {
     const nlohmann::json out{{"undone", effects_list(corrected.undone)},
                              {"left", effects_list(corrected.left)},
-                             {"warnings", log.warnings},
+                             {"warnings", warnings},
                              {"log", options.output.string()}};
     fmt::print("{}\n", out.dump(2));
     return ExitCode::kDone;
   }
-  if (console.quiet) return ExitCode::kDone;
-  for (const std::string& warning : log.warnings) fmt::print("{}\n", warning);
   fmt::print("{}\n",
              corrected.undone.empty()
                  ? std::string("The run found no effect that a joint log shows: nothing to undo.")

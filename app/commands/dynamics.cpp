@@ -174,6 +174,21 @@ std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds
   return fitted;
 }
 
+std::vector<fs::path> files_read(const DynamicsOptions& options) {
+  std::vector<fs::path> out{options.robot};
+  for (const auto* logs : {&options.logs, &options.test_logs, &options.unloaded_logs}) {
+    out.insert(out.end(), logs->begin(), logs->end());
+  }
+  return out;
+}
+
+Writer writer_of(const DynamicsOptions& options) {
+  return {.command = options.owner,
+          .products = dynamics_products(options.trace ? options.trace_file : std::string()),
+          .inputs = files_read(options),
+          .force = options.force};
+}
+
 constexpr std::array kSavable = {TorqueModelKind::kParametric, TorqueModelKind::kRbf,
                                  TorqueModelKind::kGip, TorqueModelKind::kSemiParametric};
 
@@ -185,6 +200,12 @@ void check_savable(const DynamicsOptions& options, const std::vector<TorqueModel
   if (!std::ranges::any_of(kinds, savable)) {
     throw bad_request("--save-model", fmt::format("{} cannot be saved", to_string(kinds.front())),
                       "name parametric, rbf, gip or semi_parametric");
+  }
+  require_new_file(options.save_model, "--save-model", files_read(options), options.force);
+  for (const std::string& name : dynamics_products(options.trace_file)) {
+    if (!same_place(options.save_model, options.output / name)) continue;
+    throw bad_request(options.save_model.string(), "is the place of another product",
+                      "name another file with --save-model");
   }
   const fs::path folder = options.save_model.parent_path();
   require_writable_folder(folder.empty() ? "." : folder);  // before the long work
@@ -266,7 +287,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   check_savable(options, kinds);
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   DynamicModel model = robot.model;
-  const OutputFolder folder(options.output);
+  const OutputFolder folder(options.output, writer_of(options));
   summary.robot = model.tree.name;
   summary.log = "Log " + file_list(options.logs);
   summary.version = program_version();
@@ -339,7 +360,6 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
 
 ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
   const TorqueSummary summary = model_torque(options, console.progress);
-  const OutputFolder folder(options.output);
   if (console.json) {
     fmt::print("{}\n", torque_json(summary).dump(2));
     return ExitCode::kDone;
@@ -352,16 +372,16 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   if (summary.trace) {
     for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);
   }
-  fmt::print("urdf    {}\n", folder.file("robot_dynamics.urdf").string());
+  fmt::print("urdf    {}\n", (options.output / "robot_dynamics.urdf").string());
   if (summary.trace && summary.trace->verdict != TraceVerdict::kNothingToSay) {
     fmt::print("traced  {} (with what tracing found; contacts left out)\n",
-               folder.file("robot_traced.urdf").string());
+               (options.output / "robot_traced.urdf").string());
   }
   if (!options.save_model.empty()) {
     fmt::print("model   {} ({}; for kinescope predict)\n", options.save_model.string(),
                summary.saved_model);
   }
-  fmt::print("report  {}\n", folder.file("dynamics.html").string());
+  fmt::print("report  {}\n", (options.output / "dynamics.html").string());
   return ExitCode::kDone;
 }
 

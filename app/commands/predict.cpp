@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
 #include "app/report/result_values.h"
@@ -108,6 +109,9 @@ std::vector<JointResult> results(const Predicted& predicted) {
 }  // namespace
 
 ExitCode predict_command(const PredictOptions& options, const Console& console) {
+  std::vector<std::filesystem::path> inputs = options.logs;
+  inputs.push_back(options.model);
+  require_new_file(options.output, "--output", inputs, options.force);
   const TorqueModelFile file = read_torque_model(options.model);
   const Predicted predicted = predict(options, file);
   const RigidModel& rigid = file.model.rigid;

@@ -61,9 +61,7 @@ void describe_recording(const Recording& recording, const Observed& observed,
 }
 
 // What is odd about the input, beside the result: the report has it, too.
-void print_warning(const std::string& warning, const Console& console) {
-  if (!console.quiet) fmt::print(stderr, "warning: {}\n", warning);
-}
+void print_warning(const std::string& warning) { fmt::print(stderr, "warning: {}\n", warning); }
 
 double mean_step(const std::vector<double>& times_s) {
   return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
@@ -215,6 +213,13 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
     run.warnings.push_back(odd_words(odd, recording));
 }
 
+// Without a nominal robot there is no geometry to hold.
+void require_nominal(const RunOptions& options, const Recording& recording) {
+  if (!options.free || *options.free == FreeGeometry::kGeometry || recording.nominal) return;
+  throw bad_request("--free", "placement and offsets hold the geometry of a nominal robot",
+                    "name the robot with --nominal, or leave --free out");
+}
+
 }  // namespace
 
 ExitCode run_command(const RunOptions& options, const Console& console) {
@@ -222,13 +227,15 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
   const Recording recording = read_recording(options.recording);
+  require_nominal(options, recording);
   RunFolder folder(options, recording);
+  if (options.must_trace) require_same_inputs(options.output, recording);
   clock.lap("read", run.times);
 
   const auto [observed, camera] =
       see(recording, options, folder.cached_observations(recording), console.progress);
   describe_recording(recording, observed, options, run);
-  for (const std::string& warning : run.warnings) print_warning(warning, console);
+  for (const std::string& warning : run.warnings) print_warning(warning);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
   if (!answered) folder.keep_observations(recording, observed.tags);
@@ -252,7 +259,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (best.failure) throw Error(*best.failure);
   run.tracks = std::move(best.tracks);
   take(std::move(value_of(best.fitted)), recording, observed, options, run);
-  for (std::size_t k = told; k < run.warnings.size(); ++k) print_warning(run.warnings[k], console);
+  for (std::size_t k = told; k < run.warnings.size(); ++k) print_warning(run.warnings[k]);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
   run.errors = summarise_errors(run.calibration);
 

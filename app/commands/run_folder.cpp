@@ -19,22 +19,68 @@ using nlohmann::json;
 
 constexpr std::string_view kObservations = "observations.csv";
 constexpr std::string_view kObservationsKey = "observations.json";
-// Only `run` writes these, also where it ends without an answer and without a run.json.
-constexpr std::array<std::string_view, 5> kOwn{kObservations, kObservationsKey, "tracks.csv",
-                                               "structure.json", "failed_report.html"};
+constexpr std::string_view kRunFile = "run.json";
 
-// The products that a run.json names; none where there is none that can be read.
-std::set<std::string> products_of(const fs::path& run_json) {
-  std::set<std::string> out;
-  if (!fs::exists(run_json)) return out;
-  const json document = json::parse(read_text_file(run_json), nullptr, false);
-  if (!document.is_object() || !document.contains("products")) return out;
-  for (const json& name : document.at("products")) {
-    if (!name.is_string()) continue;
-    const fs::path path = name.get<std::string>();
-    if (path == path.filename()) out.insert(path.string());
+// run.json; nothing where there is none of a run.
+std::optional<json> run_document(const fs::path& folder) {
+  const fs::path path = folder / kRunFile;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
+  json document = json::parse(read_text_file(path), nullptr, false);
+  if (!document.is_object() || document.value("schema", json()) != "kinescope.run") {
+    return std::nullopt;
+  }
+  return document;
+}
+
+// Name and hash of every input that run.json lists.
+std::vector<InputFile> inputs_of(const json& document) {
+  std::vector<InputFile> out;
+  for (const json& input : document.value("inputs", json::array())) {
+    if (!input.is_object()) continue;
+    const json name = input.value("name", json());
+    const json sha256 = input.value("sha256", json());
+    if (name.is_string() && sha256.is_string()) out.push_back({name, sha256});
   }
   return out;
+}
+
+// What was measured: one camera.yaml and one tags.yaml serve many recordings.
+bool is_measured(const fs::path& input) {
+  constexpr std::array<std::string_view, 4> kDeclared{".yaml", ".yml", ".xml", ".urdf"};
+  return std::ranges::find(kDeclared, input.extension().string()) == kDeclared.end();
+}
+
+// A recording that was renamed or is worked on keeps its name or one of its measured files.
+bool is_another_recording(const json& run, const Recording& recording) {
+  const json name = run.value("recording", json());
+  if (!name.is_string() || name == recording_name(recording.folder)) return false;
+  std::set<std::string> measured;
+  for (const InputFile& input : inputs_of(run)) {
+    if (is_measured(input.name)) measured.insert(input.sha256);
+  }
+  return std::ranges::none_of(hash_inputs(recording), [&](const InputFile& input) {
+    return measured.contains(input.sha256);
+  });
+}
+
+// The run's folder, if it may be written into.
+fs::path checked_output(const RunOptions& options, const Recording& recording) {
+  const fs::path folder =
+      options.output.empty() ? fs::path(recording_name(recording.folder) + "_run") : options.output;
+  if (same_place(folder, recording.folder)) {
+    throw bad_request(folder.string(), "is the recording's own folder",
+                      "name another folder with --output, such as one inside it");
+  }
+  require_apart(folder, recording.files);
+  const auto run = options.force ? std::nullopt : run_document(folder);
+  if (run && is_another_recording(*run, recording)) {
+    throw bad_request(folder.string(),
+                      fmt::format("holds the run of another recording, {}",
+                                  run->at("recording").get<std::string>()),
+                      "name another folder with --output, or replace it with --force");
+  }
+  return folder;
 }
 
 std::string describe_geometry(const std::optional<FreeGeometry>& free) {
@@ -92,11 +138,13 @@ std::optional<TagObservations> observations_of(const json& kept, TagObservations
 }  // namespace
 
 RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
-    : OutputFolder(options.output.empty() ? fs::path(recording_name(recording.folder) + "_run")
-                                          : options.output),
+    : OutputFolder(checked_output(options, recording),
+                   {.command = "run",
+                    .products = run_products(!recording.log.torque_columns.empty()),
+                    .inputs = {},  // none of them lies in the folder
+                    .force = options.force}),
       detect_(options.detect),
-      force_(options.force),
-      earlier_products_(products_of(file("run.json"))) {}
+      force_(options.force) {}
 
 std::string RunFolder::detection_key(const Recording& recording) const {
   std::string key = fmt::format(
@@ -167,13 +215,8 @@ void RunFolder::add_products(const std::vector<std::string>& names) {
 }
 
 void RunFolder::remove_stale_products() const {
-  std::set<std::string> stale = earlier_products_;
-  stale.insert(kOwn.begin(), kOwn.end());
-  for (const std::string& name : stale) {
-    std::error_code error;  // what cannot be removed is no reason to lose the run
-    if (!products_.contains(name) && fs::is_regular_file(file(name), error)) {
-      fs::remove(file(name), error);
-    }
+  for (const std::string& name : own_products()) {
+    if (!products_.contains(name)) remove(name);
   }
 }
 
@@ -230,6 +273,28 @@ json run_json(const RunSummary& run, const std::set<std::string>& products) {
           {"seed", nullptr},
           {"products", products},
           {"stages", std::move(times)}};
+}
+
+void require_same_inputs(const fs::path& run_folder, const Recording& recording) {
+  const auto run = run_document(run_folder);
+  const std::vector<InputFile> before = run ? inputs_of(*run) : std::vector<InputFile>{};
+  const std::vector<InputFile> now = hash_inputs(recording);
+  const auto refuse = [&](const InputFile& input, std::string_view what) {
+    throw bad_input((recording.folder / input.name).string(),
+                    fmt::format("{} the run in {}", what, run_folder.string()),
+                    "run the recording again");
+  };
+  const auto holds = [](const std::vector<InputFile>& list, auto member, const InputFile& input) {
+    return std::ranges::find(list, input.*member, member) != list.end();
+  };
+  for (const InputFile& input : now) {
+    if (holds(before, &InputFile::sha256, input)) continue;
+    refuse(input,
+           holds(before, &InputFile::name, input) ? "has changed since" : "was not there for");
+  }
+  for (const InputFile& input : before) {
+    if (!holds(now, &InputFile::sha256, input)) refuse(input, "is no longer used, but was for");
+  }
 }
 
 RunAgain read_run_again(const fs::path& folder) {

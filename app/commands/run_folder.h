@@ -20,6 +20,8 @@ namespace kinescope {
 
 class RunFolder : public OutputFolder {
  public:
+  /// Throws bad_request where the folder is not this run's to write into: one with the recording's
+  /// files, or with those of others, or, without force, with the run of another recording.
   RunFolder(const RunOptions& options, const Recording& recording);
 
   /// The observations of an earlier run with the same video, tags and detection options.
@@ -41,8 +43,7 @@ class RunFolder : public OutputFolder {
 
   DetectOptions detect_;
   bool force_ = false;
-  std::set<std::string> earlier_products_;  // of run.json
-  std::set<std::string> products_;          // of this run
+  std::set<std::string> products_;  // of this run
 };
 
 /// Every file that was read, with its SHA-256.
@@ -54,6 +55,10 @@ struct RunAgain {
   std::vector<std::string> arguments;
   std::filesystem::path working_folder;
 };
+
+/// Throws bad_input where the recording is not the one that run.json speaks of, and names the file
+/// that is another one.
+void require_same_inputs(const std::filesystem::path& run_folder, const Recording& recording);
 
 /// From run.json. Throws bad_input where there is none or it does not say.
 [[nodiscard]] RunAgain read_run_again(const std::filesystem::path& folder);

@@ -169,6 +169,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
           "-o,--output", [&dynamics](const std::string& text) { dynamics.output = text; },
           "Folder for the results (default: <first log's name>_dynamics here)")
       ->type_name("FOLDER");
+  add_force(command, dynamics.force, kReplaceOthers);
   add_output_options(command, line.output);
   command.footer(
       fmt::format("Examples:\n"
@@ -194,6 +195,7 @@ void add_predict(CLI::App& app, CommandLine& line) {
           "-o,--output", [&predict](const std::string& text) { predict.output = text; },
           "Table of every sample and joint (default: <first log's name>_predicted.csv here)")
       ->type_name("FILE");
+  add_force(command, predict.force, kReplaceFile);
   add_output_options(command, line.output);
   command.footer(fmt::format(
       "Example:\n  kinescope dynamics log.csv --robot robot.urdf --save-model torque.json\n"
@@ -226,6 +228,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
           "-o,--output", [&contact](const std::string& text) { contact.output = text; },
           "Folder for the results (default: <first log's name>_contact here)")
       ->type_name("FOLDER");
+  add_force(command, contact.force, kReplaceOthers);
   add_output_options(command, line.output);
   command.footer(fmt::format(
       "Example:\n  kinescope contact log.csv --robot robot.urdf --learn free_motion.csv\n\n{}",

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/output_folder.h"
 #include "app/io/dynamics_settings.h"
 
 namespace kinescope {
@@ -58,11 +59,12 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
 
 std::vector<std::string> torque_products(const DynamicsOptions& options,
                                          const TorqueSummary& summary) {
-  std::vector<std::string> out{"dynamics.json", "robot_dynamics.urdf", "dynamics.html"};
+  std::vector<std::string> out = dynamics_products("");
   if (!summary.trace) return out;
+  if (summary.trace->verdict != TraceVerdict::kNothingToSay) {
+    return dynamics_products(options.trace_file);
+  }
   out.push_back(options.trace_file);
-  if (summary.trace->verdict == TraceVerdict::kNothingToSay) return out;
-  out.insert(out.end(), {"robot_traced.urdf", "torque_compensated.csv"});
   return out;
 }
 
@@ -102,6 +104,8 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
     dynamics.trace_file = "dynamics_trace.json";  // trace.json is the calibration's
     dynamics.models = {"parametric", "gip"};      // the others on request, by kinescope dynamics
     dynamics.models_options.samples = kGpSamples;
+    dynamics.owner = "run";
+    dynamics.force = options.force;
     dynamics.command_line = options.command_line;
     const TorqueSummary summary = model_torque(dynamics, progress);
     out.products = torque_products(dynamics, summary);
@@ -114,11 +118,12 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
     contact.output = folder;
     contact.data = data;
     contact.gravity_m_s2 = summary.gravity_m_s2;
+    contact.owner = dynamics.owner;
+    contact.force = options.force;
     contact.command_line = options.command_line;
     out.words.push_back("Contacts: " + contact_verdict(find_contacts(contact)));
-    for (const char* name : {"contacts.csv", "contacts.json", "contact.html"}) {
-      out.products.emplace_back(name);
-    }
+    const std::vector<std::string> contacts = contact_products();
+    out.products.insert(out.products.end(), contacts.begin(), contacts.end());
   } catch (const Error& error) {
     // The kinematics stand all the same.
     out.words.push_back(fmt::format("Torques could not be used: {}", error.what()));

@@ -2,14 +2,12 @@
 #include "app/commands/torque_trace_stage.h"
 
 #include <cmath>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 #include "dynamics/data/torque_data.h"
-#include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -72,21 +70,14 @@ SavedTrace saved_trace(const TorqueTrace& trace, const TorqueSamples& samples,
 }
 
 void remove_corrected(const OutputFolder& folder) {
-  std::error_code error;
-  for (const char* name : {"robot_traced.urdf", "torque_compensated.csv"}) {
-    std::filesystem::remove(folder.file(name), error);
-  }
+  for (const char* name : {"robot_traced.urdf", "torque_compensated.csv"}) folder.remove(name);
 }
 
 }  // namespace
 
 void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder) {
   remove_corrected(folder);
-  const std::filesystem::path path = folder.file(trace_file);
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return;
-  const auto document = nlohmann::json::parse(read_text_file(path), nullptr, false);
-  if (document.is_object() && document.contains("left_out")) std::filesystem::remove(path, error);
+  folder.remove(trace_file);
 }
 
 TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel& model,

@@ -24,7 +24,7 @@ struct TracedLog {
                                            const CutoffChoice& cutoff, const OutputFolder& folder,
                                            const Progress& progress);
 
-/// Removes what the above wrote in an earlier run; a trace that is no torque log's stays.
+/// Removes what the above wrote in an earlier run of the same command.
 void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder);
 
 }  // namespace kinescope

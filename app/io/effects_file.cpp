@@ -108,6 +108,14 @@ std::vector<ChannelShare> couplings_of(const json& joint, const std::filesystem:
   return out;
 }
 
+std::optional<JointLimits> range_of(const json& joint, const std::filesystem::path& path) {
+  const auto range = joint.find("range");
+  if (range == joint.end()) return std::nullopt;
+  if (!range->is_array() || range->size() != 2) throw wrong(path, "'range' is no pair of numbers");
+  if ((*range)[0].is_null() || (*range)[1].is_null()) return std::nullopt;
+  return JointLimits{finite((*range)[0], path, "range"), finite((*range)[1], path, "range")};
+}
+
 std::map<std::string, double> unit_factors(const json& document,
                                            const std::filesystem::path& path) {
   std::map<std::string, double> out;
@@ -175,11 +183,11 @@ CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
     throw wrong(calibration_json, "no robot with joints");
   }
   for (const json& joint : document.at("robot").at("joints")) {
-    out.channels.push_back({word(joint, "name", calibration_json),
-                            word(joint, "channel", calibration_json),
-                            finite(joint.value("scale", json()), calibration_json, "scale"),
-                            finite(joint.value("offset", json()), calibration_json, "offset"),
-                            couplings_of(joint, calibration_json)});
+    out.channels.push_back(
+        {word(joint, "name", calibration_json), word(joint, "channel", calibration_json),
+         finite(joint.value("scale", json()), calibration_json, "scale"),
+         finite(joint.value("offset", json()), calibration_json, "offset"),
+         couplings_of(joint, calibration_json), range_of(joint, calibration_json)});
   }
   const auto effects = document.find("effects");
   if (effects == document.end()) return out;

@@ -26,6 +26,7 @@ struct JointChannel {
   double scale = 1.0;
   double offset = 0.0;
   std::vector<ChannelShare> couplings;
+  std::optional<JointLimits> range;  ///< of the joint's value in the recording
 };
 
 /// What undoing needs of calibration.json.

@@ -10,25 +10,13 @@
 #include <fmt/format.h>
 
 #include "kinematics/core/bad_rows.h"
-#include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/header_units.h"
+#include "kinematics/log/joint_log_table.h"
 #include "kinematics/log/unwrap.h"
 
 namespace kinescope {
 namespace {
-
-std::size_t time_column(const CsvTable& table) {
-  for (const std::string_view name : {"t", "time", "stamp", "timestamp"}) {
-    const auto found = std::ranges::find_if(table.header, [&](const std::string& column) {
-      return std::ranges::equal(column, name, [](unsigned char a, unsigned char b) {
-        return std::tolower(a) == static_cast<int>(b);
-      });
-    });
-    if (found != table.header.end()) return static_cast<std::size_t>(found - table.header.begin());
-  }
-  return table.require_column("t");
-}
 
 bool is_blank(const std::string& cell) {
   const auto value = parse_number(cell);
@@ -98,11 +86,11 @@ void unwrap_channels(JointLog& log) {
 }
 
 // The rows from `first` on, without those that hold no numbers and those that repeat the one
-// before; gives the line of each.
+// before; gives the table's row of each.
 std::vector<std::size_t> read_samples(const CsvTable& table, std::size_t time, std::size_t first,
                                       const std::vector<std::size_t>& columns, BadRows& bad,
                                       JointLog& log) {
-  std::vector<std::size_t> lines;
+  std::vector<std::size_t> rows;
   int repeated = 0;
   log.values.resize(static_cast<Eigen::Index>(table.rows.size() - first),
                     static_cast<Eigen::Index>(columns.size()));
@@ -124,13 +112,13 @@ std::vector<std::size_t> read_samples(const CsvTable& table, std::size_t time, s
       continue;
     }
     log.times_s.push_back(time_s);
-    lines.push_back(table.lines[r]);
+    rows.push_back(r);
   }
   if (repeated > 0) {
     log.warnings.push_back(
         fmt::format("{}: {} rows repeat the row before and are left out", table.source, repeated));
   }
-  return lines;
+  return rows;
 }
 
 // The most samples whose stamps increase (longest increasing subsequence by patience sorting,
@@ -163,65 +151,45 @@ Error stamp_error(const std::string& source, std::size_t line, const std::string
 }
 
 // Throws at the first stamp that does not come after the one before.
-[[noreturn]] void throw_first_descent(const JointLog& log, const std::vector<std::size_t>& lines) {
+[[noreturn]] void throw_first_descent(const JointLog& log, const CsvTable& table,
+                                      const std::vector<std::size_t>& rows) {
   const auto at = std::ranges::adjacent_find(log.times_s, std::greater_equal{});
   const auto i = static_cast<std::size_t>(at - log.times_s.begin());
-  throw stamp_error(log.source, lines[i + 1],
+  throw stamp_error(log.source, table.lines[rows[i + 1]],
                     fmt::format("time {:.6f} s does not come after {:.6f} s", log.times_s[i + 1],
                                 log.times_s[i]));
 }
 
-void sort_out_stamps(const std::vector<std::size_t>& lines, BadRows& bad, JointLog& log) {
+void sort_out_stamps(const CsvTable& table, BadRows& bad, TableLog& read) {
+  JointLog& log = read.log;
   const std::vector<Eigen::Index> kept = increasing(log.times_s);
   const std::size_t out_of_order = log.size() - kept.size();
   if (out_of_order == 0) return;
-  if (bad.too_many(bad.size() + out_of_order)) throw_first_descent(log, lines);
+  if (bad.too_many(bad.size() + out_of_order)) throw_first_descent(log, table, read.rows);
   std::vector<double> times_s;
+  std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < log.size(); ++i) {
     const std::size_t next = times_s.size();
     if (next < kept.size() && kept[next] == static_cast<Eigen::Index>(i)) {
       times_s.push_back(log.times_s[i]);
+      rows.push_back(read.rows[i]);
       continue;
     }
     const bool late = !times_s.empty() && log.times_s[i] <= times_s.back();
     const double other = late ? times_s.back() : log.times_s[static_cast<std::size_t>(kept[next])];
-    bad.add(lines[i], stamp_error(log.source, lines[i],
-                                  fmt::format("time {:.6f} s does not come {} {:.6f} s",
-                                              log.times_s[i], late ? "after" : "before", other)));
+    const std::size_t line = table.lines[read.rows[i]];
+    bad.add(line, stamp_error(log.source, line,
+                              fmt::format("time {:.6f} s does not come {} {:.6f} s", log.times_s[i],
+                                          late ? "after" : "before", other)));
   }
   log.times_s = std::move(times_s);
   log.values = log.values(kept, Eigen::all).eval();
+  read.rows = std::move(rows);
 }
 
 void to_seconds(double factor, JointLog& log) {
   if (factor == 1.0) return;
   for (double& time_s : log.times_s) time_s *= factor;
-}
-
-JointLog from_table(CsvTable table, const std::vector<std::string>& torque_channels) {
-  JointLog log;
-  log.source = table.source;
-  const std::vector<std::string> names_in_file = table.header;
-  strip_units(table);
-  const std::size_t time = time_column(table);
-  log.time_column = names_in_file[time];
-  const std::vector<std::size_t> columns = channel_columns(table, time, torque_channels, log);
-  const std::size_t first = first_whole_row(table, columns);
-  if (first > 0) {
-    log.warnings.push_back(
-        fmt::format("{}: the first {} rows, in which a channel is blank, are "
-                    "left out",
-                    table.source, first));
-  }
-  BadRows bad(table);
-  const std::vector<std::size_t> lines = read_samples(table, time, first, columns, bad, log);
-  sort_out_stamps(lines, bad, log);
-  log.values.conservativeResize(static_cast<Eigen::Index>(log.size()), Eigen::NoChange);
-  to_seconds(header_factor(log.time_column), log);
-  const std::vector<std::string> left_out = bad.warnings();
-  log.warnings.insert(log.warnings.end(), left_out.begin(), left_out.end());
-  unwrap_channels(log);
-  return log;
 }
 
 // Slope at sample i from its neighbours (parabola through three points; one-sided at the ends).
@@ -320,14 +288,53 @@ std::optional<int> JointLog::channel(std::string_view name) const {
   return static_cast<int>(found - channels.begin());
 }
 
+std::size_t time_column(const CsvTable& table) {
+  for (const std::string_view name : {"t", "time", "stamp", "timestamp"}) {
+    const auto found = std::ranges::find_if(table.header, [&](const std::string& column) {
+      return std::ranges::equal(without_unit(column), name, [](unsigned char a, unsigned char b) {
+        return std::tolower(a) == static_cast<int>(b);
+      });
+    });
+    if (found != table.header.end()) return static_cast<std::size_t>(found - table.header.begin());
+  }
+  return table.require_column("t");
+}
+
+TableLog joint_log_of(CsvTable table, const std::vector<std::string>& torque_channels) {
+  TableLog read;
+  JointLog& log = read.log;
+  log.source = table.source;
+  const std::vector<std::string> names_in_file = table.header;
+  strip_units(table);
+  const std::size_t time = time_column(table);
+  log.time_column = names_in_file[time];
+  const std::vector<std::size_t> columns = channel_columns(table, time, torque_channels, log);
+  const std::size_t first = first_whole_row(table, columns);
+  if (first > 0) {
+    log.warnings.push_back(
+        fmt::format("{}: the first {} rows, in which a channel is blank, are "
+                    "left out",
+                    table.source, first));
+  }
+  BadRows bad(table);
+  read.rows = read_samples(table, time, first, columns, bad, log);
+  sort_out_stamps(table, bad, read);
+  log.values.conservativeResize(static_cast<Eigen::Index>(log.size()), Eigen::NoChange);
+  to_seconds(header_factor(log.time_column), log);
+  const std::vector<std::string> left_out = bad.warnings();
+  log.warnings.insert(log.warnings.end(), left_out.begin(), left_out.end());
+  unwrap_channels(log);
+  return read;
+}
+
 JointLog read_joint_log(const std::filesystem::path& path,
                         const std::vector<std::string>& torque_channels) {
-  return from_table(read_csv(path, RaggedRows::kSetAside), torque_channels);
+  return joint_log_of(read_csv(path, RaggedRows::kSetAside), torque_channels).log;
 }
 
 JointLog parse_joint_log(std::string_view text, const std::string& source,
                          const std::vector<std::string>& torque_channels) {
-  return from_table(parse_csv(text, source, RaggedRows::kSetAside), torque_channels);
+  return joint_log_of(parse_csv(text, source, RaggedRows::kSetAside), torque_channels).log;
 }
 
 std::optional<ChannelValue> interpolate(const JointLog& log, int channel, double time_s,

@@ -97,13 +97,20 @@ TEST_F(DynamicsCommand, TheSameLogGivesTheSameBytes) {
   EXPECT_EQ(read_text_file(folder_.path() / "out/dynamics.json"), first);
 }
 
-// Without tracing no trace of an earlier run stays; a calibration's, of the same name, does.
+// Without tracing no trace of an earlier `dynamics` stays; that of a calibration, of the same name,
+// does.
 TEST_F(DynamicsCommand, StaleTracesGo) {
-  folder_.write("out/robot_traced.urdf", "").write("out/torque_compensated.csv", "");
-  folder_.write("out/trace.json", R"({"schema": "kinescope.trace", "left_out": []})");
+  const std::vector<std::string> traces{"trace.json", "robot_traced.urdf",
+                                        "torque_compensated.csv"};
+  std::string list;
+  for (const std::string& name : traces) {
+    folder_.write("out/" + name, "");
+    list += "dynamics " + name + "\n";
+  }
+  folder_.write("out/.kinescope_products", list);
   const std::vector<std::string> quick = words({"--no-trace"});
   ASSERT_EQ(run(quick).code, 0);
-  for (const char* name : {"trace.json", "robot_traced.urdf", "torque_compensated.csv"}) {
+  for (const std::string& name : traces) {
     EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out" / name)) << name;
   }
   folder_.write("out/trace.json", R"({"schema": "kinescope.trace"})");

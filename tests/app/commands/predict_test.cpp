@@ -49,7 +49,7 @@ class PredictCommand : public testing::Test {
     return {"predict",  path(log),
             "--model",  path("out/torque_model.json"),
             "--output", path("predicted.csv"),
-            "--quiet"};
+            "--quiet",  "--force"};
   }
 
   RecordingFolder folder_;

@@ -34,10 +34,12 @@ inline Outcome run(std::vector<std::string> words) {
   return outcome;
 }
 
-/// The exit code and one line "kinescope: .." on standard error, nothing else. Gives that line.
+/// The exit code and one line "kinescope: .." on standard error, after warnings at most. Gives that
+/// line.
 inline std::string expect_refusal(const std::vector<std::string>& words, ExitCode code,
                                   const std::string& part) {
-  const Outcome outcome = run(words);
+  Outcome outcome = run(words);
+  while (outcome.err.starts_with("warning: ")) outcome.err.erase(0, outcome.err.find('\n') + 1);
   EXPECT_EQ(outcome.code, static_cast<int>(code)) << outcome.err;
   EXPECT_EQ(outcome.out, "");
   EXPECT_TRUE(outcome.err.starts_with("kinescope: ")) << outcome.err;

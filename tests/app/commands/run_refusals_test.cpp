@@ -36,10 +36,12 @@ class RunRefusals : public testing::Test {
   std::string refused(ExitCode code, const std::string& part,
                       const std::vector<std::string>& more = {}) const {
     const fs::path kept = output();
-    for (const char* name : {"robot.urdf", "structure.json", "report.html", "result.json",
-                             "tracks.csv", "observations.csv", "observations.json"}) {
-      folder_.write(std::string("out/") + name, "of an earlier run");
-    }
+    const std::vector<std::string> earlier{"robot.urdf",       "structure.json",   "report.html",
+                                           "result.json",      "tracks.csv",       "run.json",
+                                           "observations.csv", "observations.json"};
+    for (const std::string& name : earlier) folder_.write("out/" + name, "of an earlier run");
+    const nlohmann::json run{{"schema", "kinescope.run"}, {"products", earlier}};
+    folder_.write("out/run.json", run.dump());
     const auto before = contents(kept);
     std::vector<std::string> words{"run", folder_.path().string(), "--output", output(), "--quiet"};
     words.insert(words.end(), more.begin(), more.end());
@@ -114,9 +116,9 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
   write_poses(good.recording);
   const fs::path kept = output();
   std::vector<std::string> words{
-      "run",       folder_.path().string(), "--output", output(), "--quiet", "--free", "placement",
-      "--no-trace"};
+      "run", folder_.path().string(), "--output", output(), "--quiet", "--no-trace"};
   ASSERT_EQ(run(words).code, 0);
+  words.insert(words.end(), {"--free", "placement"});
   folder_.write("nominal.urdf", read_text_file(kept / "robot.urdf"));
   // The last body is mostly not where the robot says, though not as far off as another robot's.
   RobotRecording astray = good.recording;
@@ -126,7 +128,8 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
     for (double& x : sample.T_camera_marker.translation) x += rng.uniform(-0.02, 0.02);
   }
   write_poses(astray);
-  const auto before = contents(kept);
+  auto before = contents(kept);
+  before.erase(".kinescope_products");
   for (int time = 0; time < 2; ++time) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kUndetermined)) << outcome.err;
@@ -134,6 +137,7 @@ TEST_F(RunRefusals, AnAnswerIsNotReplacedByNone) {
     EXPECT_EQ(outcome.out.find("robot.urdf"), std::string::npos) << outcome.out;
     auto after = contents(kept);
     EXPECT_EQ(after.erase("failed_report.html"), 1U);
+    EXPECT_EQ(after.erase(".kinescope_products"), 1U);
     EXPECT_EQ(after, before);
   }
   fs::remove_all(kept);
@@ -166,7 +170,8 @@ TEST_F(RunRefusals, StaleProductsGo) {
   EXPECT_EQ(earlier.at("products"),
             nlohmann::json({"calibration.json", "report.html", "residuals.csv", "result.json",
                             "robot.urdf", "run.json", "structure.json", "tracks.csv"}));
-  for (const char* name : {"trace.json", "dynamics.json", "../nominal.urdf"}) {
+  for (const char* name :
+       {"trace.json", "dynamics.json", "failed_report.html", "../nominal.urdf", "notes.txt"}) {
     earlier["products"].push_back(name);
   }
   folder_.write("out/run.json", earlier.dump());
@@ -194,6 +199,13 @@ TEST_F(RunRefusals, AFolderThatCannotBeWritten) {
   expect_refusal({"run", folder_.path().string(), "--output", "/proc/kinescope", "--quiet"},
                  ExitCode::kBadRequest, "/proc/kinescope");
   EXPECT_EQ(read_text_file(folder_.path() / "a_file"), "text");
+}
+
+TEST_F(RunRefusals, AGeometryToHoldWithoutANominalRobot) {
+  write_poses(arm("no nominal", {}).recording);
+  for (const char* level : {"placement", "offsets"}) {
+    refused(ExitCode::kBadRequest, "--nominal", {"--free", level});
+  }
 }
 
 TEST_F(RunRefusals, ALimitThatIsNoLimit) {

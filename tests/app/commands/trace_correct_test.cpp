@@ -142,7 +142,7 @@ TEST_F(Correct, KeepsToTheUnitsOfTheRecording) {
 TEST_F(Correct, SaysItToAProgram) {
   std::vector<std::string> words = command();
   words.emplace_back("--json");
-  folder_.write("new.csv", "t,a,b,mode\n0,0.1,2,AUTO\n0.1,0.2,4,AUTO\n");
+  folder_.write("new.csv", "t,a,b\n0,0.1,2\n0.1,0.2,4\n0.1,0.2,4\n");
   const Outcome outcome = run(words);
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const json said = json::parse(outcome.out);
@@ -162,6 +162,61 @@ TEST_F(Correct, SaysWhatALogCannotShow) {
   EXPECT_EQ(read_joint_log(path("corrected.csv")).values, read_joint_log(path("new.csv")).values);
 }
 
+// Torques, words and blanks are none of its business: only what is corrected changes, in its place.
+TEST_F(Correct, KeepsTheOtherColumns) {
+  folder_.write("new.csv",
+                "tau0,b,t,mode,a,temperature\n1.50,2,0,AUTO,0.10,\n-2e0,4.0,0.10,,0.20,nan\n"
+                "3,6,0.2,MAN,0.30,41\n");
+  ASSERT_EQ(run(command()).code, 0);
+  EXPECT_EQ(read_text_file(path("corrected.csv")),
+            "tau0,b,t,mode,a,temperature\n1.50,2.024,0,AUTO,0.10,\n-2e0,4.044,0.10,,0.20,nan\n"
+            "3,6.064,0.2,MAN,0.30,41\n");
+}
+
+// Of the channels seen from 0.1 to 0.5 and from 2 to 6.
+TEST_F(Correct, SaysWhatTheRunHasNotSeen) {
+  calibration_["robot"]["joints"][0]["range"] = {0.1, 0.5};
+  calibration_["robot"]["joints"][1]["range"] = {1.2, 3.2};
+  write_calibration();
+  const Outcome within = run(command());
+  EXPECT_EQ(within.code, 0) << within.err;
+  EXPECT_EQ(within.err, "");
+  std::vector<std::string> words = command();
+  words.insert(words.end(), {"--force", "--quiet"});
+  folder_.write("new.csv", "t,a,b\n0,50.1,2\n0.1,50.2,4\n0.2,50.3,8\n");
+  const Outcome beyond = run(words);
+  EXPECT_EQ(beyond.code, 0) << beyond.err;
+  EXPECT_NE(beyond.err.find("column 'a' takes joint1 from 50.1 to 50.3 rad, the run saw 0.1 to "
+                            "0.5 rad"),
+            std::string::npos)
+      << beyond.err;
+  EXPECT_NE(beyond.err.find("column 'b' takes joint2 from 1.2 to 4.2 rad"), std::string::npos)
+      << beyond.err;
+  folder_.remove("corrected.csv");
+  folder_.write("new.csv", "t,a,b\n0,6,2\n0.1,20,4\n0.2,28,6\n");
+  refused(ExitCode::kBadInput, "these are degrees");
+}
+
+TEST_F(Correct, WritesOverNothing) {
+  const auto refused = [&](const std::string& output, const std::string& part, bool force) {
+    const std::string before = read_text_file(path(output));
+    std::vector<std::string> words{"correct", path("out"), path("new.csv"), "--output",
+                                   path(output)};
+    if (force) words.emplace_back("--force");
+    expect_refusal(words, ExitCode::kBadRequest, part);
+    EXPECT_EQ(read_text_file(path(output)), before);
+  };
+  folder_.write("out/report.html", "page").write("there.csv", "text");
+  refused("there.csv", "is there already", false);
+  folder_.write("out/run.json", R"({"schema": "kinescope.run", "products": ["report.html"]})");
+  for (const bool force : {false, true}) {
+    refused("new.csv", "is an input", force);
+    refused("out/calibration.json", "is an input", force);
+    refused("out/robot.urdf", "is an input", force);
+    refused("out/report.html", "is a product of kinescope run", force);
+  }
+}
+
 TEST_F(Correct, NeedsTheFilesOfTheRun) {
   folder_.remove("out/robot.urdf");
   refused(ExitCode::kBadInput, "robot.urdf");
@@ -174,6 +229,10 @@ TEST_F(Correct, NeedsTheFilesOfTheRun) {
 TEST_F(Correct, NeedsALogWithTheChannels) {
   folder_.write("new.csv", "t,a,c\n0,0.1,2\n0.1,0.2,4\n");
   refused(ExitCode::kBadInput, "joint2: no column 'b'");
+  calibration_["effects"] = json::array();
+  write_calibration();
+  folder_.write("new.csv", "t,c,tau0\n0,0.1,2\n0.1,0.2,4\n");
+  refused(ExitCode::kBadInput, "none of the run's channels (its columns should be a, b)");
   folder_.remove("new.csv");
   refused(ExitCode::kBadInput, "new.csv");
 }
