@@ -127,5 +127,33 @@ TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   }
 }
 
+// A drawing without a fault needs nothing freed: what is freed costs certainty, and is not exported.
+TEST(RunNominal, TheFreedomThatPredictsBestIsExported) {
+  const RecordingFolder folder;
+  write_poses(arm("nominal without a fault", {}).recording, folder);
+  const std::filesystem::path found = folder.path() / "found";
+  ASSERT_EQ(
+      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
+          .code,
+      0);
+  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  drawing.markers.clear();
+  folder.write("drawing.urdf", write_urdf(drawing));
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome = run({"run", folder.path().string(), "--output", out.string(), "--quiet",
+                               "--nominal", (folder.path() / "drawing.urdf").string()});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const nlohmann::json result = nlohmann::json::parse(read_text_file(out / "result.json"));
+  const nlohmann::json& levels = result.at("nominal_levels");
+  ASSERT_GE(levels.size(), 3U);
+  const auto held_out = [&](std::size_t level) {
+    return levels[level].at("held_out_m").at("rms").get<double>();
+  };
+  EXPECT_LT(held_out(0), held_out(2)) << levels.dump(2);
+  EXPECT_TRUE(levels[0].at("exported").get<bool>()) << levels.dump(2);
+  EXPECT_NE(outcome.out.find("held as drawn"), std::string::npos) << outcome.out;
+}
+
 }  // namespace
 }  // namespace kinescope
