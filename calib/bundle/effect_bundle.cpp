@@ -213,6 +213,20 @@ bool rows_have_places(const Spec& spec, const std::vector<int>& used) {
   });
 }
 
+// The tree of a state, for joint values by the start's idea of the channels' units.
+KinematicTree fitted_tree(const Spec& spec, const State& state, const State& start) {
+  KinematicTree out = spec.tree;
+  for (std::size_t j = 0; j < out.joints.size(); ++j) {
+    Joint& joint = out.joints[j];
+    const double offset = state.joint_maps[j][1] - start.joint_maps[j][1];
+    joint.T_parent_joint = bundle::from_block(state.joint_frames[j].data()) *
+                           joint_motion(joint.type, joint.axis, offset);
+  }
+  for (std::size_t m = 0; m < out.markers.size(); ++m)
+    out.markers[m].T_link_marker = bundle::from_block(state.mounts[m].data());
+  return out;
+}
+
 }  // namespace
 
 // The least squares fit; `spec` and `state` are left with the change in them.
@@ -247,6 +261,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   int rows = 0;
   for (const int index : used) rows += with.sightings[static_cast<std::size_t>(index)].dimension();
   out.variance = 2.0 * summary.final_cost / std::max(1, rows);
+  out.tree = fitted_tree(with, state, start);
   out.values = Eigen::Map<const Eigen::VectorXd>(
       state.corrections.data(), static_cast<Eigen::Index>(state.corrections.size()));
   if (change.time_offset) {

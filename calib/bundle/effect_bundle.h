@@ -39,6 +39,8 @@ struct BundleSolution {
   Eigen::VectorXd values;  ///< of the change's parameters: corrections, then the time offset
   double time_offset_s = 0.0;
   double variance = 0.0;  ///< of a whitened row, priors' squares counted in
+  /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
+  KinematicTree tree;
 };
 
 /// A solution, and how its residual answers to the parameters and to probes.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct EffectWorld {
   std::vector<int> driven;  ///< joints
   std::vector<int> seen;    ///< markers
   JointMotion frames;
+  JointMotion loaded;  ///< at the frames, with what effects add to the values: where loads act
+  /// Of joints that sag, as the last fit has it: what each of their loads does, rad or m a unit.
+  std::map<int, Eigen::VectorXd> sags;
   JointMotion log;                              ///< finer in time; empty for postures
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   double first_s = 0.0;                         ///< of the frames
@@ -43,6 +47,8 @@ struct CameraEffect {
   std::function<ErrorTable(double scan, const Eigen::MatrixXd& covariance, Eigen::MatrixXd& shares)>
       table;
   bool is_time_offset = false;
+  /// Gravity by the values of the nuisances. Empty: the effect knows nothing of it.
+  std::function<Eigen::Vector3d(const Eigen::VectorXd&)> gravity_base;
 };
 
 /// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,

@@ -49,6 +49,7 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   world.tree = tree;
   world.frames = motion_of(log, tree);
   world.log = world.frames;
+  world.loaded = world.frames;
   world.gravity_base = gravity_base;
   world.known = true;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
@@ -143,33 +144,59 @@ bool add_to_channel(const Eigen::VectorXd& missing, const KinematicTree& tree, c
   return true;
 }
 
-// Adds to a joint's channel what its encoder did not show; false for what no encoder shows.
-bool undo_joint(const FittedEffect& effect, const KinematicTree& tree,
-                const std::vector<effects::CameraEffect>& library, const JointMotion& motion,
-                const JointLog& log, JointLog& corrected) {
+/// What a joint's encoder did not show, in the unit of its value.
+struct Missing {
+  std::size_t joint = 0;
+  Eigen::VectorXd value;  // instants
+};
+
+// Nothing for what no encoder shows.
+std::optional<Missing> missing_by(const FittedEffect& effect, const KinematicTree& tree,
+                                  const std::vector<effects::CameraEffect>& library,
+                                  const JointMotion& motion, const JointLog& log) {
   check_place(effect, tree, log);
   if (!effect.table.empty()) {
     const std::size_t j = value_of(tree.joint(effect.id.place)).index();
     const Eigen::VectorXd value = motion.value.col(static_cast<Eigen::Index>(j));
-    return add_to_channel(effect.table.at(value), tree, tree.joints[j], log, corrected);
+    return Missing{j, effect.table.at(value)};
   }
   const auto found = std::ranges::find_if(
       library, [&](const effects::CameraEffect& known) { return known.candidate.id == effect.id; });
-  if (found == library.end()) return false;
+  if (found == library.end()) return std::nullopt;
   const Candidate& candidate = found->candidate;
   if (candidate.scan_listed &&
       std::ranges::find(candidate.scan, effect.scan) == candidate.scan.end()) {
     throw refused(log, effect, "no column for what it follows");
   }
   const std::vector<Correction> corrections = found->corrections(effect.scan);
-  const Joint& joint = tree.joints[static_cast<std::size_t>(corrections.front().index)];
-  if (!is_joint_value(corrections.front(), joint)) return false;
+  const auto j = static_cast<std::size_t>(corrections.front().index);
+  if (!is_joint_value(corrections.front(), tree.joints[j])) return std::nullopt;
   if (std::cmp_not_equal(corrections.size(), effect.values.size())) {
     throw refused(
         log, effect,
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
-  return add_to_channel(missing_value(effect, corrections, motion), tree, joint, log, corrected);
+  return Missing{j, missing_value(effect, corrections, motion)};
+}
+
+// The world of the log, loads where the effects leave the joints.
+effects::EffectWorld world_under_load(const JointLog& log, const KinematicTree& tree,
+                                      const std::vector<FittedEffect>& effects,
+                                      const std::optional<Eigen::Vector3d>& gravity_base) {
+  constexpr int kRounds = 3;  // each leaves of its error what the sag is, in rad
+  effects::EffectWorld out = world_of(log, tree, gravity_base);
+  const bool under_load = std::ranges::any_of(
+      effects, [](const FittedEffect& effect) { return effect.id.effect == "compliance"; });
+  for (int round = 0; under_load && round < kRounds; ++round) {
+    const std::vector<effects::CameraEffect> library = effects::joint_effects(out);
+    out.loaded.value = out.frames.value;
+    for (const FittedEffect& effect : effects) {
+      if (!tree.joint(effect.id.place)) continue;
+      if (const auto missing = missing_by(effect, tree, library, out.frames, log))
+        out.loaded.value.col(static_cast<Eigen::Index>(missing->joint)) += missing->value;
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -179,11 +206,15 @@ CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
                            const std::optional<Eigen::Vector3d>& gravity_base) {
   CorrectedLog out{log, {}, {}};
   if (log.empty()) return out;
-  const effects::EffectWorld world = world_of(log, tree, gravity_base);
+  const effects::EffectWorld world = world_under_load(log, tree, effects, gravity_base);
   const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
   for (const FittedEffect& effect : effects) {
-    const bool undone = undo_clock(effect, out.log) ||
-                        undo_joint(effect, tree, library, world.frames, log, out.log);
+    bool undone = undo_clock(effect, out.log);
+    if (!undone) {
+      const auto missing = missing_by(effect, tree, library, world.frames, log);
+      undone = missing &&
+               add_to_channel(missing->value, tree, tree.joints[missing->joint], log, out.log);
+    }
     (undone ? out.undone : out.left).push_back(effect.id);
   }
   return out;

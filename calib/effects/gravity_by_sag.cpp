@@ -25,7 +25,7 @@ class SagColumns {
       : carrier_(carrier) {
     for (std::size_t k = 0; k < loads_.size(); ++k) {
       const Eigen::Vector3d along = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k));
-      for (const Load& load : gravity_loads(world.tree, world.frames, joint, along))
+      for (const Load& load : gravity_loads(world.tree, world.loaded, joint, along))
         loads_[k].push_back(read_at(world.frames.times_s, load.arm_m,
                                     {linear.time_s.begin(), linear.time_s.end()}));
     }
@@ -64,11 +64,9 @@ std::vector<Eigen::Vector3d> first_directions() {
 Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle, const std::vector<AddedEffect>& start,
                                const EffectId& sag) {
   const trace::StagePtr stage = trace::make_stage(bundle, start);
-  double time_offset_s = 0.0;
-  for (std::size_t i = 0; i < start.size(); ++i) {
-    if (start[i].id == EffectId{"time_offset", "clock"}) time_offset_s = stage->fit.values[i][0];
-  }
-  const EffectWorld world = bundle.world_at(time_offset_s);
+  std::vector<AddedEffect> with_sag = start;
+  with_sag.push_back({sag, 0.0});
+  const EffectWorld world = bundle.world_of(with_sag);
   const auto joint = std::ranges::find(world.tree.joints, sag.place, &Joint::name);
   const Candidate* one_mass = trace::find_candidate(stage->fit, sag);
   KINESCOPE_CHECK(joint != world.tree.joints.end() && one_mass != nullptr,
@@ -97,11 +95,7 @@ Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle, const std::vector<Add
       moved = take((R * Eigen::Vector3d(x, y, 1.0)).normalized()) || moved;
     if (!moved) step *= 0.5;
   }
-  const FittedEffect single = [&] {
-    std::vector<AddedEffect> with = start;
-    with.push_back({sag, 0.0});
-    return bundle.corrected(with, {}).effects.back();
-  }();
+  const FittedEffect single = bundle.corrected(with_sag, {}).effects.back();
   const Eigen::VectorXd pull = single.values.cwiseQuotient(single.references);
   return pull.dot(best) < 0.0 ? Eigen::Vector3d(-best) : best;
 }

@@ -156,11 +156,46 @@ Correction sag(const Suspect& s, std::string name, const Eigen::VectorXd& load) 
   return out;
 }
 
+// Two unit vectors across an axis.
+std::array<Eigen::Vector3d, 2> across(const Eigen::Vector3d& axis) {
+  const Eigen::Quaterniond R = rotation_to_axis(axis);
+  return {R * Eigen::Vector3d::UnitX(), R * Eigen::Vector3d::UnitY()};
+}
+
+// What a sag would be beside under a gravity that points a little elsewhere.
+Correction turn_of_gravity(const EffectWorld& world, const Suspect& s, const Eigen::VectorXd& sags,
+                           const Eigen::Vector3d& side, std::string name) {
+  constexpr double kDoubt = 0.02;  // rad, of a direction that was declared or that one joint told
+  const std::vector<Load> loads = gravity_loads(world.tree, world.loaded, s.joint, side);
+  Eigen::VectorXd share = Eigen::VectorXd::Zero(s.value.size());
+  for (std::size_t k = 0; k < loads.size(); ++k)
+    share += sags[static_cast<Eigen::Index>(k)] * loads[k].arm_m;
+  Correction out = turn(s, std::move(name), "rad", std::move(share));
+  out.is_nuisance = true;
+  out.prior_sigma = kDoubt;
+  return out;
+}
+
+// Gravity stands beside a sag that depends on it, as two turns across it.
+void doubt_gravity(const EffectWorld& world, const Suspect& s, const Eigen::VectorXd& sags,
+                   CameraEffect& sag) {
+  const Eigen::Vector3d gravity = *world.gravity_base;
+  const auto sides = across(gravity);
+  sag.nuisances = [turns = std::vector{
+                       turn_of_gravity(world, s, sags, sides[0], "turn of gravity, x"),
+                       turn_of_gravity(world, s, sags, sides[1], "turn of gravity, y")}](double) {
+    return turns;
+  };
+  sag.gravity_base = [gravity, sides](const Eigen::VectorXd& turns) {
+    return Eigen::Vector3d(gravity + turns[0] * sides[0] + turns[1] * sides[1]).normalized();
+  };
+}
+
 // Gravity known: the joint's own link pulls from wherever its mass is (two unknowns across the
 // axis), those behind it from their middles, evenly or at the tip.
 CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
   const std::vector<Load> loads =
-      gravity_loads(world.tree, world.frames, s.joint, world.gravity_base);
+      gravity_loads(world.tree, world.loaded, s.joint, world.gravity_base);
   std::vector<EffectParameter> parameters;
   for (const Load& load : loads) parameters.push_back({"sag by " + load.what, s.unit});
   CameraEffect out = effect(s, "compliance", fmt::format("{} gives way under its load", s.name),
@@ -182,6 +217,8 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
   out.candidate.possible = [size = out.candidate.size, limit = largest_size(s.unit)](
                                const Eigen::VectorXd& theta) { return size(theta) < limit; };
   out.corrections = [corrections](double) { return corrections; };
+  if (const auto known = world.sags.find(s.joint); world.gravity_base && known != world.sags.end())
+    doubt_gravity(world, s, known->second, out);
   return out;
 }
 
@@ -225,12 +262,6 @@ CameraEffect helical(const Suspect& s) {
     return std::vector{along};
   };
   return out;
-}
-
-// Two unit vectors across an axis.
-std::array<Eigen::Vector3d, 2> across(const Eigen::Vector3d& axis) {
-  const Eigen::Quaterniond R = rotation_to_axis(axis);
-  return {R * Eigen::Vector3d::UnitX(), R * Eigen::Vector3d::UnitY()};
 }
 
 CameraEffect curved_slider(const Suspect& s) {

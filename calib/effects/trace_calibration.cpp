@@ -42,7 +42,7 @@ CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOption
   effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added, out.trace.accepted);
   out.effects = std::move(corrected.effects);
   out.corrections = std::move(corrected.corrections);
-  out.gravity_base = options.gravity_base;
+  out.gravity_base = corrected.gravity_base ? corrected.gravity_base : options.gravity_base;
   out.stamp_jitter_s = bundle.stamp_jitter_s();
   return out;
 }
@@ -65,16 +65,26 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   CalibrationTrace out = traced(bundle, options, trace_options, progress);
   if (options.gravity_base) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
-  // predicts better and needs no more effects.
+  // predicts better and needs no more effects, or leaves nothing that no effect explains.
   const std::optional<EffectId> sag = telling_sag(out.trace);
   if (!sag) return out;
+  // What else was found at this joint may have stood for what one mass does not say of the sag.
+  for (const AddedEffect& added : out.trace.added) {
+    if (added.id.place != sag->place &&
+        std::ranges::find(trace_options.start, added.id, &AddedEffect::id) ==
+            trace_options.start.end())
+      trace_options.start.push_back(added);
+  }
   CalibrationTraceOptions upright = options;
   upright.gravity_base =
       effects::gravity_by_sag(effects::TracedBundle(bundle, options), trace_options.start, *sag);
   trace_options.start.push_back({*sag, 0.0});
   CalibrationTrace again = traced(bundle, upright, trace_options, progress);
-  if (again.trace.verdict == TraceVerdict::kNothingToSay ||
-      again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size()) ||
+  const bool says_all =
+      out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
+  const bool needs_more =
+      again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size());
+  if (again.trace.verdict == TraceVerdict::kNothingToSay || (needs_more && !says_all) ||
       again.trace.held_out_after.value >= out.trace.held_out_after.value) {
     return out;
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,8 @@
 
 namespace kinescope::effects {
 namespace {
+
+constexpr std::string_view kSag = "compliance";
 
 // Probes without a share, each once: what columns of candidates act through.
 class Carriers {
@@ -115,6 +118,25 @@ std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<Camera
   return out;
 }
 
+// What each load does to the joints that sag, at a solution.
+std::map<int, Eigen::VectorXd> sags_of(const std::vector<CameraEffect>& library,
+                                       const std::vector<AddedEffect>& effects,
+                                       const std::vector<Correction>& corrections,
+                                       const BundleSolution& solution) {
+  const auto places =
+      parameter_places(library, effects, static_cast<Eigen::Index>(corrections.size()));
+  std::map<int, Eigen::VectorXd> out;
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    if (effects[i].id.effect != kSag) continue;
+    Eigen::VectorXd sags = solution.values(places[i]);
+    for (std::size_t k = 0; k < places[i].size(); ++k)
+      sags[static_cast<Eigen::Index>(k)] /=
+          corrections[static_cast<std::size_t>(places[i][k])].reference;
+    out.emplace(corrections[static_cast<std::size_t>(places[i].front())].index, std::move(sags));
+  }
+  return out;
+}
+
 std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector<int>& frames) {
   std::vector<Covariate> out;
   const auto at_instants = [&](const Eigen::VectorXd& by_frame) {
@@ -184,6 +206,46 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
   return {image};
 }
 
+// Adds to the joints' values (frames x joints) what the corrections of a solution move them by.
+void add_values(const std::vector<Correction>& corrections, const BundleSolution& solution,
+                Eigen::MatrixXd& values) {
+  for (std::size_t k = 0; k < corrections.size(); ++k) {
+    const Correction& correction = corrections[k];
+    if (correction.part != CorrectedPart::kJoint || correction.share.size() == 0) continue;
+    const Joint& joint = solution.tree.joints[static_cast<std::size_t>(correction.index)];
+    const double along = joint.type == JointType::kRevolute
+                             ? correction.direction.head<3>().dot(joint.axis)
+                             : correction.direction.tail<3>().dot(joint.axis);
+    values.col(correction.index) +=
+        along * solution.values[static_cast<Eigen::Index>(k)] * correction.share;
+  }
+}
+
+// Gravity as the joint says whose sag hangs on it most; nothing where none does.
+std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& library,
+                                          const std::vector<AddedEffect>& effects,
+                                          const std::vector<Correction>& fitted) {
+  std::optional<Eigen::Vector3d> out;
+  double most = -1.0;
+  for (const AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    if (!effect.gravity_base) continue;
+    const std::vector<Correction> turns = effect.nuisances(added.scan);
+    Eigen::VectorXd values(static_cast<Eigen::Index>(turns.size()));
+    double telling = 0.0;
+    for (std::size_t k = 0; k < turns.size(); ++k) {
+      const auto known = std::ranges::find(fitted, turns[k].name, &Correction::name);
+      KINESCOPE_CHECK(known != fitted.end(), "what stands beside an effect is fitted with it");
+      values[static_cast<Eigen::Index>(k)] = known->value;
+      telling += turns[k].share.squaredNorm();
+    }
+    if (telling <= most) continue;
+    most = telling;
+    out = effect.gravity_base(values);
+  }
+  return out;
+}
+
 }  // namespace
 
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
@@ -219,6 +281,7 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
   world.driven = bundle_->driven_joints();
   world.seen = bundle_->seen_markers();
   world.frames = bundle_->motion_at_frames(time_offset_s);
+  world.loaded = world.frames;
   if (!world.postures) world.log = bundle_->motion_of_log(time_offset_s);
   world.gravity_base = options_.gravity_base;
   world.clock_free = options_.calibrate.estimate_time_offset;
@@ -227,17 +290,37 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
   return world;
 }
 
-TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
-  // Shares are taken where the joints are at the time offset that the fit finds: once more where it
-  // is not the plain model's.
-  EffectWorld world = world_at(0.0);
-  std::vector<CameraEffect> library = all_effects(world);
-  BundleChange change = change_of(library, effects);
-  if (change.time_offset) {
-    world = world_at(bundle_->solve(change).time_offset_s);
-    library = all_effects(world);
-    change = change_of(library, effects);
+// Shares are taken where the joints are at the time offset that the fit finds, and loads where the
+// effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
+TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
+  constexpr int kRoundsUnderLoad = 2;  // each leaves of its error what the sag is, in rad
+  Ready out;
+  out.world = world_at(0.0);
+  out.library = all_effects(out.world);
+  out.change = change_of(out.library, effects);
+  const bool under_load = std::ranges::any_of(
+      effects, [](const AddedEffect& added) { return added.id.effect == kSag; });
+  const int rounds = under_load ? kRoundsUnderLoad : out.change.time_offset ? 1 : 0;
+  for (int round = 0; round < rounds; ++round) {
+    const BundleSolution solution = bundle_->solve(out.change);
+    out.world = world_at(solution.time_offset_s);
+    if (under_load && solution.converged) {
+      out.world.tree = solution.tree;
+      add_values(out.change.corrections, solution, out.world.loaded.value);
+      out.world.sags = sags_of(out.library, effects, out.change.corrections, solution);
+    }
+    out.library = all_effects(out.world);
+    out.change = change_of(out.library, effects);
   }
+  return out;
+}
+
+EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) const {
+  return ready_for(effects).world;
+}
+
+TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
+  auto [world, library, change] = ready_for(effects);
   // Carriers of all candidates at one value of their scans: the same for the others, unless a
   // direction changes with the scan.
   Carriers carriers;
@@ -318,12 +401,8 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
                                                 const std::vector<TracedEffect>& traced) const {
   Corrected out;
   if (effects.empty()) return out;
-  std::vector<CameraEffect> library = all_effects(world_at(0.0));
-  BundleSolution fit = bundle_->solve(change_of(library, effects));
-  if (fit.time_offset_s != 0.0) {
-    library = all_effects(world_at(fit.time_offset_s));
-    fit = bundle_->solve(change_of(library, effects));
-  }
+  const auto [world, library, change] = ready_for(effects);
+  const BundleSolution fit = bundle_->solve(change);
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);
@@ -357,8 +436,10 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
   }
   for (Correction& nuisance : nuisances_of(library, effects)) {
     nuisance.value = fit.values[next++];
+    nuisance.prior_sigma *= std::sqrt(fit.variance);
     out.corrections.push_back(std::move(nuisance));
   }
+  out.gravity_base = gravity_of(library, effects, out.corrections);
   return out;
 }
 

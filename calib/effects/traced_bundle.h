@@ -19,15 +19,25 @@ class TracedBundle final : public TracedModel {
   struct Corrected {
     std::vector<FittedEffect> effects;
     std::vector<Correction> corrections;  ///< of all effects but the time offset, then nuisances
+    std::optional<Eigen::Vector3d> gravity_base;  ///< as known before, turned as sags say
   };
   /// `traced`: the same effects as tracing has them, which knows how certain curves are.
   [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects,
                                     const std::vector<TracedEffect>& traced) const;
 
-  /// The robot and its motion, the log read that much later than the plain model reads it.
-  [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
+  /// The robot and its motion as the fit with these effects has them: the log read that much later,
+  /// loads where the effects leave the joints.
+  [[nodiscard]] EffectWorld world_of(const std::vector<AddedEffect>& effects) const;
 
  private:
+  /// What a fit needs; everything belongs to one world.
+  struct Ready {
+    EffectWorld world;
+    std::vector<CameraEffect> library;
+    BundleChange change;
+  };
+  [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
+  [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
   [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
                                        const std::vector<AddedEffect>& effects) const;
 

@@ -218,6 +218,7 @@ EffectWorld hinge(double turns) {
     world.frames.value(i, 0) =
         std::numbers::pi * turns * std::sin(2.0 * std::numbers::pi * t / 30.0);
   }
+  world.loaded = world.frames;
   world.log = world.frames;
   return world;
 }

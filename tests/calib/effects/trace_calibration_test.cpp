@@ -111,6 +111,35 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"}),
     [](const auto& tested) { return tested.param.first; });
 
+// A load pulls where the joint has sagged to: of 4 deg, the sine of the reading leaves a second
+// harmonic of 0.14 deg, which passed for an eccentricity. Gravity is declared 0.5 deg off.
+TEST(TraceCalibration, ALargeSagHasTheLoadOfWhereItLeads) {
+  EffectWorldOptions options = filmed({{"compliance", "q2", 0.07}});
+  options.kind = truth::RobotKind::kScara;
+  options.down = Eigen::Vector3d(0.7, 0.4, -0.5).normalized();
+  const World world = make_effect_world(options);
+  CalibrationTraceOptions declared;
+  declared.gravity_base = Eigen::Vector3d(0.70, 0.41, -0.5).normalized();
+  const CalibrationTrace found =
+      trace_calibration(world.measurements, world.markers, world.log, start_of(world), declared);
+  const Trace& trace = found.trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"compliance", "q2"})) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), 0.07)) << trace.accepted.front().size;
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  // The log without it says where the joint is, but for what a zero is.
+  const CorrectedLog corrected =
+      corrected_log(world.log, world.tree, found.effects, found.gravity_base);
+  ASSERT_EQ(corrected.undone.size(), 1U);
+  const auto joint = static_cast<Eigen::Index>(value_of(world.tree.joint("q2")).index());
+  const int channel = value_of(world.log.channel("q2"));
+  Eigen::VectorXd miss = resample(corrected.log, world.measurements.times_s).col(channel) -
+                         world.joint_values.col(joint);
+  miss.array() -= miss.mean();
+  EXPECT_LT(miss.cwiseAbs().maxCoeff(), 0.02 * 0.07);
+}
+
 // A page printed 1 % too large, beside slides that know how far they went.
 TEST(TraceCalibration, APrintersScaleIsThatOfAllMarkers) {
   EffectWorldOptions options = filmed();
