@@ -44,7 +44,7 @@ void Tracer::search() {
   } while (backward());
   do {
     look_for_rest();
-  } while (name_the_rest());
+  } while (name_the_rest() || choose_by_rest());
   while (take_the_rest_as_curves()) look_beside_curves();
   describe_curves();
   summarise();

@@ -92,6 +92,8 @@ class Tracer {
   /// True where an effect that is small in the mean over the rows it touches says as much as what
   /// was found to be left.
   [[nodiscard]] bool name_the_rest();
+  /// Of effects that say the same, one that leaves nothing takes the place of one that does.
+  [[nodiscard]] bool choose_by_rest();
   [[nodiscard]] std::optional<FoundRest> next_rest() const;
   void add_rest(FoundRest found);
   void look_for_curves();
@@ -122,7 +124,8 @@ class Tracer {
   StagePtr now_;
   std::vector<Detail> details_;  // beside now_->added, filled by the backward check
   std::set<EffectId> removed_;
-  std::set<EffectId> small_;  // may be added below the floors
+  std::set<EffectId> small_;   // may be added below the floors
+  std::set<EffectId> needed_;  // a plainer one in their place leaves a rest
   std::vector<FoundRest> rests_;
   int round_ = 0;
   Trace trace_;

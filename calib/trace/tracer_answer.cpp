@@ -107,6 +107,40 @@ std::optional<FoundRest> Tracer::next_rest() const {
                    options_);
 }
 
+bool Tracer::choose_by_rest() {
+  if (rests_.empty()) return false;
+  const StagePtr now = now_;
+  const std::vector<FoundRest> rests = rests_;
+  for (const Ambiguity& ambiguity : trace_.ambiguities) {
+    const auto chosen = std::ranges::find(now->added, ambiguity.effects.front(), &AddedEffect::id);
+    if (chosen == now->added.end()) continue;
+    const auto index = static_cast<std::size_t>(chosen - now->added.begin());
+    const StagePtr less = stage_of(kinescope::trace::without(now->added, index));
+    for (std::size_t k = 1; k < ambiguity.effects.size(); ++k) {
+      const EffectId rival = ambiguity.effects[k];
+      const Candidate* candidate = find_candidate(less->fit, rival);
+      if (candidate == nullptr) continue;
+      std::vector<AddedEffect> effects = now->added;
+      effects[index] = {rival, best_scan(less->system, *candidate)};
+      now_ = stage_of(std::move(effects));
+      rests_.clear();
+      if (now_->fit.converged && now_->held_out_sum() < now->held_out_sum() && !next_rest()) {
+        needed_.insert(rival);
+        add_step(round_,
+                 fmt::format("{} takes the place of {}: it leaves nothing", name_of(rival),
+                             name_of(now->added[index].id)),
+                 *now_);
+        while (backward()) {
+        }
+        return true;
+      }
+    }
+  }
+  now_ = now;
+  rests_ = rests;
+  return false;
+}
+
 void Tracer::add_rest(FoundRest found) {
   add_step(round_,
            fmt::format("structure is left at {}, over {}", found.rest.place, found.rest.covariate),

@@ -258,7 +258,7 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
       continue;
     }
     // Of two that say the same the plainer one comes first.
-    const bool plainer = rival.columns.size() < own.columns.size();
+    const bool plainer = rival.columns.size() < own.columns.size() && !needed_.contains(effect.id);
     if (comparison == Comparison::kSecond || plainer) {
       if (swap(index, {candidate.id, rival.scan}, comparison == Comparison::kSecond)) return true;
     }
