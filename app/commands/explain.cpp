@@ -189,16 +189,18 @@ class Explainer {
     return out;
   }
 
-  [[nodiscard]] Structure structure_of(const PoseTracks& tracks) const {
-    Structure out = find_robot(recording(), tracks, options_.calibrate);
+  [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
+                                       std::optional<double> allowance = {}) const {
+    Structure out = find_robot(recording(), tracks, options_.calibrate, allowance);
     lap("structure");
     return out;
   }
 
   // Of a part or a change of the evidence, which may lack what was declared.
-  [[nodiscard]] std::optional<Structure> proposed_structure(const PoseTracks& tracks) const {
+  [[nodiscard]] std::optional<Structure> proposed_structure(
+      const PoseTracks& tracks, std::optional<double> allowance = {}) const {
     try {
-      return structure_of(tracks);
+      return structure_of(tracks, allowance);
     } catch (const Error&) {
       return std::nullopt;
     }
@@ -209,8 +211,8 @@ class Explainer {
     now = asked_again(std::move(now));
     std::set<Shape> tried;
     if (now.structure) tried.insert(shape_of(*now.structure));
-    for (const auto& propose :
-         {&Explainer::with_half_the_recording, &Explainer::with_camera_doubted}) {
+    for (const auto& propose : {&Explainer::with_half_the_recording,
+                                &Explainer::with_errors_allowed, &Explainer::with_camera_doubted}) {
       if (is_settled(now)) break;
       for (const Proposal& proposal : (this->*propose)(now)) {
         // A structure alone is no news where it was fitted before.
@@ -290,6 +292,17 @@ class Explainer {
         out.push_back({std::move(*structure), {}});
     }
     return out;
+  }
+
+  // What a bumped camera or a marker of another size does may look like a joint of whatever channel
+  // rises with time.
+  [[nodiscard]] std::vector<Proposal> with_errors_allowed(const Explanation& now) const {
+    constexpr double kLargeErrors =
+        0.03;  // of the distance, and rad: a bump, or a misprint, of 2 deg
+    if (is_structure_clear(now)) return {};
+    std::optional<Structure> structure = proposed_structure(evidence_.tracks, kLargeErrors);
+    if (!structure) return {};
+    return {{std::move(*structure), {}}};
   }
 
   // A lens or a focal length that is not this camera's bends the tracks themselves. The robot that

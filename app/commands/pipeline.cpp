@@ -222,7 +222,7 @@ std::string model_remedy(RecordingEntry entry, bool camera_declared) {
 }
 
 Structure find_robot(const Recording& recording, const PoseTracks& tracks,
-                     const CalibrateOptions& options) {
+                     const CalibrateOptions& options, std::optional<double> allowance) {
   if (recording.entry == RecordingEntry::kPoints) {
     throw bad_request("points.csv", "points alone do not show a structure",
                       "give a nominal robot with --nominal robot.urdf");
@@ -230,6 +230,7 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset;
   structure_options.units = declared_units(recording);
+  structure_options.allowance = allowance;
   Structure structure = find_structure(tracks, recording.log, structure_options);
   for (StructureDoubt& doubt : structure.doubts) {
     if (doubt.of_model) doubt.remedy = model_remedy(recording.entry, recording.camera.has_value());

@@ -45,9 +45,11 @@ struct Observed {
 [[nodiscard]] std::string model_remedy(RecordingEntry entry, bool camera_declared);
 
 /// The structure, with the clocks' offset scanned for unless they are trusted to agree. Throws
-/// bad_request for points, which show no structure, and what declared.h throws.
+/// bad_request for points, which show no structure, and what declared.h throws. `allowance`: as in
+/// StructureOptions.
 [[nodiscard]] Structure find_robot(const Recording& recording, const PoseTracks& tracks,
-                                   const CalibrateOptions& options);
+                                   const CalibrateOptions& options,
+                                   std::optional<double> allowance = {});
 
 /// A start from the found structure: units of the channels recognised, the base frame placed on the
 /// first tag at rest (its normal up; without one at the camera, upright), or level when gravity is

@@ -106,6 +106,11 @@ Answer search_plainly(Series full, const JointLog& log, const StructureOptions& 
 // with the smallest allowance that makes one of as many channels.
 Answer search_allowing(Series full, const JointLog& log, const StructureOptions& options,
                        OwnLog& own) {
+  if (options.allowance) {
+    own = own_log(log, same_quantities(log));
+    return answer_with(with_allowance(std::move(full), *options.allowance), *options.allowance,
+                       own.log, options);
+  }
   Answer plain = search_plainly(std::move(full), log, options, own);
   const bool whole = is_whole(plain.found.tree, plain.found.readings);
   if (log.channels.empty() || (whole && !leaves_far_more(plain.found.tree))) return plain;

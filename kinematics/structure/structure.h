@@ -101,6 +101,9 @@ struct StructureOptions {
   double min_log_odds = 4.6;       ///< below this (1:100) an answer is called ambiguous
   double max_gap_s = 0.5;          ///< gaps of the log longer than this are not bridged
   bool scan_time_offset = true;    ///< off for postures measured at rest
+  /// Errors of the poses that are no noise, as a share of the distance to the camera and in rad.
+  /// Nothing: none, or where that makes no whole robot the smallest that does.
+  std::optional<double> allowance = {};
   /// Declared, by channel: a turn by one in rad or a slide by one in m moves as far as its channel
   /// says, unless the motion clearly says otherwise. Channels that are absent: any unit.
   std::map<std::string, ChannelUnit> units = {};
