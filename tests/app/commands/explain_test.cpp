@@ -119,5 +119,22 @@ TEST(Explain, ACouplingThatTheStructureSawGivesWayToWhatExplainsMore) {
   EXPECT_FALSE(std::ranges::binary_search(found, "coupling q4"));
 }
 
+// A bump of 1.2 degrees and a marker 3 % too large: a channel that rises with time (a temperature)
+// seems to turn the base's marker.
+TEST(Explain, ABumpIsNoJointOfAnIdleChannel) {
+  const Answered answered = run_case(325);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(effects(answered), (std::vector<std::string>{"camera_bump camera", "tag_size tag_15"}));
+}
+
+// Which way things fall shows once the bump is known, and a third effect once that is known.
+TEST(Explain, GravityIsFoundBesideWhatElseWasTraced) {
+  const Answered answered = run_case(398);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(effects(answered),
+            (std::vector<std::string>{"camera_bump camera", "compliance q2", "helical q3"}));
+}
+
 }  // namespace
 }  // namespace kinescope
