@@ -13,12 +13,19 @@
 namespace kinescope {
 namespace {
 
+// The robot that a run without a drawing finds.
+KinematicTree learned_from(const RecordingFolder& folder) {
+  const std::filesystem::path found = folder.path() / "found";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  return read_urdf(found / "robot.urdf");
+}
+
 TEST(RunNominal, AnAxisDrawnTheWrongWayRoundIsNamedAndMended) {
   const RecordingFolder folder;
   write_poses(arm("nominal the wrong way round", {}).recording, folder);
-  const std::filesystem::path found = folder.path() / "found";
-  ASSERT_EQ(run({"run", folder.path().string(), "--output", found.string(), "--quiet"}).code, 0);
-  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  KinematicTree drawing = learned_from(folder);
   drawing.markers.clear();
   std::size_t turned = 0;
   while (drawing.joints.at(turned).type == JointType::kFixed) ++turned;
@@ -48,12 +55,7 @@ TEST(RunNominal, ColumnsInDegreesAreSaidAndTakenSo) {
   const RecordingFolder folder;
   RobotRecording recording = arm("nominal in degrees", {}).recording;
   write_poses(recording, folder);
-  const std::filesystem::path found = folder.path() / "found";
-  ASSERT_EQ(
-      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
-          .code,
-      0);
-  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  KinematicTree drawing = learned_from(folder);
   drawing.markers.clear();
   folder.write("drawing.urdf", write_urdf(drawing));
   recording.log.values /= kRadPerDegree;
@@ -75,12 +77,7 @@ TEST(RunNominal, ColumnsInDegreesAreSaidAndTakenSo) {
 TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   const RecordingFolder folder;
   write_poses(arm("nominal with a gripper", {}, 2).recording, folder);
-  const std::filesystem::path found = folder.path() / "found";
-  ASSERT_EQ(
-      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
-          .code,
-      0);
-  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  KinematicTree drawing = learned_from(folder);
   const KinematicTree truth = drawing;
   drawing.markers.clear();
   const LinkId hand{static_cast<int>(drawing.links.size()) - 1};
@@ -127,16 +124,12 @@ TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   }
 }
 
-// A drawing without a fault needs nothing freed: what is freed costs certainty, and is not exported.
+// A drawing without a fault needs nothing freed: what is freed costs certainty, and is not
+// exported.
 TEST(RunNominal, TheFreedomThatPredictsBestIsExported) {
   const RecordingFolder folder;
   write_poses(arm("nominal without a fault", {}).recording, folder);
-  const std::filesystem::path found = folder.path() / "found";
-  ASSERT_EQ(
-      run({"run", folder.path().string(), "--output", found.string(), "--quiet", "--no-trace"})
-          .code,
-      0);
-  KinematicTree drawing = read_urdf(found / "robot.urdf");
+  KinematicTree drawing = learned_from(folder);
   drawing.markers.clear();
   folder.write("drawing.urdf", write_urdf(drawing));
 
