@@ -31,6 +31,7 @@ set(rooms
     "app/io: kinematics/* calib/* dynamics/* app/config"
     "app/report: kinematics/* calib/* dynamics/* app/config"
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report"
+    "app/manual: kinematics/core app/commands"
     "app: app/commands")
 
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
@@ -51,7 +52,7 @@ set(third_parties
     "openssl/: app/io"
     "zlib.h: kinematics/core"
     "nlohmann/: app/io app/report app/commands"
-    "CLI/: app/commands"
+    "CLI/: app/commands app/manual"
     "gtest/: none")
 
 function(room_of file out)

@@ -235,7 +235,7 @@ bool names_no_command(const CLI::App& app, int argc, const char* const* argv) {
 }  // namespace
 
 int run_program(int argc, const char* const* argv) {
-  CLI::App app("Learns a robot's body from a video of markers and a joint log", "kinescope");
+  CLI::App app;
   CommandLine line;
   line.run.command_line = join_arguments(argc, argv);
   line.run.arguments.assign(argv + 1, argv + argc);

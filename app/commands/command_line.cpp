@@ -2,6 +2,7 @@
 #include "app/commands/command_line.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/command_options.h"
 #include "app/commands/torque_command_line.h"
@@ -11,31 +12,33 @@
 namespace kinescope {
 namespace {
 
-/// A finite length above zero, m. Nothing on a board is larger than 10 m: that would be mm.
+/// Of what is measured on a board, m: more would be mm.
+constexpr double kLongest = 10.0;
+
+/// A finite length above zero, m.
 CLI::Validator length_m() {
   return {[](const std::string& text) -> std::string {
-            constexpr double kLongest = 10.0;
             const std::optional<double> value = parse_number(text);
             if (value && *value > 0.0 && *value < kLongest) return {};
             return fmt::format("'{}' is no length in m above 0 and below {}", text, kLongest);
           },
-          "m"};
+          fmt::format("up to {} m", kLongest)};
 }
 
 /// One word of several.
 template <typename Enum, typename Value>
 CLI::Option* add_choice(CLI::App& command, const char* name,
                         const std::map<std::string, Enum>& words, Value& value, const char* help) {
-  const auto check = [words](const std::string& text) -> std::string {
-    std::vector<std::string> known;
-    for (const auto& [word, meaning] : words) known.push_back(word);
+  std::vector<std::string> known;
+  for (const auto& [word, meaning] : words) known.push_back(word);
+  const auto check = [words, known](const std::string& text) -> std::string {
     if (words.contains(text)) return {};
     return fmt::format("'{}' is not known; {}", text, did_you_mean(text, known));
   };
   return command
       .add_option_function<std::string>(
           name, [&value, words](const std::string& text) { value = words.at(text); }, help)
-      ->check(check);
+      ->check(check, "", fmt::format("{}", fmt::join(known, " ")));  // its name: for completion
 }
 
 std::string refuse_empty(const std::string& path) {
@@ -52,14 +55,14 @@ void add_path(CLI::App& command, const char* name, std::optional<std::filesystem
       ->group("Files in place of those in the recording");
 }
 
-void add_recording_options(CLI::App& command, RecordingPaths& paths) {
+void add_recording_options(CLI::App& command, RecordingPaths& paths, const char* help,
+                           const char* type) {
   command
       .add_option_function<std::string>(
-          "RECORDING", [&paths](const std::string& text) { paths.folder = text; },
-          "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml")
+          "RECORDING", [&paths](const std::string& text) { paths.folder = text; }, help)
       ->check(refuse_empty)
       ->required()
-      ->type_name("FOLDER");
+      ->type_name(type);
   add_path(command, "--video", paths.video, "Video file, or folder of images with times.csv");
   add_path(command, "--joints", paths.joints, "Joint log: t in s, one column a channel");
   add_path(command, "--camera", paths.camera, "Intrinsics (ROS camera_info, Kalibr or OpenCV)");
@@ -122,7 +125,8 @@ void add_detection_options(CLI::App& run, DetectOptions& detect) {
 
 void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
-  add_recording_options(run, line.run.recording);
+  add_recording_options(run, line.run.recording,
+                        "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml", "FOLDER");
   run.add_option_function<std::string>(
          "-o,--output", [&line](const std::string& text) { line.run.output = text; },
          "Folder for the results (default: <recording>_run here)")
@@ -185,7 +189,9 @@ void add_correct(CLI::App& app, CommandLine& line) {
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
       "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
-  add_recording_options(inspect, line.inspect.recording);
+  add_recording_options(
+      inspect, line.inspect.recording,
+      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; or a torque log", "PATH");
   add_inspect_log_options(inspect, line);
   add_output_options(inspect, line.output);
   inspect.footer(
@@ -273,6 +279,8 @@ void add_camera(CLI::App& app, CommandLine& line) {
 }  // namespace
 
 void add_commands(CLI::App& app, CommandLine& line) {
+  app.name("kinescope");
+  app.description("Learns a robot's body from a video of markers and a joint log");
   app.set_version_flag("--version", fmt::format("kinescope {}", KINESCOPE_VERSION));
   app.set_help_flag("--help,-h", "Print this help");
   app.require_subcommand(1);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the command line can say, and the help that explains it. Private to cli.cpp: shows CLI11.
+// What the command line can say, and the help that explains it. For cli.cpp and
+// app/manual: shows CLI11.
 #pragma once
 
 #include <filesystem>
@@ -33,7 +34,7 @@ struct CommandLine {
   bool no_time_offset = false;
 };
 
-/// Adds the commands with their options, which write into `line`, and the help.
+/// Adds the program's name, its commands with their options, which write into `line`, and the help.
 void add_commands(CLI::App& app, CommandLine& line);
 
 }  // namespace kinescope
