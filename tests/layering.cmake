@@ -32,6 +32,7 @@ set(rooms
     "app/report: kinematics/* calib/* dynamics/* app/config"
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report"
     "app/manual: kinematics/core app/commands"
+    "app/examples: kinematics/* calib/* app/io app/commands"
     "app: app/commands")
 
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
