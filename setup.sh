@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Installs what is missing to build and run Kinescope (Debian 12, Ubuntu 24.04). `setup.sh tests` adds what only
-# the tests need. Does nothing where everything is there.
+# the tests need, `setup.sh package` what makes Debian packages. Does nothing where everything is there.
 set -euo pipefail
 
 packages=(
@@ -13,11 +13,12 @@ packages=(
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev
-             python3-jsonschema)
+             python3-jsonschema groff-base zsh dpkg-dev file)
   # Not in every release; the tests that want them say so and skip.
   optional=(libmujoco-dev clang-format-19 chromium)
 else
   optional=()
+  if [[ "${1:-}" == package ]]; then packages+=(dpkg-dev file); fi
 fi
 
 missing=()
