@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+#
+# Makes the Debian packages and runs the program that is in one.
+cmake_minimum_required(VERSION 3.25)
+
+foreach(tool dpkg-deb dpkg-shlibdeps file)
+  find_program(TOOL_${tool} ${tool})
+  if(NOT TOOL_${tool})
+    message("SKIPPED: ${tool} is not installed")
+    return()
+  endif()
+endforeach()
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE err)
+  if(NOT code EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "${command}: exit code ${code}\n${out}${err}")
+  endif()
+  set(out "${out}" PARENT_SCOPE)
+endfunction()
+
+file(REMOVE_RECURSE ${SCRATCH})
+run(${CPACK} --config ${BUILD}/CPackConfig.cmake -B ${SCRATCH})
+file(GLOB program ${SCRATCH}/kinescope_*.deb)
+run(${TOOL_dpkg-deb} --field ${program} Depends)
+if(NOT out MATCHES "libc6 .*libopenblas0")
+  message(FATAL_ERROR "the program's libraries are not all in its package's dependencies: ${out}")
+endif()
+run(${TOOL_dpkg-deb} --extract ${program} ${SCRATCH}/root)
+run(${SCRATCH}/root/usr/bin/kinescope --version)
+foreach(file doc/kinescope/copyright man/man1/kinescope-run.1.gz zsh/vendor-completions/_kinescope)
+  if(NOT EXISTS ${SCRATCH}/root/usr/share/${file})
+    message(FATAL_ERROR "/usr/share/${file} is not in ${program}")
+  endif()
+endforeach()
