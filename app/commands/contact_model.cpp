@@ -57,6 +57,7 @@ ContactModel from_urdf(const ContactCommandOptions& options, const DynamicModel&
   std::vector<LogFinding> findings;
   if (const auto log = predicted_by(rigid, looked_at, options.data)) {
     findings = compare_torque_scale(log->samples, log->torque).findings;
+    put_into_place(options.logs, findings);
     throw_refusals(findings);
   }
   std::string words = "those of " + options.robot.filename().string();

@@ -14,6 +14,7 @@
 #include "app/commands/output_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_inputs.h"
+#include "app/commands/torque_plausibility.h"
 #include "app/commands/torque_robust_stage.h"
 #include "app/commands/torque_stages.h"
 #include "app/commands/torque_trace_stage.h"
@@ -86,12 +87,14 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
 }
 
 // The scale of the torque against the nominal masses, where there are any.
-void check_scale(const DynamicModel& model, TorqueSummary& summary) {
-  if (!has_masses(model) || summary.data.samples.torque_unit == "A") return;
-  const TorqueScales scales = torque_scales(make_rigid_model(model), summary.data.samples);
+TorqueScales check_scale(const std::vector<fs::path>& logs, const DynamicModel& model,
+                         TorqueSummary& summary) {
+  if (!has_masses(model) || summary.data.samples.torque_unit == "A") return {};
+  TorqueScales scales = torque_scales(make_rigid_model(model), summary.data.samples, logs);
   throw_refusals(scales.findings);
   summary.data.findings.insert(summary.data.findings.end(), scales.findings.begin(),
                                scales.findings.end());
+  return scales;
 }
 
 std::string_view drive_term(TermKind kind) {
@@ -148,6 +151,7 @@ void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const Dynami
 // Every model on the held-out samples; the best one's prediction is kept.
 std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds,
                                        const DynamicModel& model, const TorqueModelOptions& options,
+                                       const FittedTorqueModel& parametric,
                                        const Progress& progress, TorqueSummary& summary) {
   std::vector<FittedTorqueModel> fitted(kinds.size());
   for (std::size_t k = 0; k < kinds.size(); ++k) {
@@ -157,7 +161,7 @@ std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds
     score.kind = kinds[k];
     try {
       fitted[k] = kinds[k] == TorqueModelKind::kParametric
-                      ? parametric_model(summary.identification, model, summary.train, options)
+                      ? parametric
                       : fit_torque_model(kinds[k], model, summary.train, options, progress);
       score = score_torque_model(fitted[k], summary.test);
     } catch (const Error& error) {
@@ -305,20 +309,23 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   if (options.gravity_from_torques && !options.gravity_m_s2) {
     take_gravity_of(summary.data.samples, model, summary);
   }
-  check_scale(model, summary);
+  const TorqueScales scales = check_scale(options.logs, model, summary);
   split_samples(options, model, summary);
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), models_options);
   clock.lap("read", summary.times);
 
-  // Refuses what it must before the slow fits.
+  report_progress(progress, "identify", 0, 0);
+  summary.identification = identify_dynamics(model, summary.train, models_options.identify);
+  const FittedTorqueModel parametric =
+      parametric_model(summary.identification, model, summary.train, models_options);
+  // Refuses what it must before the slow fits, and before anything is written.
+  require_torques_of_motion(model, summary, log.log, scales, parametric, models_options);
   std::optional<TorqueSamples> unloaded;
   if (asks_for_payload(options)) {
     report_progress(progress, "payload", 0, 0);
     unloaded = add_payload(options, model, summary);
     clock.lap("payload", summary.times);
   }
-  report_progress(progress, "identify", 0, 0);
-  summary.identification = identify_dynamics(model, summary.train, models_options.identify);
   summary.consistent = consistent_model(summary.identification);
   summary.drives = drives_of(summary);
   clock.lap("identify", summary.times);
@@ -331,7 +338,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     remove_torque_trace(options.trace_file, folder);
   }
   const std::vector<FittedTorqueModel> fitted =
-      compare(kinds, model, models_options, progress, summary);
+      compare(kinds, model, models_options, parametric, progress, summary);
   clock.lap("models", summary.times);
   if (!options.save_model.empty())
     summary.saved_model = save_best(options, fitted, traced, summary);

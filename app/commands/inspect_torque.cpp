@@ -57,11 +57,12 @@ void look_at_times(const TorqueLog& log, TorqueLogFacts& facts) {
 }
 
 // The torque against the masses of the robot, as `kinescope dynamics` compares them.
-void look_at_scale(const DynamicModel& model, const TorqueLogReport& report,
-                   const TorqueDataOptions& options, std::vector<LogFinding>& findings) {
+void look_at_scale(const std::filesystem::path& file, const DynamicModel& model,
+                   const TorqueLogReport& report, const TorqueDataOptions& options,
+                   std::vector<LogFinding>& findings) {
   if (!has_masses(model) || report.log.torque.cols() == 0 || report.log.torque_unit == "A") return;
   const TorqueSamples samples = filtered_data(report, options.motion).samples;
-  const TorqueScales scales = torque_scales(make_rigid_model(model), samples);
+  const TorqueScales scales = torque_scales(make_rigid_model(model), samples, {file});
   findings.insert(findings.end(), scales.findings.begin(), scales.findings.end());
 }
 
@@ -106,7 +107,7 @@ TorqueLogFacts look_at_torques(const InspectOptions& options) {
     std::vector<LogFinding> findings = report.findings;
     const bool refused =
         std::ranges::count(findings, FaultWeight::kRefusal, &LogFinding::weight) > 0;
-    if (robot && !refused) look_at_scale(robot->model, report, options.data, findings);
+    if (robot && !refused) look_at_scale(file, robot->model, report, options.data, findings);
     for (const LogFinding& finding : findings) {
       facts.findings.push_back({finding.weight == FaultWeight::kRefusal, to_line(finding)});
     }

@@ -4,10 +4,12 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
+#include "app/commands/torque_inputs.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
 #include "app/report/result_values.h"
@@ -22,6 +24,7 @@ struct Predicted {
   TorquePrediction torque;
   BandFactors bands;
   bool traced = false;
+  std::vector<std::string> warnings;
 };
 
 std::vector<WantedJoint> wanted(const RigidModel& rigid) {
@@ -40,13 +43,35 @@ TorquePrediction by_trace(const SavedTrace& traced, const TorqueSamples& samples
   return out;
 }
 
+// What is odd about the log and was worked around, and joints that the model does not have.
+std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings) {
+  std::vector<std::string> out;
+  for (const LogFinding& finding : findings) {
+    if (finding.weight == FaultWeight::kWarning || finding.fault == LogFault::kAssignment) {
+      out.push_back(to_line(finding));
+    }
+  }
+  return out;
+}
+
+// Unit and sign of the log's torques against those that the model was learned from.
+void check_scale(const std::vector<std::filesystem::path>& logs, Predicted& predicted) {
+  std::vector<LogFinding> findings =
+      compare_torque_scale(predicted.samples, predicted.torque.mean).findings;
+  put_into_place(logs, findings);
+  throw_refusals(findings);
+  for (std::string& line : warnings_of(findings)) predicted.warnings.push_back(std::move(line));
+}
+
 Predicted predict(const PredictOptions& options, const TorqueModelFile& file) {
   TorqueDataOptions data = options.data;
   const TorqueFilter& filter = file.traced ? file.traced->filter : file.filter;
   data.motion.filter = filter.kind;
   data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
   Predicted out;
-  out.samples = read_torque_data(options.logs, wanted(file.model.rigid), data).samples;
+  TorqueData read = read_torque_data(options.logs, wanted(file.model.rigid), data);
+  out.warnings = warnings_of(read.findings);
+  out.samples = std::move(read.samples);
   if (out.samples.torque_unit != file.model.torque_unit) {
     throw bad_input(options.logs.front().string(),
                     fmt::format("its torques are in {}, the model's in {}", out.samples.torque_unit,
@@ -60,6 +85,7 @@ Predicted predict(const PredictOptions& options, const TorqueModelFile& file) {
     out.torque = predict_torque(file.model, out.samples.q, out.samples.dq, out.samples.ddq);
     out.bands = file.model.bands;
   }
+  check_scale(options.logs, out);
   return out;
 }
 
@@ -106,6 +132,21 @@ std::vector<JointResult> results(const Predicted& predicted) {
   return out;
 }
 
+// A model that knows the robot does better than the mean of the log; of another robot, load or
+// kind of torque it does not.
+std::string worse_words(const std::vector<JointResult>& joints, const RigidModel& rigid) {
+  std::vector<std::string> worse;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].nmse_percent > 100.0) worse.push_back(rigid.bodies[j].joint);
+  }
+  if (worse.empty()) return {};
+  return fmt::format(
+      "the model predicts {} of {} joints worse than a constant would ({}): is the log of the "
+      "robot, "
+      "the load and the kind of torque that it was learned from?",
+      worse.size(), joints.size(), fmt::join(worse, ", "));
+}
+
 }  // namespace
 
 ExitCode predict_command(const PredictOptions& options, const Console& console) {
@@ -113,16 +154,24 @@ ExitCode predict_command(const PredictOptions& options, const Console& console) 
   inputs.push_back(options.model);
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueModelFile file = read_torque_model(options.model);
-  const Predicted predicted = predict(options, file);
+  Predicted predicted = predict(options, file);
   const RigidModel& rigid = file.model.rigid;
+  const std::vector<JointResult> joints = results(predicted);
+  if (std::string words = worse_words(joints, rigid); !words.empty()) {
+    predicted.warnings.push_back(std::move(words));
+  }
+  for (const std::string& warning : predicted.warnings)
+    fmt::print(stderr, "warning: {}\n", warning);
   write_file_atomically(options.output, table(predicted, rigid));
   const std::vector<std::string> words = motion_words(file.model.learned, predicted.samples, rigid);
-  const std::vector<JointResult> joints = results(predicted);
   if (console.json) {
-    nlohmann::json document{
-        {"model", to_string(file.model.kind)}, {"traced", predicted.traced},
-        {"samples", predicted.samples.size()}, {"unit", predicted.samples.torque_unit},
-        {"joints", nlohmann::json::array()},   {"motion", report::texts(words)}};
+    nlohmann::json document{{"model", to_string(file.model.kind)},
+                            {"traced", predicted.traced},
+                            {"samples", predicted.samples.size()},
+                            {"unit", predicted.samples.torque_unit},
+                            {"joints", nlohmann::json::array()},
+                            {"motion", report::texts(words)},
+                            {"warnings", report::texts(predicted.warnings)}};
     for (std::size_t j = 0; j < joints.size(); ++j) {
       document["joints"].push_back({{"name", report::text(rigid.bodies[j].joint)},
                                     {"nmse_percent", report::number(joints[j].nmse_percent)},

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/io/sha256.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -52,10 +53,21 @@ bool has_masses(const DynamicModel& model) {
                              [](const InertialParameters& link) { return link.mass_kg > 0.0; });
 }
 
-TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples) {
-  return compare_torque_scale(
+TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples,
+                           const std::vector<fs::path>& logs) {
+  TorqueScales out = compare_torque_scale(
       samples, inverse_dynamics_of_samples(rigid, samples.q, samples.dq, samples.ddq),
       weight_scale(rigid, samples.q.colwise().mean().transpose()));
+  put_into_place(logs, out.findings);
+  return out;
+}
+
+void put_into_place(const std::vector<fs::path>& logs, std::vector<LogFinding>& findings) {
+  std::vector<std::string> names;
+  for (const fs::path& log : logs) names.push_back(log.string());
+  for (LogFinding& finding : findings) {
+    if (finding.place.empty()) finding.place = fmt::format("{}", fmt::join(names, ", "));
+  }
 }
 
 std::string file_list(const std::vector<fs::path>& files) {

@@ -30,8 +30,13 @@ struct TorqueRobot {
 /// Some link has a mass.
 [[nodiscard]] bool has_masses(const DynamicModel& model);
 
-/// The torque against the masses of the robot: unit, sign, lag.
-[[nodiscard]] TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples);
+/// The torque of the logs against the masses of the robot: unit, sign, lag.
+[[nodiscard]] TorqueScales torque_scales(const RigidModel& rigid, const TorqueSamples& samples,
+                                         const std::vector<std::filesystem::path>& logs);
+
+/// Findings without a place are everywhere in the logs.
+void put_into_place(const std::vector<std::filesystem::path>& logs,
+                    std::vector<LogFinding>& findings);
 
 /// "a.csv, b.csv": names of files without their folders.
 [[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);

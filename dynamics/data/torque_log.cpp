@@ -250,6 +250,7 @@ class Reader {
            fmt::format("joints taken in their order: {}", fmt::join(pairs, ", ")),
            "say otherwise in recording.yaml, dynamics: {joints: {..}}"});
     }
+    note_other_joints(order);
     Signal q = read_signal(
         table_, {position_, order, &mapping_.position_unit, &mapping_.position_factor, "position"});
     log.q = std::move(q.values);
@@ -273,6 +274,22 @@ class Reader {
       log.ddq_columns = std::move(signal.names);
     }
     read_commands();
+  }
+
+  /// Joints of the log that nobody asked for: another robot's log, or more than one robot in it.
+  void note_other_joints(const std::vector<std::size_t>& order) {
+    std::vector<std::string> others;
+    for (std::size_t k = 0; k < position_.keys.size(); ++k) {
+      if (std::ranges::find(order, k) != order.end()) continue;
+      others.push_back(
+          fmt::format("'{}'", table_.names[static_cast<std::size_t>(position_.columns[k])]));
+    }
+    if (others.empty()) return;
+    out_.findings.push_back(
+        {LogFault::kAssignment, FaultWeight::kNote, "", 0.0, 0.0, table_.source,
+         fmt::format("{} joints are wanted, the log has {}: {} left out", order.size(),
+                     position_.keys.size(), fmt::join(others, ", ")),
+         "check that the log is this robot's"});
   }
 
   void read_commands() {
