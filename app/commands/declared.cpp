@@ -36,13 +36,43 @@ std::optional<double> times_as_far(JointType type, const std::string& unit, doub
   return alike ? std::optional<double>(std::abs(scale)) : std::nullopt;
 }
 
+// As it stands in the file: the reader has brought deg and mm to rad and m.
+std::string declared_word(const Recording& recording, const std::string& channel,
+                          const std::string& unit) {
+  if (!recording.log.unit_factors.contains(channel)) return unit;
+  return unit == "rad" ? "deg" : "mm";
+}
+
+// Readings that are those of the joint in rad or m as they stand, declared as of the other kind. A
+// turning channel that slides a joint, or the other way round, has a scale of its own (a spindle, a
+// lever), but no robot's is one metre, or one rad a mm, to 5 %.
+void refuse_other_kind(const Recording& recording, const StructureJoint& joint,
+                       const std::string& channel, const std::string& declared, double scale) {
+  const auto read = recording.log.unit_factors.find(channel);
+  const double factor = read == recording.log.unit_factors.end() ? 1.0 : read->second;
+  if (std::abs(std::abs(scale) * factor - 1.0) > kSlideTolerance) return;
+  const bool turns = joint.type == JointType::kRevolute;
+  throw undetermined(
+      settings_file(recording),
+      fmt::format("the channel '{}', declared in {}, {} its joint: its readings are in {}", channel,
+                  declared_word(recording, channel, declared), turns ? "turns" : "slides",
+                  turns ? "rad" : "m"),
+      fmt::format("declare it in {}; a channel in units of its own is declared as ticks",
+                  turns ? "rad" : "m"));
+}
+
 void check_scale(const Recording& recording, const StructureJoint& joint) {
   const ChannelTerm& term = value_of(joint.channel);
   const std::string& channel = recording.log.channels[static_cast<std::size_t>(term.channel)];
   const auto declared = recording.settings.units.find(channel);
   if (declared == recording.settings.units.end()) return;
-  const auto ratio = times_as_far(joint.type, declared->second, term.scale);
-  if (!ratio) return;
+  const std::string& unit = declared->second;
+  if (unit == "ticks") return;
+  const auto ratio = times_as_far(joint.type, unit, term.scale);
+  if (!ratio) {
+    refuse_other_kind(recording, joint, channel, unit, term.scale);
+    return;
+  }
   const double off = std::abs(*ratio - 1.0);
   const bool slides = joint.type == JointType::kPrismatic;
   if (off < (slides ? kSlideTolerance : kHingeTolerance) || off < kClearSigmas * term.scale_sigma) {
@@ -50,8 +80,8 @@ void check_scale(const Recording& recording, const StructureJoint& joint) {
   }
   throw undetermined(
       settings_file(recording),
-      fmt::format("the channel '{}', declared in {}, moves its joint {:.3g} times as far", channel,
-                  declared->second, *ratio),
+      fmt::format("the channel '{}', declared in {}, moves its joint {:.3g} times as far as that",
+                  channel, declared_word(recording, channel, unit), *ratio),
       fmt::format(
           "{}; a channel in units of its own is declared as ticks",
           slides ? "check the size of the tags in tags.yaml, and the unit" : "check the unit"));

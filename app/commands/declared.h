@@ -21,7 +21,7 @@ namespace kinescope {
 /// Throws undetermined when a channel that is declared in rad, deg, m or mm moves a joint of that
 /// kind clearly (four standard deviations, and 5 % of a slide, 25 % of a turn) more or less far
 /// than it says. A turning channel that slides a joint, or the other way round, has a scale of its
-/// own.
+/// own; where that is 1, the declaration is refused as one of the wrong kind.
 void require_declared_units(const Recording& recording, const Structure& structure);
 
 /// Throws undetermined when one of the `fixed_tags` moves, and bad_input when one is not seen

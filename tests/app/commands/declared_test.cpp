@@ -67,6 +67,34 @@ TEST(DeclaredUnits, MustBeWhatTheJointMoves) {
   EXPECT_EQ(of_unit("", lift(1.2)), "accepted");
 }
 
+TEST(DeclaredUnits, OfTheOtherKindAreNamed) {
+  Structure hinge = lift(0.999);
+  hinge.joints[0].type = JointType::kRevolute;
+  const std::string line = of_unit("m", hinge);
+  EXPECT_NE(line.find("lab/recording.yaml: the channel 'lift', declared in m, turns its joint: its "
+                      "readings are in rad (declare it in rad;"),
+            std::string::npos)
+      << line;
+  EXPECT_NE(of_unit("rad", lift(-1.0))
+                .find("declared in rad, slides its joint: its readings are "
+                      "in m (declare it in m;"),
+            std::string::npos);
+  hinge.joints[0].channel->scale = 0.9;
+  EXPECT_EQ(of_unit("m", hinge), "accepted") << "a lever";
+  EXPECT_EQ(of_unit("rad", lift(0.001)), "accepted") << "a spindle";
+}
+
+// The reader brings deg to rad; the line has the word of the file.
+TEST(DeclaredUnits, AreNamedAsTheyStandInTheFile) {
+  Recording recording = with("rad");
+  recording.log.unit_factors["lift"] = kRadPerDegree;
+  Structure hinge = lift(57.3);
+  hinge.joints[0].type = JointType::kRevolute;
+  const std::string line = refusal([&] { require_declared_units(recording, hinge); });
+  EXPECT_NE(line.find("declared in deg, moves its joint 57.3 times as far"), std::string::npos)
+      << line;
+}
+
 TEST(DeclaredUnits, AHingesScaleIsNoTagsSize) {
   Structure hinge = lift(1.2);
   hinge.joints[0].type = JointType::kRevolute;
