@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/camera/camera_file.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -46,13 +47,66 @@ void require_centred(const CameraModel& camera, int width, int height, const std
       "video (kinescope camera)");
 }
 
+// Focal lengths in mm, or of another image: lenses from fisheye (a third of the image's longer
+// side) to telephoto lie far inside these bounds.
+void require_plausible_focal(const CameraModel& camera, const std::string& source) {
+  constexpr double kShortest = 0.1;  // of the image's longer side; half of it is a view of 157 deg
+  constexpr double kLongest = 1000.0;
+  const double side = std::max(camera.width, camera.height);
+  const auto plausible = [&](double focal) {
+    return focal >= kShortest * side && focal <= kLongest * side;
+  };
+  if (plausible(camera.fx) && plausible(camera.fy)) return;
+  throw bad_input(
+      source,
+      fmt::format("focal lengths {:.6g} and {:.6g} fit no lens for images of {} x {} px: in mm?",
+                  camera.fx, camera.fy, camera.width, camera.height),
+      "fx and fy are in pixels: the focal length in mm times the pixels per mm of the sensor; or "
+      "calibrate the camera (kinescope camera)");
+}
+
+// Distortion that folds the image over itself, so that most pixels see no direction, or next to the
+// same one. A fit may do so in the corners that no board reached.
+void require_plausible_distortion(const CameraModel& camera, const std::string& source) {
+  constexpr int kPerSide = 9;
+  constexpr double kSamePlace = 1.0;  // px
+  constexpr double kLeast = 0.2;      // of the angle that the focal length says
+  int seen = 0;
+  for (int i = 0; i < kPerSide; ++i) {
+    for (int j = 0; j < kPerSide; ++j) {
+      const Eigen::Vector2d pixel((i + 0.5) / kPerSide * camera.width,
+                                  (j + 0.5) / kPerSide * camera.height);
+      const auto direction = unproject(camera, pixel);
+      if (!direction) continue;
+      const auto back = project(camera, {direction->x(), direction->y(), 1.0});
+      const Eigen::Vector2d straight((pixel.x() - camera.cx) / camera.fx,
+                                     (pixel.y() - camera.cy) / camera.fy);
+      const bool bent = direction->norm() < kLeast * straight.norm();
+      if (back && !bent && (*back - pixel).norm() < kSamePlace) ++seen;
+    }
+  }
+  if (2 * seen > kPerSide * kPerSide) return;
+  throw bad_input(
+      source,
+      fmt::format("{} with these distortion coefficients shows {} of {} places of "
+                  "the image nowhere: it folds the image over itself",
+                  to_string(camera.model), kPerSide * kPerSide - seen, kPerSide * kPerSide),
+      "check model, number and order of the coefficients, or calibrate the camera "
+      "(kinescope camera)");
+}
+
+CameraModel require_plausible(CameraModel camera, const std::string& source) {
+  if (camera.width <= 0 || camera.height <= 0) return camera;  // asked when the size is known
+  require_plausible_focal(camera, source);
+  require_plausible_distortion(camera, source);
+  return camera;
+}
+
 bool is_opencv_yaml(const std::string& text) {
   return text.starts_with("%YAML:") || text.find("!!opencv-matrix") != std::string::npos;
 }
 
-}  // namespace
-
-CameraModel read_camera(const std::filesystem::path& path) {
+CameraModel read_any_format(const std::filesystem::path& path) {
   constexpr std::uintmax_t kLargest = 1U << 24U;
   const std::string text = read_text_file(path, kLargest);
   const Source source{path.string()};
@@ -76,12 +130,18 @@ CameraModel read_camera(const std::filesystem::path& path) {
   }
 }
 
+}  // namespace
+
+CameraModel read_camera(const std::filesystem::path& path) {
+  return require_plausible(read_any_format(path), path.string());
+}
+
 CameraModel with_image_size(CameraModel camera, int width, int height, const std::string& source) {
   if (camera.width == 0 && camera.height == 0) {
     require_centred(camera, width, height, source);
     camera.width = width;
     camera.height = height;
-    return camera;
+    return require_plausible(camera, source);
   }
   if (camera.width != width || camera.height != height) {
     throw bad_input(source,

@@ -12,7 +12,8 @@
 namespace kinescope {
 
 /// Throws bad_input naming file, key and remedy: not YAML/XML, a missing key, a model we do not
-/// know, a wrong number of distortion terms, sizes or focal lengths that are not positive, NaN.
+/// know, a wrong number of distortion terms, sizes or focal lengths that are not positive, NaN; focal
+/// lengths that fit no lens for the image (mm), distortion that folds it over itself.
 /// Files without an image size (OpenCV) give width = height = 0 only when `image_width` is nowhere
 /// to be found.
 [[nodiscard]] CameraModel read_camera(const std::filesystem::path& path);
