@@ -14,11 +14,16 @@
 namespace kinescope {
 namespace {
 
+constexpr double kSmallestTagM = 5e-4;  // no lens of a robot's camera sees less
 constexpr double kLargestTagM = 5.0;
 constexpr const char* kSizeRemedy = "give the edge of the black square in m, as measured";
 
 double size_of(const YamlValue& value) {
   const double size_m = value.positive(kSizeRemedy);
+  if (size_m < kSmallestTagM) {
+    throw value.error(fmt::format("is {} m, smaller than {} m", size_m, kSmallestTagM),
+                      kSizeRemedy);
+  }
   if (size_m > kLargestTagM) {
     throw value.error(fmt::format("is {} m, larger than {} m", size_m, kLargestTagM),
                       "sizes are in m; was this mm?");

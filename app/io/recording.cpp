@@ -58,6 +58,46 @@ void require_no_joints(const KinematicTree& nominal, const fs::path& folder) {
                   fmt::format("add it with the columns t, {}", fmt::join(names, ", ")));
 }
 
+/// Pixels that are not square are of few cameras; a slip of the pen makes them, too.
+void warn_of_pixels(const CameraModel& camera, const fs::path& file,
+                    std::vector<std::string>& warnings) {
+  constexpr double kSquare = 1.1;
+  const double ratio = std::max(camera.fx, camera.fy) / std::min(camera.fx, camera.fy);
+  if (ratio <= kSquare) return;
+  warnings.push_back(
+      fmt::format("{}: fx = {:.6g} and fy = {:.6g} are of pixels {:.3g} times as long as wide: is "
+                  "one of them wrong?",
+                  file.string(), camera.fx, camera.fy, ratio));
+}
+
+/// Sizes of one robot's markers that lie this far apart are in two units, mostly.
+void warn_of_sizes(const MarkerSet& markers, const fs::path& file,
+                   std::vector<std::string>& warnings) {
+  constexpr double kFarApart = 8.0;
+  double least = markers.default_size_m > 0.0 ? markers.default_size_m : 1e9;
+  double most = std::max(0.0, markers.default_size_m);
+  for (const auto& [id, size] : markers.sizes_m) {
+    least = std::min(least, size);
+    most = std::max(most, size);
+  }
+  if (most <= kFarApart * least) return;
+  warnings.push_back(fmt::format("{}: sizes from {:g} to {:g} m: are all of them in m?",
+                                 file.string(), least, most));
+}
+
+/// A robot with links of tens of metres is drawn in mm.
+void require_metres(const KinematicTree& nominal, const fs::path& file) {
+  constexpr double kNoLinkM = 20.0;
+  for (const Joint& joint : nominal.joints) {
+    const double apart = joint.T_parent_joint.translation.norm();
+    if (apart <= kNoLinkM) continue;
+    throw bad_input(
+        file.string(),
+        fmt::format("joint '{}' lies {:.4g} m from the joint before it: in mm?", joint.name, apart),
+        "lengths of a URDF are in m: divide them by 1000");
+  }
+}
+
 /// Torque channels that are declared must be columns, or the declaration is a slip of the pen.
 void read_log(Recording& recording, const RecordingFiles& files) {
   if (!files.joints) {
@@ -129,10 +169,51 @@ std::optional<Eigen::Vector2d> corner_outside(const TagObservation& tag,
   return std::nullopt;
 }
 
+/// Columns that hold each other's coordinate: many corners are outside the image, and all of them
+/// inside once u and v are exchanged. Seen only where the image is not square.
+void refuse_exchanged_axes(const TagObservations& corners, const CameraModel& camera,
+                           const fs::path& file) {
+  constexpr double kMany = 0.05;
+  CameraModel turned = camera;
+  std::swap(turned.width, turned.height);
+  std::size_t outside = 0;
+  for (const TagObservation& tag : corners.observations) {
+    if (corner_outside(tag, turned)) return;
+    if (corner_outside(tag, camera)) ++outside;
+  }
+  const std::size_t all = corners.observations.size();
+  if (static_cast<double>(outside) < kMany * static_cast<double>(all)) return;
+  throw bad_input(file.string(),
+                  fmt::format("{} of {} sightings are outside images of {} x {} px, and none is "
+                              "with u and v exchanged",
+                              outside, all, camera.width, camera.height),
+                  "u counts to the right, v down: exchange the two columns, or give the intrinsics "
+                  "of the images that the corners were found in");
+}
+
+/// All corners within a pixel or two: they are shares of the image's size, or of another unit.
+void refuse_normalised(const TagObservations& corners, const CameraModel& camera,
+                       const fs::path& file) {
+  double farthest = 0.0;
+  for (const TagObservation& tag : corners.observations) {
+    for (const Eigen::Vector2d& corner : tag.corners_px) {
+      farthest = std::max(farthest, corner.cwiseAbs().maxCoeff());
+    }
+  }
+  constexpr double kShare = 2.0;
+  if (farthest > kShare) return;
+  throw bad_input(file.string(),
+                  fmt::format("no corner is farther than {:.3g} px from the first pixel, in images "
+                              "of {} x {} px: are these shares of the size?",
+                              farthest, camera.width, camera.height),
+                  "give u and v in pixels: times the width and the height");
+}
+
 /// Leaves a few markers outside the images out; more of them are of other images than the camera's.
 void leave_out_outside(TagObservations& corners, const CameraModel& camera,
                        const RecordingFiles& files, std::vector<std::string>& warnings) {
   if (camera.width <= 0 || camera.height <= 0) return;  // its file tells no size
+  refuse_exchanged_axes(corners, camera, value_of(files.corners));
   BadRows bad(value_of(files.corners).string(), corners.observations.size(), "sightings");
   std::vector<TagObservation> inside;
   for (TagObservation& tag : corners.observations) {
@@ -166,6 +247,7 @@ void take_image_size(Recording& recording, const RecordingFiles& files) {
   TagObservations& corners = value_of(recording.corners);
   corners.width = recording.camera->width;
   corners.height = recording.camera->height;
+  refuse_normalised(corners, *recording.camera, value_of(files.corners));
   leave_out_outside(corners, *recording.camera, files, recording.warnings);
 }
 
@@ -208,6 +290,7 @@ void read_sightings(Recording& recording, const RecordingFiles& files) {
 void read_markers(Recording& recording, const RecordingFiles& files) {
   if (files.tags) {
     recording.markers = read_marker_set(*files.tags);
+    warn_of_sizes(recording.markers, *files.tags, recording.warnings);
     return;
   }
   const bool needed =
@@ -259,6 +342,31 @@ void require_seconds(const JointLog& log, const std::vector<double>& times_s,
       fmt::format("stamps are in s: divide them by {:.0f}", std::pow(1e3, thousands)));
 }
 
+bool are_whole_numbers(const std::vector<double>& times_s) {
+  return std::ranges::all_of(times_s, [](double t) { return t == std::round(t); });
+}
+
+/// Numbers of frames or rows in place of stamps: whole, one apart or more, and they run many times
+/// as long as the other clock.
+void require_stamps(const std::vector<double>& times_s, const std::string& source,
+                    const std::vector<double>& others_s, const std::string& other) {
+  constexpr double kTimesAsLong = 5.0;
+  constexpr std::size_t kFewest = 10;  // fewer may be whole by chance
+  if (times_s.size() < kFewest || others_s.size() < kFewest) return;
+  const auto [first, last] = std::ranges::minmax(times_s);
+  const double own = last - first;
+  const double others = others_s.back() - others_s.front();
+  if (own < kTimesAsLong * others || !are_whole_numbers(times_s) || are_whole_numbers(others_s)) {
+    return;
+  }
+  throw bad_input(
+      source,
+      fmt::format("its stamps are whole numbers that run for {:.6g} s, {} for {:.6g} s: "
+                  "are they numbers of frames or rows?",
+                  own, other, others),
+      "stamps are in s on one clock: divide the numbers by the rate");
+}
+
 }  // namespace
 
 std::string_view to_string(RecordingEntry entry) {
@@ -278,11 +386,21 @@ std::string_view to_string(RecordingEntry entry) {
 void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
                           const std::string& source) {
   if (log.empty() || times_s.empty()) return;
+  constexpr std::size_t kManyFrames = 10;
+  if (log.size() < 3 && times_s.size() >= kManyFrames) {
+    throw bad_input(log.source.empty() ? "joints.csv" : log.source,
+                    fmt::format("holds {} reading{} for {} frames", log.size(),
+                                log.size() == 1 ? "" : "s", times_s.size()),
+                    "log the joints all the time, ten times a second or more");
+  }
   require_seconds(log, times_s, source);
+  const std::string log_name = log.source.empty() ? "joints.csv" : log.source;
+  require_stamps(times_s, source, log.times_s, log_name);
+  require_stamps(log.times_s, log_name, times_s, source);
   const auto [first, last] = std::ranges::minmax(times_s);
   if (first <= log.times_s.back() && last >= log.times_s.front()) return;
   throw bad_input(
-      log.source.empty() ? "joints.csv" : log.source,
+      log_name,
       fmt::format("runs from {:.3f} to {:.3f} s and {} from {:.3f} to {:.3f} s: no common time",
                   log.times_s.front(), log.times_s.back(), source, first, last),
       "use one clock for both; of a video, video_start in recording.yaml is the log's time at its "
@@ -322,9 +440,13 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
     if (!files.camera) return;
     recording.camera = read_camera(*files.camera);
     recording.camera_file = *files.camera;
+    warn_of_pixels(*recording.camera, *files.camera, recording.warnings);
   });
   step([&] {
-    if (files.nominal) recording.nominal = read_urdf(*files.nominal);
+    if (!files.nominal) return;
+    recording.nominal = read_urdf(*files.nominal);
+    recording.nominal_file = *files.nominal;
+    require_metres(*recording.nominal, *files.nominal);
   });
   step([&] { read_log(recording, files); });
   step([&] { read_sightings(recording, files); });

@@ -64,6 +64,7 @@ struct Recording {
   std::filesystem::path camera_file;        ///< that it was read from
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
+  std::filesystem::path nominal_file;        ///< that it was read from
   std::vector<std::filesystem::path> files;  ///< everything that was read, sorted
   std::vector<std::string> warnings;
 };

@@ -28,6 +28,8 @@ constexpr double kPointSigmaM = 1e-4;
 // Further off than any robot or image: what a broken sensor or an unset variable writes.
 constexpr double kFarthestM = 1e6;
 constexpr double kFarthestPx = 1e7;
+// px, m or rad; simulations without noise declare less than sensors have, but no such thing.
+constexpr double kSmallestSigma = 1e-15;
 
 /// A table by its columns' names without units; its numbers come in s, m, rad and px.
 CsvTable read_sighting_table(const std::filesystem::path& path) {
@@ -108,6 +110,12 @@ std::optional<double> sigma(const CsvTable& table, std::size_t row, std::string_
     throw bad_input(table.place(row),
                     fmt::format("column '{}' holds {}, not above zero", name, *value),
                     "give a standard deviation, or leave the cell empty");
+  }
+  if (value && *value < kSmallestSigma) {
+    throw bad_input(
+        table.place(row),
+        fmt::format("column '{}' holds {}, less than any instrument's noise", name, *value),
+        "give a standard deviation, or leave the cell empty");
   }
   return value;
 }
