@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/inspection.h"
+#include "app/commands/log_doubts.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
@@ -96,6 +97,7 @@ LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
   for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
     facts.channels.push_back(look_at_channel(log, c, settings, findings));
   }
+  for (std::string& words : clock_jump_words(log)) findings.push_back({false, std::move(words)});
   const bool continuous = facts.rate_hz > 1.0 / kLongGapS;
   if (continuous && facts.longest_gap_s > kLongGapS) {
     findings.push_back(

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/commands/families_in_video.h"
 #include "app/commands/inspection.h"
 #include "calib/camera/camera_file.h"
 #include "calib/vision/double_ids.h"
@@ -124,20 +125,6 @@ std::vector<MarkerFacts> summarise(const std::map<TagId, Sightings>& seen,
                    .blur_px = median_of(sightings.blurs_px)});
   }
   return out;
-}
-
-/// Families of which something is seen although nothing of the declared one is.
-std::vector<std::string> other_families(const std::vector<GreyImage>& images,
-                                        const std::string& declared) {
-  std::vector<std::string> found;
-  for (const std::string& family : known_families()) {
-    if (family == declared) continue;
-    const auto detector = make_tag_detector(family, {.decimate = 2.0, .max_hamming = 0});
-    const bool seen = std::ranges::any_of(
-        images, [&](const GreyImage& image) { return !detector->detect(image.view()).empty(); });
-    if (seen) found.push_back(family);
-  }
-  return found;
 }
 
 void judge_nothing_seen(const Recording& recording, const std::vector<GreyImage>& images,

@@ -186,4 +186,30 @@ NominalChannels by_motion(NominalChannels matched, const Structure& structure,
   return matched;
 }
 
+void require_drawn_types(const NominalChannels& matched, const Structure& structure,
+                         const Recording& recording) {
+  if (structure.status != StructureStatus::kDetermined) return;
+  std::vector<std::string> wrong;
+  for (const StructureJoint& found : structure.joints) {
+    if (!found.channel || !found.couplings.empty()) continue;
+    const std::string& column =
+        recording.log.channels[static_cast<std::size_t>(found.channel->channel)];
+    for (const Joint& joint : matched.tree.joints) {
+      if (!is_movable(joint) || joint.channel != column || joint.type == found.type) continue;
+      const bool turns = found.type == JointType::kRevolute;
+      wrong.push_back(fmt::format(
+          "joint '{}' is drawn as {}, but the markers {} with its column "
+          "'{}'",
+          joint.name, turns ? "prismatic" : "revolute", turns ? "turn" : "slide", column));
+    }
+  }
+  if (wrong.empty()) return;
+  throw undetermined(
+      recording.nominal_file.string(), fmt::format("{}", fmt::join(wrong, "; ")),
+      wrong.size() == 1
+          ? "correct its type; kinescope run without --nominal shows what each column moves"
+          : "are their columns exchanged? kinescope run without --nominal shows what each column "
+            "moves");
+}
+
 }  // namespace kinescope

@@ -29,4 +29,9 @@ struct NominalChannels {
 [[nodiscard]] NominalChannels by_motion(NominalChannels matched, const Structure& structure,
                                         const JointLog& log);
 
+/// Throws undetermined where the markers show that the channel of a joint turns what is drawn as
+/// sliding, or the other way round. Says nothing of a structure that is not determined.
+void require_drawn_types(const NominalChannels& matched, const Structure& structure,
+                         const Recording& recording);
+
 }  // namespace kinescope

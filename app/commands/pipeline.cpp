@@ -11,11 +11,13 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/declared.h"
+#include "app/commands/families_in_video.h"
 #include "app/commands/nominal_channels.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/vision/video.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/rotation_between.h"
@@ -27,6 +29,25 @@ namespace {
 // the robot.
 constexpr double kUnitTolerance = 0.05;
 
+// What the video does show, where no marker of the declared family is found in it.
+struct Hint {
+  std::string seen;
+  std::string remedy =
+      "check the family in tags.yaml, and that the markers are sharp and at least 20 pixels wide";
+};
+
+Hint hint_of(const Recording& recording) {
+  if (recording.video.empty()) return {};
+  const std::string& family = recording.markers.family;
+  if (is_mirrored(recording.video, family)) {
+    return {"; mirrored they are there", "record or export the video without mirroring"};
+  }
+  const std::vector<std::string> others = other_families(recording.video, family);
+  if (others.empty()) return {};
+  return {fmt::format(", but markers of {}", fmt::join(others, ", ")),
+          "correct the family in tags.yaml"};
+}
+
 void require_markers(const Recording& recording, const TagObservations& tags) {
   const std::string source =
       recording.video.empty() ? recording.folder.string() : recording.video.string();
@@ -37,11 +58,11 @@ void require_markers(const Recording& recording, const TagObservations& tags) {
     for (const auto& [reason, count] : reasons) {
       rejected += fmt::format("{}{} x {}", rejected.empty() ? "; rejected: " : ", ", count, reason);
     }
+    const Hint hint = rejected.empty() ? hint_of(recording) : Hint{};
     throw bad_input(source,
-                    fmt::format("no marker of family {} was found in {} frames{}",
-                                recording.markers.family, tags.times_s.size(), rejected),
-                    "check the family in tags.yaml, and that the markers are sharp and at least 20 "
-                    "pixels wide");
+                    fmt::format("no marker of family {} was found in {} frames{}{}",
+                                recording.markers.family, tags.times_s.size(), rejected, hint.seen),
+                    hint.remedy);
   }
   std::set<int> unsized;
   for (const TagObservation& seen : tags.observations) {
@@ -168,8 +189,14 @@ Observed observe(const Recording& recording, const RunOptions& options,
       if (cached) {
         out.tags = *cached;
       } else {
+        // Before the long work.
+        const VideoInfo video = open_video(recording.video)->info();
         DetectOptions detect = options.detect;
         detect.lens = lens;
+        if (lens) {
+          detect.lens =
+              with_image_size(*lens, video.width, video.height, recording.camera_file.string());
+        }
         Detection detection = detect_tags(recording.video, recording.markers, detect, progress);
         out.tags = std::move(detection.observations);
         out.tags.warnings = std::move(detection.warnings);
@@ -281,11 +308,12 @@ CheckedNominal start_from_nominal(const Recording& recording, const Measurements
                                   const PoseTracks& tracks, const CameraModel& camera,
                                   std::vector<std::string>& warnings) {
   NominalChannels matched = match_channels(recording);
-  if (matched.in_order && !tracks.tracks.empty()) {
+  if (!tracks.tracks.empty()) {
     StructureOptions structure_options;
     structure_options.units = declared_units(recording);
     const Structure structure = find_structure(tracks, recording.log, structure_options);
-    matched = by_motion(std::move(matched), structure, recording.log);
+    if (matched.in_order) matched = by_motion(std::move(matched), structure, recording.log);
+    require_drawn_types(matched, structure, recording);
   }
   const KinematicTree& nominal = matched.tree;
   warnings.insert(warnings.end(), matched.warnings.begin(), matched.warnings.end());

@@ -8,7 +8,9 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/explain.h"
+#include "app/commands/first_look.h"
 #include "app/commands/limits.h"
+#include "app/commands/log_doubts.h"
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
@@ -53,7 +55,10 @@ void describe_recording(const Recording& recording, const Observed& observed,
   for (const RejectedTag& tag : observed.tags.rejected) ++rejected[tag.reason];
   run.rejected.assign(rejected.begin(), rejected.end());
   run.warnings = recording.warnings;
-  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
+  for (const std::vector<std::string>& more : {observed.warnings, clock_jump_words(recording.log),
+                                               frozen_log_words(recording.log, observed)}) {
+    run.warnings.insert(run.warnings.end(), more.begin(), more.end());
+  }
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();
   run.log = recording.log;
   run.nominal = recording.nominal;
@@ -247,6 +252,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
+  require_plausible_motion(recording, run.tracks, options.calibrate);
   const Evidence evidence{recording, observed, run.tracks, camera};
   const std::size_t told = run.warnings.size();
   Explanation best =
