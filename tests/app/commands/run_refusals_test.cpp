@@ -250,7 +250,22 @@ class RunRefusalsOfImages : public RunRefusals {
 
 TEST_F(RunRefusalsOfImages, NoMarkerOfTheDeclaredFamily) {
   film(false, "tag25h9");
-  refused(ExitCode::kBadInput, "no marker of family tag25h9 was found in 20 frames");
+  const std::string line =
+      refused(ExitCode::kBadInput,
+              "no marker of family tag25h9 was found in 20 frames, but markers of tag36h11");
+  EXPECT_NE(line.find("(correct the family in tags.yaml)"), std::string::npos) << line;
+}
+
+TEST_F(RunRefusalsOfImages, AMirroredVideo) {
+  film(false);
+  for (const auto& entry : fs::directory_iterator(folder_.path() / "images")) {
+    if (entry.path().extension() != ".png") continue;
+    cv::Mat picture = cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE);
+    cv::flip(picture, picture, 1);
+    ASSERT_TRUE(cv::imwrite(entry.path().string(), picture));
+  }
+  refused(ExitCode::kBadInput,
+          "no marker of family tag36h11 was found in 20 frames; mirrored they");
 }
 
 TEST_F(RunRefusalsOfImages, OneMarkerAtRest) {
@@ -275,6 +290,10 @@ TEST_F(RunRefusalsOfImages, ACameraOfAnotherShape) {
                 "[500, 0, 149.5, 0, 500, 149.5, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
                 "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
   refused(ExitCode::kBadInput, "camera.yaml");
+  const Outcome outcome = run({"run", folder_.path().string(), "--output", output() + "2"});
+  EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kBadInput));
+  EXPECT_EQ(outcome.err.find("finding markers"), std::string::npos)
+      << "known before: " << outcome.err;
 }
 
 TEST_F(RunRefusalsOfImages, ACameraOfAnotherShapeThatWasNamed) {
