@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -52,9 +53,9 @@ Pose inverted(const Pose& pose) { return pose.inverse(); }
 Pose w_first_inverted(const Pose& pose) { return w_first(pose).inverse(); }
 
 constexpr std::array<Convention, 4> kConventions{
-    {{"with the quaternions in the order w, x, y, z", w_first},
+    {{"with the poses inverted (of the camera in the body's frame)", inverted},
+     {"with the quaternions in the order w, x, y, z", w_first},
      {"with the quaternions conjugated", conjugated},
-     {"with the poses inverted (of the camera in the body's frame)", inverted},
      {"with the quaternions in the order w, x, y, z and the poses inverted", w_first_inverted}}};
 
 std::string file_named(const Recording& recording, std::string_view entry) {
@@ -63,8 +64,9 @@ std::string file_named(const Recording& recording, std::string_view entry) {
 
 void refuse_other_convention(const Recording& recording, const PoseTracks& tracks,
                              const CalibrateOptions& options) {
-  constexpr std::size_t kFrames = 150;  // enough, and what is no robot takes long to search
+  constexpr std::size_t kFrames = 100;  // enough, and what is no robot takes long to search
   const int every = std::max(1, static_cast<int>(tracks.times_s.size() / kFrames));
+  std::vector<std::string> fitting;  // of few joints several may
   for (const Convention& convention : kConventions) {
     PoseTracks read = tracks;
     for (PoseTrack& track : read.tracks) {
@@ -75,14 +77,14 @@ void refuse_other_convention(const Recording& recording, const PoseTracks& track
       }
     }
     const auto structure = structure_of(recording, read, recording.log, options);
-    if (!structure || !is_robot(*structure)) continue;
-    throw undetermined(
-        file_named(recording, "poses"),
-        fmt::format("the bodies do not move as a robot's links do, but {} they do",
-                    convention.words),
-        "qx, qy, qz, qw and x, y, z are the pose of the body in the tracker's frame: "
-        "convert the table");
+    if (structure && is_robot(*structure)) fitting.emplace_back(convention.words);
   }
+  if (fitting.empty()) return;
+  throw undetermined(file_named(recording, "poses"),
+                     fmt::format("the bodies do not move as a robot's links do, but {} they do",
+                                 fmt::join(fitting, ", or ")),
+                     "qx, qy, qz, qw and x, y, z are the pose of the body in the tracker's frame: "
+                     "convert the table");
 }
 
 std::string idle_channels(const Structure& structure, const JointLog& log) {
