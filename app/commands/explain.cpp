@@ -299,7 +299,7 @@ class Explainer {
   [[nodiscard]] std::vector<Proposal> with_errors_allowed(const Explanation& now) const {
     constexpr double kLargeErrors =
         0.03;  // of the distance, and rad: a bump, or a misprint, of 2 deg
-    if (is_structure_clear(now)) return {};
+    if (is_structure_clear(now) || !now.fitted || recording().log.channels.empty()) return {};
     std::optional<Structure> structure = proposed_structure(evidence_.tracks, kLargeErrors);
     if (!structure) return {};
     return {{std::move(*structure), {}}};

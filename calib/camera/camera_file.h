@@ -12,10 +12,10 @@
 namespace kinescope {
 
 /// Throws bad_input naming file, key and remedy: not YAML/XML, a missing key, a model we do not
-/// know, a wrong number of distortion terms, sizes or focal lengths that are not positive, NaN; focal
-/// lengths that fit no lens for the image (mm), distortion that folds it over itself.
-/// Files without an image size (OpenCV) give width = height = 0 only when `image_width` is nowhere
-/// to be found.
+/// know, a wrong number of distortion terms, sizes or focal lengths that are not positive, NaN;
+/// focal lengths that fit no lens for the image (mm), distortion that folds it over itself. Files
+/// without an image size (OpenCV) give width = height = 0 only when `image_width` is nowhere to be
+/// found.
 [[nodiscard]] CameraModel read_camera(const std::filesystem::path& path);
 
 /// Throws bad_input when the image size differs from the camera's; a camera without a size takes

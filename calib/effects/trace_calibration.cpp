@@ -55,6 +55,7 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
                                    const Progress& progress) {
   const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
   TraceOptions trace_options = options.trace;
+  trace_options.start = effects::TracedBundle(bundle, options).possible(options.trace.start);
   if (bundle.kind() == MeasurementKind::kCorners) {
     // An effect that moves corners by less is not told from the detector's own errors.
     trace_options.floor = std::max(trace_options.floor, bundle.corner_bias_px());

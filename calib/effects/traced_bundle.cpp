@@ -315,6 +315,15 @@ TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effe
   return out;
 }
 
+std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects) const {
+  const std::vector<CameraEffect> library = all_effects(world_at(0.0));
+  std::erase_if(effects, [&](const AddedEffect& added) {
+    return std::ranges::none_of(
+        library, [&](const CameraEffect& effect) { return effect.candidate.id == added.id; });
+  });
+  return effects;
+}
+
 EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) const {
   return ready_for(effects).world;
 }

@@ -25,6 +25,9 @@ class TracedBundle final : public TracedModel {
   [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects,
                                     const std::vector<TracedEffect>& traced) const;
 
+  /// Those of the effects that this robot can have: what was known of another may sit elsewhere.
+  [[nodiscard]] std::vector<AddedEffect> possible(std::vector<AddedEffect> effects) const;
+
   /// The robot and its motion as the fit with these effects has them: the log read that much later,
   /// loads where the effects leave the joints.
   [[nodiscard]] EffectWorld world_of(const std::vector<AddedEffect>& effects) const;

@@ -291,6 +291,17 @@ TEST(TraceCalibration, AWobblesBearingMayBeAnywhereOnTheAxis) {
             kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
+// Another account of the recording, with other joints, may have known more.
+TEST(TraceCalibration, WhatThisRobotCannotHaveIsNotBegunWith) {
+  const World world = make_effect_world(filmed());
+  CalibrationTraceOptions options;
+  options.trace.start = {{{"compliance", "q9"}, 0.0}, {{"lens_distortion", "camera"}, 0.0}};
+  const Trace trace =
+      trace_calibration(world.measurements, world.markers, world.log, start_of(world), options)
+          .trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
+}
+
 TEST(TraceCalibration, AJointThatSagsTellsWhereGravityPoints) {
   const InjectedEffect sag = strong("compliance", "q2");
   const CalibrationTrace found = trace_of(make_effect_world(filmed({sag})));
