@@ -14,4 +14,14 @@ void contact_on_ur5();
 /// Constructed worlds: hard and soft contacts, and free motion.
 void contact_simulated();
 
+/// `kinescope contact` on ur5_contact with nothing but each file: found and invented.
+void contact_logs_ur5();
+
+/// The same on measured robots that nothing touched, each trajectory judged by what was learned
+/// from another, and from itself.
+void contact_logs_free();
+
+/// The same on simulated robots that nothing touched, at rest, starting, reversing.
+void contact_logs_simulated();
+
 }  // namespace kinescope
