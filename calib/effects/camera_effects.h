@@ -27,6 +27,8 @@ struct EffectWorld {
   JointMotion loaded;  ///< at the frames, with what effects add to the values: where loads act
   /// Of joints that sag, as the last fit has it: what each of their loads does, rad or m a unit.
   std::map<int, Eigen::VectorXd> sags;
+  /// Likewise, of joints whose reading runs unevenly twice a turn: sine and cosine, rad.
+  std::map<int, Eigen::Vector2d> bends;
   JointMotion log;                              ///< finer in time; empty for postures
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   double first_s = 0.0;                         ///< of the frames
@@ -35,6 +37,9 @@ struct EffectWorld {
   /// Effects are known and to be undone: also at joints that rest here, over whatever range.
   bool known = false;
 };
+
+/// Periods a turn of an eccentricity that is a bent coupling.
+inline constexpr double kBendPeriods = 2.0;
 
 struct CameraEffect {
   Candidate candidate;  ///< without columns

@@ -179,12 +179,18 @@ std::optional<Missing> missing_by(const FittedEffect& effect, const KinematicTre
   return Missing{j, missing_value(effect, corrections, motion)};
 }
 
-// The world of the log, loads where the effects leave the joints.
-effects::EffectWorld world_under_load(const JointLog& log, const KinematicTree& tree,
-                                      const std::vector<FittedEffect>& effects,
-                                      const std::optional<Eigen::Vector3d>& gravity_base) {
+// The world of the log with the effects in it: loads where they leave the joints.
+effects::EffectWorld world_with(const JointLog& log, const KinematicTree& tree,
+                                const std::vector<FittedEffect>& effects,
+                                const std::optional<Eigen::Vector3d>& gravity_base) {
   constexpr int kRounds = 3;  // each leaves of its error what the sag is, in rad
   effects::EffectWorld out = world_of(log, tree, gravity_base);
+  for (const FittedEffect& effect : effects) {
+    const auto joint = tree.joint(effect.id.place);
+    if (joint && effect.id.effect == "eccentricity" && effect.scan == effects::kBendPeriods &&
+        effect.values.size() == 2)
+      out.bends.insert_or_assign(joint->value, Eigen::Vector2d(effect.values));
+  }
   const bool under_load = std::ranges::any_of(
       effects, [](const FittedEffect& effect) { return effect.id.effect == "compliance"; });
   for (int round = 0; under_load && round < kRounds; ++round) {
@@ -206,7 +212,7 @@ CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
                            const std::optional<Eigen::Vector3d>& gravity_base) {
   CorrectedLog out{log, {}, {}};
   if (log.empty()) return out;
-  const effects::EffectWorld world = world_under_load(log, tree, effects, gravity_base);
+  const effects::EffectWorld world = world_with(log, tree, effects, gravity_base);
   const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
   for (const FittedEffect& effect : effects) {
     bool undone = undo_clock(effect, out.log);

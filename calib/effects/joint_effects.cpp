@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <string>
 #include <tuple>
@@ -64,18 +65,44 @@ std::vector<Correction> sines(const Suspect& s, const std::string& what, double 
           turn(s, what + " cosine", s.unit, angle.cos())};
 }
 
-CameraEffect eccentricity(const Suspect& s) {
+// A wave twice a turn is a bent coupling (a universal joint, tan q' = tan q cos bend), with
+// overtones that its size tells: Im -log(1 - w), w = (sine + i cosine) e^2iq.
+std::vector<Correction> bent_sines(const Suspect& s, const std::string& what,
+                                   const Eigen::Vector2d& bend) {
+  constexpr double kStraight = 1e-6;  // below that the logarithm loses its digits
+  const std::complex<double> size(bend[0], bend[1]);
+  Eigen::VectorXd sine(s.value.size());
+  Eigen::VectorXd cosine(s.value.size());
+  for (Eigen::Index i = 0; i < s.value.size(); ++i) {
+    const std::complex<double> turn = std::polar(1.0, 2.0 * s.value[i]);
+    const std::complex<double> w = size * turn;
+    const std::complex<double> share =
+        std::abs(w) < kStraight ? turn : turn * (-std::log(1.0 - w) / w);
+    sine[i] = share.imag();
+    cosine[i] = share.real();
+  }
+  return {turn(s, what + " sine", s.unit, std::move(sine)),
+          turn(s, what + " cosine", s.unit, std::move(cosine))};
+}
+
+CameraEffect eccentricity(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "eccentricity",
              fmt::format("the encoder (or output gear) of {} runs out of centre", s.name),
              {{"sine", "rad"}, {"cosine", "rad"}}, "rad");
-  out.candidate.scan = {1.0, 2.0};
+  out.candidate.scan = {1.0, kBendPeriods};
   out.candidate.scan_listed = true;
   out.candidate.scan_name = "periods";
   out.candidate.scan_unit = "per turn";
   out.candidate.check = "mounting of the encoder disc or magnet, run-out of the output gear";
   out.candidate.record = fmt::format("turn {} over a full turn, both ways", s.name);
-  out.corrections = [s](double periods) { return sines(s, "eccentricity", periods); };
+  const auto known = world.bends.find(s.joint);
+  const Eigen::Vector2d bend =
+      known == world.bends.end() ? Eigen::Vector2d(0.0, 0.0) : known->second;
+  out.corrections = [s, bend](double periods) {
+    return periods == kBendPeriods ? bent_sines(s, "eccentricity", bend)
+                                   : sines(s, "eccentricity", periods);
+  };
   return out;
 }
 
@@ -348,7 +375,7 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     if (!world.known && !(s.value.maxCoeff() > s.value.minCoeff())) continue;
     if (!world.postures && world.driven.size() > 1) out.push_back(late_reading(s));
     out.push_back(encoder_scale(s));
-    if (s.turns) out.push_back(eccentricity(s));
+    if (s.turns) out.push_back(eccentricity(world, s));
     if (CameraEffect gear = gear_error(s); world.known || !gear.candidate.scan.empty()) {
       out.push_back(std::move(gear));
     }

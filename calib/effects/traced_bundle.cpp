@@ -14,6 +14,15 @@ namespace {
 
 constexpr std::string_view kSag = "compliance";
 
+bool is_bend(const AddedEffect& added) {
+  return added.id.effect == "eccentricity" && added.scan == kBendPeriods;
+}
+
+// What it does at an instant is not in proportion to its size.
+bool depends_on_its_size(const AddedEffect& added) {
+  return added.id.effect == kSag || is_bend(added);
+}
+
 // Probes without a share, each once: what columns of candidates act through.
 class Carriers {
  public:
@@ -118,23 +127,25 @@ std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<Camera
   return out;
 }
 
-// What each load does to the joints that sag, at a solution.
-std::map<int, Eigen::VectorXd> sags_of(const std::vector<CameraEffect>& library,
-                                       const std::vector<AddedEffect>& effects,
-                                       const std::vector<Correction>& corrections,
-                                       const BundleSolution& solution) {
+// What effects do that depends on their size, at a solution.
+void take_sizes(const std::vector<CameraEffect>& library, const std::vector<AddedEffect>& effects,
+                const std::vector<Correction>& corrections, const BundleSolution& solution,
+                EffectWorld& world) {
   const auto places =
       parameter_places(library, effects, static_cast<Eigen::Index>(corrections.size()));
-  std::map<int, Eigen::VectorXd> out;
   for (std::size_t i = 0; i < effects.size(); ++i) {
-    if (effects[i].id.effect != kSag) continue;
-    Eigen::VectorXd sags = solution.values(places[i]);
+    if (!depends_on_its_size(effects[i])) continue;
+    Eigen::VectorXd values = solution.values(places[i]);
+    const int joint = corrections[static_cast<std::size_t>(places[i].front())].index;
+    if (is_bend(effects[i])) {
+      world.bends.insert_or_assign(joint, Eigen::Vector2d(values));
+      continue;
+    }
     for (std::size_t k = 0; k < places[i].size(); ++k)
-      sags[static_cast<Eigen::Index>(k)] /=
+      values[static_cast<Eigen::Index>(k)] /=
           corrections[static_cast<std::size_t>(places[i][k])].reference;
-    out.emplace(corrections[static_cast<std::size_t>(places[i].front())].index, std::move(sags));
+    world.sags.insert_or_assign(joint, std::move(values));
   }
-  return out;
 }
 
 std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector<int>& frames) {
@@ -293,21 +304,20 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
 // Shares are taken where the joints are at the time offset that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
 TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
-  constexpr int kRoundsUnderLoad = 2;  // each leaves of its error what the sag is, in rad
+  constexpr int kRounds = 2;  // each leaves of its error what the effect's size is, in rad
   Ready out;
   out.world = world_at(0.0);
   out.library = all_effects(out.world);
   out.change = change_of(out.library, effects);
-  const bool under_load = std::ranges::any_of(
-      effects, [](const AddedEffect& added) { return added.id.effect == kSag; });
-  const int rounds = under_load ? kRoundsUnderLoad : out.change.time_offset ? 1 : 0;
+  const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
+  const int rounds = by_size ? kRounds : out.change.time_offset ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
     const BundleSolution solution = bundle_->solve(out.change);
     out.world = world_at(solution.time_offset_s);
-    if (under_load && solution.converged) {
+    if (by_size && solution.converged) {
       out.world.tree = solution.tree;
       add_values(out.change.corrections, solution, out.world.loaded.value);
-      out.world.sags = sags_of(out.library, effects, out.change.corrections, solution);
+      take_sizes(out.library, effects, out.change.corrections, solution, out.world);
     }
     out.library = all_effects(out.world);
     out.change = change_of(out.library, effects);

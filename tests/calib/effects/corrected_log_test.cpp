@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -100,8 +101,22 @@ TEST(CorrectedLog, AnEccentricityIsUndone) {
   const Eigen::MatrixXd logged = values_as_logged();
   Eigen::MatrixXd truth = logged;
   const Eigen::ArrayXd q = logged.col(0).array();
-  truth.col(0).array() += 0.004 * (2.0 * q).sin() - 0.003 * (2.0 * q).cos();
-  expect_values(undo({fitted("eccentricity", "q1", {0.004, -0.003}, 2.0)}, log_of(logged)), truth);
+  truth.col(0).array() += 0.004 * q.sin() - 0.003 * q.cos();
+  expect_values(undo({fitted("eccentricity", "q1", {0.004, -0.003}, 1.0)}, log_of(logged)), truth);
+}
+
+// Behind a universal joint: tan q' = tan q cos bend.
+TEST(CorrectedLog, ABentCouplingIsUndoneWithItsOvertones) {
+  constexpr double kBend = 0.6;  // rad
+  const Eigen::MatrixXd logged = values_as_logged();
+  Eigen::MatrixXd truth = logged;
+  for (double& q : truth.col(0)) {
+    const double in_turn = std::remainder(q, 2.0 * std::numbers::pi);
+    q += std::atan2(std::sin(q) * std::cos(kBend), std::cos(q)) - in_turn;
+  }
+  const double amplitude = std::pow(std::tan(0.5 * kBend), 2);
+  expect_values(undo({fitted("eccentricity", "q1", {-amplitude, 0.0}, 2.0)}, log_of(logged)),
+                truth);
 }
 
 TEST(CorrectedLog, AMapIsUndoneWithinItsRange) {

@@ -111,6 +111,20 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"}),
     [](const auto& tested) { return tested.param.first; });
 
+// The log without the effects says where the joint is, but for what a zero is.
+void expect_right_readings(const World& world, const std::string& name,
+                           const CalibrationTrace& found, double tolerance) {
+  const CorrectedLog corrected =
+      corrected_log(world.log, world.tree, found.effects, found.gravity_base);
+  EXPECT_EQ(corrected.undone.size(), found.effects.size());
+  const auto joint = static_cast<Eigen::Index>(value_of(world.tree.joint(name)).index());
+  Eigen::VectorXd miss =
+      resample(corrected.log, world.measurements.times_s).col(value_of(world.log.channel(name))) -
+      world.joint_values.col(joint);
+  miss.array() -= miss.mean();
+  EXPECT_LT(miss.cwiseAbs().maxCoeff(), tolerance);
+}
+
 // A load pulls where the joint has sagged to: of 4 deg, the sine of the reading leaves a second
 // harmonic of 0.14 deg, which passed for an eccentricity. Gravity is declared 0.5 deg off.
 TEST(TraceCalibration, ALargeSagHasTheLoadOfWhereItLeads) {
@@ -128,16 +142,23 @@ TEST(TraceCalibration, ALargeSagHasTheLoadOfWhereItLeads) {
   EXPECT_TRUE(size_is_right(trace.accepted.front(), 0.07)) << trace.accepted.front().size;
   EXPECT_LT(trace.held_out_after.value,
             kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
-  // The log without it says where the joint is, but for what a zero is.
-  const CorrectedLog corrected =
-      corrected_log(world.log, world.tree, found.effects, found.gravity_base);
-  ASSERT_EQ(corrected.undone.size(), 1U);
-  const auto joint = static_cast<Eigen::Index>(value_of(world.tree.joint("q2")).index());
-  const int channel = value_of(world.log.channel("q2"));
-  Eigen::VectorXd miss = resample(corrected.log, world.measurements.times_s).col(channel) -
-                         world.joint_values.col(joint);
-  miss.array() -= miss.mean();
-  EXPECT_LT(miss.cwiseAbs().maxCoeff(), 0.02 * 0.07);
+  expect_right_readings(world, "q2", found, 0.02 * 0.07);
+}
+
+// A bent coupling of 3 deg: its overtone, 0.08 deg four times a turn, is no effect of its own.
+TEST(TraceCalibration, ABentCouplingHasItsOvertones) {
+  constexpr double kSize = 0.053;  // rad
+  const World world = make_effect_world(filmed({{"eccentricity", "q2", kSize, 2.0}}));
+  const CalibrationTrace found = trace_of(world);
+  const Trace& trace = found.trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"eccentricity", "q2"})) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().scan, 2.0);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), kSize)) << trace.accepted.front().size;
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  expect_right_readings(world, "q2", found, 0.01 * kSize);
 }
 
 // A page printed 1 % too large, beside slides that know how far they went.
