@@ -297,8 +297,9 @@ class Explainer {
   // What a bumped camera or a marker of another size does may look like a joint of whatever channel
   // rises with time.
   [[nodiscard]] std::vector<Proposal> with_errors_allowed(const Explanation& now) const {
-    constexpr double kLargeErrors =
-        0.03;  // of the distance, and rad: a bump, or a misprint, of 2 deg
+    // Of the distance, and rad: the bump of 1.2 deg and the misprint of 3 % of `undeclared --first
+    // 325`, which the search's own allowances (up to 0.01) do not hold.
+    constexpr double kLargeErrors = 0.03;
     if (is_structure_clear(now) || !now.fitted || recording().log.channels.empty()) return {};
     std::optional<Structure> structure = proposed_structure(evidence_.tracks, kLargeErrors);
     if (!structure) return {};

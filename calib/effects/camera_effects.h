@@ -41,6 +41,11 @@ struct EffectWorld {
 /// Periods a turn of an eccentricity that is a bent coupling.
 inline constexpr double kBendPeriods = 2.0;
 
+[[nodiscard]] inline bool is_sag(const EffectId& id) { return id.effect == "compliance"; }
+[[nodiscard]] inline bool is_bend(const EffectId& id, double scan) {
+  return id.effect == "eccentricity" && scan == kBendPeriods;
+}
+
 struct CameraEffect {
   Candidate candidate;  ///< without columns
   /// One correction a parameter; for the time offset the bundle's own parameter instead.

@@ -187,12 +187,11 @@ effects::EffectWorld world_with(const JointLog& log, const KinematicTree& tree,
   effects::EffectWorld out = world_of(log, tree, gravity_base);
   for (const FittedEffect& effect : effects) {
     const auto joint = tree.joint(effect.id.place);
-    if (joint && effect.id.effect == "eccentricity" && effect.scan == effects::kBendPeriods &&
-        effect.values.size() == 2)
+    if (joint && effects::is_bend(effect.id, effect.scan) && effect.values.size() == 2)
       out.bends.insert_or_assign(joint->value, Eigen::Vector2d(effect.values));
   }
   const bool under_load = std::ranges::any_of(
-      effects, [](const FittedEffect& effect) { return effect.id.effect == "compliance"; });
+      effects, [](const FittedEffect& effect) { return effects::is_sag(effect.id); });
   for (int round = 0; under_load && round < kRounds; ++round) {
     const std::vector<effects::CameraEffect> library = effects::joint_effects(out);
     out.loaded.value = out.frames.value;

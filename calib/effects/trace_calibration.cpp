@@ -20,14 +20,14 @@ namespace {
 std::optional<EffectId> telling_sag(const Trace& trace) {
   const TracedEffect* named = nullptr;
   for (const TracedEffect& accepted : trace.accepted) {
-    if (accepted.id.effect != "compliance") continue;
+    if (!effects::is_sag(accepted.id)) continue;
     if (named == nullptr || accepted.explained > named->explained) named = &accepted;
   }
   if (named != nullptr) return named->id;
   if (trace.verdict != TraceVerdict::kClean && trace.verdict != TraceVerdict::kUnknown) return {};
   const TestedCandidate* hint = nullptr;
   for (const TestedCandidate& tested : trace.candidates) {
-    if (tested.id.effect != "compliance" || tested.p_value > trace::kHint) continue;
+    if (!effects::is_sag(tested.id) || tested.p_value > trace::kHint) continue;
     if (hint == nullptr || tested.p_value < hint->p_value) hint = &tested;
   }
   return hint == nullptr ? std::optional<EffectId>() : hint->id;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <map>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -12,15 +11,9 @@
 namespace kinescope::effects {
 namespace {
 
-constexpr std::string_view kSag = "compliance";
-
-bool is_bend(const AddedEffect& added) {
-  return added.id.effect == "eccentricity" && added.scan == kBendPeriods;
-}
-
 // What it does at an instant is not in proportion to its size.
 bool depends_on_its_size(const AddedEffect& added) {
-  return added.id.effect == kSag || is_bend(added);
+  return is_sag(added.id) || is_bend(added.id, added.scan);
 }
 
 // Probes without a share, each once: what columns of candidates act through.
@@ -137,7 +130,7 @@ void take_sizes(const std::vector<CameraEffect>& library, const std::vector<Adde
     if (!depends_on_its_size(effects[i])) continue;
     Eigen::VectorXd values = solution.values(places[i]);
     const int joint = corrections[static_cast<std::size_t>(places[i].front())].index;
-    if (is_bend(effects[i])) {
+    if (is_bend(effects[i].id, effects[i].scan)) {
       world.bends.insert_or_assign(joint, Eigen::Vector2d(values));
       continue;
     }
