@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <set>
 #include <utility>
@@ -41,6 +42,8 @@ bool has_model_doubt(const Structure& structure) {
   return std::ranges::any_of(structure.doubts, &StructureDoubt::of_model);
 }
 
+bool is_converged(const Calibration& of) { return of.status == CalibrationStatus::kConverged; }
+
 bool is_structure_clear(const Explanation& of) {
   return !of.structure ||
          (of.structure->status == StructureStatus::kDetermined && !has_model_doubt(*of.structure));
@@ -52,9 +55,21 @@ bool is_all_explained(const Trace& trace) {
 
 /// Of one piece: nothing is in doubt, nothing is left.
 bool is_settled(const Explanation& of) {
-  return of.fitted && of.fitted->calibration.status == CalibrationStatus::kConverged &&
-         is_structure_clear(of) &&
+  return of.fitted && is_converged(of.fitted->calibration) && is_structure_clear(of) &&
          (of.fitted->trace.verdict == TraceVerdict::kNotRun || is_all_explained(of.fitted->trace));
+}
+
+/// What was found is large beside the noise: tracks with it in them may have bent the structure,
+/// however certain that was of itself.
+bool is_bent(const TracedCalibration& fitted) {
+  constexpr double kBent = 3.0;  // times the noise
+  return !fitted.effects.empty() &&
+         fitted.trace.held_out_before.value > kBent * fitted.trace.held_out_after.value;
+}
+
+/// What it takes for an account: joints, and effects at them.
+std::size_t parts_of(const Explanation& of) {
+  return of.start.tree.joints.size() + of.fitted->trace.accepted.size();
 }
 
 // What tracing says of a robot whose geometry is better held than free: nothing but noise, or that
@@ -86,19 +101,22 @@ class Explainer {
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first = with_couplings_doubted(of_structure(structure_of(evidence_.tracks), {}));
+    Explanation first =
+        with_couplings_doubted(asked_again(of_structure(structure_of(evidence_.tracks), {})));
     return is_settled(first) ? first : improved(std::move(first));
   }
 
   /// Clearly more probable, over all measurements that there are; of two that are about as
-  /// probable, the one that is of one piece.
+  /// probable, the one that is of one piece, or else the plainer one.
   [[nodiscard]] static bool is_better(const Explanation& one, const Explanation& other,
                                       const Measurements& measurements) {
     if (!one.fitted || !other.fitted) return one.fitted.has_value();
     const double clearly = StructureOptions{}.min_log_odds;
     const double odds = log_odds(predictive_score(one.fitted->calibration, measurements),
                                  predictive_score(other.fitted->calibration, measurements));
-    return odds > clearly || (odds > -clearly && is_settled(one) && !is_settled(other));
+    if (std::abs(odds) > clearly) return odds > 0.0;
+    if (is_settled(one) != is_settled(other)) return is_settled(one);
+    return parts_of(one) < parts_of(other);
   }
 
  private:
@@ -208,7 +226,6 @@ class Explainer {
 
   /// The best of what the moves propose, one after the other until one is of one piece.
   [[nodiscard]] Explanation improved(Explanation now) const {
-    now = asked_again(std::move(now));
     std::set<Shape> tried;
     if (now.structure) tried.insert(shape_of(*now.structure));
     for (const auto& propose : {&Explainer::with_half_the_recording,
@@ -238,9 +255,18 @@ class Explainer {
 
   void fit(Explanation& out, const std::vector<AddedEffect>& known) const {
     const FreeGeometry free = options_.calibrate.free;
-    const Calibration plain = calibrated(out.start, free);
+    Calibration plain = calibrated(out.start, free);
+    if (is_converged(plain) && take_usual_units(plain.tree, out.start))
+      plain = calibrated(out.start, free);
     lap("calibrate");
     out.fitted = closed_loop(out.start, free, plain, known);
+    // An effect may have looked like another unit.
+    if (!is_converged(out.fitted->calibration) ||
+        !take_usual_units(out.fitted->calibration.tree, out.start))
+      return;
+    plain = calibrated(out.start, free);
+    lap("calibrate");
+    out.fitted = closed_loop(out.start, free, plain, out.fitted->trace.added);
   }
 
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
@@ -249,8 +275,8 @@ class Explainer {
 
   // The structure was searched for on tracks that the effects were in: once more without them.
   [[nodiscard]] Explanation asked_again(Explanation now) const {
-    if (!now.fitted || !now.structure || now.fitted->effects.empty() || is_structure_clear(now))
-      return now;
+    if (!now.fitted || !now.structure || now.fitted->effects.empty()) return now;
+    if (is_structure_clear(now) && !is_bent(*now.fitted)) return now;
     std::optional<Structure> again =
         proposed_structure(with_effects_undone(now.fitted->calibration, evidence_.tracks));
     if (!again) return now;

@@ -78,14 +78,15 @@ void require_markers(const Recording& recording, const TagObservations& tags) {
   }
 }
 
-double nearest_unit(JointType type, double scale) {
+// Nothing where no usual unit is near.
+std::optional<double> usual_unit(JointType type, double scale) {
   const std::vector<double> units = type == JointType::kRevolute
                                         ? std::vector<double>{1.0, kRadPerDegree}
                                         : std::vector<double>{1.0, kMetrePerMillimetre};
   for (const double unit : units) {
     if (std::abs(scale / unit - 1.0) < kUnitTolerance) return unit;
   }
-  return scale;
+  return std::nullopt;
 }
 
 // Couplings by design: a counter-commanded joint follows another one to one. What is smaller than
@@ -274,7 +275,9 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   start.tree.name = recording.settings.name;
   for (std::size_t j = 0; j < start.tree.joints.size(); ++j) {
     Joint& joint = start.tree.joints[j];
-    joint.scale = is_declared_in_si(recording, joint) ? 1.0 : nearest_unit(joint.type, joint.scale);
+    joint.scale = is_declared_in_si(recording, joint)
+                      ? 1.0
+                      : usual_unit(joint.type, joint.scale).value_or(joint.scale);
     joint.couplings = couplings_by_design(structure.joints[j], recording.log);
   }
   for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
@@ -284,6 +287,18 @@ CalibrationStart start_from_structure(const Structure& structure, const Recordin
   start.time_offset_s = structure.time_offset_s;
   start.joint_values = structure.joint_values;
   return start;
+}
+
+bool take_usual_units(const KinematicTree& calibrated, CalibrationStart& start) {
+  bool any = false;
+  for (std::size_t j = 0; j < start.tree.joints.size(); ++j) {
+    Joint& joint = start.tree.joints[j];
+    const auto found = usual_unit(joint.type, calibrated.joints[j].scale);
+    if (usual_unit(joint.type, joint.scale) || !found) continue;
+    joint.scale = *found;
+    any = true;
+  }
+  return any;
 }
 
 std::optional<CameraModel> camera_from_motion(const Recording& recording, const Observed& observed,

@@ -51,6 +51,10 @@ struct Observed {
                                    const CalibrateOptions& options,
                                    std::optional<double> allowance = {});
 
+/// Channels that the structure left in a unit of their own and the calibration finds in a usual
+/// one: the start has them in that. False where there are none.
+bool take_usual_units(const KinematicTree& calibrated, CalibrationStart& start);
+
 /// A start from the found structure: units of the channels recognised, the base frame placed on the
 /// first tag at rest (its normal up; without one at the camera, upright), or level when gravity is
 /// declared.

@@ -66,7 +66,11 @@ struct CameraEffect {
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
-/// tag_size, tag_slip, camera_bump.
+/// tag_size.
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
+
+/// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,
+/// clock_jump, zero_jump, zero_drift.
+[[nodiscard]] std::vector<CameraEffect> time_effects(const EffectWorld& world);
 
 }  // namespace kinescope::effects

@@ -88,8 +88,9 @@ Error refused(const JointLog& log, const FittedEffect& effect, const std::string
 
 // Throws for an effect at a joint that is not there.
 void check_place(const FittedEffect& effect, const KinematicTree& tree, const JointLog& log) {
-  constexpr std::array<std::string_view, 5> kElsewhere{"rolling_shutter", "lens_distortion",
-                                                       "tag_size", "tag_slip", "camera_bump"};
+  constexpr std::array<std::string_view, 7> kElsewhere{
+      "rolling_shutter", "lens_distortion", "tag_size",  "tag_slip",
+      "camera_bump",     "camera_drift",    "clock_jump"};
   if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");

@@ -14,8 +14,8 @@
 namespace kinescope {
 namespace {
 
-// The sag that may say where gravity points: the one that explains most; where something may be
-// left and none was named, the likeliest. What one mass in the middle of the links does is a poor
+// The sag that may say where gravity points: the one that explains most; where none was named, the
+// likeliest, if any is likely. What one mass in the middle of the links does is a poor
 // picture of a large sag, and what lasts as long leaves few stretches to judge it by.
 std::optional<EffectId> telling_sag(const Trace& trace) {
   const TracedEffect* named = nullptr;
@@ -24,7 +24,7 @@ std::optional<EffectId> telling_sag(const Trace& trace) {
     if (named == nullptr || accepted.explained > named->explained) named = &accepted;
   }
   if (named != nullptr) return named->id;
-  if (trace.verdict != TraceVerdict::kClean && trace.verdict != TraceVerdict::kUnknown) return {};
+  if (trace.verdict == TraceVerdict::kNothingToSay) return {};
   const TestedCandidate* hint = nullptr;
   for (const TestedCandidate& tested : trace.candidates) {
     if (!effects::is_sag(tested.id) || tested.p_value > trace::kHint) continue;

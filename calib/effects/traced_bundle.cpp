@@ -73,6 +73,7 @@ class Carriers {
 
 std::vector<CameraEffect> all_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out = camera_effects(world);
+  for (CameraEffect& effect : time_effects(world)) out.push_back(std::move(effect));
   for (CameraEffect& effect : joint_effects(world)) out.push_back(std::move(effect));
   return out;
 }

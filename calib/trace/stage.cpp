@@ -76,8 +76,7 @@ Linearisation extend(const Linearisation& linear, const Eigen::MatrixXd& columns
   return out;
 }
 
-Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
-                     const Eigen::MatrixXd& prior) {
+Eigen::MatrixXd rows_of(const Linearisation& linear, const std::vector<EffectColumn>& columns) {
   Eigen::MatrixXd rows =
       Eigen::MatrixXd::Zero(linear.residual.size(), static_cast<Eigen::Index>(columns.size()));
   std::vector<Eigen::Index> instant(static_cast<std::size_t>(linear.residual.size()));
@@ -95,7 +94,12 @@ Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn
       rows(entry.row(), a) = share * entry.value();
     }
   }
-  return extend(linear, rows, prior);
+  return rows;
+}
+
+Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
+                     const Eigen::MatrixXd& prior) {
+  return extend(linear, rows_of(linear, columns), prior);
 }
 
 }  // namespace kinescope::trace

@@ -46,6 +46,9 @@ using StagePtr = std::shared_ptr<const Stage>;
 
 [[nodiscard]] std::vector<AddedEffect> without(std::vector<AddedEffect> effects, std::size_t index);
 
+/// What columns do to every row, whitened: rows x columns.
+[[nodiscard]] Eigen::MatrixXd rows_of(const Linearisation& linear,
+                                      const std::vector<EffectColumn>& columns);
 /// The linear model with more columns, and priors on them (empty: none).
 [[nodiscard]] Linearisation extend(const Linearisation& linear,
                                    const std::vector<EffectColumn>& columns,

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/trace/scan_slope.h"
+
 namespace kinescope::trace {
 namespace {
 
@@ -46,6 +48,7 @@ void Tracer::search() {
     look_for_rest();
   } while (name_the_rest() || choose_by_rest());
   while (take_the_rest_as_curves()) look_beside_curves();
+  drop_what_leaves_too_much();
   describe_curves();
   summarise();
   list_not_found();
@@ -221,6 +224,29 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     if (moved->fit.converged && moved->held_out_sum() < now_->held_out_sum()) {
       now_ = std::move(moved);
     }
+  }
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    if (!place || now_->added[i].id.place == *place) sharpen(i);
+  }
+}
+
+// Without a large effect the model has bent itself, and its linearisation is not where the scan's
+// best value is. With the effect in, a few Gauss-Newton steps are exact.
+void Tracer::sharpen(std::size_t index) {
+  constexpr int kMostSteps = 5;
+  constexpr double kSmallStep = 0.1;     // standard deviations of the scan
+  constexpr double kLargestStep = 0.25;  // of the value
+  for (int k = 0; k < kMostSteps; ++k) {
+    const std::optional<Eigen::VectorXd> slope = scan_slope(*now_, index);
+    const auto step = slope ? scan_step(now_->system, *slope) : std::nullopt;
+    if (!step || std::abs(step->step) < kSmallStep * step->sigma) return;
+    std::vector<AddedEffect> effects = now_->added;
+    double& scan = effects[index].scan;
+    const double most = kLargestStep * std::abs(scan);
+    scan += std::clamp(step->step, -most, most);
+    StagePtr moved = stage_of(std::move(effects));
+    if (!moved->fit.converged || moved->system.total().rr >= now_->system.total().rr) return;
+    now_ = std::move(moved);
   }
 }
 

@@ -67,6 +67,7 @@ class Tracer {
   /// All effects beyond the first `known` are: what is left with all in judges.
   [[nodiscard]] bool all_needed(const Stage& stage, std::size_t known);
   void search_again(const std::optional<std::string>& place);
+  void sharpen(std::size_t index);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
   [[nodiscard]] bool drop_without_size();
@@ -106,6 +107,9 @@ class Tracer {
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   [[nodiscard]] bool drop_what_rests_explain();
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
+  /// The residual over what differs between neighbours in time; nothing where that is not known.
+  [[nodiscard]] std::optional<double> over_neighbours() const;
+  void drop_what_leaves_too_much();
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);
   void add_step(int round, std::string words, const Stage& stage);

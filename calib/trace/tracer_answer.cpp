@@ -11,6 +11,7 @@
 #include "calib/trace/curve.h"
 #include "calib/trace/distribution.h"
 #include "calib/trace/field.h"
+#include "calib/trace/scan_slope.h"
 #include "calib/trace/tracer.h"
 
 namespace kinescope::trace {
@@ -250,6 +251,29 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   return false;
 }
 
+std::optional<double> Tracer::over_neighbours() const {
+  if (!now_->fit.linear.whitened_by_neighbours) return std::nullopt;
+  const auto freedom =
+      static_cast<double>(now_->fit.linear.residual.size() - now_->system.parameters());
+  return std::sqrt(now_->system.total().rr / std::max(1.0, freedom));
+}
+
+// What lasts and depends on nothing that is known may be the larger part of what an effect stands
+// in for (a joint that creeps, as a jump of its zero).
+void Tracer::drop_what_leaves_too_much() {
+  if (!rests_.empty() || over_neighbours().value_or(0.0) <= kLasts) return;
+  const double left = now_->system.total().rr;
+  for (std::size_t i = now_->added.size(); i-- > 0;) {
+    const double explained = details_[i].effect.explained * base_->system.total().rr;
+    if (left < kDoubtfulShare * explained) continue;
+    const EffectId id = now_->added[i].id;
+    now_ = stage_of(without(now_->added, i));
+    details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+    mark(round_, id, CandidateState::kRemoved, now_->error.value);
+    add_step(round_, fmt::format("{} removed: what it leaves is no noise", name_of(id)), *now_);
+  }
+}
+
 void Tracer::record(const std::vector<TestedMember>& family, const Stage& stage, int round) {
   for (const TestedMember& member : family) {
     const Candidate& candidate = stage.fit.candidates[member.index];
@@ -286,17 +310,13 @@ void Tracer::summarise() {
   trace_.held_out_before = base_->error;
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
-  if (now_->fit.linear.whitened_by_neighbours) {
-    const auto freedom =
-        static_cast<double>(now_->fit.linear.residual.size() - now_->system.parameters());
-    trace_.over_neighbours = std::sqrt(now_->system.total().rr / std::max(1.0, freedom));
-  }
+  if (const auto over = over_neighbours()) trace_.over_neighbours = *over;
   trace_.stretches = now_->system.partition().stretches;
   for (FoundRest& found : rests_) trace_.rest.push_back(std::move(found.rest));
   Eigen::Index count = 0;
   for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();
   if (count == 0) return;
-  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, count);
+  const Eigen::MatrixXd covariance = effect_covariance(*now_, count);
   const Eigen::MatrixXd posterior = posterior_covariance(now_->system, count);
   const double t = t_quantile(0.025, std::max(2.0, trace_.stretches - 1.0));
   Eigen::Index at = 0;

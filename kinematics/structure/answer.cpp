@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "kinematics/structure/natural_units.h"
 
@@ -88,18 +89,31 @@ std::vector<SameQuantity> copies_only(std::vector<SameQuantity> groups, const An
 
 // With the sightings' own noise, and the log without the columns that repeat others.
 Answer search_plainly(Series full, const JointLog& log, const StructureOptions& options,
-                      OwnLog& own) {
+                      UnseenLinks unseen, OwnLog& own) {
   own = own_log(log, same_quantities(log));
-  Answer plain = answer_with(std::move(full), 0.0, own.log, options);
+  Answer plain = answer_with(std::move(full), 0.0, own.log, options, unseen);
   const bool enough =
       is_whole(plain.found.tree, plain.found.readings) && !shares_channels(plain.found.tree);
   if (own.groups.empty() || enough) return plain;
-  Answer every = answer_with(plain.full, 0.0, log, options);
+  Answer every = answer_with(plain.full, 0.0, log, options, unseen);
   std::vector<SameQuantity> copies = copies_only(own.groups, every);
   if (copies.size() == own.groups.size()) return plain;
   own = own_log(log, std::move(copies));
   if (own.groups.empty()) return every;
-  return answer_with(std::move(every.full), 0.0, own.log, options);
+  return answer_with(std::move(every.full), 0.0, own.log, options, unseen);
+}
+
+// The smallest allowance with which every channel drives a joint that a marker shows.
+std::optional<Answer> search_shown_joints(const Series& full, const JointLog& log,
+                                          const StructureOptions& options) {
+  for (const double allowance : kAllowances) {
+    Answer out =
+        answer_with(with_allowance(full, allowance), allowance, log, options, UnseenLinks::kNone);
+    if (is_whole(out.found.tree, out.found.readings) && uses_all(out.found) &&
+        !leaves_far_more(out.found.tree))
+      return out;
+  }
+  return std::nullopt;
 }
 
 // With the sightings' own noise or, where that makes no whole robot or leaves far more than itself,
@@ -111,7 +125,14 @@ Answer search_allowing(Series full, const JointLog& log, const StructureOptions&
     return answer_with(with_allowance(std::move(full), *options.allowance), *options.allowance,
                        own.log, options);
   }
-  Answer plain = search_plainly(std::move(full), log, options, own);
+  Answer plain = search_plainly(std::move(full), log, options, UnseenLinks::kNone, own);
+  if (is_unfinished(plain.found)) {
+    // Errors that are no noise look like links that no marker shows, and are sooner found.
+    if (!log.channels.empty()) {
+      if (auto shown = search_shown_joints(plain.full, own.log, options)) return std::move(*shown);
+    }
+    plain = search_plainly(std::move(plain.full), log, options, UnseenLinks::kWhereNeeded, own);
+  }
   const bool whole = is_whole(plain.found.tree, plain.found.readings);
   if (log.channels.empty() || (whole && !leaves_far_more(plain.found.tree))) return plain;
   for (const double allowance : kAllowances) {
@@ -139,12 +160,12 @@ std::size_t used_channels(const GrownTree& tree) {
 }
 
 Answer answer_with(Series full, double allowance, const JointLog& log,
-                   const StructureOptions& options) {
+                   const StructureOptions& options, UnseenLinks unseen) {
   Answer out;
   out.full = std::move(full);
   out.thin = thinned(out.full, kInstants);
   out.allowance = allowance;
-  out.found = search_tree(out.full, out.thin, log, options);
+  out.found = search_tree(out.full, out.thin, log, options, unseen);
   out.found.tree = with_likely_exchanges(
       in_natural_units(std::move(out.found.tree), out.thin, out.found.readings),
       out.found.readings);

@@ -22,7 +22,8 @@ struct Answer {
 
 /// The best tree with these sightings and this log, copies and all.
 [[nodiscard]] Answer answer_with(Series full, double allowance, const JointLog& log,
-                                 const StructureOptions& options);
+                                 const StructureOptions& options,
+                                 UnseenLinks unseen = UnseenLinks::kWhereNeeded);
 
 /// `own`: the columns that it was found with.
 [[nodiscard]] Answer find_answer(Series full, const JointLog& log, const StructureOptions& options,

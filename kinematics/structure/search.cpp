@@ -58,16 +58,6 @@ bool has_free_body(const GrownTree& tree) {
   return std::ranges::any_of(tree.bodies, [](const GrownBody& b) { return b.link < 0; });
 }
 
-// Something that several joints in series may explain better.
-bool is_unfinished(const FoundTree& found) {
-  const std::vector<char> idle = idle_channels(found.tree, found.readings);
-  const bool left = std::ranges::find(idle, 1) != idle.end();
-  return has_free_body(found.tree) ||
-         std::ranges::any_of(found.tree.links, [&](const GrownLink& l) {
-           return l.founder >= 0 && is_coarse(l.attachment, left);
-         });
-}
-
 // Penalised cost as if the log covered every instant, so that offsets may be compared.
 double score_of(const FoundTree& found) {
   double sum = 0.0;
@@ -89,20 +79,6 @@ bool explains_all(const GrownTree& tree) {
                b.attachment.fit.model.joints,
                [](const ChainJoint& j) { return j.terms.size() == 1; });
   });
-}
-
-// Every channel that moves drives a joint.
-bool uses_all(const FoundTree& found) {
-  std::vector<char> used(found.readings.mean.size(), 0);
-  for (const GrownLink& link : found.tree.links) {
-    if (link.founder >= 0 && link.attachment.driven()) {
-      used[static_cast<std::size_t>(link.attachment.channel())] = 1;
-    }
-  }
-  for (int c = 0; c < found.readings.channels(); ++c) {
-    if (found.readings.moves(c) && used[static_cast<std::size_t>(c)] == 0) return false;
-  }
-  return true;
 }
 
 class Search {
@@ -208,12 +184,35 @@ class Search {
 
 }  // namespace
 
+bool is_unfinished(const FoundTree& found) {
+  const std::vector<char> idle = idle_channels(found.tree, found.readings);
+  const bool left = std::ranges::find(idle, 1) != idle.end();
+  return has_free_body(found.tree) ||
+         std::ranges::any_of(found.tree.links, [&](const GrownLink& l) {
+           return l.founder >= 0 && is_coarse(l.attachment, left);
+         });
+}
+
+bool uses_all(const FoundTree& found) {
+  std::vector<char> used(found.readings.mean.size(), 0);
+  for (const GrownLink& link : found.tree.links) {
+    if (link.founder >= 0 && link.attachment.driven()) {
+      used[static_cast<std::size_t>(link.attachment.channel())] = 1;
+    }
+  }
+  for (int c = 0; c < found.readings.channels(); ++c) {
+    if (found.readings.moves(c) && used[static_cast<std::size_t>(c)] == 0) return false;
+  }
+  return true;
+}
+
 FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
-                      const StructureOptions& options) {
+                      const StructureOptions& options, UnseenLinks unseen) {
   const Search search(full, thin, log, options);
-  if (!search.scans()) return search.finished(search.grow_at(0.0), 0.0, {});
-  // Joints in series without markers between are a long search: not at every offset.
   const GrowthOptions quick{.paths_of_several_joints = false};
+  const GrowthOptions all{.paths_of_several_joints = unseen == UnseenLinks::kWhereNeeded};
+  if (!search.scans()) return search.finished(search.grow_at(0.0, all), 0.0, all);
+  // The long search is not for every offset.
   const double step_s = offset_step(readings_at(log, thin, 0.0, options.max_gap_s));
   std::vector<FoundTree> found;
   found.push_back(search.settle_at(0.0, step_s, quick));
@@ -235,8 +234,9 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
   for (std::size_t k = 1; k < found.size(); ++k) {
     if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
   }
-  if (!is_unfinished(found[best])) return search.finished(std::move(found[best]), step_s, quick);
-  return search.finished(search.settle_at(found[best].offset.value_s, step_s, {}), step_s, {});
+  if (unseen == UnseenLinks::kNone || !is_unfinished(found[best]))
+    return search.finished(std::move(found[best]), step_s, quick);
+  return search.finished(search.settle_at(found[best].offset.value_s, step_s, all), step_s, all);
 }
 
 }  // namespace kinescope::structure_search

@@ -21,7 +21,17 @@ struct FoundTree {
   TimeOffset offset;
 };
 
+/// Joints in series without markers between them: a search a hundred times as long as that for
+/// single joints.
+enum class UnseenLinks { kNone, kWhereNeeded };
+
 [[nodiscard]] FoundTree search_tree(const Series& full, const Series& thin, const JointLog& log,
-                                    const StructureOptions& options);
+                                    const StructureOptions& options, UnseenLinks unseen);
+
+/// Something that several joints in series may explain better.
+[[nodiscard]] bool is_unfinished(const FoundTree& found);
+
+/// Every channel that moves drives a joint.
+[[nodiscard]] bool uses_all(const FoundTree& found);
 
 }  // namespace kinescope::structure_search

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -26,15 +27,22 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kWeakest = 3.0;  // times what tracing is asked to see
 constexpr double kStrongest = 100.0;
 
+// Recordings of lower numbers were drawn from the first effects of the library and of the test's
+// own, before there were others: they stay what they are.
+constexpr int kFirstOfAllEffects = 1000;
+constexpr std::size_t kFirstLibraryEffects = 16;
+constexpr std::size_t kFirstOwnEffects = 3;
+
 // Effects that a robot at rest before a tracker can have.
 bool shows_at_postures(const std::string& effect) {
   static const std::set<std::string> names{
-      "own_tanh", "encoder_scale", "eccentricity", "gear_error",    "compliance", "coupling",
-      "helical",  "axis_wobble",   "tag_slip",     "curved_slider", "camera_bump"};
+      "own_tanh",    "encoder_scale", "eccentricity", "gear_error", "compliance",
+      "coupling",    "helical",       "axis_wobble",  "tag_slip",   "curved_slider",
+      "camera_bump", "zero_jump",     "own_product"};
   return names.contains(effect);
 }
 
-std::optional<InjectedEffect> draw_effect(const std::vector<std::string>& names,
+std::optional<InjectedEffect> draw_effect(std::span<const std::string> names,
                                           const UndeclaredCase& of, Rng& rng) {
   const std::string& name =
       names[static_cast<std::size_t>(rng.index(static_cast<int>(names.size())))];
@@ -50,8 +58,11 @@ bool clashes(const InjectedEffect& effect, const std::vector<InjectedEffect>& ot
   });
 }
 
-void draw_effects(std::size_t count, const std::vector<std::string>& names, UndeclaredCase& of,
-                  Rng& rng) {
+void draw_effects(std::size_t count, UndeclaredCase& of, Rng& rng) {
+  const bool own = of.kind == UndeclaredKind::kOwn;
+  std::span<const std::string> names = own ? truth::own_effects() : truth::library_effects();
+  if (of.number < kFirstOfAllEffects)
+    names = names.first(own ? kFirstOwnEffects : kFirstLibraryEffects);
   while (of.world.effects.size() < count) {
     const auto effect = draw_effect(names, of, rng);
     if (effect && !clashes(*effect, of.world.effects)) of.world.effects.push_back(*effect);
@@ -208,16 +219,14 @@ UndeclaredCase undeclared_case(int number) {
     case kClean:
       break;
     case kSingle:
-      draw_effects(1, truth::library_effects(), out, rng);
+    case kOwn:
+      draw_effects(1, out, rng);
       break;
     case kPair:
-      draw_effects(2, truth::library_effects(), out, rng);
+      draw_effects(2, out, rng);
       break;
     case kTriple:
-      draw_effects(3, truth::library_effects(), out, rng);
-      break;
-    case kOwn:
-      draw_effects(1, truth::own_effects(), out, rng);
+      draw_effects(3, out, rng);
       break;
   }
   return out;

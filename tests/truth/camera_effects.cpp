@@ -26,8 +26,10 @@ struct Clock {
   double offset_s = 0.0;
   double drift = 0.0;
   double agree_s = 0.0;
+  double jump_s = 0.0;
+  double jumps_at_s = 0.0;
   [[nodiscard]] double log_time(double t_s) const {
-    return t_s + offset_s + drift * (t_s - agree_s);
+    return t_s + offset_s + drift * (t_s - agree_s) + (t_s >= jumps_at_s ? jump_s : 0.0);
   }
 };
 
@@ -39,6 +41,25 @@ struct Bump {
 struct Slip {
   double time_s = 0.0;
   Pose T_before_after;
+};
+
+// Creeps towards another place.
+struct Drift {
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rad, at the last frame
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+  double time_constant_s = 1.0;
+  double duration_s = 1.0;
+  [[nodiscard]] Pose at(double t_s) const {
+    Pose T;
+    T.rotation = exp_rotation(rotation * creep(t_s, time_constant_s, duration_s));
+    T.translation = pivot - T.rotation * pivot;
+    return T;
+  }
+};
+
+struct Ripple {
+  Eigen::Vector2d per_px = Eigen::Vector2d::Zero();  ///< rad, across the wave
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
 };
 
 struct Chequer {
@@ -53,7 +74,9 @@ struct Undeclared {
   double line_s = 0.0;  ///< a row
   double reference_row = 0.0;
   std::optional<Bump> bump;
+  std::optional<Drift> drift;
   std::optional<Chequer> chequer;
+  std::optional<Ripple> ripple;
   std::map<TagId, double> size_factor;
   std::map<TagId, Slip> slips;
 };
@@ -67,16 +90,33 @@ TagId tag_named(const FilmedRobot& robot, const std::string& place) {
   return found->id;
 }
 
-Bump bump_of(const InjectedEffect& effect, double time_s, Rng& rng) {
-  // Across the line of sight more than about it: a roll moves only the corners of the image.
+// Across the line of sight more than about it: a roll moves only the corners of the image.
+Eigen::Vector3d axis_across(Rng& rng) {
   const double direction = rng.uniform(0.0, kTwoPi);
-  Eigen::Vector3d axis(std::cos(direction), std::sin(direction), rng.normal(0.3));
-  axis.normalize();
+  return Eigen::Vector3d(std::cos(direction), std::sin(direction), rng.normal(0.3)).normalized();
+}
+
+Bump bump_of(const InjectedEffect& effect, double time_s, Rng& rng) {
+  const Eigen::Vector3d axis = axis_across(rng);
   const Eigen::Vector3d pivot = rng.unit3() * kBumpLever;
   Pose T;
   T.rotation = exp_rotation(axis * effect.size);
   T.translation = pivot - T.rotation * pivot;
   return {time_s, T};
+}
+
+Drift drift_of(const InjectedEffect& effect, double time_constant_s, double duration_s, Rng& rng) {
+  const Eigen::Vector3d axis = axis_across(rng);
+  return {axis * effect.size, rng.unit3() * kBumpLever, time_constant_s, duration_s};
+}
+
+Ripple ripple_of(const InjectedEffect& effect, Rng& rng) {
+  const auto towards = [&rng] {
+    const double direction = rng.uniform(0.0, kTwoPi);
+    return Eigen::Vector2d(std::cos(direction), std::sin(direction));
+  };
+  const Eigen::Vector2d per_px = towards() * (kTwoPi / effect.detail);
+  return {per_px, towards() * effect.size};
 }
 
 Slip slip_of(const InjectedEffect& effect, double tag_size_m, double time_s, Rng& rng) {
@@ -94,14 +134,17 @@ void add_lens(const InjectedEffect& effect, CameraModel& camera) {
   camera.distortion[first + 1] += effect.detail;
 }
 
-void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out) {
+void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, Undeclared& out) {
   Rng rng = Rng::from_name(fmt::format("injected {} {}", effect.effect, effect.place), robot.seed);
   const double time_s = effect.detail * robot.duration_s;
   if (effect.effect == "time_offset" && effect.place == "clock") {
     out.clock.offset_s += effect.size;
   } else if (effect.effect == "clock_drift") {
     out.clock.drift = effect.size;
-    out.clock.agree_s = time_s;
+    out.clock.agree_s = effect.detail * last_s;
+  } else if (effect.effect == "clock_jump") {
+    out.clock.jump_s = effect.size;
+    out.clock.jumps_at_s = time_s;
   } else if (effect.effect == "lens_distortion") {
     add_lens(effect, out.camera);
   } else if (effect.effect == "rolling_shutter") {
@@ -109,10 +152,14 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out
     out.reference_row = effect.detail * robot.camera.height;
   } else if (effect.effect == "camera_bump") {
     out.bump = bump_of(effect, time_s, rng);
+  } else if (effect.effect == "camera_drift") {
+    out.drift = drift_of(effect, time_s, robot.duration_s, rng);
   } else if (effect.effect == "own_chequer") {
     const double direction = rng.uniform(0.0, kTwoPi);
     out.chequer = {effect.detail,
                    effect.size * Eigen::Vector2d(std::cos(direction), std::sin(direction))};
+  } else if (effect.effect == "own_ripple") {
+    out.ripple = ripple_of(effect, rng);
   } else if (effect.effect == "tag_size" && effect.place == "tags") {
     for (const Marker& marker : robot.tree.markers) out.size_factor[marker.id] = 1.0 + effect.size;
   } else if (effect.effect == "tag_size") {
@@ -121,8 +168,7 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out
     const TagId id = tag_named(robot, effect.place);
     out.slips[id] = slip_of(effect, robot.markers.size_m(id), time_s, rng);
   } else {
-    KINESCOPE_CHECK(sits_on_joint(effect.effect) || is_late_joint(effect),
-                    "an effect has a known name");
+    KINESCOPE_CHECK(is_mechanical(effect), "an effect has a known name");
   }
 }
 
@@ -160,6 +206,7 @@ class Eye {
     const Pose T_base_link = links_at(t_s)[marker.link.index()];
     Pose T = robot_.T_camera_base * T_base_link * marker.T_link_marker;
     if (un_.bump && t_s >= un_.bump->time_s) T = un_.bump->T_new_old * T;
+    if (un_.drift) T = un_.drift->at(t_s) * T;
     const auto slip = un_.slips.find(marker.id);
     if (slip != un_.slips.end() && t_s >= slip->second.time_s) T = T * slip->second.T_before_after;
     return T;
@@ -187,6 +234,7 @@ class Eye {
   }
 
   [[nodiscard]] Eigen::Vector2d shifted(const Eigen::Vector2d& pixel) const {
+    if (un_.ripple) return pixel + std::sin(un_.ripple->per_px.dot(pixel)) * un_.ripple->shift_px;
     if (!un_.chequer) return pixel;
     const double fields = std::floor(pixel.x() / un_.chequer->field_px) +
                           std::floor(pixel.y() / un_.chequer->field_px);
@@ -330,7 +378,8 @@ World make_effect_world(const EffectWorldOptions& options) {
   const Mechanics mechanics(robot, options.effects);
   Undeclared undeclared;
   undeclared.camera = robot.camera;
-  for (const InjectedEffect& effect : options.effects) add(effect, robot, undeclared);
+  const double last_s = (options.frames - 1) / options.frame_rate_hz;
+  for (const InjectedEffect& effect : options.effects) add(effect, robot, last_s, undeclared);
   World world;
   world.tree = robot.tree;
   world.T_camera_base = robot.T_camera_base;

@@ -23,7 +23,7 @@ struct Strength {
   Unit kind = Unit::kPlain;
 };
 
-constexpr std::array<Strength, 19> kWeakest{{
+constexpr std::array<Strength, 29> kWeakest{{
     {"time_offset", 0.5e-3},
     {"clock_drift", 5e-5},  // 0.5 ms rms over 33 s
     {"encoder_scale", 500e-6},
@@ -40,14 +40,29 @@ constexpr std::array<Strength, 19> kWeakest{{
     {"tag_size", 1e-3},  // 0.05 mm of 50 mm
     {"tag_slip", 0.3e-3},
     {"camera_bump", 0.3 / kFocal},
+    {"camera_drift", 0.6 / kFocal},
+    {"zero_jump", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"zero_drift", 0.06 * kRadPerDegree, Unit::kAngle},
+    {"clock_jump", 1e-3},
     {"own_tanh", 0.03 * kRadPerDegree, Unit::kAngle},
     {"own_speed", 0.06 * kRadPerDegree, Unit::kAngle},
     {"own_chequer", 0.03},
+    {"own_ripple", 0.03},
+    {"own_product", 0.06 * kRadPerDegree, Unit::kAngle},
+    {"own_acceleration", 0.06 * kRadPerDegree, Unit::kAngle},
+    {"own_vibration", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"own_creep", 0.03 * kRadPerDegree, Unit::kAngle},
+    {"own_growth", 0.5e-3},
 }};
 
-constexpr std::array<std::string_view, 11> kOnJoints{
-    "encoder_scale", "eccentricity",  "gear_error",  "backlash", "compliance", "coupling",
-    "helical",       "curved_slider", "axis_wobble", "own_tanh", "own_speed"};
+constexpr std::array<std::string_view, 17> kOnJoints{
+    "encoder_scale", "eccentricity", "gear_error",       "backlash",      "compliance", "coupling",
+    "helical",       "axis_wobble",  "curved_slider",    "zero_jump",     "zero_drift", "own_tanh",
+    "own_speed",     "own_product",  "own_acceleration", "own_vibration", "own_creep"};
+constexpr std::array<std::string_view, 4> kAtATime{"tag_slip", "camera_bump", "zero_jump",
+                                                   "clock_jump"};
+constexpr std::array<std::string_view, 6> kByAnother{
+    "coupling", "own_tanh", "own_speed", "own_product", "own_acceleration", "own_creep"};
 constexpr std::array<std::string_view, 3> kOnRevolute{"eccentricity", "helical", "axis_wobble"};
 // A load that hardly changes sags by an offset, which is the joint's zero.
 constexpr double kChangingLoad = 0.3;
@@ -67,8 +82,10 @@ double detail_of(std::string_view effect, const Joint* joint, Rng& rng) {
   if (effect == "clock_drift" || effect == "rolling_shutter") return 0.5;
   if (effect == "eccentricity") return 1.0 + rng.index(2);
   if (effect == "axis_wobble") return -1.0;
-  if (effect == "tag_slip" || effect == "camera_bump") return rng.uniform(0.25, 0.75);
-  if (effect == "own_chequer") return rng.uniform(60.0, 120.0);
+  if (among(kAtATime, effect)) return rng.uniform(0.25, 0.75);
+  if (effect == "camera_drift" || effect == "zero_drift") return rng.uniform(0.2, 2.0);
+  if (effect == "own_chequer" || effect == "own_ripple") return rng.uniform(60.0, 120.0);
+  if (effect == "own_vibration") return rng.uniform(2.0, 6.0);
   if (effect != "gear_error") return 0.0;
   return joint->type == JointType::kPrismatic ? rng.uniform(15.0, 60.0) : rng.uniform(6.0, 40.0);
 }
@@ -91,7 +108,7 @@ std::vector<InjectedEffect> on_joint(std::string_view effect, const FilmedRobot&
   InjectedEffect out{std::string(effect), joint.name, strength.size,
                      detail_of(effect, &joint, rng)};
   if (strength.kind == Unit::kAngle) out.size *= unit(joint);
-  if (effect != "coupling" && !effect.starts_with("own_")) return {out};
+  if (!among(kByAnother, effect)) return {out};
   std::vector<InjectedEffect> pairs;
   for (const Joint& other : robot.tree.joints) {
     if (other.name == joint.name) continue;
@@ -106,15 +123,17 @@ std::vector<InjectedEffect> on_joint(std::string_view effect, const FilmedRobot&
 
 const std::vector<std::string>& library_effects() {
   static const std::vector<std::string> names{
-      "time_offset",     "clock_drift", "encoder_scale", "eccentricity",
-      "gear_error",      "backlash",    "compliance",    "coupling",
-      "helical",         "axis_wobble", "curved_slider", "lens_distortion",
-      "rolling_shutter", "tag_size",    "tag_slip",      "camera_bump"};
+      "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity", "gear_error",
+      "backlash",      "compliance",      "coupling",        "helical",      "axis_wobble",
+      "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",     "tag_slip",
+      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",   "clock_jump"};
   return names;
 }
 
 const std::vector<std::string>& own_effects() {
-  static const std::vector<std::string> names{"own_tanh", "own_speed", "own_chequer"};
+  static const std::vector<std::string> names{"own_tanh",      "own_speed",   "own_chequer",
+                                              "own_ripple",    "own_product", "own_acceleration",
+                                              "own_vibration", "own_creep",   "own_growth"};
   return names;
 }
 
@@ -124,6 +143,14 @@ bool is_late_joint(const InjectedEffect& effect) {
   return effect.effect == "time_offset" && effect.place != "clock";
 }
 
+bool is_mechanical(const InjectedEffect& effect) {
+  return sits_on_joint(effect.effect) || is_late_joint(effect) || effect.effect == "own_growth";
+}
+
+double creep(double t_s, double time_constant_s, double duration_s) {
+  return std::expm1(-t_s / time_constant_s) / std::expm1(-duration_s / time_constant_s);
+}
+
 bool can_have(JointType type, std::string_view effect) {
   if (type == JointType::kFixed || !sits_on_joint(effect)) return false;
   if (effect == "curved_slider") return type == JointType::kPrismatic;
@@ -131,12 +158,12 @@ bool can_have(JointType type, std::string_view effect) {
 }
 
 std::string_view size_unit(std::string_view effect, JointType type) {
-  if (effect == "time_offset" || effect == "rolling_shutter") return "s";
+  if (effect == "time_offset" || effect == "clock_jump" || effect == "rolling_shutter") return "s";
   if (effect == "clock_drift") return "s/s";
   if (effect == "helical" || effect == "tag_slip") return "m";
   if (effect == "curved_slider") return "1/m";
-  if (effect == "axis_wobble" || effect == "camera_bump") return "rad";
-  if (effect == "own_chequer") return "px";
+  if (effect == "axis_wobble" || effect.starts_with("camera_")) return "rad";
+  if (effect == "own_chequer" || effect == "own_ripple") return "px";
   if (effect == "encoder_scale" || effect == "coupling" || !sits_on_joint(effect)) return "";
   return type == JointType::kPrismatic ? "m" : "rad";
 }
@@ -159,7 +186,8 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
     const auto slides = std::ranges::count(robot.tree.joints, JointType::kPrismatic, &Joint::type);
     if (effect == "tag_size" && slides > 1) places.emplace_back("tags");
   } else {
-    places.emplace_back(effect == "time_offset" || effect == "clock_drift" ? "clock" : "camera");
+    const bool is_of_clock = effect == "time_offset" || effect.starts_with("clock_");
+    places.emplace_back(is_of_clock ? "clock" : effect == "own_growth" ? "robot" : "camera");
     if (effect == "time_offset" && robot.tree.joints.size() > 1) {
       for (const Joint& joint : robot.tree.joints) places.push_back(joint.name);
     }

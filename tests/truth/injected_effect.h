@@ -16,8 +16,8 @@ namespace kinescope::truth {
 
 /// `effect`, its `size` and `detail`:
 ///   time_offset      s, joint-log time = frame time + size; on a joint: of its reading alone
-///   clock_drift      s/s, the log's clock gains this; detail: share of the recording at which the
-///                    clocks agree
+///   clock_drift      s/s, the log's clock gains this; detail: share of the way from the first
+///                    frame to the last at which the clocks agree
 ///   encoder_scale    1, true = (1 + size) x logged
 ///   eccentricity     rad amplitude; detail 1: an encoder disc out of centre, 2: a universal joint
 ///   gear_error       rad (m) amplitude, sine; detail: periods a turn (a metre), any number
@@ -35,12 +35,27 @@ namespace kinescope::truth {
 ///   tag_size         1, the tag (on "tags": every one) is (1 + size) x as large as declared
 ///   tag_slip         m, in the tag's plane, with a small turn; detail: when, share of the time
 ///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
+///   camera_drift     rad from the first frame to the last, about a point 0.3 m away; detail: time
+///                    constant of its approach to rest, share of the time
+///   zero_jump        rad (m), the joint's zero from then on; detail: when, share of the time
+///   zero_drift       rad (m) from the first frame to the last; detail as of camera_drift
+///   clock_jump       s, joint-log time = frame time + size from then on; detail: when, share of
+///   the
+///                    time
 /// and of the test's own making, in no library:
 ///   own_tanh         true value of `place` +=
 ///                    size x tanh(5 (logged value of `with` - detail) / reach)
 ///   own_speed        true value of `place` += size x (speed of `with` / its largest)^2
 ///   own_chequer      px, corners shift one way on the black fields of a chequered image and back
 ///                    on the white ones; detail: px, edge of a field
+///   own_ripple       px, corners shift along a wave over the image; detail: px, its length
+///   own_product      true value of `place` += size x (its value / reach) x (value of `with` /
+///   reach) own_acceleration true value of `place` += size x acceleration of `with` / its largest
+///   own_vibration    rad (m) amplitude; detail: Hz
+///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
+///   and
+///                    before, fading - its value) / reach
+///   own_growth       1, growth of all distances between joints, from the first frame to the last
 struct InjectedEffect {
   std::string effect;
   std::string place;
@@ -57,6 +72,10 @@ struct InjectedEffect {
 [[nodiscard]] bool sits_on_joint(std::string_view effect);
 /// A time_offset that is not the clock's.
 [[nodiscard]] bool is_late_joint(const InjectedEffect& effect);
+/// Of the robot's own mechanics: of joints, late readings, growth.
+[[nodiscard]] bool is_mechanical(const InjectedEffect& effect);
+/// Share, 0 at 0 and 1 at the end, of what creeps towards rest with a time constant.
+[[nodiscard]] double creep(double t_s, double time_constant_s, double duration_s);
 /// False where an effect makes no sense: a slide has no screw, a hinge no curvature.
 [[nodiscard]] bool can_have(JointType type, std::string_view effect);
 

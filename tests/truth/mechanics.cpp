@@ -16,6 +16,7 @@ namespace {
 constexpr double kBefore = 2.0;    // s, in which play forgets where it began
 constexpr double kStep = 0.0005;   // s, of the play's memory
 constexpr double kGravity = 9.81;  // m/s^2
+constexpr double kCreep = 1.5;     // s
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 std::size_t joint_named(const KinematicTree& tree, const std::string& name) {
@@ -96,9 +97,31 @@ Mechanics::Law encoder_law(const InjectedEffect& effect, bool turns, double phas
   return {};
 }
 
+// Laws that need nothing but the time.
+Mechanics::Law law_of_time(const InjectedEffect& effect, double duration_s, double phase) {
+  const double size = effect.size;
+  if (effect.effect == "zero_jump") {
+    return [size, at_s = effect.detail * duration_s](double q, const auto&, double t) {
+      return q + (t >= at_s ? size : 0.0);
+    };
+  }
+  if (effect.effect == "zero_drift") {
+    return [=, constant_s = effect.detail * duration_s](double q, const auto&, double t) {
+      return q + size * creep(t, constant_s, duration_s);
+    };
+  }
+  if (effect.effect == "own_vibration") {
+    return [=, omega = kTwoPi * effect.detail](double q, const auto&, double t) {
+      return q + size * std::sin(omega * t + phase);
+    };
+  }
+  return {};
+}
+
 Mechanics::Law law_of(const InjectedEffect& effect, const FilmedRobot& robot, std::size_t joint,
                       double phase) {
   const bool turns = robot.tree.joints[joint].type == JointType::kRevolute;
+  if (Mechanics::Law law = law_of_time(effect, robot.duration_s, phase)) return law;
   if (Mechanics::Law law = encoder_law(effect, turns, phase)) return law;
   const double size = effect.size;
   const std::size_t other = joint_named(robot.tree, effect.with);
@@ -113,9 +136,34 @@ Mechanics::Law law_of(const InjectedEffect& effect, const FilmedRobot& robot, st
       return q + size * std::tanh(slope * (encoders[k] - middle));
     };
   }
+  if (effect.effect == "own_product") {
+    const auto own = static_cast<Eigen::Index>(joint);
+    const double factor = size / (largest_value(robot, joint) * largest_value(robot, other));
+    return [=](double q, const Eigen::VectorXd& encoders, double) {
+      return q + factor * encoders[own] * encoders[k];
+    };
+  }
+  const SmoothMotion& motion = robot.motions[other];
+  if (effect.effect == "own_acceleration") {
+    const auto acceleration = [&motion](double t) {
+      constexpr double kHalfStep = 1e-3;  // s
+      return (motion.rate(t + kHalfStep) - motion.rate(t - kHalfStep)) / (2.0 * kHalfStep);
+    };
+    double largest = 0.0;
+    for (const double t : instants(robot.duration_s, 0.01))
+      largest = std::max(largest, std::abs(acceleration(t)));
+    return [=](double q, const auto&, double t) { return q + size * acceleration(t) / largest; };
+  }
+  if (effect.effect == "own_creep") {
+    const Creep creep(motion, kCreep, robot.duration_s);
+    const double factor = size / largest_value(robot, other);
+    return [=](double q, const Eigen::VectorXd& encoders, double t) {
+      return q + factor * (creep.value(t) - encoders[k]);
+    };
+  }
   KINESCOPE_CHECK(effect.effect == "own_speed", "an effect of a joint has a known name");
   const double factor = size / std::pow(largest_rate(robot, other), 2);
-  return [factor, &motion = robot.motions[other]](double q, const auto&, double t) {
+  return [factor, &motion](double q, const auto&, double t) {
     return q + factor * std::pow(motion.rate(t), 2);
   };
 }
@@ -160,6 +208,21 @@ double Play::value(double t_s) const {
   const double at = std::clamp((t_s + kBefore) / kStep, 0.0, static_cast<double>(held_.size() - 1));
   const double q = leader_.value(t_s);
   return std::clamp(held_[static_cast<std::size_t>(at)], q - half_width_, q + half_width_);
+}
+
+Creep::Creep(const SmoothMotion& leader, double time_constant_s, double duration_s) {
+  double held = leader.value(-kBefore);
+  const auto steps = static_cast<std::size_t>((duration_s + 2.0 * kBefore) / kStep);
+  for (std::size_t i = 0; i <= steps; ++i) {
+    held_.push_back(held);
+    const double q = leader.value(static_cast<double>(i) * kStep - kBefore);
+    held += (q - held) * kStep / time_constant_s;
+  }
+}
+
+double Creep::value(double t_s) const {
+  const double at = std::clamp((t_s + kBefore) / kStep, 0.0, static_cast<double>(held_.size() - 1));
+  return held_[static_cast<std::size_t>(at)];
 }
 
 Masses::Masses(const KinematicTree& tree, std::uint64_t seed) {
@@ -229,7 +292,11 @@ Mechanics::Mechanics(const FilmedRobot& robot, const std::vector<InjectedEffect>
         [&joint](double value) { return joint_motion(joint.type, joint.axis, value); });
   }
   for (const InjectedEffect& effect : effects) {
-    if (sits_on_joint(effect.effect) || is_late_joint(effect)) add(effect);
+    if (effect.effect == "own_growth") {
+      growth_ = effect.size;
+    } else if (is_mechanical(effect)) {
+      add(effect);
+    }
   }
 }
 
@@ -285,7 +352,9 @@ std::vector<Pose> Mechanics::links(double t_s) const {
   std::vector<Pose> T_base_link(robot_.tree.links.size());
   for (std::size_t j = 0; j < robot_.tree.joints.size(); ++j) {
     const Joint& joint = robot_.tree.joints[j];
-    T_base_link[joint.child.index()] = T_base_link[joint.parent.index()] * joint.T_parent_joint *
+    Pose T_parent_joint = joint.T_parent_joint;
+    T_parent_joint.translation *= 1.0 + growth_ * t_s / robot_.duration_s;
+    T_base_link[joint.child.index()] = T_base_link[joint.parent.index()] * T_parent_joint *
                                        motions_[j](now[static_cast<Eigen::Index>(j)]);
   }
   return T_base_link;

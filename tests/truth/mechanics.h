@@ -55,6 +55,16 @@ struct TorqueRange {
 };
 [[nodiscard]] TorqueRange gravity_range(const FilmedRobot& robot, std::size_t joint);
 
+/// A value that remembers: follows another with a delay, as a spring beside a damper does.
+class Creep {
+ public:
+  Creep(const SmoothMotion& leader, double time_constant_s, double duration_s);
+  [[nodiscard]] double value(double t_s) const;
+
+ private:
+  std::vector<double> held_;
+};
+
 /// The robot must outlive it.
 class Mechanics {
  public:
@@ -84,6 +94,7 @@ class Mechanics {
   std::vector<std::vector<Law>> laws_;
   std::vector<Motion> motions_;
   std::vector<Sag> sags_;
+  double growth_ = 0.0;  ///< of distances between joints, by the last frame
 };
 
 }  // namespace kinescope::truth

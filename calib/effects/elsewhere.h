@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What every effect that is at no joint is made of: of camera, clock and markers.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/effects/camera_effects.h"
+
+namespace kinescope::effects {
+
+/// An effect at a place, still without corrections.
+[[nodiscard]] CameraEffect effect(std::string name, std::string place, std::string words,
+                                  std::vector<EffectParameter> parameters, std::string size_unit);
+
+/// One of its parameters, 1 everywhere.
+[[nodiscard]] Correction correct(CorrectedPart part, const CameraEffect& effect,
+                                 std::size_t parameter, int index = kEverywhere);
+
+[[nodiscard]] Eigen::VectorXd frame_times(const EffectWorld& world);  ///< s
+
+[[nodiscard]] std::string marker_name(const EffectWorld& world, int marker);
+/// True of a marker that no joint moves.
+[[nodiscard]] bool rests(const EffectWorld& world, int marker);
+
+}  // namespace kinescope::effects

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/effects/camera_effects.h"
+#include "calib/effects/elsewhere.h"
+#include "calib/effects/suspect.h"
+
+namespace kinescope::effects {
+namespace {
+
+// What happens once leaves no trace too near to the ends.
+constexpr double kFewestBefore = 0.06;  // of the recording
+constexpr int kMostTimes = 120;
+// A marker at rest repeats its corners' errors in every frame, until a bump gives it others.
+constexpr double kRestingBias = 0.05;  // px
+
+const std::vector<EffectParameter> kTwist{{"turn x", "rad"}, {"turn y", "rad"}, {"turn z", "rad"},
+                                          {"shift x", "m"},  {"shift y", "m"},  {"shift z", "m"}};
+
+// The six parameters of a twist of a part, with the same share.
+std::vector<Correction> twists(const CameraEffect& like, CorrectedPart part, int index,
+                               const Eigen::VectorXd& share) {
+  std::vector<Correction> out;
+  for (std::size_t i = 0; i < kTwist.size(); ++i) {
+    Correction twist = correct(part, like, i, index);
+    twist.direction = Vector6d::Unit(static_cast<Eigen::Index>(i));
+    twist.share = share;
+    out.push_back(std::move(twist));
+  }
+  return out;
+}
+
+// Of every frame: 0 before a time, 1 from then on.
+Eigen::VectorXd since(const Eigen::VectorXd& time, double at_s) {
+  return (time.array() >= at_s).cast<double>();
+}
+
+// The time at which something happens once, as the value of the scan.
+void happens_once(const EffectWorld& world, Candidate& c) {
+  const double length = world.last_s - world.first_s;
+  const double begin = world.first_s + kFewestBefore * length;
+  const double end = world.last_s - kFewestBefore * length;
+  const auto count = std::min<std::size_t>(kMostTimes, world.frames.times_s.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    c.scan.push_back(begin + (end - begin) * static_cast<double>(k) /
+                                 static_cast<double>(std::max<std::size_t>(1, count - 1)));
+  }
+  // A step between two frames: any time between them says the same.
+  c.scan_step =
+      length / static_cast<double>(std::max<std::size_t>(1, world.frames.times_s.size() - 1));
+  c.scan_name = "at";
+  c.scan_unit = "s";
+  if (world.postures) {
+    // Their stamps may be any numbers.
+    c.scan_words = [times_s = world.frames.times_s](double at_s) {
+      const auto first = std::ranges::lower_bound(times_s, at_s);
+      return fmt::format("posture {} of {}", first - times_s.begin() + 1, times_s.size());
+    };
+  }
+}
+
+// Of every frame: the way from the first (0) to the last (1) of what creeps towards rest.
+Eigen::VectorXd creep(const Eigen::VectorXd& time, double constant) {
+  const double last = std::expm1(-(time[time.size() - 1] - time[0]) / constant);
+  return ((time[0] - time.array()) / constant).unaryExpr([last](double exponent) {
+    return std::expm1(exponent) / last;
+  });
+}
+
+// Stamps of postures may be any numbers: they are counted.
+Eigen::VectorXd creeping_time(const EffectWorld& world) {
+  const Eigen::VectorXd time = frame_times(world);
+  if (!world.postures) return time;
+  return Eigen::VectorXd::LinSpaced(time.size(), 0.0, static_cast<double>(time.size() - 1));
+}
+
+// A time constant, as the value of the scan: from what is over early to a straight line.
+void creeps(const EffectWorld& world, Candidate& c) {
+  constexpr std::array kConstants{0.1, 0.2, 0.4, 0.8, 1.6, 3.2};  // of the recording
+  const Eigen::VectorXd time = creeping_time(world);
+  const double length = time[time.size() - 1] - time[0];
+  for (const double constant : kConstants) c.scan.push_back(constant * length);
+  c.scan_name = "time constant";
+  c.scan_unit = world.postures ? "postures" : "s";
+}
+
+// Further than its own size, or half a radian, a marker does not slip: it is put elsewhere.
+std::function<bool(const Eigen::VectorXd&)> is_a_slip(const EffectWorld& world, int marker) {
+  constexpr double kMostTurn = 0.5;      // rad
+  constexpr double kUnknownSize = 0.05;  // m
+  const double size = world.tree.markers[static_cast<std::size_t>(marker)].size_m;
+  return [most = size > 0.0 ? size : kUnknownSize](const Eigen::VectorXd& twist) {
+    return twist.head<3>().norm() < kMostTurn && twist.tail<3>().norm() < most;
+  };
+}
+
+CameraEffect tag_slip(const EffectWorld& world, int marker) {
+  const std::string name = marker_name(world, marker);
+  CameraEffect out =
+      effect("tag_slip", name, fmt::format("{} moved on its link", name), kTwist, "m");
+  out.candidate.size_weights.head<3>().setZero();
+  out.candidate.check = "glue or screws of the marker's plate";
+  out.candidate.record = "more frames with this marker in view, before and after";
+  out.candidate.possible = is_a_slip(world, marker);
+  if (rests(world, marker) && world.kind == MeasurementKind::kCorners)
+    out.candidate.floor = kRestingBias;
+  happens_once(world, out.candidate);
+  out.corrections = [like = out, marker, time = frame_times(world)](double at_s) {
+    return twists(like, CorrectedPart::kMarker, marker, since(time, at_s));
+  };
+  return out;
+}
+
+CameraEffect camera_bump(const EffectWorld& world) {
+  CameraEffect out =
+      effect("camera_bump", "camera", "the camera (or the robot's base) was moved", kTwist, "rad");
+  out.candidate.size_weights.tail<3>().setZero();
+  out.candidate.check = "tripod, cable pulls, screws of the base";
+  out.candidate.record = "put a marker on the base, in view all the time";
+  happens_once(world, out.candidate);
+  out.corrections = [like = out, time = frame_times(world)](double at_s) {
+    return twists(like, CorrectedPart::kCamera, 0, since(time, at_s));
+  };
+  return out;
+}
+
+CameraEffect camera_drift(const EffectWorld& world) {
+  CameraEffect out = effect("camera_drift", "camera",
+                            "the camera (or the robot's base) moves slowly", kTwist, "rad");
+  out.candidate.size_weights.tail<3>().setZero();
+  out.candidate.check = "tripod head that settles, camera and mount that warm up";
+  out.candidate.record = "let the camera warm up; put a marker on the base, in view all the time";
+  creeps(world, out.candidate);
+  out.corrections = [like = out, time = creeping_time(world)](double constant) {
+    return twists(like, CorrectedPart::kCamera, 0, creep(time, constant));
+  };
+  return out;
+}
+
+CameraEffect clock_jump(const EffectWorld& world) {
+  CameraEffect out = effect("clock_jump", "clock", "one of the clocks jumped, or frames were lost",
+                            {{"jump", "s"}}, "s");
+  out.candidate.check = "frames that the recorder dropped or doubled, clock that was set meanwhile";
+  out.candidate.record = "stamps of the exposures in place of a frame rate; move all the time";
+  happens_once(world, out.candidate);
+  out.corrections = [like = out, time = frame_times(world)](double at_s) {
+    Correction jump = correct(CorrectedPart::kClock, like, 0);
+    jump.share = since(time, at_s);
+    return std::vector{jump};
+  };
+  return out;
+}
+
+CameraEffect zero_jump(const EffectWorld& world, const Suspect& s) {
+  CameraEffect out = effect(s, "zero_jump", fmt::format("the zero of {} jumped", s.name),
+                            {{"jump", s.unit}}, s.unit);
+  out.candidate.check =
+      "steps that the motor lost, teeth that a belt jumped, set screws, counts that an encoder "
+      "lost";
+  out.candidate.record = fmt::format("go to the reference of {} before and after", s.name);
+  happens_once(world, out.candidate);
+  out.corrections = [s, time = frame_times(world)](double at_s) {
+    return std::vector{turn(s, "zero jump", s.unit, since(time, at_s))};
+  };
+  return out;
+}
+
+CameraEffect zero_drift(const EffectWorld& world, const Suspect& s) {
+  CameraEffect out = effect(s, "zero_drift", fmt::format("the zero of {} moves slowly", s.name),
+                            {{"drift", s.unit}}, s.unit);
+  out.candidate.check = "warm-up of drive and link, set screws, belt that creeps";
+  out.candidate.record = fmt::format("go to the same place of {} from time to time", s.name);
+  creeps(world, out.candidate);
+  out.corrections = [s, time = creeping_time(world)](double constant) {
+    return std::vector{turn(s, "zero drift", s.unit, creep(time, constant))};
+  };
+  return out;
+}
+
+}  // namespace
+
+std::vector<CameraEffect> time_effects(const EffectWorld& world) {
+  std::vector<CameraEffect> out;
+  for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
+  out.push_back(camera_bump(world));
+  out.push_back(camera_drift(world));
+  if (!world.postures) out.push_back(clock_jump(world));
+  for (const int joint : world.driven) {
+    const Suspect s = suspect(world, joint);
+    out.push_back(zero_jump(world, s));
+    out.push_back(zero_drift(world, s));
+  }
+  return out;
+}
+
+}  // namespace kinescope::effects
