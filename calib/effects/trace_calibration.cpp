@@ -33,6 +33,10 @@ std::optional<EffectId> telling_sag(const Trace& trace) {
   return hint == nullptr ? std::optional<EffectId>() : hint->id;
 }
 
+bool names(const Trace& trace, const EffectId& id) {
+  return std::ranges::find(trace.accepted, id, &TracedEffect::id) != trace.accepted.end();
+}
+
 CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                         const TraceOptions& trace_options, const Progress& progress) {
   const effects::TracedBundle model(bundle, options);
@@ -85,7 +89,9 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
       out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
   const bool needs_more =
       again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size());
-  if (again.trace.verdict == TraceVerdict::kNothingToSay || (needs_more && !says_all) ||
+  // What was only likely is told by gravity, or gravity by nothing.
+  const bool told = names(out.trace, *sag) || names(again.trace, *sag);
+  if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || (needs_more && !says_all) ||
       again.trace.held_out_after.value >= out.trace.held_out_after.value) {
     return out;
   }

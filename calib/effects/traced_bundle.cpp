@@ -142,6 +142,19 @@ void take_sizes(const std::vector<CameraEffect>& library, const std::vector<Adde
   }
 }
 
+// By its neighbours, in its unit per s.
+Eigen::VectorXd slope_of(const Eigen::VectorXd& values, const std::vector<double>& times_s) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(values.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Eigen::Index before = std::max<Eigen::Index>(0, i - 1);
+    const Eigen::Index after = std::min<Eigen::Index>(values.size() - 1, i + 1);
+    const double span_s =
+        times_s[static_cast<std::size_t>(after)] - times_s[static_cast<std::size_t>(before)];
+    if (span_s > 0.0) out[i] = (values[after] - values[before]) / span_s;
+  }
+  return out;
+}
+
 std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector<int>& frames) {
   std::vector<Covariate> out;
   const auto at_instants = [&](const Eigen::VectorXd& by_frame) {
@@ -157,6 +170,8 @@ std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector
     out.push_back({"value of " + j.name, unit, at_instants(world.frames.value.col(joint))});
     if (world.postures) continue;
     const Eigen::VectorXd rate = at_instants(world.frames.rate.col(joint));
+    out.push_back({"acceleration of " + j.name, unit + "/s^2",
+                   at_instants(slope_of(world.frames.rate.col(joint), world.frames.times_s))});
     out.push_back({"speed of " + j.name, unit + "/s", rate});
     out.push_back({"direction of " + j.name, "",
                    rate.unaryExpr([](double v) { return v > 0.0 ? 1.0 : -1.0; })});

@@ -128,6 +128,26 @@ TEST(Explain, ABumpIsNoJointOfAnIdleChannel) {
   EXPECT_EQ(effects(answered), (std::vector<std::string>{"camera_bump camera", "tag_size tag_15"}));
 }
 
+// A camera that turns by 0.43 degrees while it warms up: the same channel seems to turn the base.
+TEST(Explain, ADriftingCameraIsNoJointOfAnIdleChannel) {
+  const Answered answered = run_case(1223);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(only_effect(answered), "camera_drift camera");
+}
+
+// A bent coupling of 2.6 degrees looks as if its channel counted in another unit.
+TEST(Explain, AUnitThatAnEffectHidIsTheUsualOne) {
+  const Answered answered = run_case(608);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  ASSERT_EQ(effects(answered),
+            (std::vector<std::string>{"axis_wobble q2", "eccentricity q7", "tag_slip tag_11"}));
+  for (const nlohmann::json& effect : answered.trace["accepted"]) {
+    if (effect["place"] != "q7") continue;
+    EXPECT_NEAR(effect["size"].get<double>(), 0.04548, 5e-4);
+  }
+}
+
 // Which way things fall shows once the bump is known, and a third effect once that is known.
 TEST(Explain, GravityIsFoundBesideWhatElseWasTraced) {
   const Answered answered = run_case(398);

@@ -274,6 +274,10 @@ TEST(CorrectedLog, NamesWhatALogCannotShow) {
       fitted("helical", "q1", {1e-4}), fitted("axis_wobble", "q2", {1e-3, 0.0}, 1.0),
       fitted("tag_slip", "tag_12", {0, 0, 0, 1e-3, 0, 0}, 3.0),
       fitted("camera_bump", "camera", {1e-3, 0, 0, 0, 0, 0}, 3.0),
+      fitted("camera_drift", "camera", {1e-3, 0, 0, 0, 0, 0}, 3.0),
+      fitted("clock_jump", "clock", {1e-3}, 3.0),
+      fitted("zero_jump", "q1", {1e-3}, 3.0),
+      fitted("zero_drift", "q2", {1e-3}, 3.0),
       fitted("lens_distortion", "camera tangential", {1e-3, 0.0})};
   const JointLog log = log_of(values_as_logged());
   const CorrectedLog corrected = undo(effects, log);

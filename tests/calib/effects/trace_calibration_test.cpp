@@ -108,8 +108,48 @@ INSTANTIATE_TEST_SUITE_P(
     TraceCalibration, Named,
     ::testing::Values(std::pair{"eccentricity", "q2"}, std::pair{"backlash", "q3"},
                       std::pair{"tag_slip", "tag_12"}, std::pair{"camera_bump", "camera"},
-                      std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"}),
+                      std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"},
+                      std::pair{"camera_drift", "camera"}, std::pair{"clock_jump", "clock"},
+                      std::pair{"zero_jump", "q2"}, std::pair{"zero_drift", "q3"}),
     [](const auto& tested) { return tested.param.first; });
+
+class Unnamed : public ::testing::TestWithParam<std::string> {};
+
+// Whatever it is taken for, and wherever: an effect of no library has no name.
+TEST_P(Unnamed, HasNoNameOfTheLibrary) {
+  const std::vector<InjectedEffect> places =
+      truth::weakest_effects(GetParam(), truth::robot_of(filmed()));
+  ASSERT_FALSE(places.empty());
+  InjectedEffect injected = places[places.size() / 2];
+  injected.size *= 10.0;
+  const Trace trace = trace_of(make_effect_world(filmed({injected}))).trace;
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  EXPECT_TRUE(trace.ambiguities.empty()) << answer(trace);
+}
+
+// A vibration needs more than these six frames a second; a creep that is high-passed coupling and a
+// growth that is nearly a drift are run by `undeclared` alone.
+INSTANTIATE_TEST_SUITE_P(TraceCalibration, Unnamed,
+                         ::testing::Values("own_tanh", "own_speed", "own_chequer", "own_ripple",
+                                           "own_product", "own_acceleration"),
+                         [](const auto& tested) { return tested.param; });
+
+// Of 0.7 deg: the time constant that is best beside a model that has bent itself is not the right
+// one, and the size says no more than that is known.
+TEST(TraceCalibration, ATimeConstantIsFoundWithTheEffectInTheModel) {
+  InjectedEffect drift = strong("camera_drift", "camera");
+  drift.size = 0.012;
+  drift.detail = 1.7;
+  const World world = make_effect_world(filmed({drift}));
+  const Trace trace = trace_of(world).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& found = trace.accepted.front();
+  EXPECT_LE(found.interval.low, drift.size);
+  EXPECT_GE(found.interval.high, drift.size);
+  EXPECT_NEAR(found.size, drift.size, 0.02 * drift.size);
+  const double length_s = world.measurements.times_s.back() - world.measurements.times_s.front();
+  EXPECT_NEAR(found.scan, drift.detail * length_s, 0.1 * drift.detail * length_s);
+}
 
 // The log without the effects says where the joint is, but for what a zero is.
 void expect_right_readings(const World& world, const std::string& name,
