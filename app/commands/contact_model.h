@@ -4,19 +4,24 @@
 // drive gains that no URDF has a place for.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "app/commands/commands.h"
-#include "dynamics/contact/balance.h"
+#include "dynamics/contact/drive_friction.h"
 #include "dynamics/data/torque_data.h"
+#include "dynamics/identify/identify.h"
 
 namespace kinescope {
 
 struct ContactModel {
-  RigidBalance balance;
-  Eigen::VectorXd gains;  ///< one a joint: measured = gain * torque of the balance
-  std::string words;      ///< where masses, friction and offsets come from
+  RigidModel rigid;                       ///< of the joints that it speaks of
+  std::vector<Eigen::Index> joints;       ///< their columns in a log
+  std::vector<SlidingFriction> friction;  ///< one each, of the log to learn from
+  Eigen::VectorXd gains;  ///< one a joint of the log: measured = gain * torque of the balance
+  std::optional<Identification> identified;  ///< behind it, where it was identified
+  std::string words;                         ///< where masses, friction and offsets come from
   std::vector<LogFinding> findings;
 };
 
@@ -29,5 +34,26 @@ struct ContactModel {
                                               const DynamicModel& model,
                                               const TorqueLogReport& looked_at,
                                               const TorqueLogReport& learn);
+
+/// The log as it was measured, each trajectory by itself, without the drives' gains.
+[[nodiscard]] std::vector<TorqueSamples> unfiltered(const TorqueLog& log,
+                                                    const Eigen::VectorXd& gains);
+
+/// Standard deviation of the model's error from that of its parameters, in units of the noise of
+/// its fit, which it is added to: of filtered samples x the model's joints.
+struct ModelDoubt {
+  TorqueSamples samples;
+  Eigen::MatrixXd sigma;  ///< empty where masses were not identified, or the log is too short
+};
+[[nodiscard]] ModelDoubt model_doubt(const ContactModel& model, const TorqueLogReport& log,
+                                     const TorqueDataOptions& options);
+
+/// The balance of one motion as unfiltered() gives it, of all joints: one that the model does not
+/// have may stick all the time, in an interval without end. `speeds_logged`: else those at the ends
+/// are noisier than the others.
+[[nodiscard]] std::vector<BalanceSample> balance_samples(const ContactModel& model,
+                                                         const TorqueSamples& motion,
+                                                         const ModelDoubt& doubt,
+                                                         bool speeds_logged);
 
 }  // namespace kinescope
