@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "dynamics/identify/weighted_fit.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -30,6 +33,7 @@ constexpr double kIndependent_s = 0.25;
 constexpr double kRateWindow_s = 0.05;
 /// Friction is known down to half the speed below which the joint slid for so long; where it slid
 /// less than twice that, to half its median.
+constexpr double kBeyond = 1.2;  ///< and up to this times what 99 % of the samples do not pass
 constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
 constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};  // rad/s
 constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
@@ -128,14 +132,33 @@ void set_interval(SlidingFriction& friction) {
   friction.highest = half;
 }
 
-double slowest_known(const Slid& slid) {
+double speed_quantile(const Slid& slid, double share) {
   std::vector<double> speeds(slid.dq.begin(), slid.dq.end());
   for (double& speed : speeds) speed = std::abs(speed);
-  const double share = std::min(0.5, kKnownAfter_s / slid.length_s);
   const auto at =
       speeds.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(speeds.size() - 1));
   std::ranges::nth_element(speeds, at);
-  return 0.5 * *at;
+  return *at;
+}
+
+/// Acceleration that is clear of the noise while a joint slides; of one with inertia in the model
+/// none is.
+Eigen::VectorXd clear_gains(const RigidModel& model, const Eigen::MatrixXd& accelerations,
+                            const Eigen::MatrixXi& states) {
+  constexpr double kSigmas = 6.0;
+  constexpr double kMedianOfNormal = 0.6745;
+  Eigen::VectorXd out =
+      Eigen::VectorXd::Constant(model.size(), std::numeric_limits<double>::infinity());
+  if (!body_parameters(model).isZero(0.0)) return out;
+  for (Eigen::Index j = 0; j < model.size(); ++j) {
+    if (model.bodies[static_cast<std::size_t>(j)].motor_inertia != 0.0) continue;
+    std::vector<double> sizes;
+    for (Eigen::Index t = 0; t < states.rows(); ++t) {
+      if (states(t, j) != 0) sizes.push_back(std::abs(accelerations(t, j)));
+    }
+    out[j] = kSigmas / kMedianOfNormal * median_of(std::move(sizes));
+  }
+  return out;
 }
 
 SlidingFriction friction_from(const Slid& slid, bool turns) {
@@ -152,7 +175,9 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
   }
   best->friction.sigma = best->sigma;
   best->friction.slid_s = slid.length_s;
-  best->friction.slowest_known = slowest_known(slid);
+  best->friction.slowest_known =
+      0.5 * speed_quantile(slid, std::min(0.5, kKnownAfter_s / slid.length_s));
+  best->friction.fastest_known = kBeyond * speed_quantile(slid, 0.99);
   set_interval(best->friction);
   return best->friction;
 }
@@ -248,6 +273,8 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
   const MotionTerms terms = terms_of(model, motion);
   const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
   const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
+  const Eigen::MatrixXd gains_speed = windowed_rates(motion.t_s, speeds);
+  const Eigen::VectorXd least_gain = clear_gains(model, gains_speed, states);
   // Before it first slides, a joint may hold, or be held by, anything.
   std::vector<char> slid_before(static_cast<std::size_t>(n), 0);
   Eigen::VectorXd stuck_until_s = Eigen::VectorXd::Constant(n, motion.t_s[0]);
@@ -267,7 +294,14 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
       const double sliding = own.sliding(motion.dq(t, j), direction);
       char& slid = slid_before[static_cast<std::size_t>(j)];
       if (direction != 0) slid = 1;
-      if (direction != 0 && std::abs(speeds(t, j)) >= own.slowest_known) {
+      const double rate = terms.rate(t, j);
+      const double wanted = sample.drive[j] - rate;
+      const double speed = std::abs(speeds(t, j));
+      const bool learned =
+          direction != 0 && speed >= own.slowest_known && speed <= own.fastest_known;
+      const bool speeds_up = std::abs(gains_speed(t, j)) > least_gain[j] &&
+                             gains_speed(t, j) * (wanted - sliding) > 0.0;
+      if (learned && !speeds_up) {
         sample.drive[j] -= sliding;
         const double doubt = kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma *
                              std::exp((stuck_until_s[j] - motion.t_s[t]) / kAfterBreakaway_s);
@@ -275,16 +309,19 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
         continue;
       }
       sample.sticks[j] = 1;
-      stuck_until_s[j] = motion.t_s[t];
-      const double rate = terms.rate(t, j);
-      const double viscous = own.viscous * motion.dq(t, j);
-      const double wanted = sample.drive[j] - rate;
       double taken = wanted;
-      if (own.known() && slid != 0) {
+      if (speeds_up || !own.known() || slid == 0) {
+        // anything
+      } else if (direction != 0 && speed > own.fastest_known) {
+        const double more = std::abs(own.viscous) * (speed - own.fastest_known);
+        taken = std::clamp(wanted, sliding - more, sliding + more);
+      } else {
+        const double viscous = own.viscous * motion.dq(t, j);
         const double least = direction > 0 ? std::min(sliding, own.highest) : viscous + own.lowest;
         const double most = direction < 0 ? std::max(sliding, own.lowest) : viscous + own.highest;
         taken = std::clamp(wanted, std::min(least, most), std::max(least, most));
       }
+      if (direction == 0) stuck_until_s[j] = motion.t_s[t];
       sample.drive[j] = rate + (wanted - taken);
     }
     out.push_back(std::move(sample));

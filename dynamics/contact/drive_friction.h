@@ -23,6 +23,7 @@ struct SlidingFriction {
   double highest = 0.0;         ///< to here
   /// rad/s or m/s; slower, and friction may rise up to breakaway for all that the log tells.
   double slowest_known = 0.0;
+  double fastest_known = 0.0;   ///< faster, viscous friction may be none or twice as much
   double sigma = 0.0;           ///< robust spread of what sliding leaves unexplained
   double slid_s = 0.0;          ///< time that the joint slid
   bool slides_forward = false;  ///< the log showed it; else it is an interval there too
@@ -53,8 +54,9 @@ struct SlidingFriction {
 [[nodiscard]] double sliding_deviance(const std::vector<SlidingFriction>& friction, int parameters);
 
 /// The balance of one uninterrupted motion. Where a joint may stick, its friction is what keeps the
-/// balance, within its interval: only what leaves the interval is in `drive`. `sigma`: samples x
-/// joints, for BalanceSample::sigma; empty: 1.
+/// balance, within its interval: only what leaves the interval is in `drive`. So it is where a
+/// joint without any inertia in the model speeds up the way its torque pushes it. `sigma`: samples
+/// x joints, for BalanceSample::sigma; empty: 1.
 [[nodiscard]] std::vector<BalanceSample> sliding_balance(
     const RigidModel& model, const std::vector<SlidingFriction>& friction,
     const TorqueSamples& motion, const Eigen::MatrixXd& sigma = {});
