@@ -200,25 +200,17 @@ void check_samples(const std::vector<BalanceSample>& samples) {
   }
 }
 
-}  // namespace
+void learn_from_all(const std::vector<BalanceSample>& samples, ContactCalibration& calibration) {
+  calibration.thresholds.setConstant(std::numeric_limits<double>::max());
+  const std::vector<char> all(samples.size(), 1);
+  set_thresholds(contact::log_statistics(calibration, samples), all, calibration);
+  calibration.iterations = 1;
+  calibration.status = ContactCalibrationStatus::kSettled;
+}
 
-ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
-                                      const ContactOptions& options) {
-  validate(options);
-  check_samples(samples);
-  ContactCalibration calibration;
-  calibration.options = options;
-  calibration.step_s = median_step_s(samples);
-  calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
-  calibration.noise = estimate_noise(samples);
-  if (!options.may_contain_contacts) {
-    calibration.thresholds.setConstant(std::numeric_limits<double>::max());
-    const std::vector<char> all(samples.size(), 1);
-    set_thresholds(contact::log_statistics(calibration, samples), all, calibration);
-    calibration.iterations = 1;
-    calibration.status = ContactCalibrationStatus::kSettled;
-    return calibration;
-  }
+void leave_contacts_out(const std::vector<BalanceSample>& samples,
+                        ContactCalibration& calibration) {
+  const ContactOptions& options = calibration.options;
   set_first_thresholds(samples, calibration);
   calibration.status = ContactCalibrationStatus::kIterationLimit;
   for (calibration.iterations = 1; calibration.iterations <= kMaxRounds; ++calibration.iterations) {
@@ -237,6 +229,33 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
     set_thresholds_robustly(samples, log, use, calibration);
   }
   calibration.iterations = std::min(calibration.iterations, kMaxRounds);
+}
+
+}  // namespace
+
+ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
+                                      const ContactOptions& options) {
+  validate(options);
+  check_samples(samples);
+  ContactCalibration calibration;
+  calibration.options = options;
+  calibration.step_s = median_step_s(samples);
+  calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
+  calibration.noise = estimate_noise(samples);
+  if (!options.may_contain_contacts) {
+    learn_from_all(samples, calibration);
+    return calibration;
+  }
+  const ContactCalibration begun = calibration;
+  try {
+    leave_contacts_out(samples, calibration);
+  } catch (const Error& error) {
+    // Too little is left: with all of it, contacts included, thresholds are high, not wrong.
+    if (error.code() != ExitCode::kUndetermined) throw;
+    calibration = begun;
+    learn_from_all(samples, calibration);
+    calibration.status = ContactCalibrationStatus::kIterationLimit;
+  }
   return calibration;
 }
 

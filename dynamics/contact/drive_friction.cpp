@@ -27,6 +27,7 @@ constexpr Eigen::Index kMostRows = 6000;
 /// (build/test/contact logs_ur5).
 constexpr double kAfterBreakaway = 0.25;
 constexpr double kAfterBreakaway_s = 0.25;
+constexpr double kAfterBreakaway_rad = 0.01;  ///< or over that way, where it is slower
 /// Over this time the model's errors are one and the same: ContactOptions::longest_window_s.
 constexpr double kIndependent_s = 0.25;
 /// Time over which the momentum's rate is taken.
@@ -277,6 +278,7 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
   const Eigen::VectorXd least_gain = clear_gains(model, gains_speed, states);
   // Before it first slides, a joint may hold, or be held by, anything.
   std::vector<char> slid_before(static_cast<std::size_t>(n), 0);
+  Eigen::VectorXd stuck_at = motion.q.row(0).transpose();
   Eigen::VectorXd stuck_until_s = Eigen::VectorXd::Constant(n, motion.t_s[0]);
   std::vector<BalanceSample> out;
   for (Eigen::Index t = 0; t < motion.size(); ++t) {
@@ -299,12 +301,17 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
       const double speed = std::abs(speeds(t, j));
       const bool learned =
           direction != 0 && speed >= own.slowest_known && speed <= own.fastest_known;
-      const bool speeds_up = std::abs(gains_speed(t, j)) > least_gain[j] &&
+      const bool speeds_up = motion.t_s[motion.size() - 1] - motion.t_s[t] > kRateWindow_s &&
+                             std::abs(gains_speed(t, j)) > least_gain[j] &&
                              gains_speed(t, j) * (wanted - sliding) > 0.0;
       if (learned && !speeds_up) {
         sample.drive[j] -= sliding;
-        const double doubt = kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma *
-                             std::exp((stuck_until_s[j] - motion.t_s[t]) / kAfterBreakaway_s);
+        const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
+        const double way = std::abs(motion.q(t, j) - stuck_at[j]) / (turns ? 1.0 : kLinearShare);
+        const double fades = std::min((motion.t_s[t] - stuck_until_s[j]) / kAfterBreakaway_s,
+                                      way / kAfterBreakaway_rad);
+        const double doubt =
+            kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma * std::exp(-fades);
         sample.sigma[j] = std::hypot(sample.sigma[j], doubt);
         continue;
       }
@@ -321,7 +328,10 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
         const double most = direction < 0 ? std::max(sliding, own.lowest) : viscous + own.highest;
         taken = std::clamp(wanted, std::min(least, most), std::max(least, most));
       }
-      if (direction == 0) stuck_until_s[j] = motion.t_s[t];
+      if (direction == 0) {
+        stuck_until_s[j] = motion.t_s[t];
+        stuck_at[j] = motion.q(t, j);
+      }
       sample.drive[j] = rate + (wanted - taken);
     }
     out.push_back(std::move(sample));
