@@ -34,8 +34,9 @@ constexpr double kIndependent_s = 0.25;
 constexpr double kRateWindow_s = 0.05;
 /// Friction is known down to half the speed below which the joint slid for so long; where it slid
 /// less than twice that, to half its median.
-constexpr double kBeyond = 1.2;  ///< and up to this times what 99 % of the samples do not pass
 constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
+/// And up to this times what 99 % of the samples do not pass.
+constexpr double kBeyond = 1.2;
 constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};  // rad/s
 constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
 
@@ -102,7 +103,10 @@ std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape, 
   identify::WeightedFitOptions robust;
   robust.loss = RobustLoss::kHuber;
   const identify::WeightedFit fit = weighted_fit(system, robust);
-  Fit out{.cost = 0.0, .sigma = sigma > 0.0 ? sigma : fit.sigma[0], .friction = shape};
+  // A log without noise has rounding.
+  const double least = 1e-9 * (1e-9 + slid.residual.cwiseAbs().maxCoeff());
+  Fit out{
+      .cost = 0.0, .sigma = sigma > 0.0 ? sigma : std::max(least, fit.sigma[0]), .friction = shape};
   out.friction.offset = fit.parameters[0];
   out.friction.viscous = fit.parameters[1];
   if (both) out.friction.coulomb = fit.parameters[2];
@@ -142,10 +146,10 @@ double speed_quantile(const Slid& slid, double share) {
   return *at;
 }
 
-/// Acceleration that is clear of the noise while a joint slides; of one with inertia in the model
-/// none is.
-Eigen::VectorXd clear_gains(const RigidModel& model, const Eigen::MatrixXd& accelerations,
-                            const Eigen::MatrixXi& states) {
+/// Acceleration that is clear of the noise while a joint slides, where its inertia is not known;
+/// else infinite.
+Eigen::VectorXd clear_accelerations(const RigidModel& model, const Eigen::MatrixXd& accelerations,
+                                    const Eigen::MatrixXi& states) {
   constexpr double kSigmas = 6.0;
   constexpr double kMedianOfNormal = 0.6745;
   Eigen::VectorXd out =
@@ -182,6 +186,41 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
   set_interval(best->friction);
   return best->friction;
 }
+
+/// What friction may be; one number where it is known.
+struct FrictionInterval {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
+
+/// `speed`: smoothed; `direction`: 0 where the joint may stick, or was not seen to slide.
+FrictionInterval interval_of(const SlidingFriction& own, double dq, double speed, int direction) {
+  const double viscous = own.viscous * dq;
+  if (direction == 0) return {viscous + own.lowest, viscous + own.highest};
+  const double sliding = own.sliding(dq, direction);
+  const double size = std::abs(speed);
+  if (size > own.fastest_known) {
+    const double more = std::abs(own.viscous) * (size - own.fastest_known);
+    return {sliding - more, sliding + more};
+  }
+  if (size >= own.slowest_known) return {sliding, sliding};
+  return direction > 0 ? FrictionInterval{sliding, std::max(sliding, viscous + own.highest)}
+                       : FrictionInterval{std::min(sliding, viscous + own.lowest), sliding};
+}
+
+struct JointPast {
+  bool has_slid = false;
+  double stuck_until_s = 0.0;
+  double stuck_at = 0.0;
+  double fade_way = 0.0;
+
+  /// Of friction after breakaway, in units of what sliding leaves unexplained.
+  [[nodiscard]] double doubt(const SlidingFriction& own, double t_s, double q) const {
+    const double fades =
+        std::min((t_s - stuck_until_s) / kAfterBreakaway_s, std::abs(q - stuck_at) / fade_way);
+    return kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma * std::exp(-fades);
+  }
+};
 
 }  // namespace
 
@@ -274,12 +313,16 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
   const MotionTerms terms = terms_of(model, motion);
   const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
   const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
-  const Eigen::MatrixXd gains_speed = windowed_rates(motion.t_s, speeds);
-  const Eigen::VectorXd least_gain = clear_gains(model, gains_speed, states);
-  // Before it first slides, a joint may hold, or be held by, anything.
-  std::vector<char> slid_before(static_cast<std::size_t>(n), 0);
-  Eigen::VectorXd stuck_at = motion.q.row(0).transpose();
-  Eigen::VectorXd stuck_until_s = Eigen::VectorXd::Constant(n, motion.t_s[0]);
+  const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
+  const Eigen::VectorXd clear = clear_accelerations(model, accelerations, states);
+  const double end_s = motion.t_s[motion.size() - 1];
+  std::vector<JointPast> pasts;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
+    pasts.push_back({.stuck_until_s = motion.t_s[0],
+                     .stuck_at = motion.q(0, j),
+                     .fade_way = kAfterBreakaway_rad * (turns ? 1.0 : kLinearShare)});
+  }
   std::vector<BalanceSample> out;
   for (Eigen::Index t = 0; t < motion.size(); ++t) {
     BalanceSample sample{.stamp_s = motion.t_s[t],
@@ -292,47 +335,32 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
                          .sticks = Eigen::VectorXi::Zero(n)};
     for (Eigen::Index j = 0; j < n; ++j) {
       const SlidingFriction& own = friction[static_cast<std::size_t>(j)];
+      JointPast& past = pasts[static_cast<std::size_t>(j)];
       const int direction = own.known(states(t, j)) ? states(t, j) : 0;
-      const double sliding = own.sliding(motion.dq(t, j), direction);
-      char& slid = slid_before[static_cast<std::size_t>(j)];
-      if (direction != 0) slid = 1;
+      past.has_slid = past.has_slid || direction != 0;
       const double rate = terms.rate(t, j);
+      const FrictionInterval taken = interval_of(own, motion.dq(t, j), speeds(t, j), direction);
       const double wanted = sample.drive[j] - rate;
-      const double speed = std::abs(speeds(t, j));
-      const bool learned =
-          direction != 0 && speed >= own.slowest_known && speed <= own.fastest_known;
-      const bool speeds_up = motion.t_s[motion.size() - 1] - motion.t_s[t] > kRateWindow_s &&
-                             std::abs(gains_speed(t, j)) > least_gain[j] &&
-                             gains_speed(t, j) * (wanted - sliding) > 0.0;
-      if (learned && !speeds_up) {
-        sample.drive[j] -= sliding;
-        const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
-        const double way = std::abs(motion.q(t, j) - stuck_at[j]) / (turns ? 1.0 : kLinearShare);
-        const double fades = std::min((motion.t_s[t] - stuck_until_s[j]) / kAfterBreakaway_s,
-                                      way / kAfterBreakaway_rad);
-        const double doubt =
-            kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma * std::exp(-fades);
-        sample.sigma[j] = std::hypot(sample.sigma[j], doubt);
+      // Seen to one side only, an acceleration at the end is noise.
+      const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
+                             std::abs(accelerations(t, j)) > clear[j] &&
+                             accelerations(t, j) * (wanted - taken.highest) > 0.0 &&
+                             accelerations(t, j) * (wanted - taken.lowest) > 0.0;
+      const bool anything = speeds_up || !own.known() || !past.has_slid;
+      if (taken.lowest == taken.highest && !anything) {
+        sample.drive[j] -= taken.lowest;
+        sample.sigma[j] =
+            std::hypot(sample.sigma[j], past.doubt(own, motion.t_s[t], motion.q(t, j)));
         continue;
       }
       sample.sticks[j] = 1;
-      double taken = wanted;
-      if (speeds_up || !own.known() || slid == 0) {
-        // anything
-      } else if (direction != 0 && speed > own.fastest_known) {
-        const double more = std::abs(own.viscous) * (speed - own.fastest_known);
-        taken = std::clamp(wanted, sliding - more, sliding + more);
-      } else {
-        const double viscous = own.viscous * motion.dq(t, j);
-        const double least = direction > 0 ? std::min(sliding, own.highest) : viscous + own.lowest;
-        const double most = direction < 0 ? std::max(sliding, own.lowest) : viscous + own.highest;
-        taken = std::clamp(wanted, std::min(least, most), std::max(least, most));
-      }
-      if (direction == 0) {
-        stuck_until_s[j] = motion.t_s[t];
-        stuck_at[j] = motion.q(t, j);
-      }
-      sample.drive[j] = rate + (wanted - taken);
+      // Before it first slides, a joint may hold, or be held by, anything.
+      const double beyond =
+          anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
+      sample.drive[j] = rate + beyond;
+      if (direction != 0) continue;
+      past.stuck_until_s = motion.t_s[t];
+      past.stuck_at = motion.q(t, j);
     }
     out.push_back(std::move(sample));
   }

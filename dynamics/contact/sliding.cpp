@@ -26,22 +26,35 @@ double position_noise(const Eigen::VectorXd& q) {
                   quantum / std::sqrt(12.0));
 }
 
-/// The sample `window_s` away in the direction of `step`, at least one sample, within the motion.
-Eigen::Index sample_at(const Eigen::VectorXd& t_s, Eigen::Index k, double window_s, int step) {
-  Eigen::Index at = k;
-  const auto inside = [&](Eigen::Index i) { return i >= 0 && i < t_s.size(); };
-  while (inside(at + step) && std::abs(t_s[at] - t_s[k]) < window_s * (1.0 - 1e-9)) at += step;
-  return at;
+/// For each sample the one `window_s` before and after it, at least one sample away, within the
+/// motion.
+struct Neighbours {
+  std::vector<Eigen::Index> before, after;
+};
+
+Neighbours neighbours(const Eigen::VectorXd& t_s, double window_s) {
+  const double window = window_s * (1.0 - 1e-9);
+  Neighbours out;
+  Eigen::Index before = 0;
+  Eigen::Index after = 0;
+  for (Eigen::Index k = 0; k < t_s.size(); ++k) {
+    while (before + 1 < k && t_s[k] - t_s[before + 1] >= window) ++before;
+    after = std::max(after, std::min(k + 1, t_s.size() - 1));
+    while (after + 1 < t_s.size() && t_s[after] - t_s[k] < window) ++after;
+    out.before.push_back(before);
+    out.after.push_back(after);
+  }
+  return out;
 }
 
 /// -1, 0, 1: which way the joint goes before and after the sample, 0 where it rests or turns.
-int direction_at(const Eigen::VectorXd& t_s, const Eigen::VectorXd& q, Eigen::Index k,
-                 double window_s, double rest_speed, double noise) {
+int direction_at(const Eigen::VectorXd& t_s, const Eigen::VectorXd& q, const Neighbours& near,
+                 Eigen::Index k, double rest_speed, double noise) {
   int out = 0;
-  for (const int step : {-1, 1}) {
-    const Eigen::Index other = sample_at(t_s, k, window_s, step);
+  for (const auto* side : {&near.before, &near.after}) {
+    const Eigen::Index other = (*side)[static_cast<std::size_t>(k)];
     if (other == k) continue;  // the motion's own end
-    const double way = (q[other] - q[k]) * step;
+    const double way = (q[other] - q[k]) * (other > k ? 1.0 : -1.0);
     const double least = rest_speed * std::abs(t_s[other] - t_s[k]) + noise;
     const int own = way > least ? 1 : way < -least ? -1 : 0;
     if (own == 0 || (out != 0 && own != out)) return 0;
@@ -55,6 +68,7 @@ int direction_at(const Eigen::VectorXd& t_s, const Eigen::VectorXd& q, Eigen::In
 Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t_s,
                                const Eigen::MatrixXd& q, const SlidingOptions& options) {
   Eigen::MatrixXi out = Eigen::MatrixXi::Zero(q.rows(), q.cols());
+  const Neighbours near = neighbours(t_s, options.window_s);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
     const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
     const Eigen::VectorXd own = q.col(j);
@@ -64,7 +78,7 @@ Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t
     int direction = 0;
     double from = 0.0;
     for (Eigen::Index k = 0; k < q.rows(); ++k) {
-      const int now = direction_at(t_s, own, k, options.window_s, rest, noise);
+      const int now = direction_at(t_s, own, near, k, rest, noise);
       if (now != direction) from = own[k];
       direction = now;
       if (now != 0 && (own[k] - from) * now >= far) out(k, j) = now;
