@@ -28,8 +28,9 @@ struct ContactModel {
 /// `looked_at`: the log in which contacts are looked for, `learn` the one to learn from (the same
 /// where there is no other). The URDF's masses serve where it has some, unless options.identify or
 /// torques in A, which they say nothing about. Throws the refusals of compare_torque_scale (torques
-/// in another unit or with another sign than the masses'), bad_input for logs in two units, and
-/// what identification throws.
+/// in another unit or with another sign than the masses'), bad_input for logs in two units,
+/// undetermined where masses are to be identified and no joint slides, and what identification
+/// throws.
 [[nodiscard]] ContactModel make_contact_model(const ContactCommandOptions& options,
                                               const DynamicModel& model,
                                               const TorqueLogReport& looked_at,

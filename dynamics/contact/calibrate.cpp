@@ -24,7 +24,7 @@ constexpr double kSecondsPerHour = 3600.0;
 constexpr double kFirstMedians = 12.0;
 /// Of free motion, to learn a tail from; thresholds of few are high (TailFit::shape).
 constexpr int kFewestPeaks = 5;
-/// Peaks that may hide each other.
+/// Peaks that may hide each other: begin and end of three contacts.
 constexpr int kMostSetAside = 6;
 
 double median_of_finite(std::vector<double> values) {

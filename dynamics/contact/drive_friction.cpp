@@ -15,8 +15,8 @@
 namespace kinescope {
 namespace {
 
-/// Breakaway beyond the sliding friction, at least. Harmonic drives of robots: 0.1 to 0.4 of the
-/// Coulomb friction (Armstrong-Helouvry 1991; build/test/contact logs_free, starts).
+/// Breakaway beyond the sliding friction, at least, as a share of it: twice what a UR5's base shows
+/// when it starts (build/test/contact logs_ur5).
 constexpr double kLeastBreakaway = 0.5;
 /// Sliding samples in a direction from which its friction is taken for known.
 constexpr Eigen::Index kFewestSliding = 100;
@@ -35,7 +35,7 @@ constexpr double kRateWindow_s = 0.05;
 /// Friction is known down to half the speed below which the joint slid for so long; where it slid
 /// less than twice that, to half its median.
 constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
-/// And up to this times what 99 % of the samples do not pass.
+/// And up to this times what 99 % of the samples do not pass: a margin for the noise of speeds.
 constexpr double kBeyond = 1.2;
 constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};  // rad/s
 constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
@@ -346,7 +346,9 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
                              std::abs(accelerations(t, j)) > clear[j] &&
                              accelerations(t, j) * (wanted - taken.highest) > 0.0 &&
                              accelerations(t, j) * (wanted - taken.lowest) > 0.0;
-      const bool anything = speeds_up || !own.known() || !past.has_slid;
+      // Without inertia, what the log begins with may be the end of a motion.
+      const bool begins = !past.has_slid && std::isfinite(clear[j]);
+      const bool anything = speeds_up || !own.known() || begins;
       if (taken.lowest == taken.highest && !anything) {
         sample.drive[j] -= taken.lowest;
         sample.sigma[j] =
@@ -354,7 +356,6 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
         continue;
       }
       sample.sticks[j] = 1;
-      // Before it first slides, a joint may hold, or be held by, anything.
       const double beyond =
           anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
       sample.drive[j] = rate + beyond;
