@@ -21,44 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
 
-// Velocities as the slope between the neighbouring positions, where the log has none.
-Eigen::MatrixXd velocities(const TorqueLog& log) {
-  if (log.dq.cols() > 0) return log.dq;
-  Eigen::MatrixXd dq = Eigen::MatrixXd::Zero(log.q.rows(), log.q.cols());
-  const Eigen::Index last = log.rows() - 1;
-  for (Eigen::Index i = 0; i <= last; ++i) {
-    Eigen::Index a = std::max<Eigen::Index>(0, i - 1);
-    Eigen::Index b = std::min(last, i + 1);
-    if (log.trajectory[a] != log.trajectory[i]) a = i;
-    if (log.trajectory[b] != log.trajectory[i]) b = i;
-    if (a < b) dq.row(i) = (log.q.row(b) - log.q.row(a)) / (log.t_s[b] - log.t_s[a]);
-  }
-  return dq;
-}
-
-// The log as it was measured, each trajectory by itself, without the drives' gains.
-std::vector<TorqueSamples> unfiltered(const TorqueLog& log, const Eigen::VectorXd& gains) {
-  const Eigen::MatrixXd dq = velocities(log);
-  const std::vector<Eigen::Index> bounds = log.bounds();
-  std::vector<TorqueSamples> out;
-  for (std::size_t k = 0; k + 1 < bounds.size(); ++k) {
-    // A slope to one side only, at the ends, has another error than those within.
-    const Eigen::Index ends = log.dq.cols() > 0 ? 0 : 1;
-    const Eigen::Index from = bounds[k] + ends;
-    const Eigen::Index count = bounds[k + 1] - ends - from;
-    if (count < 2) continue;
-    TorqueSamples part;
-    part.t_s = log.t_s.segment(from, count);
-    part.q = log.q.middleRows(from, count);
-    part.dq = dq.middleRows(from, count);
-    part.torque = log.torque.middleRows(from, count) * gains.cwiseInverse().asDiagonal();
-    part.trajectory = log.trajectory.segment(from, count);
-    part.torque_unit = log.torque_unit;
-    out.push_back(std::move(part));
-  }
-  return out;
-}
-
 TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel& model,
                          const TorqueDataOptions& options) {
   TorqueLogReport log = look_at_torque_log(files, wanted_joints(model.tree), options);
@@ -93,12 +55,16 @@ OneClock apart(const std::vector<TorqueSamples>& parts, double guard_s) {
   return {t_s, trajectory, {.least_gap_s = gap_s, .gap_s = gap_s}};
 }
 
-LogBalance balance_of(const ContactModel& model, const TorqueLog& log, double guard_s) {
+LogBalance balance_of(const ContactModel& model, const TorqueLogReport& report,
+                      const TorqueDataOptions& options, double guard_s) {
+  const TorqueLog& log = report.log;
+  const ModelDoubt doubt = model_doubt(model, report, options);
   const std::vector<TorqueSamples> parts = unfiltered(log, model.gains);
   LogBalance out;
   out.clock = {apart(parts, guard_s), log.trajectory_names};
   for (const TorqueSamples& part : parts) {
-    const std::vector<BalanceSample> samples = balance_samples(model.balance, part);
+    const std::vector<BalanceSample> samples =
+        balance_samples(model, part, doubt, log.dq.cols() > 0);
     out.samples.insert(out.samples.end(), samples.begin(), samples.end());
   }
   for (std::size_t i = 0; i < out.samples.size(); ++i) {
@@ -171,9 +137,9 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   for (const RigidBody& body : make_rigid_model(model).bodies) {
     contact.parents.push_back(body.parent);
   }
-  const LogBalance looked_at = balance_of(expected, log.log, contact.guard_s);
+  const LogBalance looked_at = balance_of(expected, log, options.data, contact.guard_s);
   const LogBalance learned =
-      learn_apart ? balance_of(expected, learn.log, contact.guard_s) : looked_at;
+      learn_apart ? balance_of(expected, learn, options.data, contact.guard_s) : looked_at;
   const std::vector<BalanceSample>& samples = looked_at.samples;
   summary.clock = looked_at.clock;
   summary.learn_clock = learned.clock;

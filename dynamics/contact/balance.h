@@ -26,6 +26,13 @@ struct BalanceSample {
   /// Standard deviation of the model's torque as predicted by the model itself, without the
   /// sensor's noise. Only its ratios count: the scale of each joint is calibrated.
   Eigen::VectorXd sigma;
+  /// 1 where the joint may stick (sliding.h): `drive` is then what friction cannot take, and says
+  /// nothing of noise. Empty: no joint does.
+  Eigen::VectorXi sticks = {};
+
+  [[nodiscard]] bool may_stick(Eigen::Index joint) const {
+    return sticks.size() > 0 && sticks[joint] != 0;
+  }
 };
 
 /// Friction and offset of a drive, as part of its measured torque:

@@ -57,6 +57,7 @@ BalanceFilter::BalanceFilter(BalanceNoise noise) : noise_(std::move(noise)) {
   for (Eigen::VectorXd* v : {&drive_, &sigma_, &p_, &d_, &innovation_, &decay_, &new_sigma_}) {
     *v = Eigen::VectorXd::Zero(n);
   }
+  stuck_ = Eigen::VectorXi::Zero(n);
   for (Eigen::MatrixXd* m : {&P_pp_, &P_pd_, &P_dd_, &S_, &whitener_, &gain_p_, &gain_d_}) {
     *m = Eigen::MatrixXd::Zero(n, n);
   }
@@ -73,6 +74,7 @@ void BalanceFilter::start(const BalanceSample& sample, const Eigen::VectorXd& er
   stamp_s_ = sample.stamp_s;
   drive_ = sample.drive;
   sigma_ = noise_.model_sigma.cwiseProduct(sample.sigma);
+  for (Eigen::Index j = 0; j < stuck_.size(); ++j) stuck_[j] = sample.may_stick(j) ? 1 : 0;
   p_ = sample.momentum;
   d_ = error_mean;
   momentum_covariance(sample, noise_, P_pp_);
@@ -96,8 +98,10 @@ void BalanceFilter::predict(const BalanceSample& sample) {
   P_pp_ += dt * (P_pd_ + P_pd_.transpose().eval()) + dt * dt * P_dd_;
   P_pd_ += dt * P_dd_;
   for (Eigen::Index j = 0; j < d_.size(); ++j) {
-    const double a = std::exp(-dt / noise_.model_time_s[j]);
-    decay_[j] = a;
+    // While a joint sticks nothing is learned of the model's error, which begins anew with sliding.
+    const int sticks = sample.may_stick(j) ? 1 : 0;
+    decay_[j] = sticks == stuck_[j] ? std::exp(-dt / noise_.model_time_s[j]) : 0.0;
+    stuck_[j] = sticks;
     const double white = dt * noise_.torque_sigma[j];
     P_pp_(j, j) += white * white;
   }

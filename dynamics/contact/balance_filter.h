@@ -48,6 +48,7 @@ class BalanceFilter {
   double step_s_ = 0.0;
   Eigen::VectorXd drive_;  ///< of the sample before
   Eigen::VectorXd sigma_;  ///< of the model's error at the sample before
+  Eigen::VectorXi stuck_;  ///< BalanceSample::sticks at the sample before
   Eigen::VectorXd p_, d_;
   Eigen::MatrixXd P_pp_, P_pd_, P_dd_;
   Eigen::MatrixXd S_, whitener_, gain_p_, gain_d_;

@@ -29,15 +29,19 @@ double trimmed_variance(std::vector<double> squares) {
   return sum / static_cast<double>(kept) / kTrimmedVariance;
 }
 
-/// For each sample the first of the unbroken stretch it stands in; a sample left out stands alone.
+/// For each sample the first of the unbroken stretch it stands in; a sample left out stands alone,
+/// and one in which the joint may stick (-1: whatever sticks).
 std::vector<std::size_t> stretches(const std::vector<BalanceSample>& samples,
-                                   const std::vector<char>& use, double step_s) {
+                                   const std::vector<char>& use, double step_s,
+                                   Eigen::Index joint) {
   std::vector<std::size_t> first(samples.size());
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    const bool joined = k > 0 && (use.empty() || (use[k] != 0 && use[k - 1] != 0)) &&
-                        is_finite(samples[k]) && is_finite(samples[k - 1]) &&
-                        samples[k].stamp_s > samples[k - 1].stamp_s &&
-                        samples[k].stamp_s - samples[k - 1].stamp_s < 10.0 * step_s;
+    const bool joined =
+        k > 0 && (use.empty() || (use[k] != 0 && use[k - 1] != 0)) && is_finite(samples[k]) &&
+        is_finite(samples[k - 1]) &&
+        (joint < 0 || (!samples[k].may_stick(joint) && !samples[k - 1].may_stick(joint))) &&
+        samples[k].stamp_s > samples[k - 1].stamp_s &&
+        samples[k].stamp_s - samples[k - 1].stamp_s < 10.0 * step_s;
     first[k] = joined ? first[k - 1] : k;
   }
   return first;
@@ -59,19 +63,18 @@ double white_sigma(const std::vector<std::size_t>& first, const Signal& signal) 
                   smallest / std::sqrt(12.0));
 }
 
-/// Accumulated imbalance, p(t) - p(0) - integral of drive dt, samples x joints.
-Eigen::MatrixXd imbalance(const std::vector<BalanceSample>& samples,
-                          const std::vector<std::size_t>& first) {
-  Eigen::MatrixXd out =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples.size()), samples[0].drive.size());
+/// Accumulated imbalance of a joint, p(t) - p(0) - integral of drive dt, one entry a sample.
+Eigen::VectorXd imbalance(const std::vector<BalanceSample>& samples,
+                          const std::vector<std::size_t>& first, Eigen::Index joint) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(samples.size()));
   for (std::size_t k = 1; k < samples.size(); ++k) {
     if (first[k] == k) continue;
     const BalanceSample& a = samples[k - 1];
     const BalanceSample& b = samples[k];
     const double half_step = 0.5 * (b.stamp_s - a.stamp_s);
     const auto row = static_cast<Eigen::Index>(k);
-    out.row(row) = out.row(row - 1) + (b.momentum - a.momentum).transpose() -
-                   half_step * (a.drive + b.drive).transpose();
+    out[row] = out[row - 1] + b.momentum[joint] - a.momentum[joint] -
+               half_step * (a.drive[joint] + b.drive[joint]);
   }
   return out;
 }
@@ -147,7 +150,7 @@ double usual_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joint
 
 std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& samples,
                                              const std::vector<std::size_t>& first,
-                                             const Eigen::MatrixXd& imbalances, Eigen::Index joint,
+                                             const Eigen::VectorXd& imbalances, Eigen::Index joint,
                                              const BalanceNoise& noise, double step_s) {
   std::vector<WindowVariance> out;
   const std::size_t n = samples.size();
@@ -158,8 +161,8 @@ std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& s
     const std::size_t stride = std::max<std::size_t>(1, length / 8);
     for (std::size_t k = length; k < n; k += stride) {
       if (first[k] + length > k) continue;
-      const double d = imbalances(static_cast<Eigen::Index>(k), joint) -
-                       imbalances(static_cast<Eigen::Index>(k - length), joint);
+      const double d = imbalances[static_cast<Eigen::Index>(k)] -
+                       imbalances[static_cast<Eigen::Index>(k - length)];
       squares.push_back(d * d);
       if (samples[k].mass.size() > 0) {
         white += 2.0 * samples[k].mass.row(joint).cwiseAbs2().dot(noise.velocity_sigma.cwiseAbs2());
@@ -175,6 +178,22 @@ std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& s
                    .weight = std::min(independent, 100.0)});
   }
   return out;
+}
+
+std::size_t usable_samples(const std::vector<std::size_t>& first) {
+  std::size_t out = 0;
+  for (std::size_t k = 0; k < first.size(); ++k) out += first[k] != k ? 1U : 0U;
+  return out;
+}
+
+/// So much noise that the joint's torque counts for nothing, and numbers stay within their digits.
+double unheard_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joint) {
+  constexpr double kFactor = 1e4;
+  double largest = 1.0;
+  for (const BalanceSample& sample : samples) {
+    if (is_finite(sample)) largest = std::max(largest, std::abs(sample.drive[joint]));
+  }
+  return kFactor * largest;
 }
 
 }  // namespace
@@ -195,33 +214,47 @@ BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
                             const std::vector<char>& use) {
   KINESCOPE_CHECK(use.empty() || use.size() == samples.size(), "one mark a sample");
   const double step_s = median_step_s(samples);
-  const std::vector<std::size_t> first = stretches(samples, use, step_s);
-  std::size_t usable = 0;
-  for (std::size_t k = 0; k < first.size(); ++k) usable += first[k] != k ? 1U : 0U;
-  if (usable < kFewestSamples) {
-    throw undetermined("contact", "too few samples without contact: " + std::to_string(usable),
+  const Eigen::Index n = samples[0].drive.size();
+  const std::vector<std::size_t> anyhow = stretches(samples, use, step_s, -1);
+  std::vector<std::vector<std::size_t>> first;
+  std::size_t most = 0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    first.push_back(stretches(samples, use, step_s, j));
+    most = std::max(most, usable_samples(first.back()));
+  }
+  if (most < kFewestSamples) {
+    throw undetermined("contact", "too few samples without contact: " + std::to_string(most),
                        "record at least some seconds of free motion");
   }
-  const Eigen::Index n = samples[0].drive.size();
   BalanceNoise noise{.velocity_sigma = Eigen::VectorXd::Zero(n),
                      .torque_sigma = Eigen::VectorXd::Zero(n),
                      .model_sigma = Eigen::VectorXd::Zero(n),
-                     .model_time_s = Eigen::VectorXd::Zero(n)};
+                     .model_time_s = Eigen::VectorXd::Constant(n, 1.0)};
+  std::vector<char> heard(static_cast<std::size_t>(n), 1);
   for (Eigen::Index j = 0; j < n; ++j) {
-    noise.torque_sigma[j] = white_sigma(first, [&](std::size_t k) { return samples[k].drive[j]; });
+    const auto& own = first[static_cast<std::size_t>(j)];
+    heard[static_cast<std::size_t>(j)] = usable_samples(own) >= kFewestSamples ? 1 : 0;
+    if (samples[0].velocity.size() > 0) {
+      const auto& all = heard[static_cast<std::size_t>(j)] != 0 ? own : anyhow;
+      noise.velocity_sigma[j] =
+          white_sigma(all, [&](std::size_t k) { return samples[k].velocity[j]; });
+    }
+    if (heard[static_cast<std::size_t>(j)] == 0) {
+      noise.torque_sigma[j] = unheard_sigma(samples, j);
+      continue;
+    }
+    noise.torque_sigma[j] = white_sigma(own, [&](std::size_t k) { return samples[k].drive[j]; });
     if (noise.torque_sigma[j] <= 0.0) {
       throw undetermined("contact", "the torque of joint " + std::to_string(j + 1) + " is constant",
                          "log the measured torque");
     }
-    if (samples[0].velocity.size() == 0) continue;
-    noise.velocity_sigma[j] =
-        white_sigma(first, [&](std::size_t k) { return samples[k].velocity[j]; });
   }
-  const Eigen::MatrixXd imbalances = imbalance(samples, first);
   for (Eigen::Index j = 0; j < n; ++j) {
-    const ModelError error =
-        fit_model_error(window_variances(samples, first, imbalances, j, noise, step_s), step_s,
-                        noise.torque_sigma[j]);
+    const auto& own = first[static_cast<std::size_t>(j)];
+    if (heard[static_cast<std::size_t>(j)] == 0) continue;
+    const ModelError error = fit_model_error(
+        window_variances(samples, own, imbalance(samples, own, j), j, noise, step_s), step_s,
+        noise.torque_sigma[j]);
     noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
     noise.model_time_s[j] = error.time_s;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "dynamics/contact/contact.h"
 #include "dynamics/contact/onset_bank.h"
@@ -21,6 +22,10 @@ constexpr double kSecondsPerHour = 3600.0;
 /// Thresholds of the first round, where nothing is left out yet: this many medians of the
 /// statistic.
 constexpr double kFirstMedians = 12.0;
+/// Of free motion, to learn a tail from; thresholds of few are high (TailFit::shape).
+constexpr int kFewestPeaks = 5;
+/// Peaks that may hide each other: begin and end of three contacts.
+constexpr int kMostSetAside = 6;
 
 double median_of_finite(std::vector<double> values) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
@@ -41,6 +46,30 @@ Eigen::Index octaves_of(const ContactCalibration& calibration) {
   return contact::OnsetBank(1, std::max(1, static_cast<int>(std::lround(steps)))).octaves();
 }
 
+/// What a standard normal variable exceeds with the probability.
+double normal_quantile(double probability) {
+  double low = 0.0;
+  double high = 40.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (0.5 * std::erfc(middle / std::numbers::sqrt2) > probability ? low : high) = middle;
+  }
+  return low;
+}
+
+/// No lower than what white innovations would pass as declared: a noise that is put too high where
+/// most samples are makes the statistic small there, and says nothing of the few others.
+void keep_above_white(ContactCalibration& calibration) {
+  const double rate_per_s = calibration.options.false_alarms_per_hour / kSecondsPerHour;
+  double look_s = calibration.step_s;
+  for (double& threshold : calibration.thresholds) {
+    const double z = normal_quantile(std::min(0.5, rate_per_s * look_s));
+    threshold =
+        std::max(threshold, chi_square_quantile(static_cast<double>(calibration.joints()), z));
+    look_s *= 2.0;
+  }
+}
+
 /// Each octave its own threshold, then one factor for all so that together they pass as declared.
 void set_thresholds(const contact::StatisticLog& log, const std::vector<char>& use,
                     ContactCalibration& calibration) {
@@ -48,8 +77,9 @@ void set_thresholds(const contact::StatisticLog& log, const std::vector<char>& u
   calibration.tails.clear();
   double shape = 0.0;
   for (Eigen::Index o = 0; o < calibration.thresholds.size(); ++o) {
-    calibration.tails.push_back(
-        fit_tail({.values = octave_values(log, o, use), .step_s = calibration.step_s}));
+    calibration.tails.push_back(fit_tail({.values = octave_values(log, o, use),
+                                          .step_s = calibration.step_s,
+                                          .fewest_peaks = kFewestPeaks}));
     shape +=
         calibration.tails.back().own_shape / static_cast<double>(calibration.thresholds.size());
   }
@@ -61,9 +91,72 @@ void set_thresholds(const contact::StatisticLog& log, const std::vector<char>& u
   }
   calibration.joint_tail =
       fit_tail({.values = contact::largest_ratio(log, calibration.thresholds, use),
-                .step_s = calibration.step_s});
+                .step_s = calibration.step_s,
+                .fewest_peaks = kFewestPeaks});
   calibration.thresholds *= calibration.joint_tail.quantile(rate_per_s);
+  keep_above_white(calibration);
   calibration.exposure_s = calibration.joint_tail.exposure_s;
+}
+
+/// The samples of the largest ratio and its neighbours that belong to it, left out of `use`; the
+/// ratio.
+double set_aside_largest(const std::vector<BalanceSample>& samples,
+                         const std::vector<double>& ratio, double level, double guard_s,
+                         std::vector<char>& use) {
+  std::size_t top = use.size();
+  for (std::size_t k = 0; k < use.size(); ++k) {
+    if (use[k] == 0 || std::isnan(ratio[k])) continue;
+    if (top == use.size() || ratio[k] > ratio[top]) top = k;
+  }
+  if (top == use.size()) return 0.0;
+  // As far as it stays above the level of the tail's peaks.
+  std::size_t first = top;
+  std::size_t last = top;
+  while (first > 0 && ratio[first - 1] > level) --first;
+  while (last + 1 < use.size() && ratio[last + 1] > level) ++last;
+  const double begin_s = samples[first].stamp_s - guard_s;
+  const double end_s = samples[last].stamp_s + guard_s;
+  for (std::size_t k = 0; k < use.size(); ++k) {
+    if (samples[k].stamp_s >= begin_s && samples[k].stamp_s <= end_s) use[k] = 0;
+  }
+  return ratio[top];
+}
+
+/// Contacts that pass no threshold yet still bend the tail to hide behind it: the largest peaks are
+/// set aside one after another, and stay so where the rest calls them alarms (generalised extreme
+/// Studentised deviate, Rosner 1983).
+void set_thresholds_robustly(const std::vector<BalanceSample>& samples,
+                             const contact::StatisticLog& log, const std::vector<char>& use,
+                             ContactCalibration& calibration) {
+  set_thresholds(log, use, calibration);
+  ContactCalibration trial = calibration;
+  std::vector<char> kept = use;
+  for (int aside = 0; aside < kMostSetAside; ++aside) {
+    const std::vector<double> ratio = contact::largest_ratio(log, trial.thresholds, kept);
+    const Eigen::VectorXd before = trial.thresholds;
+    std::vector<char> without = kept;
+    const double level =
+        trial.joint_tail.level /
+        trial.joint_tail.quantile(calibration.options.false_alarms_per_hour / kSecondsPerHour);
+    const std::vector<char> inside = kept;
+    if (set_aside_largest(samples, ratio, level, calibration.options.guard_s, without) <= 0.0)
+      return;
+    try {
+      set_thresholds(log, without, trial);
+    } catch (const Error&) {
+      return;  // nothing is left to learn from
+    }
+    // Of what was set aside just now.
+    std::vector<char> last(use.size(), 0);
+    for (std::size_t k = 0; k < last.size(); ++k)
+      last[k] = inside[k] != 0 && without[k] == 0 ? 1 : 0;
+    double peak = 0.0;
+    for (const double value : contact::largest_ratio(log, trial.thresholds, last)) {
+      if (value > peak) peak = value;
+    }
+    kept = std::move(without);
+    if (peak >= 1.0) calibration = trial;
+  }
 }
 
 /// From the bulk of the statistics, whatever contacts the log may hold.
@@ -107,6 +200,37 @@ void check_samples(const std::vector<BalanceSample>& samples) {
   }
 }
 
+void learn_from_all(const std::vector<BalanceSample>& samples, ContactCalibration& calibration) {
+  calibration.thresholds.setConstant(std::numeric_limits<double>::max());
+  const std::vector<char> all(samples.size(), 1);
+  set_thresholds(contact::log_statistics(calibration, samples), all, calibration);
+  calibration.iterations = 1;
+  calibration.status = ContactCalibrationStatus::kSettled;
+}
+
+void leave_contacts_out(const std::vector<BalanceSample>& samples,
+                        ContactCalibration& calibration) {
+  const ContactOptions& options = calibration.options;
+  set_first_thresholds(samples, calibration);
+  calibration.status = ContactCalibrationStatus::kIterationLimit;
+  for (calibration.iterations = 1; calibration.iterations <= kMaxRounds; ++calibration.iterations) {
+    const contact::StatisticLog log = contact::log_statistics(calibration, samples);
+    const std::vector<TimeSpan> spans = spans_of(log.events);
+    const bool settled =
+        calibration.iterations > 1 && same(spans, calibration.excluded, options.guard_s);
+    calibration.excluded = spans;
+    const std::vector<char> use = contact::outside(samples, spans, options.guard_s);
+    if (settled) {
+      set_thresholds_robustly(samples, log, use, calibration);
+      calibration.status = ContactCalibrationStatus::kSettled;
+      break;
+    }
+    calibration.noise = estimate_noise(samples, use);
+    set_thresholds_robustly(samples, log, use, calibration);
+  }
+  calibration.iterations = std::min(calibration.iterations, kMaxRounds);
+}
+
 }  // namespace
 
 ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
@@ -119,31 +243,19 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
   calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
   calibration.noise = estimate_noise(samples);
   if (!options.may_contain_contacts) {
-    calibration.thresholds.setConstant(std::numeric_limits<double>::max());
-    const std::vector<char> all(samples.size(), 1);
-    set_thresholds(contact::log_statistics(calibration, samples), all, calibration);
-    calibration.iterations = 1;
-    calibration.status = ContactCalibrationStatus::kSettled;
+    learn_from_all(samples, calibration);
     return calibration;
   }
-  set_first_thresholds(samples, calibration);
-  calibration.status = ContactCalibrationStatus::kIterationLimit;
-  for (calibration.iterations = 1; calibration.iterations <= kMaxRounds; ++calibration.iterations) {
-    const contact::StatisticLog log = contact::log_statistics(calibration, samples);
-    const std::vector<TimeSpan> spans = spans_of(log.events);
-    const bool settled =
-        calibration.iterations > 1 && same(spans, calibration.excluded, options.guard_s);
-    calibration.excluded = spans;
-    const std::vector<char> use = contact::outside(samples, spans, options.guard_s);
-    if (settled) {
-      set_thresholds(log, use, calibration);
-      calibration.status = ContactCalibrationStatus::kSettled;
-      break;
-    }
-    calibration.noise = estimate_noise(samples, use);
-    set_thresholds(log, use, calibration);
+  const ContactCalibration begun = calibration;
+  try {
+    leave_contacts_out(samples, calibration);
+  } catch (const Error& error) {
+    // Too little is left: with all of it, contacts included, thresholds are high, not wrong.
+    if (error.code() != ExitCode::kUndetermined) throw;
+    calibration = begun;
+    learn_from_all(samples, calibration);
+    calibration.status = ContactCalibrationStatus::kIterationLimit;
   }
-  calibration.iterations = std::min(calibration.iterations, kMaxRounds);
   return calibration;
 }
 

@@ -92,7 +92,8 @@ FalseAlarmCheck check_false_alarms(const ContactCalibration& calibration,
   check.lower_per_hour = poisson_limit(check.alarms, true) / check.hours;
   check.upper_per_hour = poisson_limit(check.alarms, false) / check.hours;
   const StatisticRecord record{.values = contact::largest_ratio(log, calibration.thresholds, use),
-                               .step_s = calibration.step_s};
+                               .step_s = calibration.step_s,
+                               .fewest_peaks = 1};
   check.extrapolated_per_hour = fit_tail(record).rate_above(1.0) * kSecondsPerHour;
   return check;
 }

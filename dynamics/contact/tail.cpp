@@ -12,7 +12,6 @@ namespace kinescope {
 namespace {
 
 constexpr int kWantedPeaks = 100;
-constexpr int kFewestPeaks = 10;
 constexpr std::array kLevels{0.995, 0.99, 0.98, 0.96, 0.93, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5};
 
 std::vector<double> peaks_above(const StatisticRecord& record, double level) {
@@ -86,7 +85,7 @@ TailFit fit_tail(const StatisticRecord& record) {
     fit.level = level;
     if (best.size() >= kWantedPeaks) break;
   }
-  if (best.size() < kFewestPeaks) {
+  if (best.empty() || static_cast<int>(best.size()) < record.fewest_peaks) {
     throw undetermined("contact",
                        "only " + std::to_string(best.size()) +
                            " separate peaks without contact to learn the false-alarm rate from",

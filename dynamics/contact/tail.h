@@ -38,10 +38,11 @@ struct StatisticRecord {
   std::vector<double> values;
   double step_s = 0.0;
   double cluster_gap_s = 0.05;  ///< exceedances that are further apart are two clusters
+  int fewest_peaks = 10;        ///< refused below; fewer mean a larger TailFit::shape
 };
 
 /// The highest level with 100 peaks, at least the upper half of the values. Throws undetermined
-/// where there are fewer than 10.
+/// where there are too few.
 [[nodiscard]] TailFit fit_tail(const StatisticRecord& record);
 
 }  // namespace kinescope

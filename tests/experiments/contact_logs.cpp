@@ -389,6 +389,53 @@ void contact_logs_free() {
   }
 }
 
+namespace {
+
+// Sweeps of joint 1 into an obstacle, whose torque rises to so much in 0.4 s.
+void sweeps_into_obstacles(double obstacle_nm) {
+  constexpr int kSweeps = 10;
+  constexpr double kObstacle_s = 10.0;
+  for (const bool masses : {true, false}) {
+    const Folder work;
+    const DynamicModel model = contact_arm(3);
+    write_file_atomically(work / "robot.urdf",
+                          write_urdf(masses ? model : without_masses(model.tree)));
+    int hits = 0;
+    int invented = 0;
+    int refused = 0;
+    for (int w = 0; w < kSweeps; ++w) {
+      Rng rng = Rng::from_name("sweep", static_cast<std::uint64_t>(w));
+      TorqueLog log;
+      const TorqueSamples samples = drive_world(model,
+                                                {.speed_rad_s = rng.uniform(0.03, 0.15),
+                                                 .one_way = true,
+                                                 .obstacle_s = kObstacle_s,
+                                                 .obstacle_nm = obstacle_nm},
+                                                rng)
+                                        .samples;
+      log.t_s = samples.t_s;
+      log.q = samples.q;
+      log.dq = samples.dq;
+      log.torque = samples.torque;
+      const Found found =
+          look(work, write_log(work, "log.csv", log), {}, work / "robot.urdf", model.gravity_m_s2);
+      bool hit = false;
+      for (const DetectedContact& event : found.events) {
+        hit = hit || event.alarm_s >= kObstacle_s;
+        invented += event.alarm_s >= kObstacle_s ? 0 : 1;
+      }
+      hits += hit ? 1 : 0;
+      refused += found.refused.empty() ? 0 : 1;
+    }
+    std::printf("  obstacle of %.1f N m, %s: found %d of %d, invented %d, refused %d\n",
+                obstacle_nm, masses ? "masses known" : "identified", hits, kSweeps, invented,
+                refused);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+
 void contact_logs_simulated() {
   std::printf("simulated, %s\n", "a minute each");
   constexpr int kMinutes = 20;
@@ -422,6 +469,7 @@ void contact_logs_simulated() {
       print_count(kind, masses ? "masses known" : "identified", count);
     }
   }
+  for (const double obstacle_nm : {0.5, 1.0, 3.0}) sweeps_into_obstacles(obstacle_nm);
 }
 
 }  // namespace kinescope

@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/contact/drive_friction.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "dynamics/identify/weighted_fit.h"
+#include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
+
+namespace kinescope {
+namespace {
+
+/// Breakaway beyond the sliding friction, at least, as a share of it: twice what a UR5's base shows
+/// when it starts (build/test/contact logs_ur5).
+constexpr double kLeastBreakaway = 0.5;
+/// Sliding samples in a direction from which its friction is taken for known.
+constexpr Eigen::Index kFewestSliding = 100;
+/// Samples that a fit looks at; beyond them every second, third, .. is taken.
+constexpr Eigen::Index kMostRows = 6000;
+/// Friction just after breakaway: its doubt, a share of the breakaway friction, and how it fades. A
+/// UR5's base starts with a quarter more than it slides with, for a quarter of a second
+/// (build/test/contact logs_ur5).
+constexpr double kAfterBreakaway = 0.25;
+constexpr double kAfterBreakaway_s = 0.25;
+constexpr double kAfterBreakaway_rad = 0.01;  ///< or over that way, where it is slower
+/// Over this time the model's errors are one and the same: ContactOptions::longest_window_s.
+constexpr double kIndependent_s = 0.25;
+/// Time over which the momentum's rate is taken.
+constexpr double kRateWindow_s = 0.05;
+/// Friction is known down to half the speed below which the joint slid for so long; where it slid
+/// less than twice that, to half its median.
+constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
+/// And up to this times what 99 % of the samples do not pass: a margin for the noise of speeds.
+constexpr double kBeyond = 1.2;
+constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};  // rad/s
+constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
+
+struct MotionTerms {
+  Eigen::MatrixXd drive, momentum, rate;  ///< samples x joints; drive before friction
+  std::vector<Eigen::MatrixXd> mass;
+};
+
+MotionTerms terms_of(const RigidModel& model, const TorqueSamples& motion) {
+  MomentumRecursion recursion(model);
+  MotionTerms out{.drive = motion.torque, .momentum = motion.torque, .rate = {}, .mass = {}};
+  for (Eigen::Index t = 0; t < motion.size(); ++t) {
+    const MomentumTerms& terms =
+        recursion.evaluate(motion.q.row(t).transpose(), motion.dq.row(t).transpose());
+    out.drive.row(t) += (terms.velocity_torque - terms.gravity_torque).transpose();
+    out.momentum.row(t) = terms.momentum.transpose();
+    out.mass.push_back(terms.mass);
+  }
+  out.rate = windowed_rates(motion.t_s, out.momentum);
+  return out;
+}
+
+/// Sliding samples of one joint.
+struct Slid {
+  Eigen::VectorXd dq, direction, residual;
+  double length_s = 0.0;
+};
+
+struct Fit {
+  double cost = 0.0;   ///< deviance with a penalty for parameters (Schwarz 1978)
+  double sigma = 0.0;  ///< of the residual
+  SlidingFriction friction;
+};
+
+/// Twice Huber's loss, of residuals in sigmas.
+double huber_deviance(const Eigen::VectorXd& residuals, double sigma) {
+  constexpr double kBend = 1.345;
+  double sum = 0.0;
+  for (const double value : residuals) {
+    const double size = std::abs(value) / sigma;
+    sum += size < kBend ? size * size : kBend * (2.0 * size - kBend);
+  }
+  return sum;
+}
+
+/// `sigma` scales the deviance; 0: that of the fit itself.
+std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape, double sigma) {
+  const Eigen::Index rows = slid.dq.size();
+  const bool both = shape.slides_forward && shape.slides_backward;
+  const bool stribeck = shape.stribeck_speed > 0.0;
+  Eigen::MatrixXd columns(rows, 2 + (both ? 1 : 0) + (stribeck ? 1 : 0));
+  columns.col(0).setOnes();
+  columns.col(1) = slid.dq;
+  if (both) columns.col(2) = slid.direction;
+  if (stribeck) {
+    columns.rightCols(1) =
+        slid.direction.array() * (-(slid.dq.array() / shape.stribeck_speed).square()).exp();
+  }
+  identify::StackedSystem system;
+  system.joints = {identify::compact_columns(columns)};
+  system.parameters = columns.cols();
+  system.torque = slid.residual;
+  system.weights = Eigen::MatrixXd::Ones(rows, 1);
+  identify::WeightedFitOptions robust;
+  robust.loss = RobustLoss::kHuber;
+  const identify::WeightedFit fit = weighted_fit(system, robust);
+  // A log without noise has rounding.
+  const double least = 1e-9 * (1e-9 + slid.residual.cwiseAbs().maxCoeff());
+  Fit out{
+      .cost = 0.0, .sigma = sigma > 0.0 ? sigma : std::max(least, fit.sigma[0]), .friction = shape};
+  out.friction.offset = fit.parameters[0];
+  out.friction.viscous = fit.parameters[1];
+  if (both) out.friction.coulomb = fit.parameters[2];
+  if (stribeck) out.friction.stribeck = fit.parameters[columns.cols() - 1];
+  // Friction that grows from standstill on is no breakaway.
+  if (out.friction.stribeck < 0.0) return std::nullopt;
+  const double independent = slid.length_s / kIndependent_s;
+  out.cost =
+      huber_deviance(fit.residuals.col(0), out.sigma) * independent / static_cast<double>(rows) +
+      std::log(std::max(2.0, independent)) *
+          static_cast<double>(columns.cols() + (stribeck ? 1 : 0));
+  return out;
+}
+
+void set_interval(SlidingFriction& friction) {
+  const bool both = friction.slides_forward && friction.slides_backward;
+  if (both) {
+    const double size = std::abs(friction.coulomb);
+    const double half = size + std::max(friction.stribeck, kLeastBreakaway * size);
+    friction.lowest = friction.offset - half;
+    friction.highest = friction.offset + half;
+    return;
+  }
+  // One direction does not tell friction from an offset: none of it, or all of it may turn round.
+  const double size = std::abs(friction.offset);
+  const double half = size + std::max(friction.stribeck, kLeastBreakaway * size);
+  friction.lowest = -half;
+  friction.highest = half;
+}
+
+double speed_quantile(const Slid& slid, double share) {
+  std::vector<double> speeds(slid.dq.begin(), slid.dq.end());
+  for (double& speed : speeds) speed = std::abs(speed);
+  const auto at =
+      speeds.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(speeds.size() - 1));
+  std::ranges::nth_element(speeds, at);
+  return *at;
+}
+
+/// Acceleration that is clear of the noise while a joint slides, where its inertia is not known;
+/// else infinite.
+Eigen::VectorXd clear_accelerations(const RigidModel& model, const Eigen::MatrixXd& accelerations,
+                                    const Eigen::MatrixXi& states) {
+  constexpr double kSigmas = 6.0;
+  constexpr double kMedianOfNormal = 0.6745;
+  Eigen::VectorXd out =
+      Eigen::VectorXd::Constant(model.size(), std::numeric_limits<double>::infinity());
+  if (!body_parameters(model).isZero(0.0)) return out;
+  for (Eigen::Index j = 0; j < model.size(); ++j) {
+    if (model.bodies[static_cast<std::size_t>(j)].motor_inertia != 0.0) continue;
+    std::vector<double> sizes;
+    for (Eigen::Index t = 0; t < states.rows(); ++t) {
+      if (states(t, j) != 0) sizes.push_back(std::abs(accelerations(t, j)));
+    }
+    out[j] = kSigmas / kMedianOfNormal * median_of(std::move(sizes));
+  }
+  return out;
+}
+
+SlidingFriction friction_from(const Slid& slid, bool turns) {
+  SlidingFriction shape;
+  shape.slides_forward = (slid.direction.array() > 0.0).count() >= kFewestSliding;
+  shape.slides_backward = (slid.direction.array() < 0.0).count() >= kFewestSliding;
+  if (!shape.known()) return shape;
+  std::optional<Fit> best = fit_friction(slid, shape, 0.0);
+  const double sigma = best->sigma;
+  for (const double speed : kStribeckSpeeds) {
+    shape.stribeck_speed = turns ? speed : kLinearShare * speed;
+    const std::optional<Fit> fit = fit_friction(slid, shape, sigma);
+    if (fit && fit->cost < best->cost) best = fit;
+  }
+  best->friction.sigma = best->sigma;
+  best->friction.slid_s = slid.length_s;
+  best->friction.slowest_known =
+      0.5 * speed_quantile(slid, std::min(0.5, kKnownAfter_s / slid.length_s));
+  best->friction.fastest_known = kBeyond * speed_quantile(slid, 0.99);
+  set_interval(best->friction);
+  return best->friction;
+}
+
+/// What friction may be; one number where it is known.
+struct FrictionInterval {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
+
+/// `speed`: smoothed; `direction`: 0 where the joint may stick, or was not seen to slide.
+FrictionInterval interval_of(const SlidingFriction& own, double dq, double speed, int direction) {
+  const double viscous = own.viscous * dq;
+  if (direction == 0) return {viscous + own.lowest, viscous + own.highest};
+  const double sliding = own.sliding(dq, direction);
+  const double size = std::abs(speed);
+  if (size > own.fastest_known) {
+    const double more = std::abs(own.viscous) * (size - own.fastest_known);
+    return {sliding - more, sliding + more};
+  }
+  if (size >= own.slowest_known) return {sliding, sliding};
+  return direction > 0 ? FrictionInterval{sliding, std::max(sliding, viscous + own.highest)}
+                       : FrictionInterval{std::min(sliding, viscous + own.lowest), sliding};
+}
+
+struct JointPast {
+  bool has_slid = false;
+  double stuck_until_s = 0.0;
+  double stuck_at = 0.0;
+  double fade_way = 0.0;
+
+  /// Of friction after breakaway, in units of what sliding leaves unexplained.
+  [[nodiscard]] double doubt(const SlidingFriction& own, double t_s, double q) const {
+    const double fades =
+        std::min((t_s - stuck_until_s) / kAfterBreakaway_s, std::abs(q - stuck_at) / fade_way);
+    return kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma * std::exp(-fades);
+  }
+};
+
+}  // namespace
+
+Eigen::MatrixXd windowed_rates(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(values.rows(), values.cols());
+  const Eigen::Index last = values.rows() - 1;
+  Eigen::Index from = 0;
+  Eigen::Index to = 0;
+  for (Eigen::Index k = 0; k <= last; ++k) {
+    while (from < k && t_s[k] - t_s[from] > 0.5 * kRateWindow_s + 1e-9) ++from;
+    while (to < last && (to < k || t_s[to + 1] - t_s[k] <= 0.5 * kRateWindow_s + 1e-9)) ++to;
+    const Eigen::Index a = std::min(from, std::max<Eigen::Index>(0, k - 1));
+    const Eigen::Index b = std::max(to, std::min(last, k + 1));
+    const Eigen::Index count = b - a + 1;
+    const Eigen::VectorXd t = t_s.segment(a, count).array() - t_s.segment(a, count).mean();
+    if (count > 1) out.row(k) = t.transpose() * values.middleRows(a, count) / t.squaredNorm();
+  }
+  return out;
+}
+
+double SlidingFriction::sliding(double dq, int direction) const {
+  double size = coulomb;
+  if (stribeck_speed > 0.0) {
+    const double low = dq / stribeck_speed;
+    size += stribeck * std::exp(-low * low);
+  }
+  return offset + viscous * dq + direction * size;
+}
+
+Eigen::MatrixXd drive_residual(const RigidModel& model, const TorqueSamples& motion) {
+  const MotionTerms terms = terms_of(model, motion);
+  return terms.drive - terms.rate;
+}
+
+std::vector<SlidingFriction> sliding_friction(const RigidModel& model,
+                                              const std::vector<TorqueSamples>& motions) {
+  std::vector<Eigen::MatrixXd> residuals;
+  std::vector<Eigen::MatrixXi> states;
+  for (const TorqueSamples& motion : motions) {
+    residuals.push_back(drive_residual(model, motion));
+    states.push_back(sliding_states(model, motion.t_s, motion.q));
+  }
+  std::vector<SlidingFriction> out;
+  for (Eigen::Index j = 0; j < model.size(); ++j) {
+    std::vector<std::array<double, 3>> rows;
+    Slid slid;
+    for (std::size_t m = 0; m < motions.size(); ++m) {
+      for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
+        if (states[m](t, j) == 0) continue;
+        rows.push_back({motions[m].dq(t, j), 1.0 * states[m](t, j), residuals[m](t, j)});
+        slid.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
+      }
+    }
+    const auto all = static_cast<Eigen::Index>(rows.size());
+    const Eigen::Index step = all / kMostRows + 1;
+    const Eigen::Index kept = (all + step - 1) / step;
+    slid.dq.resize(kept);
+    slid.direction.resize(kept);
+    slid.residual.resize(kept);
+    for (Eigen::Index k = 0; k < kept; ++k) {
+      const auto& row = rows[static_cast<std::size_t>(k * step)];
+      slid.dq[k] = row[0];
+      slid.direction[k] = row[1];
+      slid.residual[k] = row[2];
+    }
+    const JointType type = model.bodies[static_cast<std::size_t>(j)].type;
+    out.push_back(friction_from(slid, type != JointType::kPrismatic));
+  }
+  return out;
+}
+
+double sliding_deviance(const std::vector<SlidingFriction>& friction, int parameters) {
+  double out = 0.0;
+  double independent = 2.0;
+  for (const SlidingFriction& own : friction) {
+    if (!own.known()) continue;
+    const double stretches = own.slid_s / kIndependent_s;
+    out += 2.0 * stretches * std::log(own.sigma);
+    independent += stretches;
+  }
+  return out + parameters * std::log(independent);
+}
+
+std::vector<BalanceSample> sliding_balance(const RigidModel& model,
+                                           const std::vector<SlidingFriction>& friction,
+                                           const TorqueSamples& motion,
+                                           const Eigen::MatrixXd& sigma) {
+  const Eigen::Index n = model.size();
+  KINESCOPE_CHECK(friction.size() == static_cast<std::size_t>(n), "one friction a joint");
+  const MotionTerms terms = terms_of(model, motion);
+  const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
+  const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
+  const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
+  const Eigen::VectorXd clear = clear_accelerations(model, accelerations, states);
+  const double end_s = motion.t_s[motion.size() - 1];
+  std::vector<JointPast> pasts;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
+    pasts.push_back({.stuck_until_s = motion.t_s[0],
+                     .stuck_at = motion.q(0, j),
+                     .fade_way = kAfterBreakaway_rad * (turns ? 1.0 : kLinearShare)});
+  }
+  std::vector<BalanceSample> out;
+  for (Eigen::Index t = 0; t < motion.size(); ++t) {
+    BalanceSample sample{.stamp_s = motion.t_s[t],
+                         .momentum = terms.momentum.row(t).transpose(),
+                         .drive = terms.drive.row(t).transpose(),
+                         .velocity = motion.dq.row(t).transpose(),
+                         .mass = terms.mass[static_cast<std::size_t>(t)],
+                         .sigma = sigma.size() > 0 ? sigma.row(t).transpose().eval()
+                                                   : Eigen::VectorXd::Ones(n).eval(),
+                         .sticks = Eigen::VectorXi::Zero(n)};
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const SlidingFriction& own = friction[static_cast<std::size_t>(j)];
+      JointPast& past = pasts[static_cast<std::size_t>(j)];
+      const int direction = own.known(states(t, j)) ? states(t, j) : 0;
+      past.has_slid = past.has_slid || direction != 0;
+      const double rate = terms.rate(t, j);
+      const FrictionInterval taken = interval_of(own, motion.dq(t, j), speeds(t, j), direction);
+      const double wanted = sample.drive[j] - rate;
+      // Seen to one side only, an acceleration at the end is noise.
+      const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
+                             std::abs(accelerations(t, j)) > clear[j] &&
+                             accelerations(t, j) * (wanted - taken.highest) > 0.0 &&
+                             accelerations(t, j) * (wanted - taken.lowest) > 0.0;
+      // Without inertia, what the log begins with may be the end of a motion.
+      const bool begins = !past.has_slid && std::isfinite(clear[j]);
+      const bool anything = speeds_up || !own.known() || begins;
+      if (taken.lowest == taken.highest && !anything) {
+        sample.drive[j] -= taken.lowest;
+        sample.sigma[j] =
+            std::hypot(sample.sigma[j], past.doubt(own, motion.t_s[t], motion.q(t, j)));
+        continue;
+      }
+      sample.sticks[j] = 1;
+      const double beyond =
+          anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
+      sample.drive[j] = rate + beyond;
+      if (direction != 0) continue;
+      past.stuck_until_s = motion.t_s[t];
+      past.stuck_at = motion.q(t, j);
+    }
+    out.push_back(std::move(sample));
+  }
+  return out;
+}
+
+}  // namespace kinescope

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Friction of drives that slide and stick, from a log: sliding friction of a joint and the interval
+// that sticking may take. Armstrong-Helouvry, Dupont, Canudas de Wit 1994.
+#pragma once
+
+#include <vector>
+
+#include "dynamics/contact/balance.h"
+#include "dynamics/contact/sliding.h"
+
+namespace kinescope {
+
+/// Torques in the unit of the log, N m, N or A. Sliding with direction s = +-1 takes
+///     offset + viscous dq + s (coulomb + stribeck exp(-(dq / stribeck_speed)^2)).
+struct SlidingFriction {
+  double offset = 0.0;
+  double viscous = 0.0;
+  double coulomb = 0.0;
+  double stribeck = 0.0;
+  double stribeck_speed = 0.0;  ///< rad/s or m/s
+  double lowest = 0.0;          ///< sticking may take anything from here
+  double highest = 0.0;         ///< to here
+  /// rad/s or m/s; slower, and friction may rise up to breakaway for all that the log tells.
+  double slowest_known = 0.0;
+  double fastest_known = 0.0;   ///< faster, viscous friction may be none or twice as much
+  double sigma = 0.0;           ///< robust spread of what sliding leaves unexplained
+  double slid_s = 0.0;          ///< time that the joint slid
+  bool slides_forward = false;  ///< the log showed it; else it is an interval there too
+  bool slides_backward = false;
+
+  [[nodiscard]] bool known() const { return slides_forward || slides_backward; }
+  [[nodiscard]] bool known(int direction) const {
+    return direction > 0 ? slides_forward : direction < 0 && slides_backward;
+  }
+  [[nodiscard]] double sliding(double dq, int direction) const;
+};
+
+/// Slope of each column over some 50 ms about each sample, samples x columns, per s.
+[[nodiscard]] Eigen::MatrixXd windowed_rates(const Eigen::VectorXd& t_s,
+                                             const Eigen::MatrixXd& values);
+
+/// What masses leave of the measured torque, samples x joints: offset, friction, contacts and the
+/// model's error. `motion`: one uninterrupted motion.
+[[nodiscard]] Eigen::MatrixXd drive_residual(const RigidModel& model, const TorqueSamples& motion);
+
+/// Friction of each joint by a robust fit (Huber) to the samples in which it slides. A joint that
+/// hardly slides is not known(): its torque says nothing of contacts.
+[[nodiscard]] std::vector<SlidingFriction> sliding_friction(
+    const RigidModel& model, const std::vector<TorqueSamples>& motions);
+
+/// Of a model with so many parameters beside friction, on the samples that friction was fitted to:
+/// deviance with a penalty for parameters (Schwarz 1978), stretches of 0.25 s being independent.
+[[nodiscard]] double sliding_deviance(const std::vector<SlidingFriction>& friction, int parameters);
+
+/// The balance of one uninterrupted motion. Where a joint may stick, its friction is what keeps the
+/// balance, within its interval: only what leaves the interval is in `drive`. So it is where a
+/// joint without any inertia in the model speeds up the way its torque pushes it. `sigma`: samples
+/// x joints, for BalanceSample::sigma; empty: 1.
+[[nodiscard]] std::vector<BalanceSample> sliding_balance(
+    const RigidModel& model, const std::vector<SlidingFriction>& friction,
+    const TorqueSamples& motion, const Eigen::MatrixXd& sigma = {});
+
+}  // namespace kinescope

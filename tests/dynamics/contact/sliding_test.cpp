@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Drives that slide and stick: when each is said, what friction a log shows, and what is evidence.
+#include <gtest/gtest.h>
+
+#include "dynamics/contact/contact.h"
+#include "dynamics/contact/drive_friction.h"
+#include "tests/truth/drive_world.h"
+
+namespace kinescope {
+namespace {
+
+constexpr double kStep_s = 0.004;
+
+/// Rest, forward, rest, backward, a second each.
+Eigen::MatrixXd there_and_back(double speed_rad_s, Eigen::VectorXd& t_s) {
+  const Eigen::Index rows = 1000;
+  t_s = Eigen::VectorXd::LinSpaced(rows, 0.0, kStep_s * static_cast<double>(rows - 1));
+  Eigen::MatrixXd q = Eigen::MatrixXd::Zero(rows, 1);
+  for (Eigen::Index k = 1; k < rows; ++k) {
+    const double rate = (k / 250 % 2 == 0 ? 0.0 : k < 500 ? 1.0 : -1.0) * speed_rad_s;
+    q(k, 0) = q(k - 1, 0) + kStep_s * rate;
+  }
+  return q;
+}
+
+TEST(Sliding, BeginsAfterPreslidingAndEndsWithRest) {
+  const RigidModel model = make_rigid_model(contact_arm(1));
+  Eigen::VectorXd t_s;
+  const Eigen::MatrixXd q = there_and_back(0.1, t_s);
+  const Eigen::MatrixXi states = sliding_states(model, t_s, q);
+  for (Eigen::Index k = 0; k < q.rows(); ++k) {
+    if (k / 250 % 2 == 0) {
+      EXPECT_EQ(states(k, 0), 0) << k;
+    }
+  }
+  EXPECT_EQ(states(375, 0), 1);
+  EXPECT_EQ(states(875, 0), -1);
+  // 3 mrad at 0.1 rad/s, from when the motion before is a motion too.
+  EXPECT_EQ(states(255, 0), 0);
+  EXPECT_EQ(states(275, 0), 1);
+}
+
+TEST(Sliding, SlowerThanTheNoiseIsRest) {
+  const RigidModel model = make_rigid_model(contact_arm(1));
+  Rng rng = Rng::from_name("sliding.noise");
+  Eigen::VectorXd t_s;
+  Eigen::MatrixXd q = there_and_back(0.01, t_s);
+  for (double& value : q.reshaped()) value += rng.normal(1e-3);
+  EXPECT_TRUE(sliding_states(model, t_s, q).isZero());
+}
+
+struct Drives {
+  DynamicModel model = contact_arm(2);
+  RigidModel rigid = make_rigid_model(model);
+  ContactWorld world;
+  std::vector<SlidingFriction> friction;
+
+  explicit Drives(const DriveWorldOptions& options) {
+    Rng rng = Rng::from_name("sliding.drives");
+    world = drive_world(model, options, rng);
+    friction = sliding_friction(rigid, {world.samples});
+  }
+};
+
+TEST(Sliding, FrictionIsThatOfTheLog) {
+  const Drives drives({.duration_s = 60.0, .speed_rad_s = 0.08});
+  for (const SlidingFriction& own : drives.friction) {
+    ASSERT_TRUE(own.slides_forward && own.slides_backward);
+    EXPECT_NEAR(own.coulomb, 1.0, 0.03);
+    EXPECT_NEAR(own.offset, 0.0, 0.03);
+    EXPECT_NEAR(own.stribeck, 0.25, 0.1);
+    EXPECT_LT(own.lowest, -1.3);  // breakaway is 1.3
+    EXPECT_GT(own.highest, 1.3);
+  }
+}
+
+TEST(Sliding, StickingIsNoEvidenceWithinItsInterval) {
+  const Drives drives({.duration_s = 30.0, .speed_rad_s = 0.5});
+  TorqueSamples held = drives.world.samples;
+  const auto balance = [&](double more_nm) {
+    TorqueSamples pushed = held;
+    pushed.torque.col(0).array() += more_nm;
+    return sliding_balance(drives.rigid, drives.friction, pushed);
+  };
+  // The last rest: what friction holds is between -1 and 1 N m.
+  const std::vector<BalanceSample> free = balance(0.0);
+  std::size_t rest = free.size();
+  for (std::size_t k = free.size() / 2; k < free.size(); ++k) {
+    if (held.dq.row(static_cast<Eigen::Index>(k)).cwiseAbs().maxCoeff() < 4e-3) rest = k;
+  }
+  ASSERT_LT(rest, free.size());
+  ASSERT_TRUE(free[rest].may_stick(0));
+  constexpr double kSlope = 0.1;  // N m, of the momentum's noise
+  EXPECT_NEAR(free[rest].drive[0], 0.0, kSlope);
+  EXPECT_GT(balance(6.0)[rest].drive[0], 3.0);
+  EXPECT_LT(balance(-6.0)[rest].drive[0], -3.0);
+}
+
+TEST(Sliding, StopAndGoHasNoContact) {
+  const Drives drives({.duration_s = 60.0});
+  const std::vector<BalanceSample> samples =
+      sliding_balance(drives.rigid, drives.friction, drives.world.samples);
+  EXPECT_TRUE(detect_contacts(calibrate_contacts(samples), samples).empty());
+}
+
+TEST(Sliding, ASweepIntoAnObstacleIsAContact) {
+  const Drives drives(
+      {.speed_rad_s = 0.1, .one_way = true, .obstacle_s = 10.0, .obstacle_nm = 2.0});
+  EXPECT_FALSE(drives.friction[1].known());
+  const std::vector<BalanceSample> samples =
+      sliding_balance(drives.rigid, drives.friction, drives.world.samples);
+  const std::vector<ContactEvent> events = detect_contacts(calibrate_contacts(samples), samples);
+  ASSERT_FALSE(events.empty());
+  EXPECT_GT(events.front().alarm_s, 10.0);
+  EXPECT_LT(events.front().alarm_s, 10.4);
+}
+
+}  // namespace
+}  // namespace kinescope
