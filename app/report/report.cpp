@@ -18,7 +18,6 @@ using report::Facts;
 
 constexpr std::array<report::ContentsEntry, 13> kContents = {{
     {"verdict", "Verdict"},
-    {"identity", "Identity"},
     {"view", "The robot"},
     {"data", "Data quality"},
     {"structure", "Structure"},
@@ -28,19 +27,20 @@ constexpr std::array<report::ContentsEntry, 13> kContents = {{
     {"residuals", "Residuals"},
     {"observability", "What the data see"},
     {"method", "Method and limits"},
+    {"identity", "Identity"},
     {"reproduce", "How to reproduce"},
     {"licences", "Licences"},
 }};
 
 std::string sections(const Facts& facts, std::string_view urdf) {
-  return report::verdict_section(facts) + report::identity_section(facts) +
-         report::view_section(facts) + report::data_section(facts) +
-         report::structure_section(facts) +
+  return report::verdict_section(facts) + report::view_section(facts) +
+         report::data_section(facts) + report::structure_section(facts) +
          (facts.run.trace ? report::trace_section(*facts.run.trace) : "") +
          report::parameters_section(facts) + report::errors_section(facts) +
          report::residuals_section(facts) + report::observability_section(facts) +
          report::torque_section(facts) + report::method_section(facts) +
-         report::reproduce_section(facts, urdf) + report::licences_section();
+         report::identity_section(facts) + report::reproduce_section(facts, urdf) +
+         report::licences_section();
 }
 
 }  // namespace

@@ -91,8 +91,12 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
       again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size());
   // What was only likely is told by gravity, or gravity by nothing.
   const bool told = names(out.trace, *sag) || names(again.trace, *sag);
+  // Other effects say it, too, and give way to what predicts clearly better.
+  const HeldOutError& before = out.trace.held_out_after;
+  const bool others_say = out.trace.verdict == TraceVerdict::kEffects && !names(out.trace, *sag);
+  const double bar = others_say ? before.interval.low : before.value;
   if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || (needs_more && !says_all) ||
-      again.trace.held_out_after.value >= out.trace.held_out_after.value) {
+      again.trace.held_out_after.value >= bar) {
     return out;
   }
   again.trace.steps.front().words =
