@@ -315,6 +315,7 @@ std::optional<CameraModel> camera_from_motion(const Recording& recording, const 
     if (calibration.status != CalibrationStatus::kUndetermined) return calibration.camera;
   } catch (const Error&) {
     // What is wrong will be said of the answer, not of this first look.
+    return std::nullopt;
   }
   return std::nullopt;
 }

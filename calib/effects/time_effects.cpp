@@ -73,9 +73,9 @@ Eigen::VectorXd creep(const Eigen::VectorXd& time, double constant) {
 
 // Stamps of postures may be any numbers: they are counted.
 Eigen::VectorXd creeping_time(const EffectWorld& world) {
-  const Eigen::VectorXd time = frame_times(world);
-  if (!world.postures) return time;
-  return Eigen::VectorXd::LinSpaced(time.size(), 0.0, static_cast<double>(time.size() - 1));
+  if (!world.postures) return frame_times(world);
+  const auto count = static_cast<Eigen::Index>(world.frames.times_s.size());
+  return Eigen::VectorXd::LinSpaced(count, 0.0, static_cast<double>(count - 1));
 }
 
 // A time constant, as the value of the scan: from what is over early to a straight line.
