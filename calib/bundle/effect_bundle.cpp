@@ -323,6 +323,7 @@ BundleFit EffectBundle::fit(const BundleChange& change,
       const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
       const Eigen::VectorXd units = units_of(sighting);
       out.unit.segment(at, units.size()) = units;
+      out.marker.insert(out.marker.end(), static_cast<std::size_t>(units.size()), sighting.marker);
       if (with_places) {
         out.place_px.middleRows(at, units.size()) =
             places_of(spec, sighting, out.residual.segment(at, units.size()));

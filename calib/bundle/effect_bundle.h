@@ -53,6 +53,7 @@ struct BundleFit : BundleSolution {
   Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant
+  std::vector<int> marker;              ///< rows: of the tree
   Eigen::VectorXd unit;                 ///< rows: px or m of a whitened one; 0 for a pose's turn
   /// Rows: where in the image the corner is expected; NaN where that says nothing of the image (a
   /// marker at rest is at one place only). Empty: rows are no corners, or were mixed.

@@ -144,6 +144,8 @@ CameraEffect camera_drift(const EffectWorld& world) {
 CameraEffect clock_jump(const EffectWorld& world) {
   CameraEffect out = effect("clock_jump", "clock", "one of the clocks jumped, or frames were lost",
                             {{"jump", "s"}}, "s");
+  // Before anything moves it is an offset from the start.
+  out.candidate.contains = {{"time_offset", "clock"}};
   out.candidate.check = "frames that the recorder dropped or doubled, clock that was set meanwhile";
   out.candidate.record = "stamps of the exposures in place of a frame rate; move all the time";
   happens_once(world, out.candidate);

@@ -209,6 +209,14 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
   return out;
 }
 
+// The time of a frame, as all joints that move show it.
+int clock_carrier(Carriers& carriers) {
+  Correction time;
+  time.part = CorrectedPart::kClock;
+  time.index = kEverywhere;
+  return carriers.still(time);
+}
+
 // Corners may be off by where in the image they are.
 constexpr double kUsualShift = 0.02;  // px, what any detector's corners are off by
 
@@ -366,6 +374,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   TracedFit out;
   out.rest_places = rest_places_of(world, carriers);
   out.rest_fields = rest_fields_of(world, options_.trace.floor, carriers);
+  if (!world.postures) out.clock = clock_carrier(carriers);
   BundleFit fit = bundle_->fit(change, carriers.probes());
   if (fit.place_px.size() == 0) out.rest_fields.clear();
   for (RestField& field : out.rest_fields) field.at = fit.place_px;
@@ -397,6 +406,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.carriers.swap(fit.probes);
   linear.first_row = std::move(fit.first_row);
   linear.unit = std::move(fit.unit);
+  linear.body = std::move(fit.marker);
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";
   linear.coordinates = world.kind == MeasurementKind::kCorners ? 2 : 3;
   linear.independent_instants = world.postures;

@@ -35,6 +35,8 @@ struct Linearisation {
   /// and are not counted in errors.
   Eigen::VectorXd unit;
   std::string unit_name;  ///< "px", "m", "N m"
+  /// Rows: the body (marker) that was seen, those of one together; empty: rows are of none.
+  std::vector<int> body;
   /// Counted rows that are the coordinates of one point: errors are given as distances.
   int coordinates = 1;
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.
@@ -157,6 +159,7 @@ struct TracedFit {
   std::vector<Covariate> covariates;
   std::vector<RestPlace> rest_places;
   std::vector<RestField> rest_fields;
+  int clock = -1;  ///< carrier of the time of an instant; -1: instants have none
 };
 
 class TracedModel {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/trace/common_motion.h"
 #include "calib/trace/family.h"
 #include "calib/trace/rest.h"
 #include "calib/trace/stage.h"
@@ -109,6 +110,9 @@ class Tracer {
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
   /// The residual over what differs between neighbours in time; nothing where that is not known.
   [[nodiscard]] std::optional<double> over_neighbours() const;
+  /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
+  /// left.
+  [[nodiscard]] std::optional<CommonMotion> common_motion() const;
   void drop_what_leaves_too_much();
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);

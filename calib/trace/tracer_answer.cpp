@@ -23,6 +23,8 @@ constexpr double kSlightShare = 1e-3;
 // What is left over what differs between neighbours in time. Noise, with the sensor's own errors
 // counted in, makes it 0.6 to 1.0 (`undeclared`); what lasts is no noise.
 constexpr double kLasts = 3.0;
+// Of what is left: more than that is no error of single bodies.
+constexpr double kMostOfIt = 0.5;
 
 Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRest>& rests) {
   Linearisation out = linear;
@@ -258,10 +260,16 @@ std::optional<double> Tracer::over_neighbours() const {
   return std::sqrt(now_->system.total().rr / std::max(1.0, freedom));
 }
 
-// What lasts and depends on nothing that is known may be the larger part of what an effect stands
-// in for (a joint that creeps, as a jump of its zero).
+std::optional<CommonMotion> Tracer::common_motion() const {
+  const auto found = find_common_motion(now_->system, now_->fit.rest_places, now_->fit.clock);
+  return found && found->share > kMostOfIt ? found : std::nullopt;
+}
+
+// What lasts, or what bodies share from instant to instant, may be the larger part of what an
+// effect stands in for (a joint that creeps, as a jump of its zero).
 void Tracer::drop_what_leaves_too_much() {
-  if (!rests_.empty() || over_neighbours().value_or(0.0) <= kLasts) return;
+  if (!rests_.empty()) return;
+  if (over_neighbours().value_or(0.0) <= kLasts && !common_motion()) return;
   const double left = now_->system.total().rr;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const double explained = details_[i].effect.explained * base_->system.total().rr;
@@ -471,6 +479,16 @@ void Tracer::conclude() {
         "lasts, and no known effect explains it",
         trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ",
         trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
+  } else if (const auto common = common_motion()) {
+    const RestPlace& place = now_->fit.rest_places[common->place];
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason = fmt::format(
+        "{}all that {} moves differs alike from instant to instant, by {:.3g} {} of it (rms), "
+        "which "
+        "makes {:.0f} % of what is left: a vibration or unsteady readings, that no known effect "
+        "explains",
+        trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ", place.name,
+        common->size, place.unit, 100.0 * std::min(1.0, common->share));
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();

@@ -135,7 +135,8 @@ TEST(CameraEffects, AnOffsetIsTheSameRobotAtAnotherInstant) {
 }
 
 TEST(CameraEffects, ADriftingClockAgreesWhereItSays) {
-  const World drifting = make_effect_world(exact_world({{"clock_drift", "clock", 1e-3, 30.0 / 59.0}}));
+  const World drifting =
+      make_effect_world(exact_world({{"clock_drift", "clock", 1e-3, 30.0 / 59.0}}));
   const World clean = make_effect_world(exact_world());
   EXPECT_LT(largest_shift(drifting, clean, [](int f, TagId) { return f == 30; }), kExactPx);
   const double end = largest_shift(drifting, clean, [](int f, TagId) { return f == 59; });

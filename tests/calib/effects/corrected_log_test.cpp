@@ -271,7 +271,8 @@ TEST(CorrectedLog, AJointThatRestsIsCorrectedWhereItRests) {
 
 TEST(CorrectedLog, NamesWhatALogCannotShow) {
   const std::vector<FittedEffect> effects{
-      fitted("helical", "q1", {1e-4}), fitted("axis_wobble", "q2", {1e-3, 0.0}, 1.0),
+      fitted("helical", "q1", {1e-4}),
+      fitted("axis_wobble", "q2", {1e-3, 0.0}, 1.0),
       fitted("tag_slip", "tag_12", {0, 0, 0, 1e-3, 0, 0}, 3.0),
       fitted("camera_bump", "camera", {1e-3, 0, 0, 0, 0, 0}, 3.0),
       fitted("camera_drift", "camera", {1e-3, 0, 0, 0, 0, 0}, 3.0),

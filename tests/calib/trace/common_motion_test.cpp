@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/common_motion.h"
+
+#include <gtest/gtest.h>
+
+#include "calib/trace/partition.h"
+#include "kinematics/core/rng.h"
+
+namespace kinescope::trace {
+namespace {
+
+constexpr int kInstants = 300;
+constexpr int kBodies = 3;
+constexpr int kRowsOfBody = 4;
+
+// What each instant does to the rows beside white noise of 1: a shake of the first carrier, which
+// moves the last two bodies, an error of each body, an error of the time (the second carrier).
+struct Unrest {
+  double shake = 0.0;
+  double of_body = 0.0;
+  double of_time = 0.0;
+};
+
+Linearisation world(const Unrest& unrest) {
+  Rng rng(7);
+  constexpr int kRows = kBodies * kRowsOfBody;
+  Linearisation out;
+  out.residual.resize(kInstants * kRows);
+  out.unit = Eigen::VectorXd::Ones(out.residual.size());
+  out.jacobian = RowMatrix::Zero(out.residual.size(), 1);
+  out.time_s = Eigen::VectorXd::LinSpaced(kInstants, 0.0, 10.0);
+  std::vector<Eigen::Triplet<double>> carriers;
+  for (int i = 0; i < kInstants; ++i) {
+    out.first_row.push_back(i * kRows);
+    out.fold.push_back(i % 5);
+    const double shake = rng.normal(unrest.shake);
+    const double time = rng.normal(unrest.of_time);
+    for (int b = 0; b < kBodies; ++b) {
+      const double own = rng.normal(unrest.of_body);
+      for (int k = 0; k < kRowsOfBody; ++k) {
+        const int row = i * kRows + b * kRowsOfBody + k;
+        const double moved = b == 0 ? 0.0 : rng.uniform(1.0, 2.0);
+        const double speed = rng.uniform(-2.0, 2.0);
+        if (b > 0) carriers.emplace_back(row, 0, moved);
+        carriers.emplace_back(row, 1, speed);
+        out.residual[row] = rng.normal() + moved * shake + own + speed * time;
+        out.jacobian(row, 0) = 1.0;
+        out.body.push_back(b);
+      }
+    }
+  }
+  out.first_row.push_back(kInstants * kRows);
+  out.carriers.resize(out.residual.size(), 2);
+  out.carriers.setFromTriplets(carriers.begin(), carriers.end());
+  return out;
+}
+
+CommonMotion found_in(const Unrest& unrest) {
+  const Linearisation linear = world(unrest);
+  const NormalSystem system(linear, make_partition(linear));
+  const auto found = find_common_motion(system, {{"joint", "rad", 0}}, 1);
+  EXPECT_TRUE(found.has_value());
+  return found.value_or(CommonMotion{});
+}
+
+TEST(CommonMotion, AShakeIsFoundWithItsSize) {
+  const CommonMotion found = found_in({.shake = 2.0});
+  EXPECT_EQ(found.place, 0U);
+  EXPECT_NEAR(found.size, 2.0, 0.2);
+  EXPECT_GT(found.share, 0.8);
+}
+
+TEST(CommonMotion, NoiseOfEachRowOrOfEachBodyIsNone) {
+  EXPECT_LT(found_in({}).share, 0.05);
+  EXPECT_LT(found_in({.of_body = 3.0}).share, 0.2);
+}
+
+TEST(CommonMotion, StampsThatScatterAreNone) { EXPECT_LT(found_in({.of_time = 3.0}).share, 0.05); }
+
+TEST(CommonMotion, OneBodyAloneDoesNotTell) {
+  Linearisation linear = world({.shake = 2.0});
+  for (int& body : linear.body) body = 0;
+  const NormalSystem system(linear, make_partition(linear));
+  EXPECT_FALSE(find_common_motion(system, {{"joint", "rad", 0}}, 1).has_value());
+}
+
+}  // namespace
+}  // namespace kinescope::trace
