@@ -13,10 +13,6 @@ namespace {
 constexpr double kVarianceStep = 0.25;  // decades
 constexpr int kNoiseSteps = 4;
 
-double freedom_of(const NormalSystem& system) {
-  return std::max(1.0, static_cast<double>(system.linear().residual.size() - system.parameters()));
-}
-
 Smoothness diagonalise(const NormalSystem& system, const Candidate& candidate, double length) {
   const EffectSums sums = system.sums(candidate.columns(length));
   const Eigen::MatrixXd B = system.inverse() * sums.JE;
@@ -48,7 +44,7 @@ std::optional<AddedEffect> likeliest_curve(const NormalSystem& system, const Can
     all.push_back(diagonalise(system, candidate, length));
   }
   const double whole = system.total().rr;
-  const double freedom = freedom_of(system);
+  const double freedom = system.freedom();
   double noise = system.memory() * whole / freedom;
   SmoothnessChoice choice;
   for (int i = 0; i < kNoiseSteps; ++i) {
@@ -92,7 +88,7 @@ void size_up_curve(const std::vector<EffectColumn>& columns, double t, TracedEff
 }
 
 Eigen::MatrixXd posterior_covariance(const NormalSystem& system, Eigen::Index count) {
-  const double noise = system.memory() * system.total().rr / freedom_of(system);
+  const double noise = system.memory() * system.total().rr / system.freedom();
   return noise * system.inverse().bottomRightCorner(count, count);
 }
 

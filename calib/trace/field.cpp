@@ -55,7 +55,7 @@ Evidence gather(const NormalSystem& system, const FieldGrid& grid) {
   out.S = -out.QE.transpose() * out.own.solve(out.QE);
   out.S += EE;
   out.score = grid.columns.transpose() * out.residual;
-  out.freedom = std::max(1.0, static_cast<double>(linear.residual.size() - system.parameters()));
+  out.freedom = system.freedom();
   return out;
 }
 

@@ -62,6 +62,10 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
       linear.prior.size() == 0 ? total_.H : Eigen::MatrixXd(total_.H + linear.prior), kUnseen);
 }
 
+double NormalSystem::freedom() const {
+  return std::max(1.0, static_cast<double>(linear_->residual.size() - parameters()));
+}
+
 double NormalSystem::memory() const {
   const Eigen::Index n = linear_->instants();
   if (linear_->independent_instants || n < 2) return 1.0;

@@ -42,6 +42,8 @@ class NormalSystem {
   /// (J'J + prior)^-1, directions that the data do not show left out.
   [[nodiscard]] const Eigen::MatrixXd& inverse() const { return inverse_; }
   [[nodiscard]] Eigen::Index parameters() const { return total_.g.size(); }
+  /// Rows beyond the model's own parameters; 1 at the least.
+  [[nodiscard]] double freedom() const;
   /// Instants that say the same, in the mean, because noise lasts; 1 where it does not.
   [[nodiscard]] double memory() const;
 

@@ -146,9 +146,7 @@ Evidence gather(const NormalSystem& system, const std::vector<EffectColumn>& col
   Evidence out;
   out.S = sums.EE - sums.JE.transpose() * B;
   out.score = sums.Er - B.transpose() * system.total().g;
-  const double rows = static_cast<double>(system.linear().residual.size());
-  const double white = (system.total().rr - score.gain) /
-                       std::max(1.0, rows - static_cast<double>(system.parameters()));
+  const double white = (system.total().rr - score.gain) / system.freedom();
   // F of white noise would be gain / rank / white; the stretches say how much less it is.
   const double classical = score.gain / std::max(1, score.rank) / std::max(1e-300, white);
   const double widening = score.statistic > 0.0 ? classical / score.statistic : 1.0;

@@ -39,9 +39,8 @@ std::optional<ScanStep> scan_step(const NormalSystem& system, const Eigen::Vecto
   const double information = slope.squaredNorm() - beside.dot(taken_up);
   if (!(information > kHidden * slope.squaredNorm())) return {};
   const double score = slope.dot(linear.residual) - taken_up.dot(system.total().g);
-  const double freedom =
-      std::max(1.0, static_cast<double>(linear.residual.size() - system.parameters()));
-  return ScanStep{score / information, std::sqrt(system.total().rr / freedom / information)};
+  return ScanStep{score / information,
+                  std::sqrt(system.total().rr / system.freedom() / information)};
 }
 
 Eigen::MatrixXd effect_covariance(const Stage& stage, Eigen::Index count) {

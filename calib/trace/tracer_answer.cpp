@@ -255,9 +255,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
 
 std::optional<double> Tracer::over_neighbours() const {
   if (!now_->fit.linear.whitened_by_neighbours) return std::nullopt;
-  const auto freedom =
-      static_cast<double>(now_->fit.linear.residual.size() - now_->system.parameters());
-  return std::sqrt(now_->system.total().rr / std::max(1.0, freedom));
+  return std::sqrt(now_->system.total().rr / now_->system.freedom());
 }
 
 std::optional<CommonMotion> Tracer::common_motion() const {
@@ -484,8 +482,8 @@ void Tracer::conclude() {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format(
         "{}all that {} moves differs alike from instant to instant, by {:.3g} {} of it (rms), "
-        "which "
-        "makes {:.0f} % of what is left: a vibration or unsteady readings, that no known effect "
+        "which makes {:.0f} % of what is left: a vibration or unsteady readings, that no known "
+        "effect "
         "explains",
         trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ", place.name,
         common->size, place.unit, 100.0 * std::min(1.0, common->share));
