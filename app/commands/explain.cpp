@@ -348,9 +348,10 @@ class Explainer {
       std::optional<Structure> structure =
           proposed_structure(pose_tracks_from_tags(tags, *found, recording().markers));
       if (!structure) continue;
-      return {
-          {std::move(*structure),
-           {{{"lens_distortion", "camera"}, 0.0}, {{"lens_distortion", "camera pinhole"}, 0.0}}}};
+      return {{std::move(*structure),
+               {{{"lens_distortion", "camera"}, 0.0},
+                {{"intrinsics", "camera focal length"}, 0.0},
+                {{"intrinsics", "camera centre"}, 0.0}}}};
     }
     return {};
   }

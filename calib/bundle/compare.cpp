@@ -7,13 +7,13 @@ namespace kinescope::bundle {
 namespace {
 
 std::optional<SightingError> compare_corners(const Sighting& sighting, const Pose& T_camera_marker,
-                                             const CameraModel& camera, double size) {
+                                             const CameraModel& camera, const MarkerShape& shape) {
   const auto n = static_cast<Eigen::Index>(sighting.corners_px.size());
   SightingError error{Eigen::VectorXd(2 * n), Eigen::Matrix<double, Eigen::Dynamic, 6>(2 * n, 6),
                       Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics>(2 * n, kMaxIntrinsics)};
   const Eigen::Matrix3d R = T_camera_marker.matrix3();
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Vector3d p = size * sighting.geometry_m[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d p = shape.corner_m(sighting.geometry_m[static_cast<std::size_t>(i)]);
     const auto projection = project_with_derivatives(camera, T_camera_marker * p);
     if (!projection) return std::nullopt;
     Eigen::Matrix<double, 3, 6> d_point;
@@ -59,10 +59,10 @@ int Sighting::dimension() const {
 
 std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_camera_marker,
                                      const CameraModel& camera, const Eigen::Vector3d* target_m,
-                                     double size) {
+                                     const MarkerShape& shape) {
   switch (sighting.kind) {
     case MeasurementKind::kCorners:
-      return compare_corners(sighting, T_camera_marker, camera, size);
+      return compare_corners(sighting, T_camera_marker, camera, shape);
     case MeasurementKind::kPose:
       return compare_pose(sighting, T_camera_marker);
     case MeasurementKind::kPoint:

@@ -35,6 +35,13 @@ CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>
   return camera;
 }
 
+// What a corner moves by with a parameter of MarkerShape.
+Eigen::Vector3d d_corner(CorrectedPart part, const Eigen::Vector3d& corner_m) {
+  if (part == CorrectedPart::kMarkerSize) return corner_m;
+  if (part == CorrectedPart::kMarkerWidth) return {0.5 * corner_m.x(), -0.5 * corner_m.y(), 0.0};
+  return {0.0, 0.0, corner_m.x() * corner_m.y() < 0.0 ? -1.0 : 1.0};
+}
+
 // Rows of the image between a corner and the middle row.
 double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t corner) {
   return sighting.corners_px[corner].y() - 0.5 * spec.camera.height;
@@ -53,12 +60,15 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
         bears = std::ranges::find(path, correction.index) != path.end();
         break;
       case CorrectedPart::kMarker:
+      case CorrectedPart::kMarkerWidth:
+      case CorrectedPart::kMarkerWarp:
         bears = correction.index == sighting.marker;
         break;
       case CorrectedPart::kMarkerSize:
         bears = correction.index == kEverywhere || correction.index == sighting.marker;
         break;
       case CorrectedPart::kIntrinsic:
+      case CorrectedPart::kFocalLength:
       case CorrectedPart::kReadout:
         bears = sighting.kind == MeasurementKind::kCorners;
         break;
@@ -90,13 +100,23 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         out.marker += twist;
         break;
       case CorrectedPart::kMarkerSize:
-        out.size += amount;
+        out.shape.size += amount;
+        break;
+      case CorrectedPart::kMarkerWidth:
+        out.shape.width += amount;
+        break;
+      case CorrectedPart::kMarkerWarp:
+        out.shape.warp_m += amount;
         break;
       case CorrectedPart::kCamera:
         out.camera += twist;
         break;
       case CorrectedPart::kIntrinsic:
         out.intrinsics[static_cast<std::size_t>(correction.index)] += amount;
+        break;
+      case CorrectedPart::kFocalLength:
+        out.intrinsics[0] += amount * spec.camera.fx;
+        out.intrinsics[1] += amount * spec.camera.fy;
         break;
       case CorrectedPart::kReadout:
         out.line_delay_s += amount;
@@ -119,7 +139,7 @@ std::optional<CorrectedError> corrected_error(
   out.chain = differentiate_chain(exp_pose(corrected.camera) * T_camera_base, joints,
                                   T_link_marker * exp_pose(corrected.marker));
   auto error = compare(sighting, out.chain.T_camera_marker, changed(camera, corrected.intrinsics),
-                       target_m, corrected.size);
+                       target_m, corrected.shape);
   if (!error) return std::nullopt;
   out.error = std::move(*error);
   Vector6d velocity = Vector6d::Zero();
@@ -149,17 +169,23 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
       return at.error.d_marker * twist;
     case CorrectedPart::kCamera:
       return at.error.d_marker * (adjoint(at.chain.T_camera_marker.inverse()) * twist);
-    case CorrectedPart::kMarkerSize: {
+    case CorrectedPart::kMarkerSize:
+    case CorrectedPart::kMarkerWidth:
+    case CorrectedPart::kMarkerWarp: {
       Eigen::VectorXd out = Eigen::VectorXd::Zero(at.error.residual.size());
       for (std::size_t i = 0; i < sighting.geometry_m.size(); ++i) {
         const auto row = static_cast<Eigen::Index>(2 * i);
-        out.segment<2>(row) =
-            at.error.d_marker.block<2, 3>(row, 3) * sighting.geometry_m[i] * share;
+        out.segment<2>(row) = at.error.d_marker.block<2, 3>(row, 3) *
+                              d_corner(correction.part, sighting.geometry_m[i]) * share;
       }
       return out;
     }
     case CorrectedPart::kIntrinsic:
       return at.error.d_intrinsics.col(correction.index) * share;
+    case CorrectedPart::kFocalLength:
+      return (at.error.d_intrinsics.col(0) * spec.camera.fx +
+              at.error.d_intrinsics.col(1) * spec.camera.fy) *
+             share;
     case CorrectedPart::kReadout: {
       Eigen::VectorXd out = at.d_time * share;
       for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {

@@ -16,7 +16,7 @@ struct CorrectedSighting {
   Vector6d camera = Vector6d::Zero();
   std::vector<Vector6d> joints;  ///< beside the path
   Vector6d marker = Vector6d::Zero();
-  double size = 1.0;
+  MarkerShape shape;
   std::array<double, kMaxIntrinsics> intrinsics{};  ///< changes
   double line_delay_s = 0.0;
 };

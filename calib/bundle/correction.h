@@ -12,13 +12,16 @@
 namespace kinescope {
 
 enum class CorrectedPart {
-  kJoint,       ///< a twist (rad, m) behind the joint's motion, in the link's frame
-  kMarker,      ///< a twist of the marker in its own frame
-  kMarkerSize,  ///< the marker's size over the declared one, minus 1
-  kCamera,      ///< a twist of everything seen, in the camera's frame
-  kIntrinsic,   ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
-  kReadout,     ///< s per image row by which a corner is seen later than the frame's middle row
-  kClock        ///< s by which the log is further ahead than the time offset says
+  kJoint,        ///< a twist (rad, m) behind the joint's motion, in the link's frame
+  kMarker,       ///< a twist of the marker in its own frame
+  kMarkerSize,   ///< the marker's size over the declared one, minus 1
+  kMarkerWidth,  ///< the marker's width over its height, minus 1, the size kept
+  kMarkerWarp,   ///< m by which two opposite corners stand before the marker's plane, two behind it
+  kCamera,       ///< a twist of everything seen, in the camera's frame
+  kIntrinsic,    ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
+  kFocalLength,  ///< fx and fy over the declared ones, minus 1
+  kReadout,      ///< s per image row by which a corner is seen later than the frame's middle row
+  kClock         ///< s by which the log is further ahead than the time offset says
 };
 
 inline constexpr int kEverywhere = -1;

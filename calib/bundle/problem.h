@@ -128,13 +128,26 @@ struct SightingError {
   Eigen::Matrix<double, Eigen::Dynamic, kMaxIntrinsics> d_intrinsics;  ///< corners only
 };
 
+/// What a marker's corners are other than those of a flat square of the declared size.
+struct MarkerShape {
+  double size = 1.0;    ///< factor
+  double width = 0.0;   ///< width over height, minus 1
+  double warp_m = 0.0;  ///< two opposite corners stand as far before its plane, two behind it
+
+  [[nodiscard]] Eigen::Vector3d corner_m(const Eigen::Vector3d& declared_m) const {
+    const double before = declared_m.x() * declared_m.y() < 0.0 ? -1.0 : 1.0;
+    return {(size + 0.5 * width) * declared_m.x(), (size - 0.5 * width) * declared_m.y(),
+            size * declared_m.z() + before * warp_m};
+  }
+};
+
 /// Nothing when a corner lies behind the camera. `target_m` takes the place of the measured
-/// position; `size` multiplies the marker's corners.
+/// position.
 [[nodiscard]] std::optional<SightingError> compare(const Sighting& sighting,
                                                    const Pose& T_camera_marker,
                                                    const CameraModel& camera,
                                                    const Eigen::Vector3d* target_m,
-                                                   double size = 1.0);
+                                                   const MarkerShape& shape = {});
 
 /// The error of one sighting at a state.
 [[nodiscard]] std::optional<SightingError> error_of(const Spec& spec, const State& state,

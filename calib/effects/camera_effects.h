@@ -11,6 +11,7 @@
 
 #include "calib/bundle/effect_bundle.h"
 #include "calib/effects/error_table.h"
+#include "calib/effects/unsteady_reading.h"
 #include "calib/trace/traced_model.h"
 
 namespace kinescope::effects {
@@ -30,6 +31,7 @@ struct EffectWorld {
   /// Likewise, of joints whose reading runs unevenly twice a turn: sine and cosine, rad.
   std::map<int, Eigen::Vector2d> bends;
   JointMotion log;                              ///< finer in time; empty for postures
+  std::map<int, UnsteadyReading> unsteady;      ///< joints whose reading in the log jumps
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   double first_s = 0.0;                         ///< of the frames
   double last_s = 0.0;
@@ -46,6 +48,9 @@ inline constexpr double kBendPeriods = 2.0;
   return id.effect == "eccentricity" && scan == kBendPeriods;
 }
 
+/// Where an effect intrinsics of the focal length sits.
+inline constexpr const char* kFocalLengthPlace = "camera focal length";
+
 struct CameraEffect {
   Candidate candidate;  ///< without columns
   /// One correction a parameter; for the time offset the bundle's own parameter instead.
@@ -61,12 +66,16 @@ struct CameraEffect {
   std::function<Eigen::Vector3d(const Eigen::VectorXd&)> gravity_base;
 };
 
+/// Joints of those driven whose readings jump, by how a log has them.
+[[nodiscard]] std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
+                                                               const std::vector<int>& driven);
+
 /// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,
-/// coupling, helical, curved_slider, axis_wobble, joint_map.
+/// coupling, helical, curved_slider, axis_wobble, quantisation, reading_noise, joint_map.
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
-/// tag_size.
+/// intrinsics, tag_size, bent_tag.
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,

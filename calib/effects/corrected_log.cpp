@@ -55,6 +55,7 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     if (log.channel(tree.joints[j].channel)) world.driven.push_back(static_cast<int>(j));
   }
+  world.unsteady = effects::unsteady_readings(world.log, world.driven);
   return world;
 }
 
@@ -88,9 +89,9 @@ Error refused(const JointLog& log, const FittedEffect& effect, const std::string
 
 // Throws for an effect at a joint that is not there.
 void check_place(const FittedEffect& effect, const KinematicTree& tree, const JointLog& log) {
-  constexpr std::array<std::string_view, 7> kElsewhere{
-      "rolling_shutter", "lens_distortion", "tag_size",  "tag_slip",
-      "camera_bump",     "camera_drift",    "clock_jump"};
+  constexpr std::array<std::string_view, 9> kElsewhere{
+      "rolling_shutter", "lens_distortion", "intrinsics",   "tag_size",  "bent_tag",
+      "tag_slip",        "camera_bump",     "camera_drift", "clock_jump"};
   if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");

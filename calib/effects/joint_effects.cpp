@@ -44,6 +44,29 @@ CameraEffect late_reading(const Suspect& s) {
   return out;
 }
 
+// The size that the residual shows is the one that the log shows, or it is another effect's.
+CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const UnsteadyReading& reading) {
+  constexpr double kAsTheLogSays = 0.5;
+  const std::string parameter = reading.in_steps ? "step" : "standard deviation";
+  CameraEffect out =
+      effect(s, reading.in_steps ? "quantisation" : "reading_noise",
+             fmt::format("{} is read {}", s.name, reading.in_steps ? "in steps" : "with noise"),
+             {{parameter, s.unit}}, s.unit);
+  out.candidate.possible = [shown = reading.size](const Eigen::VectorXd& size) {
+    return std::abs(size[0] - shown) < kAsTheLogSays * shown;
+  };
+  out.candidate.check = reading.in_steps
+                            ? "digits that the log is written with, counts a turn of the encoder"
+                            : "potentiometer, shielding and filter of this encoder";
+  out.candidate.record = fmt::format("move {} more slowly, and log it at a higher rate", s.name);
+  const Eigen::VectorXd share =
+      (read_at(reading.times_s, reading.motion, world.frames.times_s) - s.value) / reading.size;
+  out.corrections = [s, parameter, share](double) {
+    return std::vector{turn(s, parameter, s.unit, share)};
+  };
+  return out;
+}
+
 CameraEffect encoder_scale(const Suspect& s) {
   CameraEffect out = effect(s, "encoder_scale",
                             fmt::format("{} moves by more (or less) than its encoder says, in "
@@ -368,6 +391,16 @@ CameraEffect axis_wobble(const Suspect& s) {
 
 }  // namespace
 
+std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
+                                                 const std::vector<int>& driven) {
+  std::map<int, UnsteadyReading> out;
+  for (const int joint : driven) {
+    if (auto found = unsteady_reading(log.times_s, log.value.col(joint)))
+      out.emplace(joint, std::move(*found));
+  }
+  return out;
+}
+
 std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out;
   for (const int joint : world.driven) {
@@ -379,7 +412,11 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     if (CameraEffect gear = gear_error(s); world.known || !gear.candidate.scan.empty()) {
       out.push_back(std::move(gear));
     }
-    if (!world.postures) out.push_back(backlash(world, s));
+    if (!world.postures) {
+      out.push_back(backlash(world, s));
+      if (const auto reading = world.unsteady.find(joint); reading != world.unsteady.end())
+        out.push_back(unsteady(world, s, reading->second));
+    }
     out.push_back(compliance(world, s));
     if (world.known || world.driven.size() > 1) out.push_back(coupling(world, s));
     out.push_back(helical(s));

@@ -50,34 +50,62 @@ CameraEffect rolling_shutter() {
   return out;
 }
 
-CameraEffect lens(std::string place, std::string words, const std::vector<int>& intrinsics,
-                  std::vector<EffectParameter> parameters, std::string unit) {
-  CameraEffect out = effect("lens_distortion", std::move(place), std::move(words),
+// Corrections of intrinsic parameters, one a parameter of the effect.
+CameraEffect of_intrinsics(std::string name, std::string place, std::string words,
+                           std::vector<EffectParameter> parameters, std::string unit,
+                           const std::vector<int>& intrinsics) {
+  CameraEffect out = effect(std::move(name), std::move(place), std::move(words),
                             std::move(parameters), std::move(unit));
-  // The first parameter is the size that people know (k1, p1, fx).
-  out.candidate.size_weights.tail(out.candidate.size_weights.size() - 1).setZero();
   out.candidate.check = "calibrate the camera again (kinescope camera), at the focus it is used at";
   out.candidate.record = "let the markers pass near the image's corners";
   out.corrections = [like = out, intrinsics](double) {
     std::vector<Correction> corrections;
-    for (std::size_t i = 0; i < intrinsics.size(); ++i) {
+    for (std::size_t i = 0; i < intrinsics.size(); ++i)
       corrections.push_back(correct(CorrectedPart::kIntrinsic, like, i, intrinsics[i]));
-    }
     return corrections;
   };
   return out;
 }
 
-std::vector<CameraEffect> lenses(const CameraModel& camera) {
+// The first of the two coefficients is the size that people know (k1, p1).
+CameraEffect lens(std::string place, std::string words, std::vector<EffectParameter> coefficients,
+                  const std::vector<int>& intrinsics) {
+  CameraEffect out = of_intrinsics("lens_distortion", std::move(place), std::move(words),
+                                   std::move(coefficients), "", intrinsics);
+  out.candidate.size_weights[1] = 0.0;
+  return out;
+}
+
+CameraEffect focal_length() {
+  CameraEffect out = effect("intrinsics", kFocalLengthPlace,
+                            "the focal length is not the declared one (another zoom or focus)",
+                            {{"relative change", ""}}, "");
+  out.candidate.check =
+      "calibrate the camera again (kinescope camera), at the zoom and focus it is used at; switch "
+      "autofocus off";
+  out.candidate.record = "bring the markers nearer to the camera and farther away, and tilt them";
+  out.corrections = [like = out](double) {
+    return std::vector{correct(CorrectedPart::kFocalLength, like, 0)};
+  };
+  return out;
+}
+
+std::vector<CameraEffect> of_camera(const CameraModel& camera) {
   std::vector<CameraEffect> out;
-  out.push_back(lens("camera", "the lens bends more (or less) than declared", {4, 5},
-                     {{"k1", ""}, {"k2", ""}}, ""));
+  out.push_back(lens("camera", "the lens bends more (or less) than declared",
+                     {{"k1", ""}, {"k2", ""}}, {4, 5}));
   if (camera.model != DistortionModel::kEquidistant) {
-    out.push_back(lens("camera tangential", "the lens is tilted against the sensor", {6, 7},
-                       {{"p1", ""}, {"p2", ""}}, ""));
+    out.push_back(lens("camera tangential", "the lens is tilted against the sensor",
+                       {{"p1", ""}, {"p2", ""}}, {6, 7}));
   }
-  out.push_back(lens("camera pinhole", "focal length or image centre differ from those declared",
-                     {0, 1, 2, 3}, {{"fx", "px"}, {"fy", "px"}, {"cx", "px"}, {"cy", "px"}}, "px"));
+  out.push_back(focal_length());
+  out.push_back(of_intrinsics("intrinsics", "camera centre",
+                              "the image's centre is not the declared one (a cropped image)",
+                              {{"cx", "px"}, {"cy", "px"}}, "px", {2, 3}));
+  CameraEffect aspect = of_intrinsics("intrinsics", "camera aspect",
+                                      "the image is stretched one way", {{"fy", "px"}}, "px", {1});
+  aspect.candidate.check = "how the video was scaled: pixels that are not square";
+  out.push_back(std::move(aspect));
   return out;
 }
 
@@ -91,6 +119,32 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
   if (rests(world, marker)) out.candidate.floor = std::numeric_limits<double>::infinity();
   out.corrections = [like = out, marker](double) {
     return std::vector{correct(CorrectedPart::kMarkerSize, like, 0, marker)};
+  };
+  return out;
+}
+
+// A sheet of paper that does not lie flat. Bent, it is shorter, too.
+CameraEffect bent_tag(const EffectWorld& world, int marker) {
+  const std::string name = marker_name(world, marker);
+  CameraEffect out =
+      effect("bent_tag", name, fmt::format("{} is not flat (or not square)", name),
+             {{"out of plane", "m"}, {"width over height", ""}, {"relative size", ""}}, "m");
+  const double half = 0.5 * world.tree.markers[static_cast<std::size_t>(marker)].size_m;
+  out.candidate.contains = {{"tag_size", name}};
+  out.candidate.size = [half](const Eigen::VectorXd& shape) {
+    return std::hypot(shape[0], half * shape[1]);
+  };
+  out.candidate.possible = [half](const Eigen::VectorXd& shape) {
+    constexpr double kMostOfSize = 0.5;
+    return std::abs(shape[0]) < kMostOfSize * half && shape.tail<2>().norm() < kMostOfSize;
+  };
+  out.candidate.check = "glue the marker on something flat; a printer that stretches one way";
+  out.candidate.record = "show the marker from several sides, tilted";
+  if (rests(world, marker)) out.candidate.floor = std::numeric_limits<double>::infinity();
+  out.corrections = [like = out, marker](double) {
+    return std::vector{correct(CorrectedPart::kMarkerWarp, like, 0, marker),
+                       correct(CorrectedPart::kMarkerWidth, like, 1, marker),
+                       correct(CorrectedPart::kMarkerSize, like, 2, marker)};
   };
   return out;
 }
@@ -131,8 +185,9 @@ std::vector<CameraEffect> camera_effects(const EffectWorld& world) {
     if (corners) out.push_back(rolling_shutter());
   }
   if (corners) {
-    for (CameraEffect& lens : lenses(world.camera)) out.push_back(std::move(lens));
+    for (CameraEffect& effect : of_camera(world.camera)) out.push_back(std::move(effect));
     for (const int marker : world.seen) out.push_back(tag_size(world, marker));
+    for (const int marker : world.seen) out.push_back(bent_tag(world, marker));
     if (may_be_misprinted(world)) out.push_back(all_tag_sizes());
   }
   return out;

@@ -278,7 +278,10 @@ std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& libra
 
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                            std::vector<std::size_t> without_couplings)
-    : bundle_(&bundle), options_(options), without_couplings_(std::move(without_couplings)) {}
+    : bundle_(&bundle), options_(options), without_couplings_(std::move(without_couplings)) {
+  if (!bundle_->postures())
+    unsteady_ = unsteady_readings(bundle_->motion_of_log(0.0), bundle_->driven_joints());
+}
 
 BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
                                      const std::vector<AddedEffect>& effects) const {
@@ -311,6 +314,7 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
   world.frames = bundle_->motion_at_frames(time_offset_s);
   world.loaded = world.frames;
   if (!world.postures) world.log = bundle_->motion_of_log(time_offset_s);
+  world.unsteady = unsteady_;
   world.gravity_base = options_.gravity_base;
   world.clock_free = options_.calibrate.estimate_time_offset;
   world.first_s = world.frames.times_s.front();

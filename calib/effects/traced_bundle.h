@@ -47,6 +47,7 @@ class TracedBundle final : public TracedModel {
   const EffectBundle* bundle_;
   CalibrationTraceOptions options_;
   std::vector<std::size_t> without_couplings_;
+  std::map<int, UnsteadyReading> unsteady_;
 };
 
 }  // namespace kinescope::effects

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -104,7 +106,10 @@ void Tracer::forward() {
       mark(round_, id, CandidateState::kAccepted, now_->error.value);
       add_step(round_, fmt::format("{} added", name_of(id)), *now_);
     }
-    search_again(now_->added.back().id.place);
+    std::set<std::string> places;
+    for (std::size_t i = before; i < now_->added.size(); ++i)
+      places.insert(now_->added[i].id.place);
+    for (const std::string& place : places) search_again(place);
   }
 }
 
@@ -203,8 +208,8 @@ StagePtr Tracer::chain(const AddedEffect& first) {
   return found;
 }
 
-// The value of a scan was the best beside the effects that were known then. Everywhere, or at one
-// place.
+// The value of a scan was the best beside the effects that were known then. All values are tried
+// everywhere, or at one place; a step from where it is costs little and is taken everywhere.
 void Tracer::search_again(const std::optional<std::string>& place) {
   constexpr double kNoticeable = 1e-6;  // of what the effect explains
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
@@ -225,9 +230,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
       now_ = std::move(moved);
     }
   }
-  for (std::size_t i = 0; i < now_->added.size(); ++i) {
-    if (!place || now_->added[i].id.place == *place) sharpen(i);
-  }
+  for (std::size_t i = 0; i < now_->added.size(); ++i) sharpen(i);
 }
 
 // Without a large effect the model has bent itself, and its linearisation is not where the scan's

@@ -32,6 +32,21 @@ Linearisation with_rests(const Linearisation& linear, const std::vector<FoundRes
   return out;
 }
 
+// True of an effect that is a straight line over what the rest is a curve over.
+bool is_straight_over(const Stage& stage, const AddedEffect& effect, const Rest& rest) {
+  constexpr double kStraight = 0.999;  // of correlation, squared
+  const Candidate* candidate = find_candidate(stage.fit, effect.id);
+  const auto over = std::ranges::find(stage.fit.covariates, rest.covariate, &Covariate::name);
+  if (candidate == nullptr || candidate->is_curve() || over == stage.fit.covariates.end())
+    return false;
+  const std::vector<EffectColumn> columns = candidate->columns(effect.scan);
+  if (columns.size() != 1 || columns.front().share.size() != over->value.size()) return false;
+  const Eigen::ArrayXd share = columns.front().share.array() - columns.front().share.mean();
+  const Eigen::ArrayXd value = over->value.array() - over->value.mean();
+  const double product = (share * value).sum();
+  return product * product > kStraight * share.square().sum() * value.square().sum();
+}
+
 bool same_place(const std::string& rest, const std::string& effect) {
   return rest == effect || rest.starts_with(effect + " ") || effect.starts_with(rest + " ");
 }
@@ -225,7 +240,8 @@ bool Tracer::drop_what_rests_explain() {
 }
 
 // An effect of the library can stand in for one that is not in it. Then the rest at its place is
-// large, and a curve without the effect predicts no worse than the curve with it.
+// large, and a curve without the effect predicts no worse than the curve with it, or the effect is
+// no more than the curve's slope: one cause, which is not that of the straight line.
 bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
@@ -236,10 +252,10 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
                            ? find_field(stage->system, stage->fit.rest_fields, rest_level())
                            : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
                                        {}, rest_level(), options_);
-    if (!alone || alone->rest.place != found.rest.place ||
-        predicts_clearly_worse(alone->held_out, found.held_out)) {
-      continue;
-    }
+    if (!alone || alone->rest.place != found.rest.place) continue;
+    const bool is_its_slope = alone->rest.covariate == found.rest.covariate &&
+                              is_straight_over(*now_, now_->added[i], found.rest);
+    if (!is_its_slope && predicts_clearly_worse(alone->held_out, found.held_out)) continue;
     removed_.insert(id);
     mark(round_, id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/data/smoothing_spline.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/log/smoothing_spline.h"
 
 namespace kinescope {
 namespace {

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/acceleration_share.h"
-#include "dynamics/data/smoothing_spline.h"
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
+#include "kinematics/log/smoothing_spline.h"
 
 namespace kinescope {
 namespace {

@@ -12,9 +12,7 @@ namespace {
 using truth::InjectedEffect;
 
 bool is_at(const EffectId& found, const InjectedEffect& injected) {
-  // Variants of a lens have a place each: "camera tangential".
-  const bool lens = injected.effect == "lens_distortion" && !injected.with.empty();
-  const std::string place = lens ? injected.place + " " + injected.with : injected.place;
+  const std::string place = truth::place_in_library(injected);
   return found.effect == injected.effect && found.place == place;
 }
 

@@ -81,8 +81,7 @@ struct Outcome {
 };
 
 bool is_at(const json& found, const InjectedEffect& injected) {
-  const bool lens = injected.effect == "lens_distortion" && !injected.with.empty();
-  const std::string place = lens ? injected.place + " " + injected.with : injected.place;
+  const std::string place = truth::place_in_library(injected);
   if (found.at("effect") != injected.effect || found.at("place") != place) return false;
   return injected.effect != "coupling" || found.at("at").at("words") == injected.with;
 }

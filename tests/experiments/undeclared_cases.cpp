@@ -29,9 +29,12 @@ constexpr double kStrongest = 100.0;
 
 // Recordings of lower numbers were drawn from the first effects of the library and of the test's
 // own, before there were others: they stay what they are.
-constexpr int kFirstOfAllEffects = 1000;
-constexpr std::size_t kFirstLibraryEffects = 16;
-constexpr std::size_t kFirstOwnEffects = 3;
+struct Drawn {
+  int below = 0;  ///< numbers of recordings
+  std::size_t library = 0;
+  std::size_t own = 0;
+};
+constexpr std::array kDrawn{Drawn{1000, 16, 3}, Drawn{3000, 20, 9}};
 
 // Effects that a robot at rest before a tracker can have.
 bool shows_at_postures(const std::string& effect) {
@@ -61,8 +64,9 @@ bool clashes(const InjectedEffect& effect, const std::vector<InjectedEffect>& ot
 void draw_effects(std::size_t count, UndeclaredCase& of, Rng& rng) {
   const bool own = of.kind == UndeclaredKind::kOwn;
   std::span<const std::string> names = own ? truth::own_effects() : truth::library_effects();
-  if (of.number < kFirstOfAllEffects)
-    names = names.first(own ? kFirstOwnEffects : kFirstLibraryEffects);
+  const auto drawn =
+      std::ranges::find_if(kDrawn, [&](const Drawn& d) { return of.number < d.below; });
+  if (drawn != kDrawn.end()) names = names.first(own ? drawn->own : drawn->library);
   while (of.world.effects.size() < count) {
     const auto effect = draw_effect(names, of, rng);
     if (effect && !clashes(*effect, of.world.effects)) of.world.effects.push_back(*effect);

@@ -62,6 +62,20 @@ struct Ripple {
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
 };
 
+struct Bend {
+  double curvature = 0.0;  ///< 1/m
+  double axis_rad = 0.0;   ///< of the cylinder, from the tag's x
+
+  [[nodiscard]] Eigen::Vector3d corner_m(const Eigen::Vector3d& flat_m) const {
+    const Eigen::AngleAxisd to_cylinder(-axis_rad, Eigen::Vector3d::UnitZ());
+    Eigen::Vector3d p = to_cylinder * flat_m;
+    const double angle = p.y() * curvature;
+    p.z() = (1.0 - std::cos(angle)) / curvature;
+    p.y() = std::sin(angle) / curvature;
+    return to_cylinder.inverse() * p;
+  }
+};
+
 struct Chequer {
   double field_px = 1.0;
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
@@ -78,6 +92,7 @@ struct Undeclared {
   std::optional<Chequer> chequer;
   std::optional<Ripple> ripple;
   std::map<TagId, double> size_factor;
+  std::map<TagId, Bend> bends;
   std::map<TagId, Slip> slips;
 };
 
@@ -128,6 +143,23 @@ Slip slip_of(const InjectedEffect& effect, double tag_size_m, double time_s, Rng
   return {time_s, T};
 }
 
+// The squares of two corners' distances from the cylinder's axis differ by size^2 sin(2 axis).
+Bend bend_of(const InjectedEffect& effect, double tag_size_m) {
+  const double difference = tag_size_m * tag_size_m * std::sin(2.0 * effect.detail);
+  return {4.0 * effect.size / difference, effect.detail};
+}
+
+void add_intrinsics(const InjectedEffect& effect, Rng& rng, CameraModel& camera) {
+  if (effect.with != "centre") {
+    camera.fx *= 1.0 + effect.size;
+    camera.fy *= 1.0 + effect.size;
+    return;
+  }
+  const double direction = rng.uniform(0.0, kTwoPi);
+  camera.cx += effect.size * std::cos(direction);
+  camera.cy += effect.size * std::sin(direction);
+}
+
 void add_lens(const InjectedEffect& effect, CameraModel& camera) {
   const std::size_t first = effect.with == "tangential" ? 2 : 0;
   camera.distortion[first] += effect.size;
@@ -147,6 +179,11 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, 
     out.clock.jumps_at_s = time_s;
   } else if (effect.effect == "lens_distortion") {
     add_lens(effect, out.camera);
+  } else if (effect.effect == "intrinsics") {
+    add_intrinsics(effect, rng, out.camera);
+  } else if (effect.effect == "bent_tag") {
+    const TagId id = tag_named(robot, effect.place);
+    out.bends[id] = bend_of(effect, robot.markers.size_m(id));
   } else if (effect.effect == "rolling_shutter") {
     out.line_s = effect.size;
     out.reference_row = effect.detail * robot.camera.height;
@@ -168,7 +205,8 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, 
     const TagId id = tag_named(robot, effect.place);
     out.slips[id] = slip_of(effect, robot.markers.size_m(id), time_s, rng);
   } else {
-    KINESCOPE_CHECK(is_mechanical(effect), "an effect has a known name");
+    KINESCOPE_CHECK(is_mechanical(effect) || effect.effect == "quantisation",
+                    "an effect has a known name");
   }
 }
 
@@ -187,9 +225,12 @@ class Eye {
     if (view_cosine(T) < kFromBehind) return std::nullopt;
     const auto factor = un_.size_factor.find(marker.id);
     const double scale = factor == un_.size_factor.end() ? 1.0 : factor->second;
+    const auto bend = un_.bends.find(marker.id);
     std::vector<Eigen::Vector2d> corners;
     for (const Eigen::Vector3d& corner : robot_.markers.corners_m(marker.id)) {
-      const auto pixel = expose(marker, scale * corner, stamp_s, T);
+      const Eigen::Vector3d on_tag =
+          bend == un_.bends.end() ? corner : bend->second.corner_m(corner);
+      const auto pixel = expose(marker, scale * on_tag, stamp_s, T);
       if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() > robot_.camera.width - 1 ||
           pixel->y() > robot_.camera.height - 1)
         return std::nullopt;
@@ -338,6 +379,14 @@ double rounded(double value, double step) {
   return step > 0.0 ? step * std::round(value / step) : value;
 }
 
+// Distance of the steps in which a joint's reading comes; 0: none.
+double step_of(const EffectWorldOptions& options, const FilmedRobot& robot, const Joint& joint) {
+  for (const InjectedEffect& effect : options.effects)
+    if (effect.effect == "quantisation" && effect.place == joint.name) return effect.size;
+  const bool slides = joint.type == JointType::kPrismatic;
+  return options.encoder_step_rad * (slides ? robot.prismatic_m_per_rad : 1.0);
+}
+
 void log_encoders(const EffectWorldOptions& options, const FilmedRobot& robot, World& world) {
   Rng rng = Rng::from_name("stamps of a filmed robot", options.seed);
   const double step_s = 1.0 / options.log_rate_hz;
@@ -350,10 +399,8 @@ void log_encoders(const EffectWorldOptions& options, const FilmedRobot& robot, W
     const double t = begin_s + step_s * (i + jitter);
     world.log.times_s.push_back(t);
     for (std::size_t j = 0; j < robot.tree.joints.size(); ++j) {
-      const bool slides = robot.tree.joints[j].type == JointType::kPrismatic;
-      const double unit = slides ? robot.prismatic_m_per_rad : 1.0;
       world.log.values(i, static_cast<Eigen::Index>(j)) =
-          rounded(robot.motions[j].value(t), options.encoder_step_rad * unit);
+          rounded(robot.motions[j].value(t), step_of(options, robot, robot.tree.joints[j]));
     }
   }
 }

@@ -23,7 +23,7 @@ struct Strength {
   Unit kind = Unit::kPlain;
 };
 
-constexpr std::array<Strength, 29> kWeakest{{
+constexpr std::array<Strength, 32> kWeakest{{
     {"time_offset", 0.5e-3},
     {"clock_drift", 5e-5},  // 0.5 ms rms over 33 s
     {"encoder_scale", 500e-6},
@@ -36,6 +36,9 @@ constexpr std::array<Strength, 29> kWeakest{{
     {"curved_slider", 0.005},  // turns the carriage by 0.03 deg at the end of 0.1 m
     {"axis_wobble", 0.03 * kRadPerDegree},
     {"lens_distortion", 0.002},
+    {"intrinsics", 2e-3},
+    {"bent_tag", 0.1e-3},
+    {"quantisation", 0.06 * kRadPerDegree, Unit::kAngle},  // 0.017 deg rms
     {"rolling_shutter", 1e-6},
     {"tag_size", 1e-3},  // 0.05 mm of 50 mm
     {"tag_slip", 0.3e-3},
@@ -55,10 +58,11 @@ constexpr std::array<Strength, 29> kWeakest{{
     {"own_growth", 0.5e-3},
 }};
 
-constexpr std::array<std::string_view, 17> kOnJoints{
-    "encoder_scale", "eccentricity", "gear_error",       "backlash",      "compliance", "coupling",
-    "helical",       "axis_wobble",  "curved_slider",    "zero_jump",     "zero_drift", "own_tanh",
-    "own_speed",     "own_product",  "own_acceleration", "own_vibration", "own_creep"};
+constexpr std::array<std::string_view, 18> kOnJoints{
+    "encoder_scale", "eccentricity", "gear_error",  "backlash",      "compliance",
+    "coupling",      "helical",      "axis_wobble", "curved_slider", "zero_jump",
+    "zero_drift",    "own_tanh",     "own_speed",   "own_product",   "own_acceleration",
+    "own_vibration", "own_creep",    "quantisation"};
 constexpr std::array<std::string_view, 4> kAtATime{"tag_slip", "camera_bump", "zero_jump",
                                                    "clock_jump"};
 constexpr std::array<std::string_view, 6> kByAnother{
@@ -85,6 +89,7 @@ double detail_of(std::string_view effect, const Joint* joint, Rng& rng) {
   if (among(kAtATime, effect)) return rng.uniform(0.25, 0.75);
   if (effect == "camera_drift" || effect == "zero_drift") return rng.uniform(0.2, 2.0);
   if (effect == "own_chequer" || effect == "own_ripple") return rng.uniform(60.0, 120.0);
+  if (effect == "bent_tag") return rng.uniform(0.2, 1.4);
   if (effect == "own_vibration") return rng.uniform(2.0, 6.0);
   if (effect != "gear_error") return 0.0;
   return joint->type == JointType::kPrismatic ? rng.uniform(15.0, 60.0) : rng.uniform(6.0, 40.0);
@@ -126,7 +131,8 @@ const std::vector<std::string>& library_effects() {
       "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity", "gear_error",
       "backlash",      "compliance",      "coupling",        "helical",      "axis_wobble",
       "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",     "tag_slip",
-      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",   "clock_jump"};
+      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",   "clock_jump",
+      "intrinsics",    "bent_tag",        "quantisation"};
   return names;
 }
 
@@ -137,6 +143,13 @@ const std::vector<std::string>& own_effects() {
   return names;
 }
 
+std::string place_in_library(const InjectedEffect& effect) {
+  if (effect.place != "camera") return effect.place;
+  if (effect.effect == "intrinsics")
+    return effect.with.empty() ? "camera focal length" : "camera " + effect.with;
+  return effect.with.empty() ? effect.place : effect.place + " " + effect.with;
+}
+
 bool sits_on_joint(std::string_view effect) { return among(kOnJoints, effect); }
 
 bool is_late_joint(const InjectedEffect& effect) {
@@ -144,6 +157,7 @@ bool is_late_joint(const InjectedEffect& effect) {
 }
 
 bool is_mechanical(const InjectedEffect& effect) {
+  if (effect.effect == "quantisation") return false;
   return sits_on_joint(effect.effect) || is_late_joint(effect) || effect.effect == "own_growth";
 }
 
@@ -160,7 +174,7 @@ bool can_have(JointType type, std::string_view effect) {
 std::string_view size_unit(std::string_view effect, JointType type) {
   if (effect == "time_offset" || effect == "clock_jump" || effect == "rolling_shutter") return "s";
   if (effect == "clock_drift") return "s/s";
-  if (effect == "helical" || effect == "tag_slip") return "m";
+  if (effect == "helical" || effect == "tag_slip" || effect == "bent_tag") return "m";
   if (effect == "curved_slider") return "1/m";
   if (effect == "axis_wobble" || effect.starts_with("camera_")) return "rad";
   if (effect == "own_chequer" || effect == "own_ripple") return "px";
@@ -180,7 +194,7 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
   if (effect.starts_with("tag_")) {
     for (const Marker& marker : robot.tree.markers) {
       // A tag that never moves may as well be larger and further away.
-      if (effect == "tag_size" && marker.link == LinkId{0}) continue;
+      if (effect != "tag_slip" && marker.link == LinkId{0}) continue;
       places.push_back(fmt::format("tag_{}", marker.id.value));
     }
     const auto slides = std::ranges::count(robot.tree.joints, JointType::kPrismatic, &Joint::type);
@@ -196,6 +210,9 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
     Rng rng = Rng::from_name(fmt::format("weakest {} {}", effect, place), robot.seed);
     out.push_back(
         {std::string(effect), place, strength_of(effect).size, detail_of(effect, nullptr, rng)});
+    if (effect != "intrinsics") continue;
+    constexpr double kWeakestShift = 2.0;  // px
+    out.push_back({std::string(effect), place, kWeakestShift, 0.0, "centre"});
   }
   return out;
 }

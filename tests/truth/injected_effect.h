@@ -31,6 +31,11 @@ namespace kinescope::truth {
 ///                    the joint turns once, seen from the frame (0 and 1 would be a tilted bearing,
 ///                    a bent shaft: no wobble but another geometry)
 ///   lens_distortion  1, change of k1; detail: of k2. `with` "tangential": of p1 and p2
+///   intrinsics       1, change of the focal length; `with` "centre": px, of the image's centre,
+///                    somewhere
+///   bent_tag         m, the tag lies on a cylinder: two opposite corners that far before the
+///                    plane, two behind; detail: rad, of the cylinder's axis from the tag's x
+///   quantisation     rad (m), the joint's reading is rounded to a multiple of that
 ///   rolling_shutter  s a row; detail: row exposed at the frame's stamp, share of the height
 ///   tag_size         1, the tag (on "tags": every one) is (1 + size) x as large as declared
 ///   tag_slip         m, in the tag's plane, with a small turn; detail: when, share of the time
@@ -68,11 +73,15 @@ struct InjectedEffect {
 [[nodiscard]] const std::vector<std::string>& library_effects();
 [[nodiscard]] const std::vector<std::string>& own_effects();
 
+/// The place under which the library has the effect: variants of a camera's have one each, "camera
+/// tangential".
+[[nodiscard]] std::string place_in_library(const InjectedEffect& effect);
+
 /// True for effects that sit on a joint; the others sit on a tag, the camera or the clock.
 [[nodiscard]] bool sits_on_joint(std::string_view effect);
 /// A time_offset that is not the clock's.
 [[nodiscard]] bool is_late_joint(const InjectedEffect& effect);
-/// Of the robot's own mechanics: of joints, late readings, growth.
+/// Of the robot's own mechanics: of joints, late readings, growth; not of what the log makes of it.
 [[nodiscard]] bool is_mechanical(const InjectedEffect& effect);
 /// Share, 0 at 0 and 1 at the end, of what creeps towards rest with a time constant.
 [[nodiscard]] double creep(double t_s, double time_constant_s, double duration_s);

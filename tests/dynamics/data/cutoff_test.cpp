@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "dynamics/data/smoothing_spline.h"
 #include "dynamics/data/spectrum.h"
 #include "kinematics/core/rng.h"
+#include "kinematics/log/smoothing_spline.h"
 
 namespace kinescope {
 namespace {

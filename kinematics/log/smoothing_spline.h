@@ -17,6 +17,10 @@ class SmoothingSpline {
   /// time they stand for, so that the cut-off does not depend on their density. O(samples x
   /// signals).
   SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values, double cutoff_hz);
+  /// The same with the samples' own weights, positive with a mean of 1. The cut-off is that of even
+  /// samples of equal weight.
+  SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values,
+                  const Eigen::VectorXd& weights, double cutoff_hz);
 
   /// The `derivative`-th derivative (0 to 2) at times inside the data: times x signals.
   [[nodiscard]] Eigen::MatrixXd evaluate(const Eigen::VectorXd& t_s, int derivative = 0) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dynamics/data/smoothing_spline.h"
+#include "kinematics/log/smoothing_spline.h"
 
 #include <algorithm>
 #include <array>
@@ -96,9 +96,14 @@ Place place_of(double t_s, double start_s, double step_s, Eigen::Index intervals
 }  // namespace
 
 SmoothingSpline::SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values,
-                                 double cutoff_hz) {
+                                 double cutoff_hz)
+    : SmoothingSpline(t_s, values, time_weights(t_s), cutoff_hz) {}
+
+SmoothingSpline::SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values,
+                                 const Eigen::VectorXd& weights, double cutoff_hz) {
   const Eigen::Index n = t_s.size();
-  KINESCOPE_CHECK(n >= kFewest && values.rows() == n, "a spline wants 8 samples or more");
+  KINESCOPE_CHECK(n >= kFewest && values.rows() == n && weights.size() == n,
+                  "a spline wants 8 samples or more");
   KINESCOPE_CHECK(cutoff_hz > 0.0, "the cut-off must be positive");
   const double duration_s = t_s(n - 1) - t_s(0);
   const double step_s = duration_s / static_cast<double>(n - 1);
@@ -121,7 +126,6 @@ SmoothingSpline::SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::Matrix
   };
   const Eigen::Matrix<double, kBasis, kBasis> rough = lambda * roughness();
   for (Eigen::Index k = 0; k < intervals_; ++k) add(k, rough);
-  const Eigen::VectorXd weights = time_weights(t_s);
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(size, values.cols());
   Eigen::Matrix<double, kBasis, kBasis> block = Eigen::Matrix<double, kBasis, kBasis>::Zero();
   Eigen::Index open = 0;

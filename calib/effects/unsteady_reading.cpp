@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/unsteady_reading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kinematics/log/smoothing_spline.h"
+
+namespace kinescope::effects {
+namespace {
+
+// Of a grid rounded to its steps, and of any value within one.
+const double kRoundedSigma = 1.0 / std::sqrt(12.0);
+constexpr Eigen::Index kFewest = 32;
+// Of the range: a grid or noise that is finer is no matter beside what a camera sees.
+constexpr double kFinest = 1e-4;
+
+/// A value that is known at a time.
+struct Node {
+  double t_s = 0.0;
+  double value = 0.0;
+  double weight = 0.0;  ///< inverse variance
+};
+
+struct Columns {
+  Eigen::VectorXd t_s;
+  Eigen::VectorXd value;
+  Eigen::VectorXd weight;
+};
+
+Columns columns_of(const std::vector<Node>& nodes) {
+  const auto n = static_cast<Eigen::Index>(nodes.size());
+  Columns out{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Node& node = nodes[static_cast<std::size_t>(i)];
+    out.t_s[i] = node.t_s;
+    out.value[i] = node.value;
+    out.weight[i] = node.weight;
+  }
+  out.weight /= out.weight.mean();
+  return out;
+}
+
+SmoothingSpline spline_through(const std::vector<Node>& nodes, double cutoff_hz) {
+  const Columns columns = columns_of(nodes);
+  return {columns.t_s, columns.value, columns.weight, cutoff_hz};
+}
+
+// Squares, over the mean weight, of every other node against the spline through the rest.
+double missed_squares(const std::vector<Node>& nodes, double cutoff_hz) {
+  double out = 0.0;
+  for (std::size_t first : {0U, 1U}) {
+    std::vector<Node> kept;
+    std::vector<Node> left_out;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const bool at_end = i == 0 || i + 1 == nodes.size();
+      (i % 2 == first && !at_end ? left_out : kept).push_back(nodes[i]);
+    }
+    const Columns there = columns_of(left_out);
+    const Eigen::VectorXd predicted = spline_through(kept, cutoff_hz).evaluate(there.t_s);
+    out += there.weight.dot((there.value - predicted).cwiseAbs2());
+  }
+  return out;
+}
+
+// The cut-off under which every other node is predicted best, Hz.
+double best_cutoff(std::vector<Node> nodes) {
+  constexpr std::size_t kMostNodes = 4000;  // that is enough to know it by
+  constexpr int kCutoffs = 12;
+  constexpr double kSlowest = 0.5;  // Hz, of a motion
+  if (nodes.size() > kMostNodes) {
+    const auto skipped = static_cast<std::ptrdiff_t>((nodes.size() - kMostNodes) / 2);
+    nodes = {nodes.begin() + skipped, nodes.begin() + skipped + kMostNodes};
+  }
+  const double rate_hz =
+      static_cast<double>(nodes.size() - 1) / (nodes.back().t_s - nodes.front().t_s);
+  double best = 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kCutoffs; ++k) {
+    // Up to the rate of the nodes: the spline passes through them.
+    const double cutoff_hz =
+        kSlowest * std::pow(std::max(1.0, rate_hz / kSlowest), k / (kCutoffs - 1.0));
+    const double squares = missed_squares(nodes, cutoff_hz);
+    if (squares < least) {
+      least = squares;
+      best = cutoff_hz;
+    }
+  }
+  return best;
+}
+
+std::vector<Node> samples(const std::vector<double>& times_s, const Eigen::VectorXd& values) {
+  std::vector<Node> out;
+  for (std::size_t i = 0; i < times_s.size(); ++i)
+    out.push_back({times_s[i], values[static_cast<Eigen::Index>(i)], 1.0});
+  return out;
+}
+
+// Edges of the steps, where a reading goes from one to another: some time between two samples.
+std::vector<Node> edges(const std::vector<double>& times_s, const Eigen::VectorXd& values) {
+  std::vector<Node> out;
+  std::size_t since = 0;  // sample from which the reading has not changed
+  for (std::size_t i = 1; i < times_s.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (values[at] == values[at - 1]) continue;
+    const double change = values[at] - values[at - 1];
+    const double between_s = times_s[i] - times_s[i - 1];
+    const double held_s = std::max(between_s, times_s[i] - times_s[since]);
+    const double sigma = kRoundedSigma * change * between_s / held_s;
+    out.push_back({0.5 * (times_s[i - 1] + times_s[i]), 0.5 * (values[at - 1] + values[at]),
+                   1.0 / (sigma * sigma)});
+    since = i;
+  }
+  return out;
+}
+
+// Where a reading rests it says that the value is within its step, once, however long it rests.
+std::vector<Node> with_rests(std::vector<Node> out, const std::vector<double>& times_s,
+                             const Eigen::VectorXd& values, double step) {
+  const double information = 1.0 / (kRoundedSigma * kRoundedSigma * step * step);
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= times_s.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (i < times_s.size() && values[at] == values[at - 1]) continue;
+    for (std::size_t k = begin; k < i; ++k)
+      out.push_back({times_s[k], values[at - 1], information / static_cast<double>(i - begin)});
+    begin = i;
+  }
+  std::ranges::stable_sort(out, {}, &Node::t_s);
+  return out;
+}
+
+// What fifth differences leave: noise, and little of a motion.
+double noise_at_most(const Eigen::VectorXd& values) {
+  constexpr int kOrder = 5;
+  constexpr double kOfNoise = 252.0;  // squares of 1 5 10 10 5 1
+  Eigen::VectorXd d = values;
+  for (int k = 0; k < kOrder; ++k) d = (d.tail(d.size() - 1) - d.head(d.size() - 1)).eval();
+  return std::sqrt(d.squaredNorm() / (kOfNoise * static_cast<double>(d.size())));
+}
+
+Eigen::Index changes_of(const Eigen::VectorXd& values) {
+  Eigen::Index out = 0;
+  for (Eigen::Index i = 1; i < values.size(); ++i) out += values[i] != values[i - 1] ? 1 : 0;
+  return out;
+}
+
+}  // namespace
+
+std::optional<double> step_of(const Eigen::VectorXd& values) {
+  constexpr double kOnGrid = 0.02;  // of a step: digits that were cut off
+  std::vector<double> changes;
+  for (Eigen::Index i = 1; i < values.size(); ++i)
+    if (values[i] != values[i - 1]) changes.push_back(std::abs(values[i] - values[i - 1]));
+  if (changes.empty()) return std::nullopt;
+  std::ranges::sort(changes);
+  const double range = values.maxCoeff() - values.minCoeff();
+  if (changes.front() < kFinest * range) return std::nullopt;
+  // The smallest first: each says the step more exactly than those before.
+  double step = changes.front();
+  double count = 0.0;
+  double sum = 0.0;
+  for (const double change : changes) {
+    const double steps = std::round(change / step);
+    if (std::abs(change - steps * step) > kOnGrid * changes.front()) return std::nullopt;
+    count += steps;
+    sum += change;
+    step = sum / count;
+  }
+  return step;
+}
+
+std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
+                                                const Eigen::VectorXd& values) {
+  const Eigen::Index changes = changes_of(values);
+  if (changes < kFewest) return std::nullopt;
+  const std::optional<double> step = step_of(values);
+  const double range = values.maxCoeff() - values.minCoeff();
+  if (!step && noise_at_most(values) < kFinest * range) return std::nullopt;
+  UnsteadyReading out;
+  out.times_s = times_s;
+  out.in_steps = step.has_value();
+  const bool rests_on_steps = step && changes < values.size() / 2;
+  std::vector<Node> nodes = rests_on_steps ? edges(times_s, values) : samples(times_s, values);
+  const double cutoff_hz = best_cutoff(nodes);
+  if (rests_on_steps) nodes = with_rests(std::move(nodes), times_s, values, *step);
+  const Eigen::Map<const Eigen::VectorXd> at(times_s.data(), values.size());
+  out.motion = spline_through(nodes, cutoff_hz).evaluate(at);
+  if (step) {
+    const double half = 0.5 * *step;
+    out.motion = out.motion.cwiseMax((values.array() - half).matrix())
+                     .cwiseMin((values.array() + half).matrix());
+  }
+  out.size = step.value_or(std::sqrt((out.motion - values).array().square().mean()));
+  if (!(out.size > 0.0)) return std::nullopt;
+  return out;
+}
+
+}  // namespace kinescope::effects

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Readings that jump about a motion that does not: in steps (a log of few digits, an encoder of few
+// counts) or by noise (a potentiometer).
+// Method  a smoothing spline, its cut-off by cross-validation over every other sample (Craven and
+//         Wahba 1979; Stone 1974). A reading that rests on its steps is known best where it goes on
+//         to the next one: there it passes the edge between the two (level crossings, Mark and Todd
+//         1981). What is found stays within the step that is read.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace kinescope::effects {
+
+struct UnsteadyReading {
+  std::vector<double> times_s;  ///< of the samples
+  bool in_steps = false;
+  double size = 0.0;        ///< distance of the steps, or standard deviation of the noise
+  Eigen::VectorXd motion;   ///< samples, in the unit of the reading
+};
+
+/// Distance of the steps that `values` come in. Nothing for values that lie on no grid, or on one
+/// that is finer than a share of 1e-4 of their range.
+[[nodiscard]] std::optional<double> step_of(const Eigen::VectorXd& values);
+
+/// `times_s` increasing. Nothing where the samples are too few, do not move, or are unsteady by
+/// less than that share. A constant is not seen: a reading that is cut off has another zero than
+/// one that is rounded.
+[[nodiscard]] std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
+                                                              const Eigen::VectorXd& values);
+
+}  // namespace kinescope::effects

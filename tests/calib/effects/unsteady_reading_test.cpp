@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/effects/unsteady_reading.h"
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "kinematics/core/error.h"
+#include "kinematics/core/rng.h"
+
+namespace kinescope::effects {
+namespace {
+
+constexpr double kStep = 0.01;
+constexpr double kExact = 1e-12;
+
+struct Read {
+  std::vector<double> times_s;
+  Eigen::VectorXd truth;
+  Eigen::VectorXd reading;
+};
+
+// 1.5 rad/s at most.
+Read moved(double rate_hz = 200.0) {
+  Read out;
+  out.truth.resize(2000);
+  for (Eigen::Index i = 0; i < out.truth.size(); ++i) {
+    const double t = static_cast<double>(i) / rate_hz;
+    out.times_s.push_back(t);
+    out.truth[i] = 0.5 * std::sin(2.0 * t) + 0.1 * std::sin(5.0 * t);
+  }
+  out.reading = out.truth;
+  return out;
+}
+
+Read in_steps(double step, double rate_hz = 200.0) {
+  Read out = moved(rate_hz);
+  for (double& value : out.reading) value = step * std::round(value / step);
+  return out;
+}
+
+double rms(const Eigen::VectorXd& error) { return std::sqrt(error.array().square().mean()); }
+
+// What the reading is off by, but for its zero.
+double rms_left(const Read& read) {
+  const auto found = unsteady_reading(read.times_s, read.reading);
+  KINESCOPE_CHECK(found, "the reading is unsteady");
+  Eigen::VectorXd off = found->motion - read.truth;
+  off.array() -= off.mean();
+  return rms(off);
+}
+
+TEST(UnsteadyReading, TheStepIsThatOfTheGrid) {
+  for (const double step : {0.05, kStep, 2e-3}) {
+    const auto found = step_of(in_steps(step).reading);
+    ASSERT_TRUE(found) << step;
+    EXPECT_NEAR(*found, step, kExact);
+  }
+}
+
+// Written with four digits: steps of 0.0087 or 0.0088.
+TEST(UnsteadyReading, DigitsThatWereCutOffAreNoOtherGrid) {
+  constexpr double kHalfDegree = 0.00872664626;
+  Read read = in_steps(kHalfDegree);
+  for (double& value : read.reading) value = 1e-4 * std::round(value / 1e-4);
+  const auto step = step_of(read.reading);
+  ASSERT_TRUE(step);
+  EXPECT_NEAR(*step, kHalfDegree, 1e-6);
+}
+
+TEST(UnsteadyReading, AFineGridAndASmoothMotionHaveNothingToSay) {
+  EXPECT_FALSE(step_of(in_steps(1e-5).reading));
+  EXPECT_FALSE(step_of(moved().reading));
+  EXPECT_FALSE(step_of(Eigen::VectorXd::Constant(100, 0.3)));
+  EXPECT_FALSE(step_of(Eigen::VectorXd()));
+  EXPECT_FALSE(unsteady_reading(moved().times_s, moved().reading));
+  EXPECT_FALSE(unsteady_reading(in_steps(1e-5).times_s, in_steps(1e-5).reading));
+  EXPECT_FALSE(unsteady_reading({}, Eigen::VectorXd()));
+  EXPECT_FALSE(unsteady_reading({0.0}, Eigen::VectorXd::Constant(1, 0.3)));
+}
+
+// Three samples on each step: the edges tell the value to a fraction of a step.
+TEST(UnsteadyReading, BetweenTheStepsTheTimesOfTheChangesTellTheValue) {
+  const Read read = in_steps(kStep);
+  const auto found = unsteady_reading(read.times_s, read.reading);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->in_steps);
+  EXPECT_NEAR(found->size, kStep, kExact);
+  EXPECT_LE((found->motion - read.reading).cwiseAbs().maxCoeff(), 0.5 * kStep + kExact);
+  EXPECT_NEAR(rms(read.reading - read.truth), kStep / std::sqrt(12.0), 0.05 * kStep);
+  EXPECT_LT(rms_left(read), 0.06 * kStep);
+}
+
+// A tenth of a degree beside a motion of up to four steps a sample.
+TEST(UnsteadyReading, StepsThatAMotionLeapsOverAreNoise) {
+  const Read read = in_steps(0.1 * std::numbers::pi / 180.0);
+  EXPECT_LT(rms_left(read), 0.5 * rms(read.reading - read.truth));
+}
+
+// A counter that cuts off is behind by half a step, whichever way the joint moves.
+TEST(UnsteadyReading, CuttingOffIsAnotherZero) {
+  Read read = moved();
+  for (double& value : read.reading) value = kStep * std::floor(value / kStep);
+  EXPECT_LT(rms_left(read), 0.06 * kStep);
+}
+
+TEST(UnsteadyReading, NoiseIsAsLargeAsItIs) {
+  constexpr double kNoise = 2e-3;
+  Read read = moved();
+  Rng rng(3);
+  for (double& value : read.reading) value += rng.normal(kNoise);
+  const auto found = unsteady_reading(read.times_s, read.reading);
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->in_steps);
+  EXPECT_NEAR(found->size, kNoise, 0.1 * kNoise);
+  EXPECT_LT(rms_left(read), 0.4 * kNoise);
+}
+
+}  // namespace
+}  // namespace kinescope::effects
