@@ -141,11 +141,11 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   const JointLog& log = read.log;
   JointLog in_si = log;
   to_si(in_si, found.unit_factors);
+  CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   std::vector<std::string> warnings = log.warnings;
-  for (std::string& warning : range_warnings(in_si, tree, found)) {
+  for (std::string& warning : range_warnings(in_si, tree, found, corrected.faded)) {
     warnings.push_back(std::move(warning));
   }
-  CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   from_si(corrected.log, log, found.unit_factors);
   write_file_atomically(options.output, corrected_csv(table, read, corrected.log));
   for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
