@@ -115,6 +115,8 @@ void check_place(const FittedEffect& effect, const KinematicTree& tree, const Jo
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");
   require_channels(effect, tree.joints[joint->index()], log);
+  if (const auto decides = deciding_joint(effect, tree))
+    require_channels(effect, tree.joints[decides->index()], log);
   if (!effects::is_sag(effect.id)) return;
   for (const Joint& other : tree.joints) {
     if (!other.channel.empty() && moves_load_of(tree, *joint, other))

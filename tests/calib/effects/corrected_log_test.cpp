@@ -420,7 +420,9 @@ TEST(CorrectedLog, AnotherLogOrRobotIsRefused) {
   expect_bad_input({fitted("eccentricity", "q1", {0.01}, 1.0)}, log, "eccentricity at q1");
   log.channels[0] = "another";
   expect_bad_input({fitted("encoder_scale", "q2", {0.01})}, log, "q2");
-  expect_bad_input({fitted("coupling", "q1", {0.01}, 1.0)}, log, "coupling at q1");
+  expect_bad_input({fitted("coupling", "q1", {0.01}, 1.0)}, log,
+                   "coupling at q1: no column 'axis2'");
+  expect_bad_input({fitted("coupling", "q1", {0.01}, 7.0)}, log, "no column for what it follows");
   EXPECT_NO_THROW(static_cast<void>(undo({fitted("encoder_scale", "q1", {0.01})}, log)));
 }
 
