@@ -112,6 +112,8 @@ KinematicTree tree_of_run(const std::filesystem::path& run_folder,
   return tree;
 }
 
+void print_warning(const std::string& warning) { fmt::print(stderr, "warning: {}\n", warning); }
+
 void to_si(JointLog& log, const std::map<std::string, double>& factors) {
   for (const auto& [name, factor] : factors) {
     if (const auto channel = log.channel(name)) log.values.col(*channel) *= factor;
@@ -139,16 +141,18 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   const CsvTable table = read_csv(options.log, RaggedRows::kSetAside);
   const TableLog read = joint_log_of(columns_of_run(table, found.channels));
   const JointLog& log = read.log;
+  // Beforehand: what was left out of the log may be why it is refused.
+  for (const std::string& warning : log.warnings) print_warning(warning);
   JointLog in_si = log;
   to_si(in_si, found.unit_factors);
+  CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   std::vector<std::string> warnings = log.warnings;
-  for (std::string& warning : range_warnings(in_si, tree, found)) {
+  for (std::string& warning : range_warnings(in_si, tree, found, corrected.faded)) {
+    print_warning(warning);
     warnings.push_back(std::move(warning));
   }
-  CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   from_si(corrected.log, log, found.unit_factors);
   write_file_atomically(options.output, corrected_csv(table, read, corrected.log));
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   if (console.json) {
     const nlohmann::json out{{"undone", effects_list(corrected.undone)},
                              {"left", effects_list(corrected.left)},

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "calib/effects/observed_range.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -50,6 +51,7 @@ void take_values(const Calibration& calibration, const std::vector<Correction>& 
     if (!effect.table.empty()) effect.table.error = effect.table_shares * effect.values;
   }
   KINESCOPE_CHECK(next == values.size(), "a value for each number of the effects");
+  for (FittedEffect& effect : effects) effect.range = observed_range(effect, calibration.tree);
 }
 
 }  // namespace

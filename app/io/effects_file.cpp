@@ -66,10 +66,22 @@ ErrorTable table_of(const json& table, const std::string& name, const std::files
   return out;
 }
 
+// Of a joint or an effect; none where it is absent or not known.
+std::optional<JointLimits> range_of(const json& entry, const std::filesystem::path& path) {
+  const auto range = entry.find("range");
+  if (range == entry.end()) return std::nullopt;
+  if (!range->is_array() || range->size() != 2) throw wrong(path, "'range' is no pair of numbers");
+  if ((*range)[0].is_null() || (*range)[1].is_null()) return std::nullopt;
+  const JointLimits out{finite((*range)[0], path, "range"), finite((*range)[1], path, "range")};
+  if (!(out.lower <= out.upper)) throw wrong(path, "'range' ends below where it begins");
+  return out;
+}
+
 FittedEffect effect_of(const json& entry, const std::filesystem::path& path) {
   FittedEffect out;
   out.id = {word(entry, "effect", path), word(entry, "place", path)};
   const std::string name = fmt::format("{} at {}", out.id.effect, out.id.place);
+  out.range = range_of(entry, path);
   if (const auto table = entry.find("table"); table != entry.end()) {
     out.scan = finite(entry.value("at", json()), path, name + ": at");
     out.table = table_of(*table, name, path);
@@ -108,14 +120,6 @@ std::vector<ChannelShare> couplings_of(const json& joint, const std::filesystem:
   return out;
 }
 
-std::optional<JointLimits> range_of(const json& joint, const std::filesystem::path& path) {
-  const auto range = joint.find("range");
-  if (range == joint.end()) return std::nullopt;
-  if (!range->is_array() || range->size() != 2) throw wrong(path, "'range' is no pair of numbers");
-  if ((*range)[0].is_null() || (*range)[1].is_null()) return std::nullopt;
-  return JointLimits{finite((*range)[0], path, "range"), finite((*range)[1], path, "range")};
-}
-
 std::map<std::string, double> unit_factors(const json& document,
                                            const std::filesystem::path& path) {
   std::map<std::string, double> out;
@@ -152,6 +156,7 @@ json effects_json(const std::vector<FittedEffect>& effects) {
                         {"error", numbers_of(effect.table.error)},
                         {"sigma", numbers_of(effect.table.sigma)}};
     }
+    if (effect.range) entry["range"] = {effect.range->lower, effect.range->upper};
     list.push_back(std::move(entry));
   }
   return list;

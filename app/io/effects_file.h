@@ -16,7 +16,8 @@
 
 namespace kinescope {
 
-/// A list: effect, place, at (the value of its scan), parameters (name, unit, value, reference).
+/// A list: effect, place, at (the value of its scan), parameters (name, unit, value, reference), of
+/// a curve its table, and the range of a joint over which the effect was observed.
 [[nodiscard]] nlohmann::json effects_json(const std::vector<FittedEffect>& effects);
 
 /// How channels become a joint's value (`Joint`), readings in SI where their unit was declared.

@@ -10,6 +10,7 @@
 
 #include "calib/effects/camera_effects.h"
 #include "calib/effects/joint_shares.h"
+#include "calib/effects/observed_range.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -87,6 +88,25 @@ Error refused(const JointLog& log, const FittedEffect& effect, const std::string
                    "give a log with the channels of the recording, and the run's own results");
 }
 
+// Throws unless the log says where the joint is.
+void require_channels(const FittedEffect& effect, const Joint& joint, const JointLog& log) {
+  std::vector<std::string> channels{joint.channel};
+  for (const ChannelShare& share : joint.couplings) channels.push_back(share.channel);
+  for (const std::string& channel : channels) {
+    if (!log.channel(channel)) throw refused(log, effect, fmt::format("no column '{}'", channel));
+  }
+}
+
+// True where the other joint turns what a joint carries, or the joint itself.
+bool moves_load_of(const KinematicTree& tree, JointId joint, const Joint& other) {
+  const auto behind = [&tree](JointId first, LinkId link) {
+    const std::vector<JointId> path = tree.path_to(link);
+    return std::ranges::find(path, first) != path.end();
+  };
+  return behind(joint, other.child) ||
+         behind(*tree.parent_joint(other.child), tree.joints[joint.index()].child);
+}
+
 // Throws for an effect at a joint that is not there.
 void check_place(const FittedEffect& effect, const KinematicTree& tree, const JointLog& log) {
   constexpr std::array<std::string_view, 9> kElsewhere{
@@ -95,8 +115,14 @@ void check_place(const FittedEffect& effect, const KinematicTree& tree, const Jo
   if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");
-  const std::string& channel = tree.joints[joint->index()].channel;
-  if (!log.channel(channel)) throw refused(log, effect, fmt::format("no column '{}'", channel));
+  require_channels(effect, tree.joints[joint->index()], log);
+  if (const auto decides = deciding_joint(effect, tree))
+    require_channels(effect, tree.joints[decides->index()], log);
+  if (!effects::is_sag(effect.id)) return;
+  for (const Joint& other : tree.joints) {
+    if (!other.channel.empty() && moves_load_of(tree, *joint, other))
+      require_channels(effect, other, log);
+  }
 }
 
 // True where the joint's channel drives a second one, which has no part in the effect.
@@ -152,10 +178,10 @@ struct Missing {
   Eigen::VectorXd value;  // instants
 };
 
-// Nothing for what no encoder shows.
-std::optional<Missing> missing_by(const FittedEffect& effect, const KinematicTree& tree,
-                                  const std::vector<effects::CameraEffect>& library,
-                                  const JointMotion& motion, const JointLog& log) {
+// Nothing for what no encoder shows. As if it had been observed everywhere.
+std::optional<Missing> missing_everywhere(const FittedEffect& effect, const KinematicTree& tree,
+                                          const std::vector<effects::CameraEffect>& library,
+                                          const JointMotion& motion, const JointLog& log) {
   check_place(effect, tree, log);
   if (!effect.table.empty()) {
     const std::size_t j = value_of(tree.joint(effect.id.place)).index();
@@ -179,6 +205,42 @@ std::optional<Missing> missing_by(const FittedEffect& effect, const KinematicTre
         fmt::format("{} numbers where it takes {}", effect.values.size(), corrections.size()));
   }
   return Missing{j, missing_value(effect, corrections, motion)};
+}
+
+// Values of the joint that an effect depends on; empty without a range to hold them against.
+Eigen::VectorXd deciding_values(const FittedEffect& effect, const KinematicTree& tree,
+                                const JointMotion& motion) {
+  const auto joint = effect.range ? deciding_joint(effect, tree) : std::nullopt;
+  if (!joint) return {};
+  return motion.value.col(static_cast<Eigen::Index>(joint->index()));
+}
+
+// Nothing for what no encoder shows.
+std::optional<Missing> missing_by(const FittedEffect& effect, const KinematicTree& tree,
+                                  const std::vector<effects::CameraEffect>& library,
+                                  const JointMotion& motion, const JointLog& log) {
+  std::optional<Missing> out = missing_everywhere(effect, tree, library, motion, log);
+  if (!out) return out;
+  const Eigen::VectorXd values = deciding_values(effect, tree, motion);
+  for (Eigen::Index i = 0; i < values.size(); ++i) out->value[i] *= range_weight(effect, values[i]);
+  return out;
+}
+
+// Nothing where the log stays within the effect's range.
+std::optional<FadedEffect> faded_part(const FittedEffect& effect, const KinematicTree& tree,
+                                      const JointMotion& motion) {
+  constexpr double kSame = 0.01;  // of the range; two drives of one path differ by as much
+  const Eigen::VectorXd values = deciding_values(effect, tree, motion);
+  if (values.size() == 0) return std::nullopt;
+  const double least = kSame * (effect.range->upper - effect.range->lower);
+  JointLimits reached = *effect.range;
+  for (const double value : values) {
+    if (!(beyond_range(effect, value) > least)) continue;
+    reached.lower = std::min(reached.lower, value);
+    reached.upper = std::max(reached.upper, value);
+  }
+  if (reached == *effect.range) return std::nullopt;
+  return FadedEffect{effect.id, value_of(deciding_joint(effect, tree)), *effect.range, reached};
 }
 
 // The world of the log with the effects in it: loads where they leave the joints.
@@ -211,7 +273,7 @@ effects::EffectWorld world_with(const JointLog& log, const KinematicTree& tree,
 CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
                            const std::vector<FittedEffect>& effects,
                            const std::optional<Eigen::Vector3d>& gravity_base) {
-  CorrectedLog out{log, {}, {}};
+  CorrectedLog out{log, {}, {}, {}};
   if (log.empty()) return out;
   const effects::EffectWorld world = world_with(log, tree, effects, gravity_base);
   const std::vector<effects::CameraEffect> library = effects::joint_effects(world);
@@ -221,6 +283,8 @@ CorrectedLog corrected_log(const JointLog& log, const KinematicTree& tree,
       const auto missing = missing_by(effect, tree, library, world.frames, log);
       undone = missing &&
                add_to_channel(missing->value, tree, tree.joints[missing->joint], log, out.log);
+      if (const auto faded = faded_part(effect, tree, world.frames); undone && faded)
+        out.faded.push_back(*faded);
     }
     (undone ? out.undone : out.left).push_back(effect.id);
   }

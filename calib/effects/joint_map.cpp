@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/effects/observed_range.h"
 #include "calib/effects/smooth_basis.h"
 
 namespace kinescope::effects {
@@ -43,14 +44,14 @@ CameraEffect joint_map(const Suspect& s) {
   out.table = [low, high](double length, const Eigen::MatrixXd& covariance,
                           Eigen::MatrixXd& shares) {
     // Lengths: straight lines between the points miss a draw of the process by 1.3 % of its spread
-    // (rms, half-way), and as far as it reaches.
+    // (rms, half-way), and as far as it reaches. Farther than it fades it is of no use.
     constexpr double kStep = 0.25;
     constexpr double kReach = 3.0;
-    const auto steps = static_cast<Eigen::Index>(
-        std::ceil((high - low + 2.0 * kReach * length) / (kStep * length)));
+    const double reach = std::min(kReach * length, kFadeShare * (high - low));
+    const auto steps =
+        static_cast<Eigen::Index>(std::ceil((high - low + 2.0 * reach) / (kStep * length)));
     ErrorTable table;
-    table.value =
-        Eigen::VectorXd::LinSpaced(steps + 1, low - kReach * length, high + kReach * length);
+    table.value = Eigen::VectorXd::LinSpaced(steps + 1, low - reach, high + reach);
     shares = SmoothBasis(low, high, length).at(table.value);
     shares.row(0).setZero();
     shares.row(steps).setZero();

@@ -37,6 +37,8 @@ struct FittedEffect {
   /// Of a joint_map, whose parameters mean nothing one by one: what they make, and of which shares.
   ErrorTable table;
   Eigen::MatrixXd table_shares;  ///< points of the table x values
+  /// Values of a joint over which it was observed (observed_range.h). Not set: it counts anywhere.
+  std::optional<JointLimits> range = {};
 };
 
 struct CalibrationTrace {

@@ -22,6 +22,7 @@ struct Answered {
   Outcome outcome;
   std::string difference;  // of the structure
   nlohmann::json trace;
+  nlohmann::json calibration;
 };
 
 Answered run_case(int number, Damage damage = Damage::kNone) {
@@ -37,6 +38,7 @@ Answered run_case(int number, Damage damage = Damage::kNone) {
   answered.difference =
       acceptance::structure_difference(acceptance::truth_of(world), read_urdf(out / "robot.urdf"));
   answered.trace = nlohmann::json::parse(read_text_file(out / "trace.json"));
+  answered.calibration = nlohmann::json::parse(read_text_file(out / "calibration.json"));
   return answered;
 }
 
@@ -46,6 +48,20 @@ std::vector<std::string> effects(const Answered& answered) {
   if (!answered.trace.is_object()) return out;
   for (const nlohmann::json& effect : answered.trace["accepted"])
     out.push_back(effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>());
+  std::ranges::sort(out);
+  return out;
+}
+
+// "name place" of those effects that hold over what was seen of their own joint, sorted.
+std::vector<std::string> ranged_effects(const Answered& answered) {
+  std::vector<std::string> out;
+  for (const nlohmann::json& effect : answered.calibration["effects"]) {
+    for (const nlohmann::json& joint : answered.calibration["robot"]["joints"]) {
+      if (effect["place"] != joint["name"] || !effect.contains("range")) continue;
+      EXPECT_EQ(effect["range"], joint["range"]);
+      out.push_back(effect["effect"].get<std::string>() + " " + effect["place"].get<std::string>());
+    }
+  }
   std::ranges::sort(out);
   return out;
 }
@@ -107,6 +123,7 @@ TEST(Explain, LargeEffectsThatHideEachOtherAreFoundTogether) {
   EXPECT_EQ(answered.difference, "");
   EXPECT_EQ(effects(answered),
             (std::vector<std::string>{"backlash q1", "gear_error q2", "rolling_shutter camera"}));
+  EXPECT_EQ(ranged_effects(answered), (std::vector<std::string>{"backlash q1", "gear_error q2"}));
 }
 
 // A guide on a curve makes another joint seem to follow the slide.

@@ -197,6 +197,40 @@ TEST_F(Correct, SaysWhatTheRunHasNotSeen) {
   refused(ExitCode::kBadInput, "these are degrees");
 }
 
+// joint2 goes to 3.2 rad; 1.2 to 3 were seen.
+TEST_F(Correct, SaysWhereAnEffectFadesOut) {
+  calibration_["robot"]["joints"][1]["range"] = {1.2, 3.0};
+  calibration_["effects"][0]["range"] = {1.2, 3.0};
+  write_calibration();
+  const Outcome outcome = run(command());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "warning: " + path("new.csv") +
+                             ": joint2 moves to 3.2 rad, beyond the 1.2 to 3 rad in which "
+                             "encoder_scale at joint2 was seen: faded out there\n");
+  const JointLog log = read_joint_log(path("corrected.csv"));
+  EXPECT_NEAR(log.values(0, 1), 2.024, 1e-12);
+  EXPECT_NEAR(log.values(1, 1), 4.044, 1e-12);
+  const double s = 0.2 / (0.25 * 1.8);
+  EXPECT_NEAR(log.values(2, 1), 6.0 + 0.064 * (1.0 - 3.0 * s * s + 2.0 * s * s * s), 1e-12);
+  // Far beyond it stays as logged. One line a joint.
+  folder_.write("new.csv", "t,a,b\n0,0.1,2\n0.1,0.2,4\n0.2,0.3,9.7\n");
+  std::vector<std::string> words = command();
+  words.insert(words.end(), {"--force", "--json"});
+  const Outcome far = run(words);
+  ASSERT_EQ(far.code, 0) << far.err;
+  EXPECT_EQ(json::parse(far.out).at("warnings").size(), 1U);
+  EXPECT_EQ(read_joint_log(path("corrected.csv")).values(2, 1), 9.7);
+}
+
+// The reader's word on a column is why the log is refused.
+TEST_F(Correct, SaysWhyAColumnIsNotThere) {
+  folder_.write("new.csv", "t,a,b\n0,0.1,nan\n0.1,0.2,nan\n");
+  const Outcome outcome = run(command());
+  EXPECT_EQ(outcome.code, static_cast<int>(ExitCode::kBadInput));
+  EXPECT_NE(outcome.err.find("column 'b'"), std::string::npos) << outcome.err;
+  EXPECT_LT(outcome.err.find("warning: "), outcome.err.find("no column 'b'")) << outcome.err;
+}
+
 TEST_F(Correct, WritesOverNothing) {
   const auto refused = [&](const std::string& output, const std::string& part, bool force) {
     const std::string before = read_text_file(path(output));

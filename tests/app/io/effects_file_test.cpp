@@ -20,6 +20,7 @@ FittedEffect eccentricity() {
   // Numbers without a short decimal form.
   out.values = Eigen::Vector2d(1.0 / 3.0 * 1e-3, -0.1 * 0.3);
   out.references = Eigen::Vector2d(1.0, 2.0 / 7.0);
+  out.range = JointLimits{-1.0 / 3.0, 1.7};
   return out;
 }
 
@@ -84,6 +85,7 @@ TEST_F(EffectsFile, ComesBackToTheLastBit) {
   for (std::size_t i = 0; i < effects.size(); ++i) {
     EXPECT_EQ(back.effects[i].id, effects[i].id);
     EXPECT_EQ(back.effects[i].scan, effects[i].scan);
+    EXPECT_EQ(back.effects[i].range, effects[i].range);
     EXPECT_EQ(back.effects[i].values, effects[i].values);
     EXPECT_EQ(back.effects[i].references, effects[i].references);
     ASSERT_EQ(back.effects[i].parameters.size(), effects[i].parameters.size());
@@ -99,6 +101,20 @@ TEST_F(EffectsFile, ComesBackToTheLastBit) {
   EXPECT_EQ(back.channels[1].couplings, (std::vector<ChannelShare>{{"a", -1.0}}));
   ASSERT_TRUE(back.gravity_base);
   EXPECT_EQ(*back.gravity_base, Eigen::Vector3d(0.0, 0.6, -0.8));
+}
+
+// As files of earlier versions have it.
+TEST_F(EffectsFile, AnEffectWithoutARangeCountsAnywhere) {
+  json document = document_of({eccentricity()});
+  json& effect = document["effects"][0];
+  effect.erase("range");
+  EXPECT_EQ(read(document.dump()).effects.at(0).range, std::nullopt);
+  effect["range"] = {1.0, -1.0};
+  refused(document, "'range' ends below where it begins");
+  effect["range"] = {1.0};
+  refused(document, "'range' is no pair of numbers");
+  effect["range"] = {1.0, "far"};
+  refused(document, "range is no number");
 }
 
 TEST_F(EffectsFile, AMapsTableComesBackToTheLastBit) {

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calib/effects/observed_range.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -269,6 +270,116 @@ TEST(CorrectedLog, AJointThatRestsIsCorrectedWhereItRests) {
   EXPECT_TRUE(corrected.left.empty());
 }
 
+// A slow way of q1 through, and far out of, what was observed of it. q2 moves likewise.
+Eigen::MatrixXd values_beyond(double low, double high) {
+  Eigen::MatrixXd out(2001, 2);
+  out.col(0) = Eigen::VectorXd::LinSpaced(out.rows(), low, high);
+  out.col(1) = 0.5 * out.col(0);
+  return out;
+}
+
+// All that a log shows of q1, and of a joint that follows q2.
+std::vector<FittedEffect> effects_of_value() {
+  FittedEffect map;
+  map.id = {"joint_map", "q1"};
+  map.table.value = Eigen::Vector4d(-1.5, -1.0, 1.0, 1.5);
+  map.table.error = Eigen::Vector4d(0.0, 0.01, -0.02, 0.0);
+  map.table.sigma = Eigen::Vector4d::Zero();
+  return {fitted("encoder_scale", "q1", {0.01}),
+          fitted("eccentricity", "q1", {0.01, 0.005}, 1.0),
+          fitted("eccentricity", "q1", {0.01, 0.005}, 2.0),
+          fitted("gear_error", "q1", {0.004, 0.003}, 17.0),
+          fitted("backlash", "q1", {0.02}, 0.02),
+          fitted("coupling", "q1", {0.05}, 1.0),
+          map};
+}
+
+TEST(CorrectedLog, WithinTheRangeOfAnEffectNothingChanges) {
+  constexpr JointLimits kRange{-1.0, 1.0};
+  const JointLog log = log_of(values_beyond(-2.0, 2.0));
+  const Eigen::MatrixXd logged = values_of(log);
+  for (FittedEffect effect : effects_of_value()) {
+    const CorrectedLog everywhere = undo({effect}, log);
+    EXPECT_TRUE(everywhere.faded.empty());
+    effect.range = kRange;
+    const CorrectedLog ranged = undo({effect}, log);
+    const Eigen::Index decides = effect.id.effect == "coupling" ? 1 : 0;
+    for (Eigen::Index i = 0; i < logged.rows(); ++i) {
+      const double value = logged(i, decides);
+      if (value < kRange.lower || value > kRange.upper) continue;
+      EXPECT_EQ(ranged.log.values.row(i), everywhere.log.values.row(i)) << effect.id.effect;
+    }
+  }
+}
+
+// Up to 4 rad no other turn of a ring comes near 1 rad.
+TEST(CorrectedLog, BeyondItsRangeAnEffectFadesOutWithoutAStep) {
+  constexpr JointLimits kRange{-1.0, 1.0};
+  constexpr double kReach = kFadeShare * 2.0;
+  const JointLog log = log_of(values_beyond(-4.0, 4.0));
+  const Eigen::MatrixXd logged = values_of(log);
+  for (FittedEffect effect : effects_of_value()) {
+    SCOPED_TRACE(effect.id.effect);
+    effect.range = kRange;
+    const Eigen::ArrayXd change = (values_of(undo({effect}, log).log) - logged).col(0).array();
+    const Eigen::ArrayXd value = logged.col(effect.id.effect == "coupling" ? 1 : 0).array();
+    const Eigen::ArrayXd steps = (change.tail(change.size() - 1) - change.head(change.size() - 1));
+    const auto within = value.abs() <= kRange.upper;
+    const double size = within.select(change.abs(), 0.0).maxCoeff();
+    const double steepest = within.tail(steps.size()).select(steps.abs(), 0.0).maxCoeff();
+    EXPECT_LT((value.abs() > kRange.upper + kReach).select(change.abs(), 0.0).maxCoeff(), kExact);
+    EXPECT_LE(change.abs().maxCoeff(), 1.5 * size);
+    // The weight falls by at most 1.5 a reach, of what may have grown by a quarter of a turn.
+    const double fall = 1.5 * (value[1] - value[0]) / kReach;
+    EXPECT_LE(steps.abs().maxCoeff(), 1.5 * steepest + 1.5 * fall * size);
+  }
+}
+
+// Loads are those of the posture, wherever it is.
+TEST(CorrectedLog, ASagFadesOutBeyondTheRangeOfItsJoint) {
+  KinematicTree tree = robot();
+  tree.joints[0].T_parent_joint.rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(-std::acos(0.0), Eigen::Vector3d::UnitX()));
+  const JointLog log = log_of(values_beyond(-2.0, 2.0));
+  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0});
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  const Eigen::MatrixXd everywhere = corrected_log(log, tree, {sag}, down).log.values;
+  sag.range = JointLimits{-1.0, 1.0};
+  const Eigen::MatrixXd ranged = corrected_log(log, tree, {sag}, down).log.values;
+  for (Eigen::Index i = 0; i < ranged.rows(); ++i) {
+    const double value = log.values(i, 1);
+    if (std::abs(value) <= 1.0) {
+      EXPECT_EQ(ranged(i, 1), everywhere(i, 1));
+    } else if (std::abs(value) > 1.5) {
+      EXPECT_EQ(ranged(i, 1), value);
+    }
+  }
+}
+
+TEST(CorrectedLog, NamesTheJointThatLeavesTheRangeOfAnEffect) {
+  constexpr JointLimits kRange{-1.0, 1.0};
+  FittedEffect coupling = fitted("coupling", "q1", {0.05}, 1.0);
+  FittedEffect scale = fitted("encoder_scale", "q1", {0.01});
+  coupling.range = scale.range = kRange;
+  // q2 stays within; of q1 a hundredth of the range is no matter.
+  EXPECT_TRUE(undo({coupling, scale}, log_of(values_beyond(-1.019, 1.0))).faded.empty());
+  const CorrectedLog one = undo({coupling, scale}, log_of(values_beyond(-1.1, 1.0)));
+  ASSERT_EQ(one.faded.size(), 1U);
+  EXPECT_EQ(one.faded[0].id, scale.id);
+  EXPECT_EQ(one.faded[0].joint, JointId{0});
+  EXPECT_EQ(one.faded[0].range, kRange);
+  EXPECT_NEAR(one.faded[0].reached.lower, -1.1, kExact);
+  EXPECT_EQ(one.faded[0].reached.upper, kRange.upper);
+  const CorrectedLog both = undo({coupling, scale}, log_of(values_beyond(-1.0, 2.4)));
+  ASSERT_EQ(both.faded.size(), 2U);
+  EXPECT_EQ(both.faded[0].joint, JointId{1});
+  EXPECT_NEAR(both.faded[0].reached.upper, 1.2, kExact);
+  // What no log shows is undone nowhere, and does not fade.
+  FittedEffect thread = fitted("helical", "q1", {1e-4});
+  thread.range = kRange;
+  EXPECT_TRUE(undo({thread}, log_of(values_beyond(-2.0, 2.0))).faded.empty());
+}
+
 TEST(CorrectedLog, NamesWhatALogCannotShow) {
   const std::vector<FittedEffect> effects{
       fitted("helical", "q1", {1e-4}),
@@ -309,8 +420,22 @@ TEST(CorrectedLog, AnotherLogOrRobotIsRefused) {
   expect_bad_input({fitted("eccentricity", "q1", {0.01}, 1.0)}, log, "eccentricity at q1");
   log.channels[0] = "another";
   expect_bad_input({fitted("encoder_scale", "q2", {0.01})}, log, "q2");
-  expect_bad_input({fitted("coupling", "q1", {0.01}, 1.0)}, log, "coupling at q1");
+  expect_bad_input({fitted("coupling", "q1", {0.01}, 1.0)}, log,
+                   "coupling at q1: no column 'axis2'");
+  expect_bad_input({fitted("coupling", "q1", {0.01}, 7.0)}, log, "no column for what it follows");
   EXPECT_NO_THROW(static_cast<void>(undo({fitted("encoder_scale", "q1", {0.01})}, log)));
+}
+
+// A column that is not there is no joint at 0.
+TEST(CorrectedLog, ALogThatDoesNotSayWhereAJointStandsIsRefused) {
+  JointLog log = log_of(values_as_logged());
+  log.channels[0] = "another";
+  expect_bad_input({fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0})}, log, "'axis2'");
+  KinematicTree coupled = robot();
+  coupled.joints[0].couplings = {{"axis2", -1.0}};
+  EXPECT_THROW(static_cast<void>(corrected_log(
+                   log, coupled, {fitted("eccentricity", "q1", {0.004, 0.0}, 1.0)}, std::nullopt)),
+               Error);
 }
 
 }  // namespace
