@@ -16,6 +16,7 @@
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/log/readings_apart.h"
+#include "kinematics/structure/resting_base.h"
 
 namespace kinescope {
 namespace {
@@ -67,9 +68,11 @@ bool is_bent(const TracedCalibration& fitted) {
          fitted.trace.held_out_before.value > kBent * fitted.trace.held_out_after.value;
 }
 
-/// What it takes for an account: joints, and effects at them.
+/// What it takes for an account: joints, the motion of those that no channel tells, and effects.
 std::size_t parts_of(const Explanation& of) {
-  return of.start.tree.joints.size() + of.fitted->trace.accepted.size();
+  const auto told_by_none = static_cast<std::size_t>(
+      std::ranges::count(of.start.tree.joints, std::string(), &Joint::channel));
+  return of.start.tree.joints.size() + told_by_none + of.fitted->trace.accepted.size();
 }
 
 // What tracing says of a robot whose geometry is better held than free: nothing but noise, or that
@@ -101,8 +104,8 @@ class Explainer {
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first =
-        with_couplings_doubted(asked_again(of_structure(structure_of(evidence_.tracks), {})));
+    Explanation first = with_base_at_rest(
+        with_couplings_doubted(asked_again(of_structure(structure_of(evidence_.tracks), {}))));
     return is_settled(first) ? first : improved(std::move(first));
   }
 
@@ -299,6 +302,15 @@ class Explainer {
     }
     if (!any) return now;
     Explanation other = of_structure(std::move(free), {});
+    return is_better(other, now) ? other : now;
+  }
+
+  // What all that is seen moves with, and no channel drives, may be the camera.
+  [[nodiscard]] Explanation with_base_at_rest(Explanation now) const {
+    if (!now.structure || !options_.trace) return now;
+    std::optional<Structure> resting = kinescope::with_base_at_rest(*now.structure);
+    if (!resting) return now;
+    Explanation other = asked_again(of_structure(std::move(*resting), {}));
     return is_better(other, now) ? other : now;
   }
 

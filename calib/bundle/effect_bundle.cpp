@@ -90,7 +90,17 @@ struct EffectBundle::Impl {
   double jitter_s = 0.0;
   // Where the last fit of the same change ended: the next one begins there.
   mutable std::map<std::vector<std::string>, State> ends;
+  // Where the last fit ended: one of another change, which as a rule differs by one effect, begins
+  // there.
+  struct End {
+    std::vector<Correction> corrections;
+    State state;
+  };
+  mutable std::optional<End> last;
 
+  /// The model with the change in it, before a fit.
+  void change_model(const BundleChange& change, Spec& with, State& state) const;
+  static void begin_at(const End& end, const BundleChange& change, State& state);
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
@@ -229,9 +239,7 @@ KinematicTree fitted_tree(const Spec& spec, const State& state, const State& sta
 
 }  // namespace
 
-// The least squares fit; `spec` and `state` are left with the change in them.
-BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
-                                         State& state) const {
+void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, State& state) const {
   with = spec;
   state = start;
   for (const std::size_t coupling : change.without_couplings) {
@@ -244,16 +252,43 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   for (const Correction& correction : with.corrections) {
     state.corrections.push_back(correction.value);
   }
+}
+
+// What the change has in common with the one that was fitted stays as it was.
+void EffectBundle::Impl::begin_at(const End& end, const BundleChange& change, State& state) {
+  const State plain = std::exchange(state, end.state);
+  state.corrections = plain.corrections;
+  if (!change.time_offset) state.time_offset = plain.time_offset;
+  for (std::size_t c = 0; c < change.corrections.size(); ++c) {
+    const auto known =
+        std::ranges::find(end.corrections, change.corrections[c].name, &Correction::name);
+    if (known == end.corrections.end()) continue;
+    state.corrections[c] =
+        end.state.corrections[static_cast<std::size_t>(known - end.corrections.begin())];
+  }
+}
+
+// The least squares fit; `with` and `state` are left with the change in them.
+BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
+                                         State& state) const {
+  change_model(change, with, state);
   std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
   for (const Correction& correction : with.corrections) key.push_back(correction.name);
   key.push_back(fmt::format("{} corrections", with.corrections.size()));
   for (const std::size_t coupling : change.without_couplings) {
     key.push_back(fmt::format("without coupling {}", coupling));
   }
-  if (const auto end = ends.find(key); end != ends.end()) state = end->second;
+  if (const auto end = ends.find(key); end != ends.end()) {
+    state = end->second;
+  } else if (last) {
+    begin_at(*last, change, state);
+  }
   constexpr int kIterations = 60;
-  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
+  constexpr double kTolerance = 1e-8;  // of the squares: less than a thousandth of a row's noise
+  const bundle::SolveSummary summary =
+      bundle::solve(with, state, used, {}, kIterations, kTolerance);
   ends.insert_or_assign(key, state);
+  if (summary.converged) last = End{with.corrections, state};
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;
@@ -268,6 +303,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
     out.values.conservativeResize(out.values.size() + 1);
     out.values[out.values.size() - 1] = state.time_offset[0];
   }
+  out.end = std::make_shared<const State>(state);
   return out;
 }
 
@@ -277,12 +313,18 @@ BundleSolution EffectBundle::solve(const BundleChange& change) const {
   return impl_->solve(change, spec, state);
 }
 
-BundleFit EffectBundle::fit(const BundleChange& change,
-                            const std::vector<Correction>& probes) const {
+BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correction>& probes,
+                            const BundleSolution* solved) const {
   Spec spec;
   State state;
   BundleFit out;
-  static_cast<BundleSolution&>(out) = impl_->solve(change, spec, state);
+  if (solved != nullptr) {
+    impl_->change_model(change, spec, state);
+    state = *solved->end;
+    static_cast<BundleSolution&>(out) = *solved;
+  } else {
+    static_cast<BundleSolution&>(out) = impl_->solve(change, spec, state);
+  }
 
   // Probes stand beside the corrections, at zero.
   spec.corrections.insert(spec.corrections.end(), probes.begin(), probes.end());
@@ -378,6 +420,8 @@ double EffectBundle::stamp_jitter_s() const { return impl_->jitter_s; }
 bool EffectBundle::postures() const { return impl_->spec.postures; }
 const std::vector<int>& EffectBundle::fold_of_frame() const { return impl_->fold; }
 const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->spec.times_s; }
+
+double EffectBundle::start_time_offset_s() const { return impl_->offset_start_s; }
 
 JointMotion EffectBundle::motion_at_frames(double time_offset_s) const {
   std::vector<double> times_s = impl_->spec.times_s;

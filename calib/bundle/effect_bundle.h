@@ -33,6 +33,10 @@ struct DesignCoupling {
   double ratio = 0.0;  ///< of the joints' values
 };
 
+namespace bundle {
+struct State;
+}
+
 struct BundleSolution {
   bool converged = false;
   std::string reason;
@@ -41,6 +45,7 @@ struct BundleSolution {
   double variance = 0.0;  ///< of a whitened row, priors' squares counted in
   /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
   KinematicTree tree;
+  std::shared_ptr<const bundle::State> end;
 };
 
 /// A solution, and how its residual answers to the parameters and to probes.
@@ -78,9 +83,10 @@ class EffectBundle {
   EffectBundle& operator=(const EffectBundle&) = delete;
 
   [[nodiscard]] BundleSolution solve(const BundleChange& change) const;
-  /// Shares of corrections and probes have one entry a frame of the measurements.
-  [[nodiscard]] BundleFit fit(const BundleChange& change,
-                              const std::vector<Correction>& probes) const;
+  /// Shares of corrections and probes have one entry a frame of the measurements. `solved`: of this
+  /// change, where it is known.
+  [[nodiscard]] BundleFit fit(const BundleChange& change, const std::vector<Correction>& probes,
+                              const BundleSolution* solved = nullptr) const;
 
   /// The plain model's start: tree with the units of the channels.
   [[nodiscard]] const KinematicTree& tree() const;
@@ -95,6 +101,8 @@ class EffectBundle {
   /// A fold for every frame, by posture; -1 for frames without a sighting.
   [[nodiscard]] const std::vector<int>& fold_of_frame() const;
   [[nodiscard]] const std::vector<double>& frame_times_s() const;
+  /// Of the plain model, where it is free.
+  [[nodiscard]] double start_time_offset_s() const;
   /// What the frames show, at a time offset.
   [[nodiscard]] JointMotion motion_at_frames(double time_offset_s) const;
   /// The log's own samples, from the first to the last frame and a little beyond.

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <set>
 
+#include <ceres/cost_function.h>
 #include <ceres/crs_matrix.h>
 
 #include "kinematics/core/dense_algebra.h"
@@ -62,6 +63,43 @@ void eliminate(FrameRows& rows, const Eigen::MatrixXd& local) {
   rows.r -= local * factor.solve(Eigen::VectorXd(local.transpose() * rows.r));
 }
 
+using BlocksOfFrames = std::map<int, std::vector<ceres::ResidualBlockId>>;
+
+// The rows of the frames from `first` to before `last`.
+void evaluate(BuiltProblem& built, BlocksOfFrames::const_iterator first,
+              BlocksOfFrames::const_iterator last,
+              const std::map<int, std::vector<FreeBlock>>& locals, int width, LinearBundle& out) {
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = data_of(out.blocks);
+  options.apply_loss_function = false;
+  for (auto frame = first; frame != last; ++frame) {
+    options.residual_blocks.insert(options.residual_blocks.end(), frame->second.begin(),
+                                   frame->second.end());
+    if (const auto local = locals.find(frame->first); local != locals.end())
+      std::ranges::copy(data_of(local->second), std::back_inserter(options.parameter_blocks));
+  }
+  std::vector<double> residuals;
+  ceres::CRSMatrix jacobian;
+  KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
+                  "a solution can be evaluated");
+  int row = 0;
+  int local_column = width;
+  for (auto frame = first; frame != last; ++frame) {
+    int count = 0;
+    for (const ceres::ResidualBlockId id : frame->second)
+      count += built.problem().GetCostFunctionForResidualBlock(id)->num_residuals();
+    const auto local = locals.find(frame->first);
+    const int local_width = local == locals.end() ? 0 : width_of(local->second);
+    FrameRows rows;
+    rows.J = dense_rows(jacobian, row, count, 0, width);
+    rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data() + row, count);
+    eliminate(rows, dense_rows(jacobian, row, count, local_column, local_width));
+    out.frames.emplace(frame->first, std::move(rows));
+    row += count;
+    local_column += local_width;
+  }
+}
+
 }  // namespace
 
 int width_of(const std::vector<FreeBlock>& blocks) {
@@ -98,33 +136,19 @@ LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& u
     }
   }
   const int width = width_of(out.blocks);
-  // Frame by frame, so that the memory needed does not depend on the length of the recording.
   std::map<int, std::vector<ceres::ResidualBlockId>> ids;
   for (std::size_t i = 0; i < built.sighting_ids().size(); ++i) {
     const int frame =
         i < used.size() ? spec.sightings[static_cast<std::size_t>(used[i])].frame : -1;
     ids[frame].push_back(built.sighting_ids()[i]);
   }
-  for (const auto& [frame, residual_blocks] : ids) {
-    ceres::Problem::EvaluateOptions options;
-    options.parameter_blocks = data_of(out.blocks);
-    const auto local = locals.find(frame);
-    int local_width = 0;
-    if (local != locals.end()) {
-      for (double* data : data_of(local->second)) options.parameter_blocks.push_back(data);
-      local_width = width_of(local->second);
-    }
-    options.residual_blocks = residual_blocks;
-    options.apply_loss_function = false;
-    std::vector<double> residuals;
-    ceres::CRSMatrix jacobian;
-    KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
-                    "a solution can be evaluated");
-    FrameRows rows;
-    rows.J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
-    rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data(), jacobian.num_rows);
-    eliminate(rows, dense_rows(jacobian, 0, jacobian.num_rows, width, local_width));
-    out.frames.emplace(frame, std::move(rows));
+  // Some frames at a time: each evaluation looks at all of the problem, and the memory needed does
+  // not depend on the length of the recording.
+  constexpr std::ptrdiff_t kFramesAtATime = 64;
+  for (auto first = ids.begin(); first != ids.end();) {
+    const auto last = std::ranges::next(first, kFramesAtATime, ids.end());
+    evaluate(built, first, last, locals, width, out);
+    first = last;
   }
   add_priors(built, data_of(out.blocks), width, out);
   return out;

@@ -40,9 +40,15 @@ struct EffectWorld {
   bool known = false;
 };
 
+/// px, what any detector's corners are off by.
+inline constexpr double kUsualShift = 0.02;
+
 /// Periods a turn of an eccentricity that is a bent coupling.
 inline constexpr double kBendPeriods = 2.0;
 
+[[nodiscard]] inline bool is_clock_offset(const EffectId& id) {
+  return id.effect == "time_offset" && id.place == "clock";
+}
 [[nodiscard]] inline bool is_sag(const EffectId& id) { return id.effect == "compliance"; }
 [[nodiscard]] inline bool is_bend(const EffectId& id, double scan) {
   return id.effect == "eccentricity" && scan == kBendPeriods;
@@ -68,6 +74,10 @@ struct CameraEffect {
 
 /// Joints of those driven whose readings jump, by how a log has them.
 [[nodiscard]] std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
+                                                               const std::vector<int>& driven);
+
+/// The same of postures.
+[[nodiscard]] std::map<int, UnsteadyReading> readings_in_steps(const JointMotion& postures,
                                                                const std::vector<int>& driven);
 
 /// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,

@@ -55,6 +55,8 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
   out.candidate.possible = [shown = reading.size](const Eigen::VectorXd& size) {
     return std::abs(size[0] - shown) < kAsTheLogSays * shown;
   };
+  // Every encoder has some.
+  if (world.kind == MeasurementKind::kCorners) out.candidate.floor = kUsualShift;
   out.candidate.check = reading.in_steps
                             ? "digits that the log is written with, counts a turn of the encoder"
                             : "potentiometer, shielding and filter of this encoder";
@@ -396,6 +398,16 @@ std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
   std::map<int, UnsteadyReading> out;
   for (const int joint : driven) {
     if (auto found = unsteady_reading(log.times_s, log.value.col(joint)))
+      out.emplace(joint, std::move(*found));
+  }
+  return out;
+}
+
+std::map<int, UnsteadyReading> readings_in_steps(const JointMotion& postures,
+                                                 const std::vector<int>& driven) {
+  std::map<int, UnsteadyReading> out;
+  for (const int joint : driven) {
+    if (auto found = reading_in_steps(postures.value.col(joint)))
       out.emplace(joint, std::move(*found));
   }
   return out;

@@ -87,12 +87,14 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   CalibrationTrace again = traced(bundle, upright, trace_options, progress);
   const bool says_all =
       out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
+  // What predicts clearly better may need more.
+  const HeldOutError& before = out.trace.held_out_after;
   const bool needs_more =
-      again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size());
+      again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size()) &&
+      again.trace.held_out_after.value >= before.interval.low;
   // What was only likely is told by gravity, or gravity by nothing.
   const bool told = names(out.trace, *sag) || names(again.trace, *sag);
   // Other effects say it, too, and give way to what predicts clearly better.
-  const HeldOutError& before = out.trace.held_out_after;
   const bool others_say = out.trace.verdict == TraceVerdict::kEffects && !names(out.trace, *sag);
   const double bar = others_say ? before.interval.low : before.value;
   if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || (needs_more && !says_all) ||

@@ -186,6 +186,9 @@ std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector
 }
 
 std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carriers) {
+  // An rms of some dozen postures' readings, and of joints behind one another, is no better known.
+  constexpr double kAtLeast = 0.5;
+  constexpr double kAtMost = 1.3;
   std::vector<RestPlace> out;
   for (const int joint : world.driven) {
     const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
@@ -193,7 +196,13 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
     value.index = joint;
     const bool turns = j.type == JointType::kRevolute;
     (turns ? value.direction.head<3>() : value.direction.tail<3>()) = j.axis;
-    out.push_back({j.name, turns ? "rad" : "m", carriers.still(value)});
+    RestPlace place{j.name, turns ? "rad" : "m", carriers.still(value), 0.0, 0.0};
+    if (const auto found = world.unsteady.find(joint); found != world.unsteady.end()) {
+      // Where a motion took the place of the reading, any part of the error may be left.
+      if (world.postures) place.reading_error_least = kAtLeast * found->second.error;
+      place.reading_error_most = kAtMost * found->second.error;
+    }
+    out.push_back(std::move(place));
   }
   for (const int marker : world.seen) {
     const Marker& m = world.tree.markers[static_cast<std::size_t>(marker)];
@@ -202,8 +211,8 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
       shift.part = CorrectedPart::kMarker;
       shift.index = marker;
       shift.direction = Vector6d::Unit(3 + axis);
-      out.push_back(
-          {fmt::format("tag_{} along {}", m.id.value, "xy"[axis]), "m", carriers.still(shift)});
+      out.push_back({fmt::format("tag_{} along {}", m.id.value, "xy"[axis]), "m",
+                     carriers.still(shift), 0.0, 0.0});
     }
   }
   return out;
@@ -216,9 +225,6 @@ int clock_carrier(Carriers& carriers) {
   time.index = kEverywhere;
   return carriers.still(time);
 }
-
-// Corners may be off by where in the image they are.
-constexpr double kUsualShift = 0.02;  // px, what any detector's corners are off by
 
 // The carriers' places are filled in when the fit has told which rows have one.
 std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Carriers& carriers) {
@@ -279,8 +285,9 @@ std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& libra
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                            std::vector<std::size_t> without_couplings)
     : bundle_(&bundle), options_(options), without_couplings_(std::move(without_couplings)) {
-  if (!bundle_->postures())
-    unsteady_ = unsteady_readings(bundle_->motion_of_log(0.0), bundle_->driven_joints());
+  unsteady_ = bundle_->postures()
+                  ? readings_in_steps(bundle_->motion_at_frames(0.0), bundle_->driven_joints())
+                  : unsteady_readings(bundle_->motion_of_log(0.0), bundle_->driven_joints());
 }
 
 BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
@@ -325,16 +332,25 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
 // Shares are taken where the joints are at the time offset that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
 TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
-  constexpr int kRounds = 2;  // each leaves of its error what the effect's size is, in rad
+  constexpr int kRounds = 2;           // each leaves of its error what the effect's size is, in rad
+  constexpr double kSameTime = 20e-6;  // s: no joint moves noticeably
+  const bool clock = std::ranges::any_of(effects, is_clock_offset, &AddedEffect::id);
+  double offset_s = clock ? last_offset_s_.value_or(bundle_->start_time_offset_s()) : 0.0;
   Ready out;
-  out.world = world_at(0.0);
+  out.world = world_at(offset_s);
   out.library = all_effects(out.world);
   out.change = change_of(out.library, effects);
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
-  const int rounds = by_size ? kRounds : out.change.time_offset ? 1 : 0;
+  const int rounds = by_size ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
-    const BundleSolution solution = bundle_->solve(out.change);
-    out.world = world_at(solution.time_offset_s);
+    BundleSolution solution = bundle_->solve(out.change);
+    if (clock && solution.converged) last_offset_s_ = solution.time_offset_s;
+    if (!by_size && std::abs(solution.time_offset_s - offset_s) < kSameTime) {
+      out.solved = std::move(solution);
+      break;
+    }
+    offset_s = solution.time_offset_s;
+    out.world = world_at(offset_s);
     if (by_size && solution.converged) {
       out.world.tree = solution.tree;
       add_values(out.change.corrections, solution, out.world.loaded.value);
@@ -360,7 +376,7 @@ EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) cons
 }
 
 TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
-  auto [world, library, change] = ready_for(effects);
+  auto [world, library, change, solved] = ready_for(effects);
   // Carriers of all candidates at one value of their scans: the same for the others, unless a
   // direction changes with the scan.
   Carriers carriers;
@@ -379,7 +395,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   out.rest_places = rest_places_of(world, carriers);
   out.rest_fields = rest_fields_of(world, options_.trace.floor, carriers);
   if (!world.postures) out.clock = clock_carrier(carriers);
-  BundleFit fit = bundle_->fit(change, carriers.probes());
+  BundleFit fit = bundle_->fit(change, carriers.probes(), solved ? &*solved : nullptr);
   if (fit.place_px.size() == 0) out.rest_fields.clear();
   for (RestField& field : out.rest_fields) field.at = fit.place_px;
   out.converged = fit.converged;
@@ -443,8 +459,8 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
                                                 const std::vector<TracedEffect>& traced) const {
   Corrected out;
   if (effects.empty()) return out;
-  const auto [world, library, change] = ready_for(effects);
-  const BundleSolution fit = bundle_->solve(change);
+  const auto [world, library, change, solved] = ready_for(effects);
+  const BundleSolution fit = solved ? *solved : bundle_->solve(change);
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);

@@ -38,6 +38,7 @@ class TracedBundle final : public TracedModel {
     EffectWorld world;
     std::vector<CameraEffect> library;
     BundleChange change;
+    std::optional<BundleSolution> solved;  ///< of the change, where that is known
   };
   [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
   [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
@@ -48,6 +49,7 @@ class TracedBundle final : public TracedModel {
   CalibrationTraceOptions options_;
   std::vector<std::size_t> without_couplings_;
   std::map<int, UnsteadyReading> unsteady_;
+  mutable std::optional<double> last_offset_s_;  ///< that a fit found: the next is near
 };
 
 }  // namespace kinescope::effects

@@ -171,6 +171,13 @@ std::optional<double> step_of(const Eigen::VectorXd& values) {
   return step;
 }
 
+std::optional<UnsteadyReading> reading_in_steps(Eigen::VectorXd values) {
+  std::ranges::sort(values);
+  const std::optional<double> step = step_of(values);
+  if (!step) return std::nullopt;
+  return UnsteadyReading{{}, true, *step, kRoundedSigma * *step, {}};
+}
+
 std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
                                                 const Eigen::VectorXd& values) {
   const Eigen::Index changes = changes_of(values);
@@ -194,6 +201,7 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   }
   out.size = step.value_or(std::sqrt((out.motion - values).array().square().mean()));
   if (!(out.size > 0.0)) return std::nullopt;
+  out.error = step ? kRoundedSigma * out.size : out.size;
   return out;
 }
 

@@ -18,13 +18,17 @@ namespace kinescope::effects {
 struct UnsteadyReading {
   std::vector<double> times_s;  ///< of the samples
   bool in_steps = false;
-  double size = 0.0;        ///< distance of the steps, or standard deviation of the noise
-  Eigen::VectorXd motion;   ///< samples, in the unit of the reading
+  double size = 0.0;       ///< distance of the steps, or standard deviation of the noise
+  double error = 0.0;      ///< rms by which a reading is off
+  Eigen::VectorXd motion;  ///< samples, in the unit of the reading
 };
 
 /// Distance of the steps that `values` come in. Nothing for values that lie on no grid, or on one
 /// that is finer than a share of 1e-4 of their range.
 [[nodiscard]] std::optional<double> step_of(const Eigen::VectorXd& values);
+
+/// Of postures, in any order, which show steps only; without a motion.
+[[nodiscard]] std::optional<UnsteadyReading> reading_in_steps(Eigen::VectorXd values);
 
 /// `times_s` increasing. Nothing where the samples are too few, do not move, or are unsteady by
 /// less than that share. A constant is not seen: a reading that is cut off has another zero than

@@ -125,6 +125,10 @@ struct RestPlace {
   std::string name;  ///< "joint3", "tag_12 across"
   std::string unit;  ///< of the carrier's factor
   int carrier = 0;
+  /// rms in `unit` by which readings here are known to err from instant to instant; an error is
+  /// theirs from the least to the most.
+  double reading_error_least = 0.0;
+  double reading_error_most = 0.0;
 };
 
 /// Where an unexplained rest may move rows by a vector that depends on a place of two coordinates,

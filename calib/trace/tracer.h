@@ -113,6 +113,9 @@ class Tracer {
   /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
   /// left.
   [[nodiscard]] std::optional<CommonMotion> common_motion() const;
+  /// True where it is what readings are known to err by.
+  [[nodiscard]] bool is_of_readings(const CommonMotion& motion) const;
+  [[nodiscard]] std::string reading_words(const CommonMotion& motion) const;
   void drop_what_leaves_too_much();
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);

@@ -22,7 +22,7 @@ constexpr std::size_t kMostRests = 3;
 constexpr double kSlightShare = 1e-3;
 // What is left over what differs between neighbours in time. Noise, with the sensor's own errors
 // counted in, makes it 0.6 to 1.0 (`undeclared`); what lasts is no noise.
-constexpr double kLasts = 3.0;
+constexpr double kLasts = 2.0;
 // Of what is left: more than that is no error of single bodies.
 constexpr double kMostOfIt = 0.5;
 
@@ -279,11 +279,17 @@ std::optional<CommonMotion> Tracer::common_motion() const {
   return found && found->share > kMostOfIt ? found : std::nullopt;
 }
 
+bool Tracer::is_of_readings(const CommonMotion& motion) const {
+  const RestPlace& place = now_->fit.rest_places[motion.place];
+  return motion.size >= place.reading_error_least && motion.size <= place.reading_error_most;
+}
+
 // What lasts, or what bodies share from instant to instant, may be the larger part of what an
 // effect stands in for (a joint that creeps, as a jump of its zero).
 void Tracer::drop_what_leaves_too_much() {
   if (!rests_.empty()) return;
-  if (over_neighbours().value_or(0.0) <= kLasts && !common_motion()) return;
+  const auto common = common_motion();
+  if (over_neighbours().value_or(0.0) <= kLasts && (!common || is_of_readings(*common))) return;
   const double left = now_->system.total().rr;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const double explained = details_[i].effect.explained * base_->system.total().rr;
@@ -473,10 +479,20 @@ std::string curve_words(const std::vector<TracedEffect>& accepted) {
 
 }  // namespace
 
+std::string Tracer::reading_words(const CommonMotion& motion) const {
+  const RestPlace& place = now_->fit.rest_places[motion.place];
+  return fmt::format(
+      "readings of {} are uncertain by {:.2g} {} (rms), as their steps or their noise say, and "
+      "that "
+      "makes {:.0f} % of what is left",
+      place.name, motion.size, place.unit, 100.0 * std::min(1.0, motion.share));
+}
+
 void Tracer::conclude() {
   const bool slight =
       std::ranges::all_of(trace_.rest, [&](const Rest& rest) { return is_slight(rest); });
   if (slight) trace_.held_out_after = now_->error;  // without curves
+  const std::optional<CommonMotion> common = slight ? common_motion() : std::nullopt;
   if (!slight) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
@@ -493,7 +509,7 @@ void Tracer::conclude() {
         "lasts, and no known effect explains it",
         trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ",
         trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
-  } else if (const auto common = common_motion()) {
+  } else if (common && !is_of_readings(*common)) {
     const RestPlace& place = now_->fit.rest_places[common->place];
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format(
@@ -519,10 +535,12 @@ void Tracer::conclude() {
           "; what is left at {} over {} is less than a thousandth of what they explain there",
           rest.place, rest.covariate);
     }
+    if (common) trace_.reason += "; " + reading_words(*common);
   } else {
     trace_.verdict = TraceVerdict::kClean;
     trace_.reason = fmt::format("the error on unseen data, {:.3g} {}, is noise",
                                 trace_.held_out_after.value, trace_.held_out_after.unit);
+    if (common) trace_.reason += ": " + reading_words(*common);
   }
 }
 

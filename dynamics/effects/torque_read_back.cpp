@@ -82,7 +82,7 @@ void TorqueFitter::name_covariates(TracedFit& out) const {
     out.covariates.push_back({"speed of " + name, rate, parts_.dq.col(c)});
     out.covariates.push_back({"acceleration of " + name, rate + "^2", parts_.ddq.col(c)});
     out.covariates.push_back({"load of " + name, context.unit(j), context_.load.col(c)});
-    out.rest_places.push_back({name, context.unit(j), static_cast<int>(j)});
+    out.rest_places.push_back({name, context.unit(j), static_cast<int>(j), 0.0, 0.0});
   }
   out.covariates.push_back({"time", "s", out.linear.time_s});
   if (context.temperature_c.size() > 0) {

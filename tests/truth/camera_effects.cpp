@@ -143,10 +143,11 @@ Slip slip_of(const InjectedEffect& effect, double tag_size_m, double time_s, Rng
   return {time_s, T};
 }
 
-// The squares of two corners' distances from the cylinder's axis differ by size^2 sin(2 axis).
+// Squares of two corners' distances from the cylinder's axis differ by size^2 sin(2 axis) / 2, and
+// each stands before the plane by half the curvature times its own.
 Bend bend_of(const InjectedEffect& effect, double tag_size_m) {
   const double difference = tag_size_m * tag_size_m * std::sin(2.0 * effect.detail);
-  return {4.0 * effect.size / difference, effect.detail};
+  return {8.0 * effect.size / difference, effect.detail};
 }
 
 void add_intrinsics(const InjectedEffect& effect, Rng& rng, CameraModel& camera) {

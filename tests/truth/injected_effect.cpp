@@ -37,7 +37,7 @@ constexpr std::array<Strength, 32> kWeakest{{
     {"axis_wobble", 0.03 * kRadPerDegree},
     {"lens_distortion", 0.002},
     {"intrinsics", 2e-3},
-    {"bent_tag", 0.1e-3},
+    {"bent_tag", 0.03e-3},
     {"quantisation", 0.06 * kRadPerDegree, Unit::kAngle},  // 0.017 deg rms
     {"rolling_shutter", 1e-6},
     {"tag_size", 1e-3},  // 0.05 mm of 50 mm
@@ -191,7 +191,7 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
     return out;
   }
   std::vector<std::string> places;
-  if (effect.starts_with("tag_")) {
+  if (effect.starts_with("tag_") || effect == "bent_tag") {
     for (const Marker& marker : robot.tree.markers) {
       // A tag that never moves may as well be larger and further away.
       if (effect != "tag_slip" && marker.link == LinkId{0}) continue;

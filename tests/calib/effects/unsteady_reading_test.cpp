@@ -106,6 +106,18 @@ TEST(UnsteadyReading, CuttingOffIsAnotherZero) {
   EXPECT_LT(rms_left(read), 0.06 * kStep);
 }
 
+TEST(UnsteadyReading, PosturesShowStepsInWhateverOrder) {
+  Rng rng(5);
+  Eigen::VectorXd values(60);
+  for (double& value : values) value = kStep * std::round(rng.uniform(-1.0, 1.0) / kStep);
+  const auto found = reading_in_steps(values);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->size, kStep, kExact);
+  EXPECT_NEAR(found->error, kStep / std::sqrt(12.0), kExact);
+  for (double& value : values) value = rng.uniform(-1.0, 1.0);
+  EXPECT_FALSE(reading_in_steps(values));
+}
+
 TEST(UnsteadyReading, NoiseIsAsLargeAsItIs) {
   constexpr double kNoise = 2e-3;
   Read read = moved();

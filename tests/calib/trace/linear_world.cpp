@@ -207,7 +207,7 @@ TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
   }
   for (Eigen::Index j = 0; j < kJoints; ++j) {
     const std::string name = "joint" + std::to_string(j + 1);
-    out.rest_places.push_back({name, "rad", static_cast<int>(j)});
+    out.rest_places.push_back({name, "rad", static_cast<int>(j), 0.0, 0.0});
     out.covariates.push_back({"value of " + name, "rad", q_.col(j)});
     out.covariates.push_back({"direction of " + name, "", direction_of(q_.col(j))});
   }
