@@ -90,17 +90,9 @@ struct EffectBundle::Impl {
   double jitter_s = 0.0;
   // Where the last fit of the same change ended: the next one begins there.
   mutable std::map<std::vector<std::string>, State> ends;
-  // Where the last fit ended: one of another change, which as a rule differs by one effect, begins
-  // there.
-  struct End {
-    std::vector<Correction> corrections;
-    State state;
-  };
-  mutable std::optional<End> last;
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  static void begin_at(const End& end, const BundleChange& change, State& state);
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
@@ -254,20 +246,6 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
   }
 }
 
-// What the change has in common with the one that was fitted stays as it was.
-void EffectBundle::Impl::begin_at(const End& end, const BundleChange& change, State& state) {
-  const State plain = std::exchange(state, end.state);
-  state.corrections = plain.corrections;
-  if (!change.time_offset) state.time_offset = plain.time_offset;
-  for (std::size_t c = 0; c < change.corrections.size(); ++c) {
-    const auto known =
-        std::ranges::find(end.corrections, change.corrections[c].name, &Correction::name);
-    if (known == end.corrections.end()) continue;
-    state.corrections[c] =
-        end.state.corrections[static_cast<std::size_t>(known - end.corrections.begin())];
-  }
-}
-
 // The least squares fit; `with` and `state` are left with the change in them.
 BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
@@ -278,17 +256,10 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   for (const std::size_t coupling : change.without_couplings) {
     key.push_back(fmt::format("without coupling {}", coupling));
   }
-  if (const auto end = ends.find(key); end != ends.end()) {
-    state = end->second;
-  } else if (last) {
-    begin_at(*last, change, state);
-  }
+  if (const auto end = ends.find(key); end != ends.end()) state = end->second;
   constexpr int kIterations = 60;
-  constexpr double kTolerance = 1e-8;  // of the squares: less than a thousandth of a row's noise
-  const bundle::SolveSummary summary =
-      bundle::solve(with, state, used, {}, kIterations, kTolerance);
+  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
   ends.insert_or_assign(key, state);
-  if (summary.converged) last = End{with.corrections, state};
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;

@@ -28,6 +28,7 @@ constexpr double kLossWidth = 3.0;
 constexpr double kFirstRadius = 1e6;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
+constexpr double kPlainTolerance = 1e-10;
 
 struct Misfit {
   int sighting = 0;
@@ -156,7 +157,7 @@ double freedom_factor(const Spec& spec, State& state, const std::vector<int>& us
 }  // namespace
 
 SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
-                   const BuildOptions& build_options, int max_iterations, double tolerance) {
+                   const BuildOptions& build_options, int max_iterations) {
   silence_glog();
   BuiltProblem built(spec, state, sightings, build_options);
   if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
@@ -169,7 +170,7 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
                                    : ceres::DENSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
   options.initial_trust_region_radius = kFirstRadius;
-  options.function_tolerance = build_options.robust_width ? kRobustTolerance : tolerance;
+  options.function_tolerance = build_options.robust_width ? kRobustTolerance : kPlainTolerance;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-14;
   options.num_threads = 1;

@@ -19,14 +19,10 @@ struct SolveSummary {
   double final_cost = 0.0;
 };
 
-/// Of the squares, by which a last step lowers them.
-inline constexpr double kPlainTolerance = 1e-10;
-
 /// Least squares over the given sightings; moves `state`. Single-threaded, so that the bits are the
-/// same. A robust solve has a tolerance of its own.
+/// same.
 [[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
-                                 const BuildOptions& options, int max_iterations,
-                                 double tolerance = kPlainTolerance);
+                                 const BuildOptions& options, int max_iterations);
 
 struct RobustSolution {
   SolveSummary summary;

@@ -11,6 +11,7 @@
 #include "calib/trace/distribution.h"
 #include "calib/trace/score_test.h"
 #include "calib/trace/stage.h"
+#include "calib/trace/tracer.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::effects {
@@ -44,8 +45,13 @@ Estimate estimate_of(const Stage& stage, std::size_t index) {
   return {stage.fit.values[index][0], std::sqrt(std::max(0.0, covariance(at, at)))};
 }
 
-TracedEffect described(const EffectBundle& bundle, const CalibrationTraceOptions& options,
-                       const std::vector<AddedEffect>& added, std::size_t coupling) {
+struct Described {
+  TracedEffect effect;  ///< `explained` in whitened squares
+  double left = 0.0;    ///< squares with it
+};
+
+Described described(const EffectBundle& bundle, const CalibrationTraceOptions& options,
+                    const std::vector<AddedEffect>& added, std::size_t coupling) {
   const DesignCoupling& design = bundle.couplings()[coupling];
   const AddedEffect effect = effect_of(bundle, design);
   // The ratio itself is held: what the recording says beyond it is an effect beside the others.
@@ -81,7 +87,16 @@ TracedEffect described(const EffectBundle& bundle, const CalibrationTraceOptions
   out.held_out_before = before->error;
   out.held_out_after = now->error;
   out.explained = before->system.total().rr - now->system.total().rr;
-  return out;
+  return {std::move(out), now->system.total().rr};
+}
+
+// The joint follows the other one along a curve: the ratio is its slope and no cause of its own.
+bool is_slope_of_a_rest(const Described& coupling, const Trace& trace) {
+  return std::ranges::any_of(trace.rest, [&](const Rest& rest) {
+    return rest.place == coupling.effect.id.place &&
+           rest.covariate == "value of " + coupling.effect.scan_words &&
+           rest.explained * coupling.left >= trace::kDoubtfulShare * coupling.effect.explained;
+  });
 }
 
 }  // namespace
@@ -95,7 +110,9 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
   std::vector<TracedEffect> found;
   std::string names;
   for (const std::size_t k : all) {
-    TracedEffect effect = described(bundle, options, trace.added, k);
+    const Described coupling = described(bundle, options, trace.added, k);
+    if (is_slope_of_a_rest(coupling, trace)) continue;
+    TracedEffect effect = coupling.effect;
     // A ratio that the structure took for likely may be nothing.
     if (effect.p_value > trace.false_alarm_rate ||
         effect.held_out_before.value <= effect.held_out_after.value) {

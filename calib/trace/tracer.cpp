@@ -211,7 +211,7 @@ StagePtr Tracer::chain(const AddedEffect& first) {
 // The value of a scan was the best beside the effects that were known then. All values are tried
 // everywhere, or at one place; a step from where it is costs little and is taken everywhere.
 void Tracer::search_again(const std::optional<std::string>& place) {
-  constexpr double kNoticeable = 1.0;  // squares, whitened: what the noise of one row makes
+  constexpr double kNoticeable = 1e-6;  // of what the effect explains
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const AddedEffect effect = now_->added[i];
     if (place && effect.id.place != *place) continue;
@@ -222,7 +222,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     if (candidate == nullptr) continue;
     const double scan = best_scan(stage->system, *candidate);
     const double before = gain_of(stage->system, candidate->columns(effect.scan));
-    if (gain_of(stage->system, candidate->columns(scan)) <= before + kNoticeable) continue;
+    if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * before) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects[i].scan = scan;
     StagePtr moved = stage_of(std::move(effects));

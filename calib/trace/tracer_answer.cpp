@@ -482,9 +482,9 @@ std::string curve_words(const std::vector<TracedEffect>& accepted) {
 std::string Tracer::reading_words(const CommonMotion& motion) const {
   const RestPlace& place = now_->fit.rest_places[motion.place];
   return fmt::format(
-      "readings of {} are uncertain by {:.2g} {} (rms), as their steps or their noise say, and "
-      "that "
-      "makes {:.0f} % of what is left",
+      "readings of {} are uncertain by {:.2g} {} (rms), as their steps or their noise say: {:.0f} "
+      "% "
+      "of what is left",
       place.name, motion.size, place.unit, 100.0 * std::min(1.0, motion.share));
 }
 
