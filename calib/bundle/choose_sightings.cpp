@@ -72,6 +72,13 @@ struct Series {
     return differences[i].squaredNorm() / static_cast<double>(differences[i].size()) /
            kDifferenceVariance;
   }
+
+  // A large error changes from frame to frame, as the marker turns, by more than the noise, and yet
+  // by little of itself: its neighbours have it, too.
+  [[nodiscard]] bool goes_on(std::size_t i) const {
+    constexpr double kLittle = 0.1;
+    return differences[i].norm() < kLittle * residuals[i].norm();
+  }
 };
 
 // What the frames' stamps scatter by, s. All that moves in a frame is then off by the same time,
@@ -329,8 +336,9 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
       const double noise = typical / (1.0 - 2.0 / (9.0 * freedom)) +
                            out.jitter_s * out.jitter_s * series.d_time[i].squaredNorm();
       widen(sighting, std::sqrt(noise + bias * bias));
-      if (!series.far[i] &&
-          series.distance(i) < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom))) {
+      const bool as_near =
+          series.distance(i) < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom));
+      if (!series.far[i] && (as_near || series.goes_on(i))) {
         out.used.push_back(series.indices[i]);
       }
     }

@@ -123,28 +123,32 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
   return out;
 }
 
-// A sheet of paper that does not lie flat. Bent, it is shorter, too.
+// A sheet of paper that does not lie flat.
 CameraEffect bent_tag(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
-  CameraEffect out =
-      effect("bent_tag", name, fmt::format("{} is not flat (or not square)", name),
-             {{"out of plane", "m"}, {"width over height", ""}, {"relative size", ""}}, "m");
+  CameraEffect out = effect("bent_tag", name, fmt::format("{} is not flat (or not square)", name),
+                            {{"out of plane", "m"}, {"width over height", ""}}, "m");
   const double half = 0.5 * world.tree.markers[static_cast<std::size_t>(marker)].size_m;
-  out.candidate.contains = {{"tag_size", name}};
+  // Any of these bends the images of markers.
+  out.candidate.refines = {{"tag_size", name},
+                           {"lens_distortion", "camera"},
+                           {"lens_distortion", "camera tangential"},
+                           {"intrinsics", kFocalLengthPlace},
+                           {"intrinsics", "camera centre"}};
+  out.candidate.floor = kUsualShift;
   out.candidate.size = [half](const Eigen::VectorXd& shape) {
     return std::hypot(shape[0], half * shape[1]);
   };
   out.candidate.possible = [half](const Eigen::VectorXd& shape) {
     constexpr double kMostOfSize = 0.5;
-    return std::abs(shape[0]) < kMostOfSize * half && shape.tail<2>().norm() < kMostOfSize;
+    return std::abs(shape[0]) < kMostOfSize * half && std::abs(shape[1]) < kMostOfSize;
   };
   out.candidate.check = "glue the marker on something flat; a printer that stretches one way";
   out.candidate.record = "show the marker from several sides, tilted";
   if (rests(world, marker)) out.candidate.floor = std::numeric_limits<double>::infinity();
   out.corrections = [like = out, marker](double) {
     return std::vector{correct(CorrectedPart::kMarkerWarp, like, 0, marker),
-                       correct(CorrectedPart::kMarkerWidth, like, 1, marker),
-                       correct(CorrectedPart::kMarkerSize, like, 2, marker)};
+                       correct(CorrectedPart::kMarkerWidth, like, 1, marker)};
   };
   return out;
 }
