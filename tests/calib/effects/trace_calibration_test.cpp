@@ -120,6 +120,19 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+// Of 24 mm, seen from sides that change: by more than the noise from frame to frame.
+TEST(TraceCalibration, ALargeSlipKeepsItsSightings) {
+  EffectWorldOptions options = filmed({{"tag_slip", "tag_16", 0.024, 0.75}}, 480);
+  options.kind = truth::RobotKind::kArm6;
+  options.frame_rate_hz = 30.0;
+  options.amplitude_rad = 1.3;
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"tag_slip", "tag_16"})) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), 0.024)) << trace.accepted.front().size;
+  EXPECT_LT(trace.held_out_after.value, 0.05);
+}
+
 // Steps of 0.6 deg. Where the joint turns back inside a step nobody knows how far it went.
 TEST(TraceCalibration, StepsOfAReadingAreTakenOutOfIt) {
   const InjectedEffect steps = strong("quantisation", "q2");
