@@ -35,11 +35,17 @@ CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>
   return camera;
 }
 
-// What a corner moves by with a parameter of MarkerShape.
+// The number of a marker's shape that a correction changes.
+double& number_of(MarkerShape& shape, CorrectedPart part) {
+  if (part == CorrectedPart::kMarkerSize) return shape.size;
+  return part == CorrectedPart::kMarkerWidth ? shape.width : shape.warp_m;
+}
+
+// What a corner moves by with that number: corners are linear in all of them.
 Eigen::Vector3d d_corner(CorrectedPart part, const Eigen::Vector3d& corner_m) {
-  if (part == CorrectedPart::kMarkerSize) return corner_m;
-  if (part == CorrectedPart::kMarkerWidth) return {0.5 * corner_m.x(), -0.5 * corner_m.y(), 0.0};
-  return {0.0, 0.0, corner_m.x() * corner_m.y() < 0.0 ? -1.0 : 1.0};
+  MarkerShape unit{0.0, 0.0, 0.0};
+  number_of(unit, part) = 1.0;
+  return unit.corner_m(corner_m);
 }
 
 // Rows of the image between a corner and the middle row.
@@ -100,13 +106,9 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         out.marker += twist;
         break;
       case CorrectedPart::kMarkerSize:
-        out.shape.size += amount;
-        break;
       case CorrectedPart::kMarkerWidth:
-        out.shape.width += amount;
-        break;
       case CorrectedPart::kMarkerWarp:
-        out.shape.warp_m += amount;
+        number_of(out.shape, correction.part) += amount;
         break;
       case CorrectedPart::kCamera:
         out.camera += twist;

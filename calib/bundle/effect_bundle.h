@@ -45,7 +45,7 @@ struct BundleSolution {
   double variance = 0.0;  ///< of a whitened row, priors' squares counted in
   /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
   KinematicTree tree;
-  std::shared_ptr<const bundle::State> end;
+  std::shared_ptr<const bundle::State> end;  ///< for fit(), which then need not solve again
 };
 
 /// A solution, and how its residual answers to the parameters and to probes.

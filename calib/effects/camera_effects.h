@@ -49,13 +49,13 @@ inline constexpr double kBendPeriods = 2.0;
 [[nodiscard]] inline bool is_clock_offset(const EffectId& id) {
   return id.effect == "time_offset" && id.place == "clock";
 }
+[[nodiscard]] inline bool is_of_reading(const EffectId& id) {
+  return id.effect == "quantisation" || id.effect == "reading_noise";
+}
 [[nodiscard]] inline bool is_sag(const EffectId& id) { return id.effect == "compliance"; }
 [[nodiscard]] inline bool is_bend(const EffectId& id, double scan) {
   return id.effect == "eccentricity" && scan == kBendPeriods;
 }
-
-/// Where an effect intrinsics of the focal length sits.
-inline constexpr const char* kFocalLengthPlace = "camera focal length";
 
 struct CameraEffect {
   Candidate candidate;  ///< without columns
@@ -72,13 +72,10 @@ struct CameraEffect {
   std::function<Eigen::Vector3d(const Eigen::VectorXd&)> gravity_base;
 };
 
-/// Joints of those driven whose readings jump, by how a log has them.
-[[nodiscard]] std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
-                                                               const std::vector<int>& driven);
-
-/// The same of postures.
-[[nodiscard]] std::map<int, UnsteadyReading> readings_in_steps(const JointMotion& postures,
-                                                               const std::vector<int>& driven);
+/// Joints of those driven whose readings jump: in a log, or (`postures`) from posture to posture.
+[[nodiscard]] std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& motion,
+                                                               const std::vector<int>& driven,
+                                                               bool postures);
 
 /// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,
 /// coupling, helical, curved_slider, axis_wobble, quantisation, reading_noise, joint_map.

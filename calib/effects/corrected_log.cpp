@@ -56,7 +56,6 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     if (log.channel(tree.joints[j].channel)) world.driven.push_back(static_cast<int>(j));
   }
-  world.unsteady = effects::unsteady_readings(world.log, world.driven);
   return world;
 }
 
@@ -71,7 +70,7 @@ bool is_joint_value(const Correction& correction, const Joint& joint) {
 
 // Moves the stamps to the camera's clock; false for other effects.
 bool undo_clock(const FittedEffect& effect, JointLog& log) {
-  if (effect.id == EffectId{"time_offset", "clock"}) {
+  if (effects::is_clock_offset(effect.id)) {
     for (double& t : log.times_s) t -= effect.values[0];
     return true;
   }
@@ -249,6 +248,8 @@ effects::EffectWorld world_with(const JointLog& log, const KinematicTree& tree,
                                 const std::optional<Eigen::Vector3d>& gravity_base) {
   constexpr int kRounds = 3;  // each leaves of its error what the sag is, in rad
   effects::EffectWorld out = world_of(log, tree, gravity_base);
+  if (std::ranges::any_of(effects, effects::is_of_reading, &FittedEffect::id))
+    out.unsteady = effects::unsteady_readings(out.log, out.driven, false);
   for (const FittedEffect& effect : effects) {
     const auto joint = tree.joint(effect.id.place);
     if (joint && effects::is_bend(effect.id, effect.scan) && effect.values.size() == 2)

@@ -393,21 +393,12 @@ CameraEffect axis_wobble(const Suspect& s) {
 
 }  // namespace
 
-std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& log,
-                                                 const std::vector<int>& driven) {
+std::map<int, UnsteadyReading> unsteady_readings(const JointMotion& motion,
+                                                 const std::vector<int>& driven, bool postures) {
   std::map<int, UnsteadyReading> out;
   for (const int joint : driven) {
-    if (auto found = unsteady_reading(log.times_s, log.value.col(joint)))
-      out.emplace(joint, std::move(*found));
-  }
-  return out;
-}
-
-std::map<int, UnsteadyReading> readings_in_steps(const JointMotion& postures,
-                                                 const std::vector<int>& driven) {
-  std::map<int, UnsteadyReading> out;
-  for (const int joint : driven) {
-    if (auto found = reading_in_steps(postures.value.col(joint)))
+    const Eigen::VectorXd values = motion.value.col(joint);
+    if (auto found = postures ? reading_in_steps(values) : unsteady_reading(motion.times_s, values))
       out.emplace(joint, std::move(*found));
   }
   return out;

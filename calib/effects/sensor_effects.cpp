@@ -11,6 +11,10 @@
 namespace kinescope::effects {
 namespace {
 
+// Where intrinsics sit.
+constexpr const char* kFocalLength = "camera focal length";
+constexpr const char* kCentre = "camera centre";
+
 CameraEffect time_offset() {
   CameraEffect out =
       effect("time_offset", "clock", "the joint log's clock and the camera's do not agree",
@@ -77,7 +81,7 @@ CameraEffect lens(std::string place, std::string words, std::vector<EffectParame
 }
 
 CameraEffect focal_length() {
-  CameraEffect out = effect("intrinsics", kFocalLengthPlace,
+  CameraEffect out = effect("intrinsics", kFocalLength,
                             "the focal length is not the declared one (another zoom or focus)",
                             {{"relative change", ""}}, "");
   out.candidate.check =
@@ -99,7 +103,7 @@ std::vector<CameraEffect> of_camera(const CameraModel& camera) {
                        {{"p1", ""}, {"p2", ""}}, {6, 7}));
   }
   out.push_back(focal_length());
-  out.push_back(of_intrinsics("intrinsics", "camera centre",
+  out.push_back(of_intrinsics("intrinsics", kCentre,
                               "the image's centre is not the declared one (a cropped image)",
                               {{"cx", "px"}, {"cy", "px"}}, "px", {2, 3}));
   CameraEffect aspect = of_intrinsics("intrinsics", "camera aspect",
@@ -133,8 +137,8 @@ CameraEffect bent_tag(const EffectWorld& world, int marker) {
   out.candidate.refines = {{"tag_size", name},
                            {"lens_distortion", "camera"},
                            {"lens_distortion", "camera tangential"},
-                           {"intrinsics", kFocalLengthPlace},
-                           {"intrinsics", "camera centre"}};
+                           {"intrinsics", kFocalLength},
+                           {"intrinsics", kCentre}};
   out.candidate.floor = kUsualShift;
   out.candidate.size = [half](const Eigen::VectorXd& shape) {
     return std::hypot(shape[0], half * shape[1]);

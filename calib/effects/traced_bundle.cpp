@@ -285,9 +285,10 @@ std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& libra
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                            std::vector<std::size_t> without_couplings)
     : bundle_(&bundle), options_(options), without_couplings_(std::move(without_couplings)) {
-  unsteady_ = bundle_->postures()
-                  ? readings_in_steps(bundle_->motion_at_frames(0.0), bundle_->driven_joints())
-                  : unsteady_readings(bundle_->motion_of_log(0.0), bundle_->driven_joints());
+  const bool postures = bundle_->postures();
+  unsteady_ =
+      unsteady_readings(postures ? bundle_->motion_at_frames(0.0) : bundle_->motion_of_log(0.0),
+                        bundle_->driven_joints(), postures);
 }
 
 BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,

@@ -45,8 +45,7 @@ namespace kinescope::truth {
 ///   zero_jump        rad (m), the joint's zero from then on; detail: when, share of the time
 ///   zero_drift       rad (m) from the first frame to the last; detail as of camera_drift
 ///   clock_jump       s, joint-log time = frame time + size from then on; detail: when, share of
-///   the
-///                    time
+///                    the time
 /// and of the test's own making, in no library:
 ///   own_tanh         true value of `place` +=
 ///                    size x tanh(5 (logged value of `with` - detail) / reach)
@@ -54,12 +53,12 @@ namespace kinescope::truth {
 ///   own_chequer      px, corners shift one way on the black fields of a chequered image and back
 ///                    on the white ones; detail: px, edge of a field
 ///   own_ripple       px, corners shift along a wave over the image; detail: px, its length
-///   own_product      true value of `place` += size x (its value / reach) x (value of `with` /
-///   reach) own_acceleration true value of `place` += size x acceleration of `with` / its largest
+///   own_product      true value of `place` +=
+///                    size x (its value / reach) x (value of `with` / reach)
+///   own_acceleration true value of `place` += size x acceleration of `with` / its largest
 ///   own_vibration    rad (m) amplitude; detail: Hz
 ///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
-///   and
-///                    before, fading - its value) / reach
+///                    and before, fading - its value) / reach
 ///   own_growth       1, growth of all distances between joints, from the first frame to the last
 struct InjectedEffect {
   std::string effect;
