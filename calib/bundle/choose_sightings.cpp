@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include <Eigen/LU>
@@ -247,50 +248,79 @@ void widen(Sighting& sighting, double factor) {
   sighting.whitening /= factor;
 }
 
-// One marker's sightings in the order of the frames, and which of them were rejected.
+// One marker's sightings in some order, and which of them were rejected.
 struct Rejections {
   std::vector<int> indices;
   std::vector<bool> rejected;
 };
 
-// How many at the end were rejected one after the other, where at the rate of the others that would
-// not happen by chance; else none.
-std::size_t lasting_end(const std::vector<bool>& rejected) {
+// Those rejected one after the other, where at the rate of the others that would not happen by
+// chance; those at either end alone or all.
+std::vector<int> rejected_in_a_row(const Rejections& of, bool at_the_ends_alone) {
   constexpr double kChance = 1e-6;
-  const auto run_end = std::find(rejected.rbegin(), rejected.rend(), false);
-  const auto run = static_cast<std::size_t>(run_end - rejected.rbegin());
-  const auto others = static_cast<double>(rejected.size() - run);
-  const auto outliers = static_cast<double>(std::count(run_end, rejected.rend(), true));
-  // Laplace's rule of succession.
-  const double rate = (outliers + 1.0) / (others + 2.0);
-  return std::pow(rate, static_cast<double>(run)) < kChance ? run : 0;
+  const std::vector<bool>& rejected = of.rejected;
+  const auto all = static_cast<double>(std::ranges::count(rejected, true));
+  const auto count = static_cast<double>(rejected.size());
+  const double places = at_the_ends_alone ? 2.0 : count;
+  std::vector<int> out;
+  for (std::size_t first = 0; first < rejected.size(); ++first) {
+    if (!rejected[first]) continue;
+    std::size_t end = first;
+    while (end < rejected.size() && rejected[end]) ++end;
+    const auto run = static_cast<double>(end - first);
+    // Laplace's rule of succession.
+    const double rate = (all - run + 1.0) / (count - run + 2.0);
+    const bool at_an_end = first == 0 || end == rejected.size();
+    if (run < count && (at_an_end || !at_the_ends_alone) &&
+        places * std::pow(rate, run) < kChance) {
+      out.insert(out.end(), of.indices.begin() + static_cast<std::ptrdiff_t>(first),
+                 of.indices.begin() + static_cast<std::ptrdiff_t>(end));
+    }
+    first = end;
+  }
+  return out;
 }
 
 }  // namespace
 
-std::vector<int> with_what_lasts(const Spec& spec, const RobustSolution& solution) {
-  std::map<int, Rejections> by_marker;
-  std::vector<int> all = solution.used;
-  all.insert(all.end(), solution.rejected.begin(), solution.rejected.end());
-  std::ranges::stable_sort(all, {}, [&](int index) {
-    return std::pair(spec.sightings[static_cast<std::size_t>(index)].frame, index);
-  });
-  for (const int index : all) {
-    Rejections& of = by_marker[spec.sightings[static_cast<std::size_t>(index)].marker];
-    of.indices.push_back(index);
-    of.rejected.push_back(!std::ranges::binary_search(solution.used, index));
+std::vector<int> with_what_lasts(const Spec& spec, const State& state,
+                                 const RobustSolution& solution) {
+  const Readings readings(spec, state);
+  std::map<int, std::vector<int>> by_marker;
+  for (const auto* indices : {&solution.used, &solution.rejected}) {
+    for (const int index : *indices)
+      by_marker[spec.sightings[static_cast<std::size_t>(index)].marker].push_back(index);
   }
-  std::vector<int> out = solution.used;
-  for (auto& [marker, of] : by_marker) {
-    const auto last = static_cast<std::ptrdiff_t>(lasting_end(of.rejected));
-    if (std::cmp_equal(last, of.indices.size())) continue;  // nothing of it was explained
-    out.insert(out.end(), of.indices.end() - last, of.indices.end());
-    std::reverse(of.rejected.begin(), of.rejected.end());
-    const auto first = static_cast<std::ptrdiff_t>(lasting_end(of.rejected));
-    out.insert(out.end(), of.indices.begin(), of.indices.begin() + first);
+  std::set<int> out(solution.used.begin(), solution.used.end());
+  const auto frame_of = [&](int index) {
+    return spec.sightings[static_cast<std::size_t>(index)].frame;
+  };
+  for (auto& [marker, indices] : by_marker) {
+    const auto is_rejected = [&](int index) {
+      return !std::ranges::binary_search(solution.used, index);
+    };
+    const auto rejected = std::ranges::count_if(indices, is_rejected);
+    // Outliers are the lesser part: a robust fit cannot tell which of two halves is right.
+    if (2 * rejected > std::ssize(indices) && rejected < std::ssize(indices))
+      out.insert(indices.begin(), indices.end());
+    const auto add = [&](bool at_the_ends_alone) {
+      Rejections of{indices, {}};
+      for (const int index : indices) of.rejected.push_back(is_rejected(index));
+      const std::vector<int> kept = rejected_in_a_row(of, at_the_ends_alone);
+      out.insert(kept.begin(), kept.end());
+    };
+    std::ranges::stable_sort(
+        indices, {}, [&](int index) { return std::pair(frame_of(index), index); });
+    add(true);
+    const Marker& seen = spec.tree.markers[static_cast<std::size_t>(marker)];
+    for (const int joint : spec.path[seen.link.index()]) {
+      if (spec.channel[static_cast<std::size_t>(joint)] < 0) continue;
+      std::ranges::stable_sort(
+          indices, {}, [&](int index) { return readings.value(frame_of(index), joint); });
+      add(false);
+    }
   }
-  std::ranges::sort(out);
-  return out;
+  return {out.begin(), out.end()};
 }
 
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,

@@ -27,9 +27,11 @@ struct ChosenSightings {
                                                    const std::vector<int>& usable,
                                                    double reject_sigma);
 
-/// What a robust solution used, and what it rejected of a marker up to an end of the recording and
-/// not by chance: the marker may have slipped, the camera may have been bumped. Of postures, whose
+/// What a robust solution used, and what it rejected in a row and not by chance: up to an end of
+/// the recording (the marker may have slipped, the camera may have been bumped), or from one value
+/// of a joint that carries the marker to another (the joint may err there). Of postures, whose
 /// neighbours in time say nothing.
-[[nodiscard]] std::vector<int> with_what_lasts(const Spec& spec, const RobustSolution& solution);
+[[nodiscard]] std::vector<int> with_what_lasts(const Spec& spec, const State& state,
+                                               const RobustSolution& solution);
 
 }  // namespace kinescope::bundle

@@ -112,7 +112,7 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
       bundle::solve_robustly(robust, state, usable, options.reject_sigma, options.max_iterations);
   if (spec.postures) {
     spec = std::move(robust);
-    impl_->used = bundle::with_what_lasts(spec, solution);
+    impl_->used = bundle::with_what_lasts(spec, state, solution);
   } else {
     bundle::ChosenSightings chosen =
         bundle::choose_by_neighbours(spec, state, usable, options.reject_sigma);

@@ -44,6 +44,23 @@ CameraEffect late_reading(const Suspect& s) {
   return out;
 }
 
+// Where a reading rests on a step, only the camera says where in the step the joint is.
+std::vector<Correction> places_in_steps(const EffectWorld& world, const Suspect& s,
+                                        const UnsteadyReading& reading) {
+  std::vector<Correction> out;
+  for (const Hold& hold : reading.holds) {
+    Eigen::VectorXd share(s.value.size());
+    for (Eigen::Index i = 0; i < share.size(); ++i)
+      share[i] = hold.share(world.frames.times_s[static_cast<std::size_t>(i)]);
+    if (share.isZero(0.0)) continue;
+    out.push_back(turn(s, fmt::format("place in its step from {:.3f} s", hold.first_s), s.unit,
+                       std::move(share)));
+    out.back().is_nuisance = true;
+    out.back().prior_sigma = reading.error;
+  }
+  return out;
+}
+
 // The size that the residual shows is the one that the log shows, or it is another effect's.
 CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const UnsteadyReading& reading) {
   constexpr double kAsTheLogSays = 0.5;
@@ -66,6 +83,9 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
   out.corrections = [s, parameter, share](double) {
     return std::vector{turn(s, parameter, s.unit, share)};
   };
+  if (!world.known && !reading.holds.empty()) {
+    out.nuisances = [places = places_in_steps(world, s, reading)](double) { return places; };
+  }
   return out;
 }
 

@@ -2,6 +2,7 @@
 #include "calib/effects/traced_bundle.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
 #include <fmt/format.h>
@@ -155,7 +156,27 @@ Eigen::VectorXd slope_of(const Eigen::VectorXd& values, const std::vector<double
   return out;
 }
 
+// Two joints that act together (gravity, a cable along both) bend each other's curves: of such
+// surfaces the product is the first term that no curve over one of them has.
+std::vector<Covariate> products_of(const std::vector<Covariate>& values) {
+  std::vector<Covariate> out;
+  const auto centred = [](const Covariate& joint) -> Eigen::ArrayXd {
+    return joint.value.array() - joint.value.mean();
+  };
+  for (std::size_t a = 0; a < values.size(); ++a) {
+    for (std::size_t b = a + 1; b < values.size(); ++b) {
+      const std::string unit = values[a].unit == values[b].unit
+                                   ? values[a].unit + "^2"
+                                   : values[a].unit + " " + values[b].unit;
+      out.push_back({fmt::format("{} times {}", values[a].name, values[b].name), unit,
+                     centred(values[a]) * centred(values[b]), true});
+    }
+  }
+  return out;
+}
+
 std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector<int>& frames) {
+  std::vector<Covariate> joints;
   std::vector<Covariate> out;
   const auto at_instants = [&](const Eigen::VectorXd& by_frame) {
     Eigen::VectorXd values(static_cast<Eigen::Index>(frames.size()));
@@ -167,7 +188,8 @@ std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector
   for (const int joint : world.driven) {
     const Joint& j = world.tree.joints[static_cast<std::size_t>(joint)];
     const std::string unit = j.type == JointType::kRevolute ? "rad" : "m";
-    out.push_back({"value of " + j.name, unit, at_instants(world.frames.value.col(joint))});
+    joints.push_back({"value of " + j.name, unit, at_instants(world.frames.value.col(joint))});
+    out.push_back(joints.back());
     if (world.postures) continue;
     const Eigen::VectorXd rate = at_instants(world.frames.rate.col(joint));
     out.push_back({"acceleration of " + j.name, unit + "/s^2",
@@ -176,6 +198,7 @@ std::vector<Covariate> covariates_of(const EffectWorld& world, const std::vector
     out.push_back({"direction of " + j.name, "",
                    rate.unaryExpr([](double v) { return v > 0.0 ? 1.0 : -1.0; })});
   }
+  std::ranges::move(products_of(joints), std::back_inserter(out));
   if (!world.postures) {
     out.push_back({"time", "s",
                    at_instants(Eigen::Map<const Eigen::VectorXd>(

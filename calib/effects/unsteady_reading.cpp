@@ -115,6 +115,25 @@ std::vector<Node> edges(const std::vector<double>& times_s, const Eigen::VectorX
   return out;
 }
 
+std::vector<Hold> holds_of(const std::vector<double>& times_s, const Eigen::VectorXd& values,
+                           double cutoff_hz) {
+  const double change_s = 1.0 / cutoff_hz;
+  std::vector<Hold> out;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= times_s.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (i < times_s.size() && values[at] == values[at - 1]) continue;
+    Hold hold;
+    hold.first_s = begin == 0 ? times_s.front() : 0.5 * (times_s[begin - 1] + times_s[begin]);
+    hold.last_s = i == times_s.size() ? times_s.back() : 0.5 * (times_s[i - 1] + times_s[i]);
+    hold.after_first_s = begin == 0 ? 0.0 : 0.5 * change_s;
+    hold.before_last_s = i == times_s.size() ? 0.0 : 0.5 * change_s;
+    if (hold.last_s - hold.first_s > change_s) out.push_back(hold);
+    begin = i;
+  }
+  return out;
+}
+
 // Where a reading rests it says that the value is within its step, once, however long it rests.
 std::vector<Node> with_rests(std::vector<Node> out, const std::vector<double>& times_s,
                              const Eigen::VectorXd& values, double step) {
@@ -148,6 +167,13 @@ Eigen::Index changes_of(const Eigen::VectorXd& values) {
 
 }  // namespace
 
+double Hold::share(double t_s) const {
+  if (t_s < first_s || t_s > last_s) return 0.0;
+  const double rise = after_first_s > 0.0 ? std::min(1.0, (t_s - first_s) / after_first_s) : 1.0;
+  const double fall = before_last_s > 0.0 ? std::min(1.0, (last_s - t_s) / before_last_s) : 1.0;
+  return std::min(rise, fall);
+}
+
 std::optional<double> step_of(const Eigen::VectorXd& values) {
   constexpr double kOnGrid = 0.02;  // of a step: digits that were cut off
   std::vector<double> changes;
@@ -175,7 +201,7 @@ std::optional<UnsteadyReading> reading_in_steps(Eigen::VectorXd values) {
   std::ranges::sort(values);
   const std::optional<double> step = step_of(values);
   if (!step) return std::nullopt;
-  return UnsteadyReading{{}, true, *step, kRoundedSigma * *step, {}};
+  return UnsteadyReading{{}, true, *step, kRoundedSigma * *step, {}, {}};
 }
 
 std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
@@ -194,6 +220,7 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   if (rests_on_steps) nodes = with_rests(std::move(nodes), times_s, values, *step);
   const Eigen::Map<const Eigen::VectorXd> at(times_s.data(), values.size());
   out.motion = spline_through(nodes, cutoff_hz).evaluate(at);
+  if (step) out.holds = holds_of(times_s, values, cutoff_hz);
   if (step) {
     const double half = 0.5 * *step;
     out.motion = out.motion.cwiseMax((values.array() - half).matrix())

@@ -15,12 +15,26 @@
 
 namespace kinescope::effects {
 
+/// A time over which the reading stays on one step: the value may be anywhere within it.
+struct Hold {
+  double first_s = 0.0;
+  double last_s = 0.0;
+  /// Within this time of an edge, where the value is known, the motion is bound to it; 0 at an end
+  /// of the log.
+  double after_first_s = 0.0;
+  double before_last_s = 0.0;
+
+  /// How much of the error in the middle of the hold there is at a time, 0 to 1.
+  [[nodiscard]] double share(double t_s) const;
+};
+
 struct UnsteadyReading {
   std::vector<double> times_s;  ///< of the samples
   bool in_steps = false;
   double size = 0.0;       ///< distance of the steps, or standard deviation of the noise
   double error = 0.0;      ///< rms by which a reading is off
   Eigen::VectorXd motion;  ///< samples, in the unit of the reading
+  std::vector<Hold> holds;  ///< longer than the motion's own changes take
 };
 
 /// Distance of the steps that `values` come in. Nothing for values that lie on no grid, or on one

@@ -125,7 +125,7 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
     }
   }
   EffectPicture out;
-  if (carrier < 0 || without.fit.covariates.empty()) return out;
+  if (carrier < 0 || std::ranges::all_of(without.fit.covariates, &Covariate::is_product)) return out;
   out.effect = Eigen::VectorXd::Zero(linear.instants());
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const EffectColumn& column = columns[k];
@@ -151,9 +151,12 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
     out.effect = seen.factor;
   }
   // A constant depends on nothing: it is shown over the last one, time.
-  const Covariate* best = &without.fit.covariates.back();
+  const auto& covariates = without.fit.covariates;
+  const Covariate* best =
+      &*std::ranges::find(covariates.rbegin(), covariates.rend(), false, &Covariate::is_product);
   double share = 0.0;
   for (const Covariate& covariate : without.fit.covariates) {
+    if (covariate.is_product) continue;
     // A load depends on the posture; any slow motion is a curve over time, too.
     if (seen.place != nullptr && covariate.name == "time") continue;
     const double explained = explained_by(covariate.value, out.effect);

@@ -118,6 +118,8 @@ struct Covariate {
   std::string name;  ///< "value of joint3", "direction of joint3", "time"
   std::string unit;
   Eigen::VectorXd value;  ///< instants
+  /// Made of two others: no axis to draw a known effect over.
+  bool is_product = false;
 };
 
 /// Where an unexplained rest may act.

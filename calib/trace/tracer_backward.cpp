@@ -22,7 +22,7 @@ namespace {
 // A rival is looked at if it explains at least this share of what the chosen effect explains.
 constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
-// A richer rival that explains less by this (squares, whitened: odds of e^-2) is none.
+// A rival whose posterior odds are less than e^-2 (in squares, whitened) is none.
 constexpr double kClearlyLess = 4.0;
 // What is less than this share of the squares that were there at first may be the imperfection of
 // the other effects: with all of them in it must be beyond doubt.
@@ -37,6 +37,18 @@ Score refitted_score(const Stage& without, const Stage& with,
   out.rms = without.system.shift_of(gain, columns);
   out.noise_share = without.system.noise_share_of(gain, columns);
   return out;
+}
+
+// By how much a richer rival has to explain more to be as likely (squares, whitened): what it might
+// have been and is not speaks against it. Schwarz 1978.
+double price_of_freedom(const Stage& without, const TestedMember& own, const TestedMember& rival) {
+  const auto freedom = [&](const TestedMember& member) {
+    const Candidate& candidate = without.fit.candidates[member.index];
+    const bool scanned = !candidate.scan.empty() && !candidate.scan_listed;
+    return static_cast<double>(member.columns.size()) + (scanned ? 1.0 : 0.0);
+  };
+  const double stretches = std::max(2, without.system.partition().stretches);
+  return (freedom(rival) - freedom(own)) * std::log(stretches);
 }
 
 }  // namespace
@@ -167,6 +179,7 @@ bool Tracer::check(std::size_t index) {
   const Candidate* candidate = find_candidate(stage->fit, effect.id);
   if (candidate == nullptr) return false;
   TestedMember own;
+  own.index = static_cast<std::size_t>(candidate - stage->fit.candidates.data());
   own.scan = effect.scan;
   own.columns = candidate->columns(effect.scan);
   own.score = jackknife_test(stage->system, own.columns);
@@ -247,16 +260,15 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
   std::ranges::stable_sort(rivals, std::greater{},
                            [](const TestedMember& rival) { return rival.score.gain; });
   if (rivals.size() > kMostRivals) rivals.resize(kMostRivals);
+  const double noise = (without.system.total().rr - own.score.gain) / without.system.freedom();
   Ambiguity ambiguity;
   for (const TestedMember& rival : rivals) {
     const Candidate& candidate = without.fit.candidates[rival.index];
+    const double price = price_of_freedom(without, own, rival);
+    const double more = (rival.score.gain - own.score.gain) / noise;
+    if (price > 0.0 && more <= price - kClearlyLess) continue;
     const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
     if (comparison == Comparison::kFirst) continue;
-    const bool richer = rival.columns.size() > own.columns.size();
-    if (comparison == Comparison::kInterchangeable && richer &&
-        rival.score.gain <= own.score.gain - kClearlyLess) {
-      continue;
-    }
     // Of two that say the same the plainer one comes first.
     const bool plainer = rival.columns.size() < own.columns.size() && !needed_.contains(effect.id);
     if (comparison == Comparison::kSecond || plainer) {

@@ -131,10 +131,53 @@ TEST_F(Sightings, WhatIsRejectedUpToAnEndIsNotByChance) {
     (rejected ? solution.rejected : solution.used).push_back(index);
   }
   ASSERT_GT(outliers.size(), 20U);
-  const std::vector<int> used = with_what_lasts(spec_, solution);
+  const std::vector<int> used = with_what_lasts(spec_, state_, solution);
   EXPECT_EQ(used.size(), usable_.size() - outliers.size());
   for (const int index : used) EXPECT_FALSE(outliers.contains(index)) << index;
   EXPECT_TRUE(std::ranges::is_sorted(used));
+}
+
+// A joint that errs at one end of its range; its marker's sightings elsewhere are outliers by
+// chance.
+TEST_F(Sightings, WhatIsRejectedFromOneValueOfAJointOnIsNotByChance) {
+  look();
+  const int seen = static_cast<int>(spec_.tree.markers.size()) - 1;
+  const int joint =
+      spec_.path[spec_.tree.markers[static_cast<std::size_t>(seen)].link.index()].back();
+  const Readings readings(spec_, state_);
+  std::vector<std::pair<double, int>> by_value;
+  for (const int index : usable_) {
+    const Sighting& sighting = spec_.sightings[static_cast<std::size_t>(index)];
+    if (sighting.marker == seen) by_value.emplace_back(readings.value(sighting.frame, joint), index);
+  }
+  std::ranges::sort(by_value);
+  std::set<int> rejected;
+  std::set<int> at_the_end;
+  for (std::size_t i = 0; i < by_value.size(); ++i) {
+    if (10 * i >= 9 * by_value.size()) at_the_end.insert(by_value[i].second);
+    if (i % 9 == 0) rejected.insert(by_value[i].second);
+  }
+  ASSERT_GT(at_the_end.size(), 20U);
+  rejected.insert(at_the_end.begin(), at_the_end.end());
+  RobustSolution solution;
+  for (const int index : usable_)
+    (rejected.contains(index) ? solution.rejected : solution.used).push_back(index);
+  const std::vector<int> used = with_what_lasts(spec_, state_, solution);
+  for (const int index : at_the_end)
+    EXPECT_TRUE(std::ranges::binary_search(used, index)) << index;
+  EXPECT_EQ(used.size(), solution.used.size() + at_the_end.size());
+}
+
+// Which half of a marker's sightings is wrong, no robust fit can say.
+TEST_F(Sightings, TheLargerPartOfAMarkersSightingsIsNoOutlier) {
+  look();
+  RobustSolution solution;
+  std::size_t number = 0;
+  for (const int index : usable_) {
+    const bool most = spec_.sightings[static_cast<std::size_t>(index)].marker == 1;
+    (most && number++ % 3 != 0 ? solution.rejected : solution.used).push_back(index);
+  }
+  EXPECT_EQ(with_what_lasts(spec_, state_, solution), usable_);
 }
 
 }  // namespace

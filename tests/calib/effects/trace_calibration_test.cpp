@@ -147,6 +147,16 @@ TEST(TraceCalibration, StepsOfAReadingAreTakenOutOfIt) {
   EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
 }
 
+// For two seconds the reading says no more than in which step the joint is.
+TEST(TraceCalibration, WhereAJointRestsInAStepOfItsReadingIsNoJump) {
+  EffectWorldOptions options = filmed({strong("quantisation", "q2")}, 300);
+  options.rest_s = 2.0;
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"quantisation", "q2"})) << answer(trace);
+  EXPECT_LT(trace.held_out_after.value, 1.3 * clean_trace().trace.held_out_after.value);
+}
+
 class Unnamed : public ::testing::TestWithParam<std::string> {};
 
 // Whatever it is taken for, and wherever: an effect of no library has no name.
@@ -461,6 +471,65 @@ TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {
   const CalibrationTrace found = trace_of_coupled(0.31, 0.3);
   expect_coupling(found, 0.31);
   EXPECT_EQ(found.corrections.size(), 1U);
+}
+
+// The robot at rest before a tracker, posture after posture.
+World tracked(truth::RobotKind kind, int postures, std::vector<InjectedEffect> effects) {
+  constexpr double kSigmaM = 2e-4;
+  constexpr double kSigmaRad = 1e-3;
+  EffectWorldOptions options = filmed(std::move(effects), postures);
+  options.kind = kind;
+  options.frame_rate_hz = 0.4;
+  options.log_rate_hz = 50.0;
+  options.clock_jitter = 0.0;
+  options.poses = true;
+  World world = make_effect_world(options);
+  const truth::FilmedRobot robot = truth::robot_of(options);
+  world.log.times_s = world.measurements.times_s;
+  world.log.values.resize(static_cast<Eigen::Index>(world.log.times_s.size()),
+                          world.log.values.cols());
+  for (Eigen::Index i = 0; i < world.log.values.rows(); ++i) {
+    world.log.values.row(i) =
+        robot.encoders(world.log.times_s[static_cast<std::size_t>(i)]).transpose();
+  }
+  Rng rng = Rng::from_name("tracker");
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(kSigmaRad), Eigen::Vector3d::Constant(kSigmaM);
+  variance = variance.cwiseAbs2().eval();
+  for (PoseTrack& track : world.measurements.poses.tracks) {
+    for (PoseSample& sample : track.samples) {
+      Vector6d noise;
+      noise << rng.normal3(kSigmaRad), rng.normal3(kSigmaM);
+      sample.T_camera_marker = sample.T_camera_marker * exp_pose(noise);
+      sample.covariance = variance.asDiagonal();
+    }
+  }
+  world.measurements.corners.clear();
+  return world;
+}
+
+// The last joint's errors are those of one marker: a quarter of its sightings stands out, at either
+// end of the joint's range. A part of a wave would explain the same; it need not be so straight.
+TEST(TraceCalibration, WhatStandsOutAtTheEndsOfAJointsRangeIsItsScale) {
+  constexpr double kScale = 0.025;
+  const World world =
+      tracked(truth::RobotKind::kPlanar, 150, {{"encoder_scale", "q4", kScale, 0.0}});
+  const Trace trace = trace_of(world).trace;
+  ASSERT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"encoder_scale", "q4"})) << answer(trace);
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), kScale)) << trace.accepted.front().size;
+}
+
+// A curve over neither joint shows what two do together.
+TEST(TraceCalibration, WhatTwoJointsDoTogetherIsUnknownOverTheirProduct) {
+  const World world =
+      tracked(truth::RobotKind::kScara, 100, {{"own_product", "q2", 0.01, 0.0, "q4"}});
+  const Trace trace = trace_of(world).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  ASSERT_FALSE(trace.rest.empty());
+  EXPECT_EQ(trace.rest.front().place, "q2");
+  EXPECT_EQ(trace.rest.front().covariate, "value of q2 times value of q4");
 }
 
 TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {

@@ -106,6 +106,27 @@ TEST(UnsteadyReading, CuttingOffIsAnotherZero) {
   EXPECT_LT(rms_left(read), 0.06 * kStep);
 }
 
+TEST(UnsteadyReading, WhileItRestsOnAStepTheValueIsSomewhereInIt) {
+  constexpr std::size_t kRests = 400;  // samples, from the first on
+  Read read = moved();
+  const double shift = 0.3 * kStep;
+  for (std::size_t i = 0; i < read.times_s.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (i < kRests) read.truth[at] = read.truth[kRests];
+    read.reading[at] = kStep * std::round((read.truth[at] + shift) / kStep);
+  }
+  const auto found = unsteady_reading(read.times_s, read.reading);
+  ASSERT_TRUE(found);
+  ASSERT_FALSE(found->holds.empty());
+  const Hold& first = found->holds.front();
+  EXPECT_EQ(first.first_s, read.times_s.front());
+  EXPECT_NEAR(first.last_s, read.times_s[kRests], 0.1);
+  EXPECT_EQ(first.share(read.times_s.front()), 1.0);
+  EXPECT_EQ(first.share(read.times_s[kRests / 2]), 1.0);
+  EXPECT_LT(first.share(first.last_s - 1e-6), 1e-3);
+  EXPECT_EQ(first.share(first.last_s + 1.0), 0.0);
+}
+
 TEST(UnsteadyReading, PosturesShowStepsInWhateverOrder) {
   Rng rng(5);
   Eigen::VectorXd values(60);
