@@ -1,27 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/trace/encompassing.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "calib/trace/stage.h"
 
 namespace kinescope::trace {
 namespace {
 
-constexpr double kLevel = 0.05;
+// Twice the logarithm of the odds: e^2, 88 of 100.
+constexpr double kClearly = 4.0;
 
-// Is `effect` needed where `other` is in the model?
-bool needed_beside(const NormalSystem& system, const std::vector<EffectColumn>& effect,
-                   const std::vector<EffectColumn>& other) {
+// Twice the log likelihood that `effect` adds where `other` is in the model, by how the stretches
+// scatter: that of noise of unknown size.
+double added_beside(const NormalSystem& system, const std::vector<EffectColumn>& effect,
+                    const std::vector<EffectColumn>& other) {
   const Linearisation with = extend(system.linear(), other, {});
   const Score score = jackknife_test(NormalSystem(with, system.partition()), effect);
-  return !score.hidden() && score.p_value < kLevel;
+  if (score.hidden()) return 0.0;
+  return score.freedom * std::log1p(score.rank * score.statistic / score.freedom);
 }
 
 }  // namespace
 
-Comparison compare_effects(const NormalSystem& system, const std::vector<EffectColumn>& first,
-                           const std::vector<EffectColumn>& second) {
-  if (needed_beside(system, first, second)) return Comparison::kFirst;
-  return needed_beside(system, second, first) ? Comparison::kSecond : Comparison::kInterchangeable;
+Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
+                           const Rivalling& second) {
+  const double stretches = std::max(2, system.partition().stretches);
+  const double price = (second.freedom - first.freedom) * std::log(stretches);
+  const double odds = added_beside(system, second.columns, first.columns) -
+                      added_beside(system, first.columns, second.columns) - price;
+  if (odds <= -kClearly) return Comparison::kFirst;
+  return odds >= kClearly ? Comparison::kSecond : Comparison::kInterchangeable;
 }
 
 }  // namespace kinescope::trace

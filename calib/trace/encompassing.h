@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Of two effects that both explain the residual: does either leave the other nothing to explain?
-// Mizon and Richard 1986.
+// Of two effects that both explain the residual: which one is it? Each is tested beside the other
+// (Mizon and Richard 1986), and the one with more freedom pays for it (Schwarz 1978).
 #pragma once
 
 #include "calib/trace/family.h"
@@ -9,14 +9,19 @@
 namespace kinescope::trace {
 
 enum class Comparison {
-  kFirst,           ///< the first one is needed beside the second
-  kSecond,          ///< the second one makes the first superfluous, and not the other way round
-  kInterchangeable  ///< either makes the other superfluous
+  kFirst,           ///< the first one is clearly likelier
+  kSecond,          ///< the second one is
+  kInterchangeable  ///< this recording cannot tell
 };
 
-/// `system` has neither in it. Two single tests, each at 5 %.
-[[nodiscard]] Comparison compare_effects(const NormalSystem& system,
-                                         const std::vector<EffectColumn>& first,
-                                         const std::vector<EffectColumn>& second);
+/// An effect at a value of its scan, and how many numbers it was fitted with.
+struct Rivalling {
+  const std::vector<EffectColumn>& columns;
+  double freedom = 1.0;
+};
+
+/// `system` has neither in it.
+[[nodiscard]] Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
+                                         const Rivalling& second);
 
 }  // namespace kinescope::trace

@@ -22,8 +22,6 @@ namespace {
 // A rival is looked at if it explains at least this share of what the chosen effect explains.
 constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
-// A rival whose posterior odds are less than e^-2 (in squares, whitened) is none.
-constexpr double kClearlyLess = 4.0;
 // What is less than this share of the squares that were there at first may be the imperfection of
 // the other effects: with all of them in it must be beyond doubt.
 constexpr double kImperfection = 1e-5;
@@ -39,16 +37,10 @@ Score refitted_score(const Stage& without, const Stage& with,
   return out;
 }
 
-// By how much a richer rival has to explain more to be as likely (squares, whitened): what it might
-// have been and is not speaks against it. Schwarz 1978.
-double price_of_freedom(const Stage& without, const TestedMember& own, const TestedMember& rival) {
-  const auto freedom = [&](const TestedMember& member) {
-    const Candidate& candidate = without.fit.candidates[member.index];
-    const bool scanned = !candidate.scan.empty() && !candidate.scan_listed;
-    return static_cast<double>(member.columns.size()) + (scanned ? 1.0 : 0.0);
-  };
-  const double stretches = std::max(2, without.system.partition().stretches);
-  return (freedom(rival) - freedom(own)) * std::log(stretches);
+// Directions that the data show of it, and the value of a scan that is searched.
+double freedom_of(const Candidate& candidate, const Score& score) {
+  const bool searched = !candidate.scan.empty() && !candidate.scan_listed;
+  return score.rank + (searched ? 1.0 : 0.0);
 }
 
 }  // namespace
@@ -161,7 +153,7 @@ std::vector<ScanAlternative> Tracer::as_likely(const Stage& without, const Candi
     if (score_test(without.system, columns).gain < kRivalShare * own.score.gain) continue;
     const Score score = jackknife_test(without.system, columns);
     if (score.hidden() || !is_possible(candidate, score.theta) ||
-        compare_effects(without.system, own.columns, columns) == Comparison::kFirst) {
+        compare_effects(without.system, {own.columns}, {columns}) == Comparison::kFirst) {
       continue;
     }
     const double size = size_of(candidate, score.theta);
@@ -220,25 +212,25 @@ bool Tracer::check(std::size_t index) {
   return settle_rivals(index, *stage, own);
 }
 
-// Puts another effect in the place of one; for good where the other makes it superfluous.
-bool Tracer::swap(std::size_t index, const AddedEffect& other, bool superfluous) {
+// Puts another effect in the place of one; for good where the other is clearly likelier.
+bool Tracer::swap(std::size_t index, const AddedEffect& other, bool likelier, bool plainer) {
   const EffectId id = now_->added[index].id;
   std::vector<AddedEffect> effects = now_->added;
   effects[index] = other;
   StagePtr swapped = stage_of(std::move(effects));
   if (!swapped->fit.converged) return false;
-  // What says the same predicts as well.
-  if (superfluous ? swapped->error.value >= now_->error.value
-                  : predicts_clearly_worse(swapped->held_out.whitened, now_->held_out.whitened)) {
+  // What is plainer and says the same predicts as well, nearly.
+  if (plainer ? predicts_clearly_worse(swapped->held_out.whitened, now_->held_out.whitened)
+              : swapped->error.value >= now_->error.value) {
     return false;
   }
-  if (superfluous) removed_.insert(id);
+  if (likelier) removed_.insert(id);
   mark(round_, id, CandidateState::kRemoved, now_->error.value);
   mark(round_, other.id, CandidateState::kAccepted, swapped->error.value);
   now_ = std::move(swapped);
   add_step(round_,
            fmt::format("{} takes the place of {}{}", name_of(other.id), name_of(id),
-                       superfluous ? ", which it makes superfluous" : ": plainer, and as good"),
+                       plainer ? ": plainer, and as good" : ", which it makes superfluous"),
            *now_);
   return true;
 }
@@ -260,21 +252,20 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
   std::ranges::stable_sort(rivals, std::greater{},
                            [](const TestedMember& rival) { return rival.score.gain; });
   if (rivals.size() > kMostRivals) rivals.resize(kMostRivals);
-  const double noise = (without.system.total().rr - own.score.gain) / without.system.freedom();
+  const double own_freedom = freedom_of(without.fit.candidates[own.index], own.score);
   Ambiguity ambiguity;
   for (const TestedMember& rival : rivals) {
     const Candidate& candidate = without.fit.candidates[rival.index];
-    const double price = price_of_freedom(without, own, rival);
-    const double more = (rival.score.gain - own.score.gain) / noise;
-    if (price > 0.0 && more <= price - kClearlyLess) continue;
-    const Comparison comparison = compare_effects(without.system, own.columns, rival.columns);
+    const double freedom = freedom_of(candidate, rival.score);
+    const Comparison comparison =
+        compare_effects(without.system, {own.columns, own_freedom}, {rival.columns, freedom});
     if (comparison == Comparison::kFirst) continue;
     // Of two that say the same the plainer one comes first.
-    const bool plainer = rival.columns.size() < own.columns.size() && !needed_.contains(effect.id);
-    if (comparison == Comparison::kSecond || plainer) {
-      if (swap(index, {candidate.id, rival.scan}, comparison == Comparison::kSecond)) return true;
-    }
-    if (comparison == Comparison::kSecond) continue;
+    const bool plainer = freedom < own_freedom && !needed_.contains(effect.id);
+    const bool likelier = comparison == Comparison::kSecond;
+    if ((likelier || plainer) && swap(index, {candidate.id, rival.scan}, likelier, plainer))
+      return true;
+    if (likelier) continue;
     ambiguity.effects.push_back(candidate.id);
     ambiguity.words.push_back(candidate.words);
     if (ambiguity.record.empty()) ambiguity.record = candidate.record;

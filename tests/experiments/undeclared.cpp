@@ -86,6 +86,27 @@ bool is_at(const json& found, const InjectedEffect& injected) {
   return injected.effect != "coupling" || found.at("at").at("words") == injected.with;
 }
 
+// The largest sag depends on where the robot was; what is drawn is that of a motion of its own.
+std::vector<InjectedEffect> as_recorded(const truth::EffectWorldOptions& options) {
+  std::vector<InjectedEffect> out = options.effects;
+  for (InjectedEffect& effect : out) {
+    if (effect.effect != "compliance") continue;
+    truth::EffectWorldOptions alone = options;
+    alone.effects = {effect};
+    const truth::World world = truth::make_effect_world(alone);
+    const truth::FilmedRobot robot = truth::robot_of(alone);
+    const auto joint = std::ranges::find(robot.tree.joints, effect.place, &Joint::name);
+    const auto at = joint - robot.tree.joints.begin();
+    effect.size = 0.0;
+    for (Eigen::Index i = 0; i < world.joint_values.rows(); ++i) {
+      const double t_s = world.measurements.times_s[static_cast<std::size_t>(i)];
+      effect.size =
+          std::max(effect.size, std::abs(world.joint_values(i, at) - robot.encoders(t_s)[at]));
+    }
+  }
+  return out;
+}
+
 // Signs are a convention of the place (which way an axis points); sizes are compared without.
 bool is_sized(const json& found, const InjectedEffect& injected) {
   const double truth = std::abs(injected.size);
@@ -99,7 +120,7 @@ bool is_sized(const json& found, const InjectedEffect& injected) {
 
 void judge_trace(const json& trace, const UndeclaredCase& of, Outcome& out) {
   const json& accepted = trace.at("accepted");
-  const std::vector<InjectedEffect>& injected = of.world.effects;
+  const std::vector<InjectedEffect> injected = as_recorded(of.world);
   out.answer = trace.at("verdict").get<std::string>();
   for (const json& found : accepted)
     out.answer += fmt::format(", {} {} {:.4g}", found.at("effect").get<std::string>(),
