@@ -34,7 +34,7 @@ Trace Tracer::run() {
   report_progress(progress_, "trace", 0, 0);
   base_ = stage_of({});
   now_ = options_.start.empty() ? base_ : stage_of(options_.start);
-  if (can_say(*now_)) search();
+  if (can_look(*now_)) search();
   const int rounds = std::max(1, round_);
   report_progress(progress_, "trace", rounds, rounds);
   return trace_;
@@ -46,6 +46,11 @@ void Tracer::search() {
   do {
     forward();
   } while (backward());
+  if (!now_->fit.converged) {
+    trace_.converged = false;
+    say_nothing(fmt::format("the model itself did not converge: {}", now_->fit.reason));
+    return;
+  }
   do {
     look_for_rest();
   } while (name_the_rest() || choose_by_rest());
@@ -67,22 +72,26 @@ StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
   return last_.front();
 }
 
-bool Tracer::can_say(const Stage& stage) {
-  trace_.stretches = stage.system.partition().stretches;
-  if (!stage.fit.converged) {
-    trace_.converged = false;
-    trace_.reason = fmt::format("the model itself did not converge: {}", stage.fit.reason);
-  } else if (trace_.stretches < options_.fewest_stretches) {
-    trace_.reason = fmt::format(
-        "{} stretches of independent data are too few to tell an effect from noise: record longer",
-        trace_.stretches);
-  } else if (stage.system.partition().folds < 2) {
-    trace_.reason = "nothing can be held out: record more postures";
-  } else {
-    return true;
-  }
+void Tracer::say_nothing(std::string reason) {
   trace_.verdict = TraceVerdict::kNothingToSay;
-  return false;
+  trace_.reason = std::move(reason);
+}
+
+// A model that did not converge may be one that lacks something large: then its linearisation shows
+// that, too, and with it in the model converges.
+bool Tracer::can_look(const Stage& stage) {
+  trace_.stretches = stage.system.partition().stretches;
+  if (trace_.stretches < options_.fewest_stretches) {
+    say_nothing(fmt::format(
+        "{} stretches of independent data are too few to tell an effect from noise: record longer",
+        trace_.stretches));
+    return false;
+  }
+  if (stage.system.partition().folds < 2) {
+    say_nothing("nothing can be held out: record more postures");
+    return false;
+  }
+  return true;
 }
 
 bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,

@@ -49,7 +49,8 @@ class Tracer {
 
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
-  [[nodiscard]] bool can_say(const Stage& stage);
+  [[nodiscard]] bool can_look(const Stage& stage);
+  void say_nothing(std::string reason);
   void search();
   void forward();
   /// Beyond what the sensor's own errors do, or shown by more than its own rows to be there.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/calib/trace/linear_world.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -156,7 +157,11 @@ std::vector<Candidate> LinearWorld::candidates() const {
 
 TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
   TracedFit out;
-  out.converged = true;
+  out.converged = options_.converges_with.empty() ||
+                  std::ranges::any_of(effects, [&](const AddedEffect& effect) {
+                    return effect.id.effect == options_.converges_with;
+                  });
+  if (!out.converged) out.reason = "iterations";
   out.candidates = candidates();
   Linearisation& linear = out.linear;
   linear.time_s = time_s_;

@@ -25,6 +25,7 @@ struct LinearWorldOptions {
   /// Candidate "bend" at joint1: at nothing it does what the joint's zero does, in the fit it is
   /// "tanh_other" (as friction frees the width of its turn).
   bool bends = false;
+  std::string converges_with;  ///< the fit converges only with this effect in it; empty: always
 };
 
 /// What is in the data and not in the model: one term of `LinearWorld::share`.

@@ -252,6 +252,19 @@ TEST(TraceTest, TooLittleToJudgeSaysNothing) {
   EXPECT_NE(held.reason.find("postures"), std::string::npos) << held.reason;
 }
 
+TEST(TraceTest, WhatTheModelNeedsToConvergeIsFound) {
+  LinearWorldOptions options;
+  options.converges_with = "gear";
+  const Trace found = trace_effects(LinearWorld(options, {{0, "gear", 0.5, 17.0}}));
+  EXPECT_TRUE(only(found, {"gear", "joint1"}));
+  EXPECT_TRUE(found.converged);
+  const Trace none = trace_effects(LinearWorld(options, {}));
+  EXPECT_EQ(none.verdict, TraceVerdict::kNothingToSay);
+  EXPECT_FALSE(none.converged);
+  EXPECT_TRUE(none.accepted.empty());
+  EXPECT_NE(none.reason.find("iterations"), std::string::npos) << none.reason;
+}
+
 // The noise is 1 and two of 1600 rows' freedom are spent: unseen rows have an error of 1.
 TEST(TraceTest, HeldOutIntervalsCoverTheNoise) {
   constexpr int kRuns = 60;
