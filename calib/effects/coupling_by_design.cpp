@@ -99,6 +99,14 @@ bool is_slope_of_a_rest(const Described& coupling, const Trace& trace) {
   });
 }
 
+// What lasts beside it is no noise, and no less than a part of what it stands for.
+bool leaves_too_much(const Described& coupling, const Trace& trace) {
+  const bool curves =
+      std::ranges::any_of(trace.accepted, [](const TracedEffect& known) { return known.is_curve(); });
+  return trace.verdict == TraceVerdict::kUnknown && trace.rest.empty() && !curves &&
+         coupling.left >= trace::kDoubtfulShare * coupling.effect.explained;
+}
+
 }  // namespace
 
 void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceOptions& options,
@@ -111,7 +119,7 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
   std::string names;
   for (const std::size_t k : all) {
     const Described coupling = described(bundle, options, trace.added, k);
-    if (is_slope_of_a_rest(coupling, trace)) continue;
+    if (is_slope_of_a_rest(coupling, trace) || leaves_too_much(coupling, trace)) continue;
     TracedEffect effect = coupling.effect;
     // A ratio that the structure took for likely may be nothing.
     if (effect.p_value > trace.false_alarm_rate ||

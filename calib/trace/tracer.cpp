@@ -53,9 +53,8 @@ void Tracer::search() {
   }
   do {
     look_for_rest();
-  } while (name_the_rest() || choose_by_rest());
+  } while (name_the_rest() || choose_by_rest() || drop_what_leaves_too_much());
   while (take_the_rest_as_curves()) look_beside_curves();
-  drop_what_leaves_too_much();
   describe_curves();
   summarise();
   list_not_found();

@@ -118,7 +118,9 @@ class Tracer {
   /// True where it is what readings are known to err by.
   [[nodiscard]] bool is_of_readings(const CommonMotion& motion) const;
   [[nodiscard]] std::string reading_words(const CommonMotion& motion) const;
-  void drop_what_leaves_too_much();
+  /// Squares that neither effects nor what was found beside them explain.
+  [[nodiscard]] double left_over() const;
+  [[nodiscard]] bool drop_what_leaves_too_much();
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);
   void add_step(int round, std::string words, const Stage& stage);

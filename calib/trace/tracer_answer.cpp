@@ -284,22 +284,33 @@ bool Tracer::is_of_readings(const CommonMotion& motion) const {
   return motion.size >= place.reading_error_least && motion.size <= place.reading_error_most;
 }
 
+double Tracer::left_over() const {
+  double explained = 0.0;
+  for (const FoundRest& found : rests_) explained += found.rest.explained;
+  return std::max(0.0, 1.0 - explained) * now_->system.total().rr;
+}
+
 // What lasts, or what bodies share from instant to instant, may be the larger part of what an
-// effect stands in for (a joint that creeps, as a jump of its zero).
-void Tracer::drop_what_leaves_too_much() {
-  if (!rests_.empty()) return;
-  const auto common = common_motion();
-  if (over_neighbours().value_or(0.0) <= kLasts && (!common || is_of_readings(*common))) return;
-  const double left = now_->system.total().rr;
+// effect stands in for (a joint that creeps, as a jump of its zero), a curve beside it or not.
+bool Tracer::drop_what_leaves_too_much() {
+  const double left = left_over();
+  const bool whitened = now_->fit.linear.whitened_by_neighbours;
+  const bool lasts = whitened && left > kLasts * kLasts * now_->system.freedom();
+  const auto common = rests_.empty() ? common_motion() : std::nullopt;
+  if (!lasts && (!common || is_of_readings(*common))) return false;
+  bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const double explained = details_[i].effect.explained * base_->system.total().rr;
     if (left < kDoubtfulShare * explained) continue;
     const EffectId id = now_->added[i].id;
+    removed_.insert(id);
     now_ = stage_of(without(now_->added, i));
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
     mark(round_, id, CandidateState::kRemoved, now_->error.value);
     add_step(round_, fmt::format("{} removed: what it leaves is no noise", name_of(id)), *now_);
+    dropped = true;
   }
+  return dropped;
 }
 
 void Tracer::record(const std::vector<TestedMember>& family, const Stage& stage, int round) {
