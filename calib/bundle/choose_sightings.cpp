@@ -309,14 +309,14 @@ std::vector<int> with_what_lasts(const Spec& spec, const State& state,
       const std::vector<int> kept = rejected_in_a_row(of, at_the_ends_alone);
       out.insert(kept.begin(), kept.end());
     };
-    std::ranges::stable_sort(
-        indices, {}, [&](int index) { return std::pair(frame_of(index), index); });
+    std::ranges::stable_sort(indices, {},
+                             [&](int index) { return std::pair(frame_of(index), index); });
     add(true);
     const Marker& seen = spec.tree.markers[static_cast<std::size_t>(marker)];
     for (const int joint : spec.path[seen.link.index()]) {
       if (spec.channel[static_cast<std::size_t>(joint)] < 0) continue;
-      std::ranges::stable_sort(
-          indices, {}, [&](int index) { return readings.value(frame_of(index), joint); });
+      std::ranges::stable_sort(indices, {},
+                               [&](int index) { return readings.value(frame_of(index), joint); });
       add(false);
     }
   }

@@ -101,8 +101,8 @@ bool is_slope_of_a_rest(const Described& coupling, const Trace& trace) {
 
 // What lasts beside it is no noise, and no less than a part of what it stands for.
 bool leaves_too_much(const Described& coupling, const Trace& trace) {
-  const bool curves =
-      std::ranges::any_of(trace.accepted, [](const TracedEffect& known) { return known.is_curve(); });
+  const bool curves = std::ranges::any_of(
+      trace.accepted, [](const TracedEffect& known) { return known.is_curve(); });
   return trace.verdict == TraceVerdict::kUnknown && trace.rest.empty() && !curves &&
          coupling.left >= trace::kDoubtfulShare * coupling.effect.explained;
 }

@@ -31,9 +31,9 @@ struct Hold {
 struct UnsteadyReading {
   std::vector<double> times_s;  ///< of the samples
   bool in_steps = false;
-  double size = 0.0;       ///< distance of the steps, or standard deviation of the noise
-  double error = 0.0;      ///< rms by which a reading is off
-  Eigen::VectorXd motion;  ///< samples, in the unit of the reading
+  double size = 0.0;        ///< distance of the steps, or standard deviation of the noise
+  double error = 0.0;       ///< rms by which a reading is off
+  Eigen::VectorXd motion;   ///< samples, in the unit of the reading
   std::vector<Hold> holds;  ///< longer than the motion's own changes take
 };
 

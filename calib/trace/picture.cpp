@@ -125,7 +125,8 @@ EffectPicture picture_of(const Stage& without, const Stage& with, const Candidat
     }
   }
   EffectPicture out;
-  if (carrier < 0 || std::ranges::all_of(without.fit.covariates, &Covariate::is_product)) return out;
+  if (carrier < 0 || std::ranges::all_of(without.fit.covariates, &Covariate::is_product))
+    return out;
   out.effect = Eigen::VectorXd::Zero(linear.instants());
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const EffectColumn& column = columns[k];

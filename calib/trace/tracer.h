@@ -80,8 +80,7 @@ class Tracer {
                                                        const Candidate& candidate,
                                                        const TestedMember& own) const;
   [[nodiscard]] bool check(std::size_t index);
-  [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool likelier,
-                          bool plainer);
+  [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool likelier, bool plainer);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   [[nodiscard]] std::vector<AddedEffect> curves_for_rests() const;

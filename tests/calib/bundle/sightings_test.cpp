@@ -148,7 +148,8 @@ TEST_F(Sightings, WhatIsRejectedFromOneValueOfAJointOnIsNotByChance) {
   std::vector<std::pair<double, int>> by_value;
   for (const int index : usable_) {
     const Sighting& sighting = spec_.sightings[static_cast<std::size_t>(index)];
-    if (sighting.marker == seen) by_value.emplace_back(readings.value(sighting.frame, joint), index);
+    if (sighting.marker == seen)
+      by_value.emplace_back(readings.value(sighting.frame, joint), index);
   }
   std::ranges::sort(by_value);
   std::set<int> rejected;
@@ -163,8 +164,7 @@ TEST_F(Sightings, WhatIsRejectedFromOneValueOfAJointOnIsNotByChance) {
   for (const int index : usable_)
     (rejected.contains(index) ? solution.rejected : solution.used).push_back(index);
   const std::vector<int> used = with_what_lasts(spec_, state_, solution);
-  for (const int index : at_the_end)
-    EXPECT_TRUE(std::ranges::binary_search(used, index)) << index;
+  for (const int index : at_the_end) EXPECT_TRUE(std::ranges::binary_search(used, index)) << index;
   EXPECT_EQ(used.size(), solution.used.size() + at_the_end.size());
 }
 
