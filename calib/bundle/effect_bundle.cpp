@@ -120,6 +120,8 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
     impl_->bias_px = chosen.bias_px;
     impl_->jitter_s = chosen.jitter_s;
   }
+  spec.corrections.clear();
+  state.corrections.clear();
   impl_->offset_start_s = state.time_offset[0];
   impl_->start = state;
   impl_->couplings = couplings_of(spec);
@@ -422,6 +424,10 @@ std::vector<int> EffectBundle::driven_joints() const {
 }
 
 const std::vector<DesignCoupling>& EffectBundle::couplings() const { return impl_->couplings; }
+
+bool EffectBundle::uses_the_same(const EffectBundle& other) const {
+  return impl_->used == other.impl_->used;
+}
 
 std::vector<int> EffectBundle::seen_markers() const {
   std::set<int> seen;

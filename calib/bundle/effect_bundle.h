@@ -75,7 +75,8 @@ struct JointMotion {
 
 class EffectBundle {
  public:
-  /// Throws as calibrate().
+  /// `start.corrections`: effects that are known, beside which the sightings are chosen; the model
+  /// begins without them. Throws as calibrate().
   EffectBundle(const Measurements& measurements, const MarkerSet& markers, const JointLog& log,
                const CalibrationStart& start, const CalibrateOptions& options);
   ~EffectBundle();
@@ -111,6 +112,8 @@ class EffectBundle {
   [[nodiscard]] std::vector<int> driven_joints() const;
   /// Those of channels that drive a joint themselves.
   [[nodiscard]] const std::vector<DesignCoupling>& couplings() const;
+  /// True where the same sightings were chosen.
+  [[nodiscard]] bool uses_the_same(const EffectBundle& other) const;
   /// Markers (index into the tree) that are seen.
   [[nodiscard]] std::vector<int> seen_markers() const;
 

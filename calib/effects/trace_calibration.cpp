@@ -51,13 +51,9 @@ CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOption
   return out;
 }
 
-}  // namespace
-
-CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
-                                   const JointLog& log, const CalibrationStart& start,
-                                   const CalibrationTraceOptions& options,
-                                   const Progress& progress) {
-  const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
+CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
+                                     const CalibrationTraceOptions& options,
+                                     const Progress& progress) {
   TraceOptions trace_options = options.trace;
   trace_options.start = effects::TracedBundle(bundle, options).possible(options.trace.start);
   if (bundle.kind() == MeasurementKind::kCorners) {
@@ -103,6 +99,29 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   }
   again.trace.steps.front().words =
       fmt::format("the model as it is; gravity points where the sag of {} says", sag->place);
+  return again;
+}
+
+}  // namespace
+
+CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
+                                   const JointLog& log, const CalibrationStart& start,
+                                   const CalibrationTraceOptions& options,
+                                   const Progress& progress) {
+  const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
+  CalibrationTrace out = traced_with_gravity(bundle, options, progress);
+  if (!bundle.postures() || out.corrections.empty()) return out;
+  // Of postures the model says what stands out, and without the effects it said so of what goes
+  // against them: of noise of one sign.
+  CalibrationStart known = start;
+  known.corrections = out.corrections;
+  const EffectBundle chosen(measurements, markers, log, known, options.calibrate);
+  if (chosen.uses_the_same(bundle)) return out;
+  CalibrationTraceOptions begun = options;
+  begun.gravity_base = out.gravity_base;
+  begun.trace.start = out.trace.added;
+  CalibrationTrace again = traced_with_gravity(chosen, begun, progress);
+  again.trace.steps.front().words = out.trace.steps.front().words;
   return again;
 }
 

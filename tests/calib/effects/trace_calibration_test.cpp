@@ -521,6 +521,22 @@ TEST(TraceCalibration, WhatStandsOutAtTheEndsOfAJointsRangeIsItsScale) {
   EXPECT_TRUE(size_is_right(trace.accepted.front(), kScale)) << trace.accepted.front().size;
 }
 
+// Without the effect those are left out whose noise adds to it; the others seem to follow a curve.
+TEST(TraceCalibration, SightingsAreChosenAgainBesideTheEffect) {
+  for (const double scale : {0.02, 0.025, 0.03}) {
+    const World world =
+        tracked(truth::RobotKind::kWrist, 90, {{"encoder_scale", "q1", scale, 0.0}});
+    const CalibrationTrace found = trace_of(world);
+    EXPECT_EQ(found.trace.verdict, TraceVerdict::kEffects) << answer(found.trace);
+    CalibrationStart start = start_of(world);
+    const EffectBundle without(world.measurements, world.markers, world.log, start, {});
+    start.corrections = found.corrections;
+    const EffectBundle beside(world.measurements, world.markers, world.log, start, {});
+    EXPECT_FALSE(beside.uses_the_same(without)) << scale;
+    EXPECT_NEAR(found.trace.accepted.front().size, scale, 0.01 * scale);
+  }
+}
+
 // A curve over neither joint shows what two do together.
 TEST(TraceCalibration, WhatTwoJointsDoTogetherIsUnknownOverTheirProduct) {
   const World world =
