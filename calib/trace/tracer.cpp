@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/trace/distribution.h"
 #include "calib/trace/scan_slope.h"
 
 namespace kinescope::trace {
@@ -19,6 +20,15 @@ constexpr std::size_t kMostHints = 3;
 // Of the squares that are left: what explains as much may be one of several that hide each other.
 constexpr double kLargeShare = 0.05;
 constexpr int kLongestChain = 5;
+
+// What the fit lost without an effect, each stretch counted as one measurement only. A few large
+// differences of squares say little about their mean, and much beside what is left with it.
+double lost_p_value(const Stage& less, const Stage& with, double parameters) {
+  const double freedom = with.system.partition().stretches - 1.0;
+  const double left = std::max(1e-300, with.system.total().rr);
+  const double lost = std::max(0.0, less.system.total().rr - left) / left;
+  return freedom < 1.0 ? 1.0 : f_survival(lost * freedom / parameters, parameters, freedom);
+}
 
 }  // namespace
 
@@ -122,13 +132,15 @@ void Tracer::forward() {
 }
 
 // Two effects may hide each other: what the other does is noise to each, and it lasts. The
-// likeliest are tried as if they were shown; both must be, once both are in.
+// likeliest are tried as if they were shown; both must be, once both are in. Where what lasts is no
+// noise for certain, too few stretches may be free of it to show anything at all.
 StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   const StagePtr now = now_;
+  const bool lasts = over_neighbours(now->system.total().rr).value_or(0.0) > kLasts;
   std::vector<const TestedMember*> hints;
   for (const TestedMember& member : family) {
     const Candidate& candidate = now->fit.candidates[member.index];
-    if (member.p_value <= kHint && may_be_added(candidate, member.score)) hints.push_back(&member);
+    if ((member.p_value <= kHint || lasts) && may_be_added(candidate, member.score)) hints.push_back(&member);
   }
   std::ranges::stable_sort(hints, std::greater{},
                            [](const TestedMember* hint) { return hint->score.gain; });
@@ -175,8 +187,9 @@ bool Tracer::all_needed(const Stage& stage, std::size_t known) {
     const StagePtr less = stage_of(kinescope::trace::without(stage.added, i));
     const Candidate* candidate = find_candidate(less->fit, stage.added[i].id);
     if (candidate == nullptr || !is_possible(*candidate, stage.fit.values[i])) return false;
-    const double p_value =
-        paired_p_value(stage.system.partition(), less->held_out.whitened, stage.held_out.whitened);
+    const double p_value = std::min(
+        paired_p_value(stage.system.partition(), less->held_out.whitened, stage.held_out.whitened),
+        lost_p_value(*less, stage, static_cast<double>(stage.fit.values[i].size())));
     if (p_value * number_of_tests(less->fit.candidates, *candidate) > level_) return false;
   }
   return true;

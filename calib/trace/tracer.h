@@ -27,6 +27,9 @@ inline constexpr double kSmallLoss = 0.05;
 // A rest that explains this much of what a named effect at its place explains puts that name in
 // doubt.
 inline constexpr double kDoubtfulShare = 0.1;
+// What is left over what differs between neighbours in time. Noise, with the sensor's own errors
+// counted in, makes it 0.6 to 1.0 (`undeclared`); what lasts is no noise.
+inline constexpr double kLasts = 2.0;
 
 class Tracer {
  public:
@@ -109,8 +112,9 @@ class Tracer {
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   [[nodiscard]] bool drop_what_rests_explain();
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
-  /// The residual over what differs between neighbours in time; nothing where that is not known.
-  [[nodiscard]] std::optional<double> over_neighbours() const;
+  /// What is left, in squares, over what differs between neighbours in time: as an rms; nothing
+  /// where that is not known.
+  [[nodiscard]] std::optional<double> over_neighbours(double squares) const;
   /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
   /// left.
   [[nodiscard]] std::optional<CommonMotion> common_motion() const;

@@ -20,9 +20,6 @@ namespace {
 constexpr std::size_t kMostRests = 3;
 // Less than this of what named effects explain at its place is the imperfection of their shapes.
 constexpr double kSlightShare = 1e-3;
-// What is left over what differs between neighbours in time. Noise, with the sensor's own errors
-// counted in, makes it 0.6 to 1.0 (`undeclared`); what lasts is no noise.
-constexpr double kLasts = 2.0;
 // Of what is left: more than that is no error of single bodies.
 constexpr double kMostOfIt = 0.5;
 
@@ -269,9 +266,9 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   return false;
 }
 
-std::optional<double> Tracer::over_neighbours() const {
+std::optional<double> Tracer::over_neighbours(double squares) const {
   if (!now_->fit.linear.whitened_by_neighbours) return std::nullopt;
-  return std::sqrt(now_->system.total().rr / now_->system.freedom());
+  return std::sqrt(squares / now_->system.freedom());
 }
 
 std::optional<CommonMotion> Tracer::common_motion() const {
@@ -294,8 +291,7 @@ double Tracer::left_over() const {
 // effect stands in for (a joint that creeps, as a jump of its zero), a curve beside it or not.
 bool Tracer::drop_what_leaves_too_much() {
   const double left = left_over();
-  const bool whitened = now_->fit.linear.whitened_by_neighbours;
-  const bool lasts = whitened && left > kLasts * kLasts * now_->system.freedom();
+  const bool lasts = over_neighbours(left).value_or(0.0) > kLasts;
   const auto common = rests_.empty() ? common_motion() : std::nullopt;
   if (!lasts && (!common || is_of_readings(*common))) return false;
   bool dropped = false;
@@ -349,7 +345,7 @@ void Tracer::summarise() {
   trace_.held_out_before = base_->error;
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
-  if (const auto over = over_neighbours()) trace_.over_neighbours = *over;
+  if (const auto over = over_neighbours(now_->system.total().rr)) trace_.over_neighbours = *over;
   trace_.stretches = now_->system.partition().stretches;
   for (FoundRest& found : rests_) trace_.rest.push_back(std::move(found.rest));
   Eigen::Index count = 0;
