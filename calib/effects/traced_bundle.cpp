@@ -389,8 +389,9 @@ TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effe
 std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects) const {
   const std::vector<CameraEffect> library = all_effects(world_at(0.0));
   std::erase_if(effects, [&](const AddedEffect& added) {
-    return std::ranges::none_of(
-        library, [&](const CameraEffect& effect) { return effect.candidate.id == added.id; });
+    return std::ranges::none_of(library, [&](const CameraEffect& effect) {
+      return effect.candidate.id == added.id && !effect.candidate.is_curve();
+    });
   });
   return effects;
 }

@@ -26,6 +26,7 @@ class TracedBundle final : public TracedModel {
                                     const std::vector<TracedEffect>& traced) const;
 
   /// Those of the effects that this robot can have: what was known of another may sit elsewhere.
+  /// Without curves, which hold what is left beside the others.
   [[nodiscard]] std::vector<AddedEffect> possible(std::vector<AddedEffect> effects) const;
 
   /// The robot and its motion as the fit with these effects has them: the log read that much later,

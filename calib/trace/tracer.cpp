@@ -132,15 +132,13 @@ void Tracer::forward() {
 }
 
 // Two effects may hide each other: what the other does is noise to each, and it lasts. The
-// likeliest are tried as if they were shown; both must be, once both are in. Where what lasts is no
-// noise for certain, too few stretches may be free of it to show anything at all.
+// likeliest are tried as if they were shown; both must be, once both are in.
 StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   const StagePtr now = now_;
-  const bool lasts = over_neighbours(now->system.total().rr).value_or(0.0) > kLasts;
   std::vector<const TestedMember*> hints;
   for (const TestedMember& member : family) {
     const Candidate& candidate = now->fit.candidates[member.index];
-    if ((member.p_value <= kHint || lasts) && may_be_added(candidate, member.score)) hints.push_back(&member);
+    if (member.p_value <= kHint && may_be_added(candidate, member.score)) hints.push_back(&member);
   }
   std::ranges::stable_sort(hints, std::greater{},
                            [](const TestedMember* hint) { return hint->score.gain; });
@@ -163,6 +161,11 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
     if (second->held_out_sum() > both->held_out_sum()) best = std::move(both);
   }
   if (best) return best;
+  // Where what is left is no noise for certain, too few stretches may be free of it to show
+  // anything at all.
+  if (hints.empty() && over_neighbours(now->system.total().rr).value_or(0.0) > kLasts) {
+    if (const TestedMember* most = most_telling(*now, family)) hints.push_back(most);
+  }
   for (const TestedMember* hint : hints) {
     if (hint->score.gain < kLargeShare * now->system.total().rr) continue;
     StagePtr several = chain({now->fit.candidates[hint->index].id, hint->scan});
@@ -195,6 +198,16 @@ bool Tracer::all_needed(const Stage& stage, std::size_t known) {
   return true;
 }
 
+const TestedMember* Tracer::most_telling(const Stage& stage,
+                                         const std::vector<TestedMember>& family) const {
+  const TestedMember* best = nullptr;
+  for (const TestedMember& member : family) {
+    if (!may_be_added(stage.fit.candidates[member.index], member.score)) continue;
+    if (best == nullptr || member.score.gain > best->score.gain) best = &member;
+  }
+  return best;
+}
+
 // Large effects together last so long that hardly a stretch is free of any of them, and each is
 // noise to the others.
 StagePtr Tracer::chain(const AddedEffect& first) {
@@ -216,12 +229,8 @@ StagePtr Tracer::chain(const AddedEffect& first) {
       break;
     }
     now_ = stage;
-    const TestedMember* best = nullptr;
     const std::vector<TestedMember> family = test_family(stage->system, stage->fit.candidates);
-    for (const TestedMember& member : family) {
-      if (!may_be_added(stage->fit.candidates[member.index], member.score)) continue;
-      if (best == nullptr || member.score.gain > best->score.gain) best = &member;
-    }
+    const TestedMember* best = most_telling(*stage, family);
     if (best == nullptr || best->score.gain < kLargeShare * stage->system.total().rr) break;
     effects.push_back({stage->fit.candidates[best->index].id, best->scan});
   }

@@ -64,8 +64,11 @@ class Tracer {
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
-  /// The best effects one after the other, from this one on, beside
-  /// those that there are, until all are needed to predict.
+  /// Of those that may be added, the one that explains most, significant or not.
+  [[nodiscard]] const TestedMember* most_telling(const Stage& stage,
+                                                 const std::vector<TestedMember>& family) const;
+  /// The best effects one after the other, from this one on, beside those that there are, until all
+  /// are needed to predict.
   [[nodiscard]] StagePtr chain(const AddedEffect& first);
   /// Without those beyond the first `known` that predict no better for being there.
   [[nodiscard]] StagePtr without_idle(StagePtr stage, std::size_t known);
