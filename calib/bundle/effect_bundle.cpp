@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -425,8 +426,10 @@ std::vector<int> EffectBundle::driven_joints() const {
 
 const std::vector<DesignCoupling>& EffectBundle::couplings() const { return impl_->couplings; }
 
-bool EffectBundle::uses_the_same(const EffectBundle& other) const {
-  return impl_->used == other.impl_->used;
+double EffectBundle::chosen_beyond(const EffectBundle& other) const {
+  std::vector<int> more;
+  std::ranges::set_difference(impl_->used, other.impl_->used, std::back_inserter(more));
+  return static_cast<double>(more.size()) / std::sqrt(static_cast<double>(impl_->used.size()));
 }
 
 std::vector<int> EffectBundle::seen_markers() const {

@@ -112,8 +112,9 @@ class EffectBundle {
   [[nodiscard]] std::vector<int> driven_joints() const;
   /// Those of channels that drive a joint themselves.
   [[nodiscard]] const std::vector<DesignCoupling>& couplings() const;
-  /// True where the same sightings were chosen.
-  [[nodiscard]] bool uses_the_same(const EffectBundle& other) const;
+  /// Sightings that were chosen here and not there, over the square root of all: by how many
+  /// standard deviations of a mean their noise, all of one sign, bends it.
+  [[nodiscard]] double chosen_beyond(const EffectBundle& other) const;
   /// Markers (index into the tree) that are seen.
   [[nodiscard]] std::vector<int> seen_markers() const;
 

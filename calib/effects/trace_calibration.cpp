@@ -116,7 +116,8 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   CalibrationStart known = start;
   known.corrections = out.corrections;
   const EffectBundle chosen(measurements, markers, log, known, options.calibrate);
-  if (chosen.uses_the_same(bundle)) return out;
+  constexpr double kBent = 0.5;
+  if (chosen.chosen_beyond(bundle) < kBent) return out;
   CalibrationTraceOptions begun = options;
   begun.gravity_base = out.gravity_base;
   begun.trace.start = out.trace.added;
