@@ -173,6 +173,12 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
   return rest;
 }
 
+// By how much the sum of squares falls in the step to the system's own solution.
+double still_to_gain(const NormalSystem& system) {
+  const Eigen::VectorXd step = system.inverse() * system.total().g;
+  return 2.0 * step.dot(system.total().g) - step.dot(system.total().H * step);
+}
+
 }  // namespace
 
 Linearisation extend(const Linearisation& linear, const FoundRest& found) {
@@ -183,8 +189,8 @@ Linearisation extend(const Linearisation& linear, const FoundRest& found) {
 bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain) {
   const Linearisation with = extend(system.linear(), found);
   const NormalSystem after(with, system.partition());
-  const Eigen::VectorXd step = after.inverse() * after.total().g;
-  gain = 2.0 * step.dot(after.total().g) - step.dot(after.total().H * step);
+  // What was found before is in the system, but not taken out of its residual.
+  gain = still_to_gain(after) - still_to_gain(system);
   found.rest.explained = gain / system.total().rr;
   if (found.rest.explained < kLeastShare) return false;
   found.rest.held_out_before = held_out_error(system, held_out_instants(system));
