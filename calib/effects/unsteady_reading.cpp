@@ -220,8 +220,8 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   if (rests_on_steps) nodes = with_rests(std::move(nodes), times_s, values, *step);
   const Eigen::Map<const Eigen::VectorXd> at(times_s.data(), values.size());
   out.motion = spline_through(nodes, cutoff_hz).evaluate(at);
-  if (step) out.holds = holds_of(times_s, values, cutoff_hz);
   if (step) {
+    out.holds = holds_of(times_s, values, cutoff_hz);
     const double half = 0.5 * *step;
     out.motion = out.motion.cwiseMax((values.array() - half).matrix())
                      .cwiseMin((values.array() + half).matrix());

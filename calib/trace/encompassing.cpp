@@ -9,7 +9,8 @@
 namespace kinescope::trace {
 namespace {
 
-// Twice the logarithm of the odds: e^2, 88 of 100.
+// Twice the logarithm of the odds: e^2, 88 of 100, a convention (Kass and Raftery 1995: positive
+// evidence is 2 to 6).
 constexpr double kClearly = 4.0;
 
 // Twice the log likelihood that `effect` adds where `other` is in the model, by how the stretches
