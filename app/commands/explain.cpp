@@ -11,11 +11,13 @@
 #include <fmt/format.h>
 
 #include "calib/bundle/undone.h"
+#include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/predictive_score.h"
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/log/readings_apart.h"
+#include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
 
 namespace kinescope {
@@ -106,7 +108,8 @@ class Explainer {
     if (recording().nominal) return of_nominal(warnings);
     Explanation first = with_base_at_rest(
         with_couplings_doubted(asked_again(of_structure(structure_of(evidence_.tracks), {}))));
-    return is_settled(first) ? first : improved(std::move(first));
+    return with_free_markers_attached(is_settled(first) ? std::move(first)
+                                                        : improved(std::move(first)));
   }
 
   /// Clearly more probable, over all measurements that there are; of two that are about as
@@ -312,6 +315,36 @@ class Explainer {
     if (!resting) return now;
     Explanation other = asked_again(of_structure(std::move(*resting), {}));
     return is_better(other, now) ? other : now;
+  }
+
+  // A marker that is bent, or slips on its link, moves with no joint exactly. On the link in whose
+  // frame it stands most still it is part of the robot, where an effect explains the rest.
+  [[nodiscard]] Explanation with_free_markers_attached(Explanation now) const {
+    constexpr std::size_t kMostLinks = 2;  // their frames may part by less than such a marker errs
+    if (!now.fitted || !now.structure || !options_.trace) return now;
+    for (const TagId id : std::vector<TagId>(now.structure->free_markers)) {
+      const auto track = std::ranges::find(evidence_.tracks.tracks, id, &PoseTrack::id);
+      if (track == evidence_.tracks.tracks.end()) continue;
+      std::vector<Marker> links = on_carrying_links(now.fitted->calibration, *track);
+      if (links.size() > kMostLinks) links.resize(kMostLinks);
+      for (const Marker& marker : links) {
+        Explanation other = asked_again(
+            of_structure(with_free_marker_on(*now.structure, marker, now.fitted->calibration),
+                         now.fitted->trace.added));
+        if (!other.fitted || !is_all_explained(other.fitted->trace) || !is_better(other, now))
+          continue;
+        now = std::move(other);
+        break;
+      }
+    }
+    return now;
+  }
+
+  static Structure with_free_marker_on(const Structure& structure, const Marker& marker,
+                                       const Calibration& robot) {
+    const Pose T_link_marker =
+        marker.link.value == 0 ? robot.T_camera_base * marker.T_link_marker : marker.T_link_marker;
+    return with_marker_on(structure, marker.id, marker.link.value, T_link_marker);
   }
 
   // Of two halves of a recording in which something happened once (a bump, a slip), one shows the

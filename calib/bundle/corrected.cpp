@@ -48,6 +48,32 @@ Eigen::Vector3d d_corner(CorrectedPart part, const Eigen::Vector3d& corner_m) {
   return unit.corner_m(corner_m);
 }
 
+// ad(a) b: the bracket of two twists.
+Vector6d bracket(const Vector6d& a, const Vector6d& b) {
+  Vector6d out;
+  out.head<3>() = a.head<3>().cross(b.head<3>());
+  out.tail<3>() = a.tail<3>().cross(b.head<3>()) + a.head<3>().cross(b.tail<3>());
+  return out;
+}
+
+// exp(at + by) = exp(out) exp(at) to first order in `by`: the left Jacobian of SE(3), as a series
+// (Barfoot 2017, section 7.1.5). Twists along one axis take its first term only.
+Vector6d moved_before(const Vector6d& at, const Vector6d& by) {
+  constexpr double kEnough = 1e-15;
+  constexpr int kMostTerms = 30;
+  Vector6d out = by;
+  Vector6d term = by;
+  for (int k = 2; k < kMostTerms; ++k) {
+    term = bracket(at, term) / k;
+    out += term;
+    if (term.squaredNorm() <= kEnough * kEnough * by.squaredNorm()) break;
+  }
+  return out;
+}
+
+// exp(at + by) = exp(at) exp(out): the right one.
+Vector6d moved_behind(const Vector6d& at, const Vector6d& by) { return moved_before(-at, by); }
+
 // Rows of the image between a corner and the middle row.
 double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t corner) {
   return sighting.corners_px[corner].y() - 0.5 * spec.camera.height;
@@ -138,6 +164,7 @@ std::optional<CorrectedError> corrected_error(
     joints[k].correction = corrected.joints[k];
   }
   CorrectedError out;
+  out.corrected = corrected;
   out.chain = differentiate_chain(exp_pose(corrected.camera) * T_camera_base, joints,
                                   T_link_marker * exp_pose(corrected.marker));
   auto error = compare(sighting, out.chain.T_camera_marker, changed(camera, corrected.intrinsics),
@@ -158,19 +185,21 @@ std::optional<CorrectedError> corrected_error(
   return out;
 }
 
-// To first order in the corrections that are there already, which are small.
 Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
                              const Correction& correction, const CorrectedError& at) {
   const double share = share_at(correction, sighting.frame);
   const Vector6d twist = twist_at(correction, sighting.frame);
   switch (correction.part) {
-    case CorrectedPart::kJoint:
+    case CorrectedPart::kJoint: {
+      const std::size_t k = place_on_path(spec, sighting, correction.index);
       return at.error.d_marker *
-             (at.chain.d_link[place_on_path(spec, sighting, correction.index)] * twist);
+             (at.chain.d_link[k] * moved_behind(at.corrected.joints[k], twist));
+    }
     case CorrectedPart::kMarker:
-      return at.error.d_marker * twist;
+      return at.error.d_marker * moved_behind(at.corrected.marker, twist);
     case CorrectedPart::kCamera:
-      return at.error.d_marker * (adjoint(at.chain.T_camera_marker.inverse()) * twist);
+      return at.error.d_marker * (adjoint(at.chain.T_camera_marker.inverse()) *
+                                  moved_before(at.corrected.camera, twist));
     case CorrectedPart::kMarkerSize:
     case CorrectedPart::kMarkerWidth:
     case CorrectedPart::kMarkerWarp: {

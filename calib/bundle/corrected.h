@@ -28,6 +28,7 @@ struct CorrectedSighting {
 
 /// Chain and error of a sighting with its corrections.
 struct CorrectedError {
+  CorrectedSighting corrected;
   ChainDerivatives chain;
   SightingError error;
   std::vector<double> rates;  ///< of the joints on the path, rad/s or m/s

@@ -78,6 +78,31 @@ void remove_coupling(const DesignCoupling& coupling, Spec& spec) {
                 [&](const auto& share) { return share.first == channel; });
 }
 
+// Where a fit ended.
+struct End {
+  bool time_offset = false;
+  std::vector<std::string> corrections;
+  std::vector<std::size_t> without_couplings;
+  State state;
+  double cost = 0.0;
+};
+
+// For each of the names the first correction of that name that no earlier one has; nothing where
+// one is not among the corrections.
+std::optional<std::vector<std::size_t>> places_of(const std::vector<std::string>& names,
+                                                  const std::vector<Correction>& corrections) {
+  std::vector<std::size_t> out;
+  std::vector<bool> taken(corrections.size(), false);
+  for (const std::string& name : names) {
+    std::size_t k = 0;
+    while (k < corrections.size() && (taken[k] || corrections[k].name != name)) ++k;
+    if (k == corrections.size()) return std::nullopt;
+    taken[k] = true;
+    out.push_back(k);
+  }
+  return out;
+}
+
 }  // namespace
 
 struct EffectBundle::Impl {
@@ -89,11 +114,13 @@ struct EffectBundle::Impl {
   std::vector<DesignCoupling> couplings;
   double bias_px = 0.0;
   double jitter_s = 0.0;
-  // Where the last fit of the same change ended: the next one begins there.
-  mutable std::map<std::vector<std::string>, State> ends;
+  mutable std::vector<End> ends;
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
+  /// Where the best fit ended whose freedom the change has, too: the fit begins there.
+  void begin_near(const BundleChange& change, State& state) const;
+  void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
 };
@@ -249,20 +276,52 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
   }
 }
 
+void EffectBundle::Impl::begin_near(const BundleChange& change, State& state) const {
+  const End* best = nullptr;
+  std::vector<std::size_t> best_places;
+  for (const End& end : ends) {
+    if (end.time_offset && !change.time_offset) continue;
+    if (end.without_couplings != change.without_couplings) continue;
+    if (best != nullptr && end.cost > best->cost) continue;
+    auto places = places_of(end.corrections, change.corrections);
+    if (!places) continue;
+    best = &end;
+    best_places = std::move(*places);
+  }
+  if (best == nullptr) return;
+  const std::vector<double> values = std::move(state.corrections);
+  const std::array<double, 1> time_offset = state.time_offset;
+  state = best->state;
+  if (!best->time_offset) state.time_offset = time_offset;
+  state.corrections = values;
+  for (std::size_t k = 0; k < best_places.size(); ++k)
+    state.corrections[best_places[k]] = best->state.corrections[k];
+}
+
+void EffectBundle::Impl::remember(const BundleChange& change, const State& state,
+                                  double cost) const {
+  End end{change.time_offset, {}, change.without_couplings, state, cost};
+  for (const Correction& correction : change.corrections)
+    end.corrections.push_back(correction.name);
+  const auto known = std::ranges::find_if(ends, [&](const End& other) {
+    return other.time_offset == end.time_offset && other.corrections == end.corrections &&
+           other.without_couplings == end.without_couplings;
+  });
+  if (known != ends.end()) {
+    *known = std::move(end);
+  } else {
+    ends.push_back(std::move(end));
+  }
+}
+
 // The least squares fit; `with` and `state` are left with the change in them.
 BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
   change_model(change, with, state);
-  std::vector<std::string> key{change.time_offset ? "time offset" : "no time offset"};
-  for (const Correction& correction : with.corrections) key.push_back(correction.name);
-  key.push_back(fmt::format("{} corrections", with.corrections.size()));
-  for (const std::size_t coupling : change.without_couplings) {
-    key.push_back(fmt::format("without coupling {}", coupling));
-  }
-  if (const auto end = ends.find(key); end != ends.end()) state = end->second;
+  begin_near(change, state);
   constexpr int kIterations = 60;
   const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
-  ends.insert_or_assign(key, state);
+  if (summary.converged) remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;

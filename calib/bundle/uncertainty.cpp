@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include <fmt/format.h>
@@ -18,8 +19,6 @@ namespace {
 // Scaled singular values below this, relative to the largest, are called weak: the combination is
 // known a thousand times worse than the best one.
 constexpr double kWeak = 1e-3;
-// Below this the data say nothing at all and the direction is left out of the covariance.
-constexpr double kUnseen = 1e-8;
 // Blocks of the sandwich: no fewer than this many, or its scatter says nothing.
 constexpr int kMinStretches = 12;
 // A marker that rests within so many pixels shows the same pixels in every frame.
@@ -183,13 +182,11 @@ std::string in_words(const std::vector<Parameter>& parameters, const WeakDirecti
 }
 
 // Singular values of the Jacobian with its columns scaled to unit length, and the directions behind
-// the small ones. Returns the information matrix's pseudo-inverse in the scaled space, unseen
-// directions left out, and marks the parameters they touch.
-Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& total,
-                        std::vector<Parameter>& parameters, Observability& out,
-                        std::vector<bool>& unseen) {
+// the small ones.
+void observe(const Eigen::MatrixXd& data, const std::vector<Parameter>& parameters,
+             Observability& out) {
   const Eigen::Index n = data.rows();
-  const Eigen::VectorXd scale = data.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(data);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * data * scale.asDiagonal());
   const double largest = std::sqrt(std::max(eigen.values[n - 1], 1e-300));
   for (Eigen::Index k = n; k-- > 0;) {
@@ -203,7 +200,6 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
     for (Eigen::Index i = 0; i < n; ++i) {
       const double weight = eigen.vectors(i, k);
       if (std::abs(weight) > 0.2) weak.parameters.emplace_back(static_cast<int>(i), weight);
-      if (relative < kUnseen && std::abs(weight) > 1e-3) unseen[static_cast<std::size_t>(i)] = true;
     }
     std::ranges::stable_sort(weak.parameters, [](const auto& a, const auto& b) {
       return std::abs(a.second) > std::abs(b.second);
@@ -211,16 +207,30 @@ Eigen::MatrixXd observe(const Eigen::MatrixXd& data, const Eigen::MatrixXd& tota
     weak.words = in_words(parameters, weak);
     out.weak.push_back(std::move(weak));
   }
-  const Eigen::VectorXd total_scale = total.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const SymmetricEigen full =
-      symmetric_eigen(total_scale.asDiagonal() * total * total_scale.asDiagonal());
+}
+
+// Pseudo-inverse of the information matrix. Directions that are no more than the rounding of its
+// eigenvalues are left out, and the parameters they touch are marked.
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information, std::vector<bool>& unseen) {
+  constexpr double kTouched = 1e-3;  // of a direction of unit length
+  const Eigen::Index n = information.rows();
+  const Eigen::VectorXd scale = unit_scale(information);
+  const SymmetricEigen eigen =
+      symmetric_eigen(scale.asDiagonal() * information * scale.asDiagonal());
+  const double rounding =
+      static_cast<double>(n) * std::numeric_limits<double>::epsilon() * eigen.values[n - 1];
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(n);
-  const double floor = kUnseen * kUnseen * full.values[n - 1];
   for (Eigen::Index k = 0; k < n; ++k) {
-    if (full.values[k] > floor) inverse[k] = 1.0 / full.values[k];
+    if (eigen.values[k] > rounding) {
+      inverse[k] = 1.0 / eigen.values[k];
+      continue;
+    }
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (std::abs(eigen.vectors(i, k)) > kTouched) unseen[static_cast<std::size_t>(i)] = true;
+    }
   }
-  return total_scale.asDiagonal() * full.vectors * inverse.asDiagonal() * full.vectors.transpose() *
-         total_scale.asDiagonal();
+  return scale.asDiagonal() * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() *
+         scale.asDiagonal();
 }
 
 // A correction with a prior is one that the data need not show.
@@ -259,9 +269,8 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
   data = Eigen::MatrixXd(data.selfadjointView<Eigen::Lower>());
 
   std::vector<bool> unseen(static_cast<std::size_t>(n), false);
-  const Eigen::MatrixXd white =
-      observe(with_known_corrections(data, linear), data + linear.prior_information, out.parameters,
-              out.observability, unseen);
+  observe(with_known_corrections(data, linear), out.parameters, out.observability);
+  const Eigen::MatrixXd white = inverse_of(data + linear.prior_information, unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
   const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
   const Eigen::VectorXd factor = inflation(linear, stretch, white).cwiseSqrt();
@@ -271,9 +280,11 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
         white * scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n) * white;
   }
   for (int i = 0; i < n; ++i) {
-    // With a prior the posterior is finite even where the data are silent, and says so by its size.
-    if (unseen[static_cast<std::size_t>(i)] && !spec.prior) continue;
     Parameter& parameter = out.parameters[static_cast<std::size_t>(i)];
+    // Where a nominal robot stands as a whole may be nobody's to know; its axes are known beside
+    // one another.
+    const bool is_of_robot = spec.prior && parameter.block != "effects";
+    if (unseen[static_cast<std::size_t>(i)] && !is_of_robot) continue;
     parameter.sigma_white = std::sqrt(white(i, i));
     parameter.sigma = std::sqrt(out.covariance(i, i));
   }

@@ -74,14 +74,12 @@ struct CoarseScan {
 };
 
 CoarseScan coarse_scan(const NormalSystem& system, const Candidate& candidate) {
-  CoarseScan out;
-  for (std::size_t i = 0; i < std::max<std::size_t>(1, candidate.scan.size()); ++i) {
-    const double value = candidate.scan.empty() ? 0.0 : candidate.scan[i];
-    const double gain = gain_of(system, candidate.columns(value));
-    if (i > 0 && gain <= out.gain) continue;
-    out = {i, gain};
-  }
-  return out;
+  if (candidate.scan.empty()) return {0, gain_of(system, candidate.columns(0.0))};
+  std::vector<std::vector<EffectColumn>> values;
+  for (const double value : candidate.scan) values.push_back(candidate.columns(value));
+  const std::vector<double> gains = gains_of(system, values);
+  const auto best = std::ranges::max_element(gains);
+  return {static_cast<std::size_t>(best - gains.begin()), *best};
 }
 
 bool is_refined(const Candidate& candidate) {

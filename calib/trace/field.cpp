@@ -59,18 +59,14 @@ Evidence gather(const NormalSystem& system, const FieldGrid& grid) {
   return out;
 }
 
-int stretch_of(const Partition& partition, std::size_t instant) {
-  return partition.cells[static_cast<std::size_t>(partition.cell[instant])].stretch;
-}
-
 // Nodes x stretches: what each stretch says of the field, E' residual.
 Eigen::MatrixXd by_stretch(const NormalSystem& system, const FieldGrid& grid,
                            const Eigen::VectorXd& residual) {
   const Linearisation& linear = system.linear();
   const Partition& partition = system.partition();
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(grid.columns.cols(), partition.stretches);
-  for (std::size_t i = 0; i < partition.cell.size(); ++i) {
-    const int stretch = stretch_of(partition, i);
+  for (std::size_t i = 0; i < partition.stretch.size(); ++i) {
+    const int stretch = partition.stretch[i];
     for (Eigen::Index row = linear.first_row[i]; row < linear.first_row[i + 1]; ++row) {
       using Entries = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
       for (Entries entry(grid.columns, row); entry; ++entry) {
@@ -88,10 +84,10 @@ Eigen::MatrixXd projected_by_stretch(const NormalSystem& system, const FieldGrid
   const Partition& partition = system.partition();
   const Eigen::MatrixXd& basis = evidence.own.basis();
   Eigen::MatrixXd own = Eigen::MatrixXd::Zero(basis.cols(), partition.stretches);
-  for (std::size_t i = 0; i < partition.cell.size(); ++i) {
+  for (std::size_t i = 0; i < partition.stretch.size(); ++i) {
     const Eigen::Index first = linear.first_row[i];
     const Eigen::Index rows = linear.first_row[i + 1] - first;
-    own.col(stretch_of(partition, i)).noalias() +=
+    own.col(partition.stretch[i]).noalias() +=
         basis.middleRows(first, rows).transpose() * evidence.residual.segment(first, rows);
   }
   return by_stretch(system, grid, evidence.residual) -

@@ -11,67 +11,54 @@
 namespace kinescope::trace {
 namespace {
 
-// Steps of the parameters without each fold.
-std::vector<Eigen::VectorXd> steps_without_folds(const NormalSystem& system,
-                                                 const std::vector<NormalEquations>& cells) {
-  const NormalEquations total = total_of(system, cells);
-  std::vector<NormalEquations> folds(static_cast<std::size_t>(system.partition().folds),
-                                     zero_like(total));
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    folds[static_cast<std::size_t>(system.partition().cells[c].fold)] += cells[c];
+// Every row's error where it is predicted without its own fold.
+Eigen::VectorXd held_out_rows(const NormalSystem& system,
+                              const std::vector<EffectColumn>& columns) {
+  const std::vector<NormalEquations> folds = augmented(
+      system.folds(), columns.empty() ? std::vector<EffectSums>{} : system.fold_sums(columns));
+  const NormalEquations total = total_of(system, folds);
+  const Linearisation& linear = system.linear();
+  const std::vector<int>& fold_of = system.partition().fold;
+  const auto k = static_cast<Eigen::Index>(columns.size());
+  Eigen::VectorXd out = linear.residual;
+  for (std::size_t fold = 0; fold < folds.size(); ++fold) {
+    const Eigen::VectorXd step = solve_without(total, folds[fold]);
+    const Eigen::VectorXd errors =
+        system.residual_after(step.head(system.parameters()), columns, step.tail(k));
+    for (std::size_t i = 0; i < fold_of.size(); ++i) {
+      if (fold_of[i] != static_cast<int>(fold)) continue;
+      const Eigen::Index first = linear.first_row[i];
+      const Eigen::Index rows = linear.first_row[i + 1] - first;
+      out.segment(first, rows) = errors.segment(first, rows);
+    }
   }
-  std::vector<Eigen::VectorXd> out;
-  for (const NormalEquations& fold : folds) out.push_back(solve_without(total, fold));
   return out;
 }
 
-// Sums of values per cell or per instant over stretches.
-Eigen::VectorXd over_stretches(const Partition& partition, const Eigen::VectorXd& values) {
+Eigen::VectorXd over_stretches(const Partition& partition, const Eigen::VectorXd& of_instants) {
+  KINESCOPE_CHECK(of_instants.size() == static_cast<Eigen::Index>(partition.stretch.size()),
+                  "one value an instant");
   Eigen::VectorXd out = Eigen::VectorXd::Zero(partition.stretches);
-  const bool by_cell = values.size() == static_cast<Eigen::Index>(partition.cells.size());
-  KINESCOPE_CHECK(by_cell || values.size() == static_cast<Eigen::Index>(partition.cell.size()),
-                  "one value a cell or an instant");
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const auto cell = static_cast<std::size_t>(
-        by_cell ? static_cast<int>(i) : partition.cell[static_cast<std::size_t>(i)]);
-    out[partition.cells[cell].stretch] += values[i];
-  }
+  for (Eigen::Index i = 0; i < of_instants.size(); ++i)
+    out[partition.stretch[static_cast<std::size_t>(i)]] += of_instants[i];
   return out;
 }
 
 }  // namespace
 
-Eigen::VectorXd held_out_cells(const NormalSystem& system,
-                               const std::vector<EffectColumn>& columns) {
-  const std::vector<NormalEquations> cells = augmented_cells(
-      system, columns.empty() ? std::vector<EffectSums>{} : system.cell_sums(columns));
-  const std::vector<Eigen::VectorXd> steps = steps_without_folds(system, cells);
-  Eigen::VectorXd out(static_cast<Eigen::Index>(cells.size()));
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    const Eigen::VectorXd& step = steps[static_cast<std::size_t>(system.partition().cells[c].fold)];
-    out[static_cast<Eigen::Index>(c)] =
-        system.cells()[c].rr - 2.0 * step.dot(cells[c].g) + step.dot(cells[c].H * step);
-  }
-  return out;
-}
-
-HeldOutInstants held_out_instants(const NormalSystem& system) {
-  const std::vector<Eigen::VectorXd> steps =
-      steps_without_folds(system, augmented_cells(system, {}));
+HeldOutInstants held_out_instants(const NormalSystem& system,
+                                  const std::vector<EffectColumn>& columns) {
+  const Eigen::VectorXd errors = held_out_rows(system, columns);
   const Linearisation& linear = system.linear();
-  const Partition& partition = system.partition();
   HeldOutInstants out;
   for (Eigen::VectorXd* v : {&out.whitened, &out.squared, &out.points}) {
     v->setZero(linear.instants());
   }
   for (Eigen::Index i = 0; i < linear.instants(); ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const int fold = partition.cells[static_cast<std::size_t>(partition.cell[at])].fold;
     const Eigen::Index first = linear.first_row[at];
     const Eigen::Index rows = linear.first_row[at + 1] - first;
-    const Eigen::VectorXd error =
-        linear.residual.segment(first, rows) -
-        linear.jacobian.middleRows(first, rows) * steps[static_cast<std::size_t>(fold)];
+    const auto error = errors.segment(first, rows);
     out.whitened[i] = error.squaredNorm();
     out.squared[i] = error.cwiseProduct(linear.unit.segment(first, rows)).squaredNorm();
     out.points[i] = linear.points(first, rows);

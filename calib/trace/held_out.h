@@ -9,25 +9,22 @@
 
 namespace kinescope::trace {
 
-/// Whitened squared error of every cell, its fold held out, with an effect's columns beside the
-/// model's own.
-[[nodiscard]] Eigen::VectorXd held_out_cells(const NormalSystem& system,
-                                             const std::vector<EffectColumn>& columns);
-
 /// Squared errors of every instant, its fold held out.
 struct HeldOutInstants {
   Eigen::VectorXd whitened;
   Eigen::VectorXd squared;  ///< in the square of the residual's unit
   Eigen::VectorXd points;
 };
-[[nodiscard]] HeldOutInstants held_out_instants(const NormalSystem& system);
+/// With an effect's columns beside the model's own.
+[[nodiscard]] HeldOutInstants held_out_instants(const NormalSystem& system,
+                                                const std::vector<EffectColumn>& columns = {});
 
 /// Root mean square distance with a 95 % interval from the scatter of the stretches.
 [[nodiscard]] HeldOutError held_out_error(const NormalSystem& system,
                                           const HeldOutInstants& errors);
 
 /// Student's t of the stretches' differences `worse - better`; 0 where they do not differ. Values
-/// are per cell, or per instant.
+/// are by instant.
 [[nodiscard]] double paired_t(const Partition& partition, const Eigen::VectorXd& worse,
                               const Eigen::VectorXd& better);
 /// Of that t by chance, one side.

@@ -11,32 +11,26 @@ NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
   return *this;
 }
 
-NormalEquations zero_like(const NormalEquations& other) {
-  return {Eigen::MatrixXd::Zero(other.H.rows(), other.H.cols()),
-          Eigen::VectorXd::Zero(other.g.size())};
-}
-
-std::vector<NormalEquations> augmented_cells(const NormalSystem& system,
-                                             const std::vector<EffectSums>& effect) {
+std::vector<NormalEquations> augmented(const std::vector<GroupSums>& own,
+                                       const std::vector<EffectSums>& effect) {
   std::vector<NormalEquations> out;
-  for (std::size_t c = 0; c < system.cells().size(); ++c) {
-    const CellSums& own = system.cells()[c];
+  for (std::size_t k = 0; k < own.size(); ++k) {
     if (effect.empty()) {
-      out.push_back({own.H, own.g});
+      out.push_back({own[k].H, own[k].g});
       continue;
     }
-    const Eigen::Index n = own.g.size() + effect[c].Er.size();
-    NormalEquations cell{Eigen::MatrixXd(n, n), Eigen::VectorXd(n)};
-    cell.H << own.H, effect[c].JE, effect[c].JE.transpose(), effect[c].EE;
-    cell.g << own.g, effect[c].Er;
-    out.push_back(std::move(cell));
+    const Eigen::Index n = own[k].g.size() + effect[k].Er.size();
+    NormalEquations group{Eigen::MatrixXd(n, n), Eigen::VectorXd(n)};
+    group.H << own[k].H, effect[k].JE, effect[k].JE.transpose(), effect[k].EE;
+    group.g << own[k].g, effect[k].Er;
+    out.push_back(std::move(group));
   }
   return out;
 }
 
-NormalEquations total_of(const NormalSystem& system, const std::vector<NormalEquations>& cells) {
-  NormalEquations total = zero_like(cells.front());
-  for (const NormalEquations& cell : cells) total += cell;
+NormalEquations total_of(const NormalSystem& system, const std::vector<NormalEquations>& groups) {
+  NormalEquations total = groups.front();
+  for (std::size_t k = 1; k < groups.size(); ++k) total += groups[k];
   const Eigen::MatrixXd& prior = system.linear().prior;
   if (prior.size() > 0) total.H.topLeftCorner(prior.rows(), prior.cols()) += prior;
   const Eigen::VectorXd& pull = system.linear().prior_gradient;
@@ -47,7 +41,7 @@ NormalEquations total_of(const NormalSystem& system, const std::vector<NormalEqu
 Eigen::VectorXd solve_without(const NormalEquations& total, const NormalEquations& part) {
   // Where one part alone shows a parameter, this keeps that parameter where it is.
   constexpr double kRidge = 1e-11;
-  const Eigen::VectorXd scale = total.H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(total.H);
   Eigen::MatrixXd H = scale.asDiagonal() * (total.H - part.H) * scale.asDiagonal();
   H.diagonal().array() += kRidge;
   const Eigen::VectorXd g = scale.asDiagonal() * (total.g - part.g);

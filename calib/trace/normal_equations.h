@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Normal equations of the model's own parameters with an effect's beside them, by cell, and their
-// solution when some cells are left out.
+// Normal equations of the model's own parameters with an effect's beside them, by group of rows,
+// and their solution when a group is left out.
 #pragma once
 
 #include <vector>
@@ -16,15 +16,13 @@ struct NormalEquations {
   NormalEquations& operator+=(const NormalEquations& other);
 };
 
-[[nodiscard]] NormalEquations zero_like(const NormalEquations& other);
+/// Of [J, E] for every group; `effect` empty: of J.
+[[nodiscard]] std::vector<NormalEquations> augmented(const std::vector<GroupSums>& own,
+                                                     const std::vector<EffectSums>& effect);
 
-/// Of [J, E] for every cell; `effect` empty: of J.
-[[nodiscard]] std::vector<NormalEquations> augmented_cells(const NormalSystem& system,
-                                                           const std::vector<EffectSums>& effect);
-
-/// Over all cells, with the priors.
+/// Over all groups, with the priors.
 [[nodiscard]] NormalEquations total_of(const NormalSystem& system,
-                                       const std::vector<NormalEquations>& cells);
+                                       const std::vector<NormalEquations>& groups);
 
 /// The step of all parameters that the rest of the rows ask for.
 [[nodiscard]] Eigen::VectorXd solve_without(const NormalEquations& total,

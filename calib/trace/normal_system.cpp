@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
@@ -13,16 +14,52 @@ namespace {
 // Directions of the model's own parameters below this (scaled) are not seen by the data.
 constexpr double kUnseen = 1e-13;
 
-CellSums zero_sums(Eigen::Index parameters) {
-  return {Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters), 0.0};
+GroupSums sums_of(RowMatrix J, const Eigen::VectorXd& r) {
+  const Eigen::Index parameters = J.cols();
+  GroupSums out{
+      Eigen::MatrixXd::Zero(parameters, parameters), J.transpose() * r, r.squaredNorm(), {}};
+  out.H.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
+  out.H = Eigen::MatrixXd(out.H.selfadjointView<Eigen::Lower>());
+  if (J.rows() < parameters) out.J = std::move(J);
+  return out;
+}
+
+// Of the rows of each group of instants.
+std::vector<GroupSums> grouped(const Linearisation& linear, const std::vector<int>& group,
+                               int groups) {
+  std::vector<GroupSums> out;
+  for (int k = 0; k < groups; ++k) {
+    Eigen::Index rows = 0;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      if (group[i] == k) rows += linear.first_row[i + 1] - linear.first_row[i];
+    }
+    RowMatrix J(rows, linear.jacobian.cols());
+    Eigen::VectorXd r(rows);
+    Eigen::Index at = 0;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      if (group[i] != k) continue;
+      const Eigen::Index count = linear.first_row[i + 1] - linear.first_row[i];
+      J.middleRows(at, count) = linear.jacobian.middleRows(linear.first_row[i], count);
+      r.segment(at, count) = linear.residual.segment(linear.first_row[i], count);
+      at += count;
+    }
+    out.push_back(sums_of(std::move(J), r));
+  }
+  return out;
 }
 
 }  // namespace
 
+Eigen::MatrixXd GroupSums::squares_of(const Eigen::MatrixXd& steps) const {
+  if (J.cols() == 0) return steps.transpose() * (H * steps);
+  const Eigen::MatrixXd moved = J * steps;
+  return moved.transpose() * moved;
+}
+
 Eigen::MatrixXd scaled_pseudo_inverse(const Eigen::MatrixXd& matrix, double floor) {
   const Eigen::Index n = matrix.rows();
   if (n == 0) return matrix;
-  const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(matrix);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
   const double least = floor * std::max(eigen.values[n - 1], 1e-300);
   const Eigen::VectorXd inverse =
@@ -33,33 +70,28 @@ Eigen::MatrixXd scaled_pseudo_inverse(const Eigen::MatrixXd& matrix, double floo
 
 NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
     : linear_(&linear), partition_(std::move(partition)) {
-  const Eigen::Index parameters = linear.jacobian.cols();
-  KINESCOPE_CHECK(linear.first_row.size() == partition_.cell.size() + 1,
-                  "one cell an instant, one first row more");
+  KINESCOPE_CHECK(linear.first_row.size() == partition_.stretch.size() + 1,
+                  "one stretch an instant, one first row more");
   KINESCOPE_CHECK(linear.jacobian.rows() == linear.residual.size(), "one row a residual");
-  cells_.assign(partition_.cells.size(), zero_sums(parameters));
-  total_ = zero_sums(parameters);
   instant_.resize(static_cast<std::size_t>(linear.residual.size()));
-  for (std::size_t i = 0; i < partition_.cell.size(); ++i) {
+  for (std::size_t i = 0; i < partition_.stretch.size(); ++i) {
     const Eigen::Index first = linear.first_row[i];
-    const Eigen::Index rows = linear.first_row[i + 1] - first;
-    std::fill_n(instant_.begin() + first, rows, static_cast<int>(i));
-    CellSums& cell = cells_[static_cast<std::size_t>(partition_.cell[i])];
-    const auto J = linear.jacobian.middleRows(first, rows);
-    const auto r = linear.residual.segment(first, rows);
-    cell.H.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
-    cell.g.noalias() += J.transpose() * r;
-    cell.rr += r.squaredNorm();
+    std::fill_n(instant_.begin() + first, linear.first_row[i + 1] - first, static_cast<int>(i));
   }
-  for (CellSums& cell : cells_) {
-    cell.H = Eigen::MatrixXd(cell.H.selfadjointView<Eigen::Lower>());
-    total_.H += cell.H;
-    total_.g += cell.g;
-    total_.rr += cell.rr;
+  stretches_ = grouped(linear, partition_.stretch, partition_.stretches);
+  folds_ = grouped(linear, partition_.fold, partition_.folds);
+  const Eigen::Index parameters = linear.jacobian.cols();
+  total_ = {
+      Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters), 0.0, {}};
+  for (const GroupSums& stretch : stretches_) {
+    total_.H += stretch.H;
+    total_.g += stretch.g;
+    total_.rr += stretch.rr;
   }
   if (linear.prior_gradient.size() > 0) total_.g -= linear.prior_gradient;
   inverse_ = scaled_pseudo_inverse(
       linear.prior.size() == 0 ? total_.H : Eigen::MatrixXd(total_.H + linear.prior), kUnseen);
+  step_ = inverse_ * total_.g;
 }
 
 double NormalSystem::freedom() const {
@@ -124,29 +156,73 @@ Eigen::VectorXd NormalSystem::share_of(const EffectColumn& column) const {
 }
 
 EffectSums NormalSystem::sums(const std::vector<EffectColumn>& columns) const {
-  const auto k = static_cast<Eigen::Index>(columns.size());
-  EffectSums out{Eigen::MatrixXd(parameters(), k), Eigen::MatrixXd(k, k), Eigen::VectorXd(k)};
-  std::vector<Eigen::VectorXd> shares;
-  for (Eigen::Index a = 0; a < k; ++a) {
-    const EffectColumn& column = columns[static_cast<std::size_t>(a)];
-    const CarrierSums& sums = carrier(column.carrier);
-    shares.push_back(share_of(column));
-    out.Er[a] = shares.back().dot(sums.with_residual);
-    out.JE.col(a).noalias() = sums.with_jacobian.transpose() * shares.back();
-    for (Eigen::Index b = 0; b <= a; ++b) {
-      const EffectColumn& other = columns[static_cast<std::size_t>(b)];
-      out.EE(a, b) = (shares[static_cast<std::size_t>(b)].array() * shares.back().array() *
-                      product(column.carrier, other.carrier).array())
-                         .sum();
-      out.EE(b, a) = out.EE(a, b);
+  std::vector<EffectSums> one = sums(std::vector<std::vector<EffectColumn>>{columns});
+  return std::move(one.front());
+}
+
+std::vector<EffectSums> NormalSystem::sums(
+    const std::vector<std::vector<EffectColumn>>& effects) const {
+  // Every column of the effects, its carrier's together.
+  struct Place {
+    std::size_t effect;
+    std::size_t column;
+  };
+  std::map<int, std::vector<Place>> carried;
+  std::vector<EffectSums> out;
+  std::vector<Eigen::MatrixXd> shares;
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    const auto k = static_cast<Eigen::Index>(effects[e].size());
+    out.push_back({Eigen::MatrixXd(parameters(), k), Eigen::MatrixXd(k, k), Eigen::VectorXd(k)});
+    shares.emplace_back(linear_->instants(), k);
+    for (std::size_t a = 0; a < effects[e].size(); ++a) {
+      shares[e].col(static_cast<Eigen::Index>(a)) = share_of(effects[e][a]);
+      carried[effects[e][a].carrier].push_back({e, a});
+    }
+  }
+  for (const auto& [index, places] : carried) {
+    const CarrierSums& own = carrier(index);
+    Eigen::MatrixXd of_carrier(linear_->instants(), static_cast<Eigen::Index>(places.size()));
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      of_carrier.col(static_cast<Eigen::Index>(k)) =
+          shares[places[k].effect].col(static_cast<Eigen::Index>(places[k].column));
+    }
+    const Eigen::MatrixXd JE = own.with_jacobian.transpose() * of_carrier;
+    const Eigen::VectorXd Er = of_carrier.transpose() * own.with_residual;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      EffectSums& effect = out[places[k].effect];
+      const auto a = static_cast<Eigen::Index>(places[k].column);
+      effect.JE.col(a) = JE.col(static_cast<Eigen::Index>(k));
+      effect.Er[a] = Er[static_cast<Eigen::Index>(k)];
+    }
+  }
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    for (Eigen::Index a = 0; a < shares[e].cols(); ++a) {
+      for (Eigen::Index b = 0; b <= a; ++b) {
+        const Eigen::VectorXd& both = product(effects[e][static_cast<std::size_t>(a)].carrier,
+                                              effects[e][static_cast<std::size_t>(b)].carrier);
+        const double sum =
+            (shares[e].col(a).array() * shares[e].col(b).array() * both.array()).sum();
+        out[e].EE(a, b) = sum;
+        out[e].EE(b, a) = sum;
+      }
     }
   }
   return out;
 }
 
-std::vector<EffectSums> NormalSystem::cell_sums(const std::vector<EffectColumn>& columns) const {
+std::vector<EffectSums> NormalSystem::stretch_sums(const std::vector<EffectColumn>& columns) const {
+  return grouped_sums(columns, partition_.stretch, partition_.stretches);
+}
+
+std::vector<EffectSums> NormalSystem::fold_sums(const std::vector<EffectColumn>& columns) const {
+  return grouped_sums(columns, partition_.fold, partition_.folds);
+}
+
+std::vector<EffectSums> NormalSystem::grouped_sums(const std::vector<EffectColumn>& columns,
+                                                   const std::vector<int>& group,
+                                                   int groups) const {
   const auto k = static_cast<Eigen::Index>(columns.size());
-  std::vector<EffectSums> out(cells_.size(),
+  std::vector<EffectSums> out(static_cast<std::size_t>(groups),
                               {Eigen::MatrixXd::Zero(parameters(), k), Eigen::MatrixXd::Zero(k, k),
                                Eigen::VectorXd::Zero(k)});
   std::vector<Eigen::VectorXd> shares;
@@ -156,22 +232,20 @@ std::vector<EffectSums> NormalSystem::cell_sums(const std::vector<EffectColumn>&
     shares.push_back(share_of(column));
     const RowMatrix with_jacobian = shares.back().asDiagonal() * sums.with_jacobian;
     for (Eigen::Index i = 0; i < linear_->instants(); ++i) {
-      EffectSums& cell =
-          out[static_cast<std::size_t>(partition_.cell[static_cast<std::size_t>(i)])];
-      cell.Er[a] += shares.back()[i] * sums.with_residual[i];
-      cell.JE.col(a) += with_jacobian.row(i);
+      EffectSums& own = out[static_cast<std::size_t>(group[static_cast<std::size_t>(i)])];
+      own.Er[a] += shares.back()[i] * sums.with_residual[i];
+      own.JE.col(a) += with_jacobian.row(i);
     }
     for (Eigen::Index b = 0; b <= a; ++b) {
       const Eigen::VectorXd& products =
           product(column.carrier, columns[static_cast<std::size_t>(b)].carrier);
       for (Eigen::Index i = 0; i < linear_->instants(); ++i) {
-        EffectSums& cell =
-            out[static_cast<std::size_t>(partition_.cell[static_cast<std::size_t>(i)])];
-        cell.EE(a, b) += shares[static_cast<std::size_t>(b)][i] * shares.back()[i] * products[i];
+        EffectSums& own = out[static_cast<std::size_t>(group[static_cast<std::size_t>(i)])];
+        own.EE(a, b) += shares[static_cast<std::size_t>(b)][i] * shares.back()[i] * products[i];
       }
     }
   }
-  for (EffectSums& cell : out) cell.EE = Eigen::MatrixXd(cell.EE.selfadjointView<Eigen::Lower>());
+  for (EffectSums& own : out) own.EE = Eigen::MatrixXd(own.EE.selfadjointView<Eigen::Lower>());
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A linearised model as sums: everything that tests of effects need of thousands of rows, by cell.
+// A linearised model as sums: everything that tests of effects need of thousands of rows, by
+// stretch of time and by fold.
 #pragma once
 
 #include <utility>
@@ -12,11 +13,14 @@
 
 namespace kinescope::trace {
 
-/// J'J, J'r and r'r over the rows of a cell; over all of them J'r less what priors pull.
-struct CellSums {
+/// J'J, J'r and r'r over the rows of a group; over all of them J'r less what priors pull.
+struct GroupSums {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   double rr = 0.0;
+  RowMatrix J;  ///< the rows themselves where they are fewer than the parameters, else empty
+  /// steps'H steps.
+  [[nodiscard]] Eigen::MatrixXd squares_of(const Eigen::MatrixXd& steps) const;
 };
 
 /// The same of an effect's columns E beside the model's own J: J'E, E'E, E'r.
@@ -37,10 +41,13 @@ class NormalSystem {
 
   [[nodiscard]] const Linearisation& linear() const { return *linear_; }
   [[nodiscard]] const Partition& partition() const { return partition_; }
-  [[nodiscard]] const std::vector<CellSums>& cells() const { return cells_; }
-  [[nodiscard]] const CellSums& total() const { return total_; }
+  [[nodiscard]] const std::vector<GroupSums>& stretches() const { return stretches_; }
+  [[nodiscard]] const std::vector<GroupSums>& folds() const { return folds_; }
+  [[nodiscard]] const GroupSums& total() const { return total_; }
   /// (J'J + prior)^-1, directions that the data do not show left out.
   [[nodiscard]] const Eigen::MatrixXd& inverse() const { return inverse_; }
+  /// Of the model's own parameters to where the sum of squares is least.
+  [[nodiscard]] const Eigen::VectorXd& step() const { return step_; }
   [[nodiscard]] Eigen::Index parameters() const { return total_.g.size(); }
   /// Rows beyond the model's own parameters; 1 at the least.
   [[nodiscard]] double freedom() const;
@@ -49,8 +56,14 @@ class NormalSystem {
 
   /// Sums over all rows.
   [[nodiscard]] EffectSums sums(const std::vector<EffectColumn>& columns) const;
-  /// Sums over each cell.
-  [[nodiscard]] std::vector<EffectSums> cell_sums(const std::vector<EffectColumn>& columns) const;
+  /// The same for several effects, which costs less than one after the other.
+  [[nodiscard]] std::vector<EffectSums> sums(
+      const std::vector<std::vector<EffectColumn>>& effects) const;
+  /// Sums over each stretch.
+  [[nodiscard]] std::vector<EffectSums> stretch_sums(
+      const std::vector<EffectColumn>& columns) const;
+  /// Sums over each fold.
+  [[nodiscard]] std::vector<EffectSums> fold_sums(const std::vector<EffectColumn>& columns) const;
   /// By how much columns move the prediction where they take `gain` from the whitened sum of
   /// squares: the same shift of every row they touch would take as much; in the residual's unit.
   [[nodiscard]] double shift_of(double gain, const std::vector<EffectColumn>& columns) const;
@@ -84,14 +97,19 @@ class NormalSystem {
   [[nodiscard]] CarrierSums carrier_sums(int index) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;
   [[nodiscard]] Eigen::VectorXd products_of(int a, int b) const;
+  [[nodiscard]] std::vector<EffectSums> grouped_sums(const std::vector<EffectColumn>& columns,
+                                                     const std::vector<int>& group,
+                                                     int groups) const;
   [[nodiscard]] Eigen::VectorXd share_of(const EffectColumn& column) const;
 
   const Linearisation* linear_;
   Partition partition_;
   std::vector<int> instant_;  // of every row
-  std::vector<CellSums> cells_;
-  CellSums total_;
+  std::vector<GroupSums> stretches_;
+  std::vector<GroupSums> folds_;
+  GroupSums total_;
   Eigen::MatrixXd inverse_;
+  Eigen::VectorXd step_;
   Memo<int, CarrierSums> carriers_;
   Memo<std::pair<int, int>, Eigen::VectorXd> products_;
 };

@@ -14,7 +14,7 @@ OwnSpace::OwnSpace(const NormalSystem& system) {
   const Linearisation& linear = system.linear();
   Eigen::MatrixXd H = system.total().H;
   if (linear.prior.size() > 0) H += linear.prior;
-  const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(H);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
   const Eigen::VectorXd& values = eigen.values;
   const Eigen::Index n = values.size();

@@ -41,25 +41,22 @@ std::vector<int> stretch_of_instants(const Linearisation& linear, double& wideni
   return out;
 }
 
+// In the order in which they appear; returns how many there are.
+int number_without_gaps(std::vector<int>& groups) {
+  std::map<int, int> number;
+  for (int& group : groups)
+    group = number.try_emplace(group, static_cast<int>(number.size())).first->second;
+  return static_cast<int>(number.size());
+}
+
 }  // namespace
 
 Partition make_partition(const Linearisation& linear) {
   Partition out;
-  const std::vector<int> stretch = stretch_of_instants(linear, out.widening);
-  std::map<std::pair<int, int>, int> number;
-  std::map<int, int> stretches;
-  std::map<int, int> folds;
-  for (std::size_t i = 0; i < stretch.size(); ++i) {
-    // Numbered without gaps: a stretch without an instant is none.
-    const int s =
-        stretches.try_emplace(stretch[i], static_cast<int>(stretches.size())).first->second;
-    const int f = folds.try_emplace(linear.fold[i], static_cast<int>(folds.size())).first->second;
-    const auto [entry, fresh] = number.try_emplace({s, f}, static_cast<int>(out.cells.size()));
-    if (fresh) out.cells.push_back({s, f});
-    out.cell.push_back(entry->second);
-  }
-  out.stretches = static_cast<int>(stretches.size());
-  out.folds = static_cast<int>(folds.size());
+  out.stretch = stretch_of_instants(linear, out.widening);
+  out.stretches = number_without_gaps(out.stretch);
+  out.fold = linear.fold;
+  out.folds = number_without_gaps(out.fold);
   return out;
 }
 

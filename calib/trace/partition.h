@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Instants in groups: stretches of time within which noise may be alike, and folds that are held
-// out together. A cell is what one stretch and one fold have in common, so that sums over cells
-// give sums over either.
+// out together.
 #pragma once
 
 #include <vector>
@@ -11,14 +10,10 @@
 
 namespace kinescope::trace {
 
-struct Cell {
-  int stretch = 0;
-  int fold = 0;
-};
-
+/// Both are numbered without gaps: one without an instant is none.
 struct Partition {
-  std::vector<Cell> cells;
-  std::vector<int> cell;  ///< of every instant
+  std::vector<int> stretch;  ///< of every instant
+  std::vector<int> fold;     ///< of every instant
   int stretches = 0;
   int folds = 0;
   /// Variances found from stretches are to be multiplied by this: what neighbouring stretches still

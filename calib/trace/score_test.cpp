@@ -22,7 +22,7 @@ constexpr double kFewestStretches = 2.0;
 
 // The effect's columns combined so that they are of unit length and all shown: E -> E T.
 Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& S) {
-  const Eigen::VectorXd scale = sums.EE.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(sums.EE);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * S * scale.asDiagonal());
   Eigen::Index first = 0;
   while (first < S.rows() && !(eigen.values[first] > kHidden)) ++first;
@@ -36,7 +36,6 @@ EffectSums combine(const EffectSums& sums, const Eigen::MatrixXd& T) {
 // The effect beside the model: what is left of it, and the joint least squares solution.
 struct Projected {
   Eigen::MatrixXd T;
-  EffectSums sums;
   Eigen::MatrixXd B;  // the model's parameters that imitate the effect
   Eigen::MatrixXd S;  // normal matrix of what they cannot imitate
   Eigen::MatrixXd S_inverse;
@@ -46,20 +45,27 @@ struct Projected {
   double gain = 0.0;
 };
 
-Projected project(const NormalSystem& system, const EffectSums& raw) {
+// `imitation`: of the raw columns by the model's parameters.
+Projected project(const NormalSystem& system, const EffectSums& raw,
+                  const Eigen::MatrixXd& imitation) {
   Projected out;
-  const Eigen::MatrixXd S_raw = raw.EE - raw.JE.transpose() * system.inverse() * raw.JE;
+  const Eigen::MatrixXd S_raw = raw.EE - raw.JE.transpose() * imitation;
   out.T = shown_directions(raw, S_raw);
-  out.sums = combine(raw, out.T);
-  out.B = system.inverse() * out.sums.JE;
+  out.B = imitation * out.T;
   out.S = out.T.transpose() * S_raw * out.T;
   out.S_inverse = scaled_pseudo_inverse(out.S, 0.0);
   out.alone = S_raw.diagonal().cwiseMax(0.0);
-  const Eigen::VectorXd score = out.sums.Er - out.B.transpose() * system.total().g;
+  const Eigen::VectorXd score =
+      out.T.transpose() * (raw.Er - imitation.transpose() * system.total().g);
   out.theta = out.S_inverse * score;
-  out.delta = system.inverse() * system.total().g - out.B * out.theta;
+  out.delta = system.step() - out.B * out.theta;
   out.gain = score.dot(out.theta);
   return out;
+}
+
+Projected project(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
+  const EffectSums raw = system.sums(columns);
+  return project(system, raw, system.inverse() * raw.JE);
 }
 
 // What the stretches say about the effect, one column each, and how much of it each one carries.
@@ -69,21 +75,22 @@ struct StretchScores {
 };
 
 StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
-                             const std::vector<EffectSums>& raw_cells) {
+                             const std::vector<EffectSums>& raw) {
   const Eigen::Index k = p.theta.size();
-  const auto stretches = static_cast<Eigen::Index>(system.partition().stretches);
-  StretchScores out{Eigen::MatrixXd::Zero(k, stretches), Eigen::VectorXd::Zero(stretches)};
-  for (std::size_t c = 0; c < raw_cells.size(); ++c) {
-    const EffectSums cell = combine(raw_cells[c], p.T);
-    const CellSums& own = system.cells()[c];
-    const Eigen::VectorXd effect = cell.Er - cell.JE.transpose() * p.delta - cell.EE * p.theta;
-    const Eigen::VectorXd model = own.g - own.H * p.delta - cell.JE * p.theta;
-    const Eigen::MatrixXd cross = p.B.transpose() * cell.JE;
-    const Eigen::MatrixXd left =
-        cell.EE - cross - cross.transpose() + p.B.transpose() * own.H * p.B;
-    const auto s = static_cast<Eigen::Index>(system.partition().cells[c].stretch);
-    out.scores.col(s) += effect - p.B.transpose() * model;
-    out.energy[s] += (p.S_inverse * left).trace();
+  const auto stretches = static_cast<Eigen::Index>(raw.size());
+  StretchScores out{Eigen::MatrixXd(k, stretches), Eigen::VectorXd(stretches)};
+  Eigen::MatrixXd own_steps(p.delta.size(), k + 1);
+  own_steps << p.B, p.delta;
+  for (Eigen::Index s = 0; s < stretches; ++s) {
+    const EffectSums effect = combine(raw[static_cast<std::size_t>(s)], p.T);
+    const GroupSums& own = system.stretches()[static_cast<std::size_t>(s)];
+    // B'H [B, delta]
+    const Eigen::MatrixXd moved = own.squares_of(own_steps).topRows(k);
+    const Eigen::MatrixXd cross = p.B.transpose() * effect.JE;
+    out.scores.col(s) = effect.Er - effect.JE.transpose() * p.delta - effect.EE * p.theta -
+                        p.B.transpose() * own.g + moved.col(k) + cross * p.theta;
+    out.energy[s] =
+        (p.S_inverse * (effect.EE - cross - cross.transpose() + moved.leftCols(k))).trace();
   }
   return out;
 }
@@ -128,23 +135,24 @@ PooledNoise noise_elsewhere(const NormalSystem& system, const Projected& p,
   const auto n = static_cast<Eigen::Index>(all.size());
   const auto k = static_cast<Eigen::Index>(columns.size());
   all.insert(all.end(), columns.begin(), columns.end());
-  const std::vector<EffectSums> cells = system.cell_sums(all);
+  const std::vector<EffectSums> stretches = system.stretch_sums(all);
   const Eigen::VectorXd theta = p.T * p.theta;
   const int windows = (system.partition().stretches + length - 1) / length;
   std::vector<Eigen::MatrixXd> S(static_cast<std::size_t>(windows), Eigen::MatrixXd::Zero(n, n));
   std::vector<Eigen::VectorXd> score(S.size(), Eigen::VectorXd::Zero(n));
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    const auto w = static_cast<std::size_t>(system.partition().cells[c].stretch / length);
-    S[w] += cells[c].EE.topLeftCorner(n, n);
-    score[w] += cells[c].Er.head(n) - cells[c].JE.leftCols(n).transpose() * p.delta -
-                cells[c].EE.topRightCorner(n, k) * theta;
+  for (std::size_t s = 0; s < stretches.size(); ++s) {
+    const EffectSums& stretch = stretches[s];
+    const std::size_t w = s / static_cast<std::size_t>(length);
+    S[w] += stretch.EE.topLeftCorner(n, n);
+    score[w] += stretch.Er.head(n) - stretch.JE.leftCols(n).transpose() * p.delta -
+                stretch.EE.topRightCorner(n, k) * theta;
   }
   double squares = 0.0;
   double directions = 0.0;
   double seen = 0.0;
   for (std::size_t w = 0; w < S.size(); ++w) {
     if (!(S[w].diagonal().maxCoeff() > 0.0)) continue;
-    const Eigen::VectorXd scale = S[w].diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const Eigen::VectorXd scale = unit_scale(S[w]);
     const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * S[w] * scale.asDiagonal());
     const Eigen::VectorXd along = eigen.vectors.transpose() * scale.asDiagonal() * score[w];
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -204,15 +212,10 @@ void judge(const NormalSystem& system, const Projected& p, const StretchScores& 
 }
 
 // Scatter of the last `count` parameters when each stretch is left out in turn.
-Eigen::MatrixXd leave_out(const NormalSystem& system, const std::vector<NormalEquations>& cells,
+Eigen::MatrixXd leave_out(const NormalSystem& system, const std::vector<EffectSums>& effect,
                           Eigen::Index count) {
-  const Partition& partition = system.partition();
-  const NormalEquations total = total_of(system, cells);
-  std::vector<NormalEquations> stretches(static_cast<std::size_t>(partition.stretches),
-                                         zero_like(total));
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    stretches[static_cast<std::size_t>(partition.cells[c].stretch)] += cells[c];
-  }
+  const std::vector<NormalEquations> stretches = augmented(system.stretches(), effect);
+  const NormalEquations total = total_of(system, stretches);
   Eigen::MatrixXd estimates(count, static_cast<Eigen::Index>(stretches.size()));
   for (std::size_t s = 0; s < stretches.size(); ++s) {
     estimates.col(static_cast<Eigen::Index>(s)) = solve_without(total, stretches[s]).tail(count);
@@ -220,7 +223,7 @@ Eigen::MatrixXd leave_out(const NormalSystem& system, const std::vector<NormalEq
   const Eigen::VectorXd mean = estimates.rowwise().mean();
   const Eigen::MatrixXd scatter = estimates.colwise() - mean;
   const auto m = static_cast<double>(stretches.size());
-  return scatter * scatter.transpose() * (partition.widening * (m - 1.0) / m);
+  return scatter * scatter.transpose() * (system.partition().widening * (m - 1.0) / m);
 }
 
 }  // namespace
@@ -230,14 +233,35 @@ bool is_large(const Score& score, const TraceOptions& options) {
 }
 
 double gain_of(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
-  return project(system, system.sums(columns)).gain;
+  return project(system, columns).gain;
+}
+
+std::vector<double> gains_of(const NormalSystem& system,
+                             const std::vector<std::vector<EffectColumn>>& effects) {
+  const std::vector<EffectSums> sums = system.sums(effects);
+  Eigen::Index columns = 0;
+  for (const EffectSums& effect : sums) columns += effect.JE.cols();
+  Eigen::MatrixXd beside(system.parameters(), columns);
+  Eigen::Index at = 0;
+  for (const EffectSums& effect : sums) {
+    beside.middleCols(at, effect.JE.cols()) = effect.JE;
+    at += effect.JE.cols();
+  }
+  const Eigen::MatrixXd imitations = system.inverse() * beside;
+  std::vector<double> out;
+  at = 0;
+  for (const EffectSums& effect : sums) {
+    out.push_back(project(system, effect, imitations.middleCols(at, effect.JE.cols())).gain);
+    at += effect.JE.cols();
+  }
+  return out;
 }
 
 Score score_test(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
-  const Projected p = project(system, system.sums(columns));
+  const Projected p = project(system, columns);
   Score out;
   if (p.theta.size() == 0) return out;
-  const StretchScores stretches = stretch_scores(system, p, system.cell_sums(columns));
+  const StretchScores stretches = stretch_scores(system, p, system.stretch_sums(columns));
   const auto count = static_cast<double>(system.partition().stretches);
   const Eigen::MatrixXd meat = stretches.scores * stretches.scores.transpose();
   judge(system, p, stretches,
@@ -247,20 +271,19 @@ Score score_test(const NormalSystem& system, const std::vector<EffectColumn>& co
 }
 
 Score jackknife_test(const NormalSystem& system, const std::vector<EffectColumn>& columns) {
-  const Projected p = project(system, system.sums(columns));
+  const Projected p = project(system, columns);
   Score out;
   if (p.theta.size() == 0) return out;
-  const std::vector<EffectSums> raw_cells = system.cell_sums(columns);
+  const std::vector<EffectSums> raw = system.stretch_sums(columns);
   std::vector<EffectSums> shown;
-  for (const EffectSums& cell : raw_cells) shown.push_back(combine(cell, p.T));
-  const Eigen::MatrixXd covariance =
-      leave_out(system, augmented_cells(system, shown), p.theta.size());
-  judge(system, p, stretch_scores(system, p, raw_cells), covariance, columns, out);
+  for (const EffectSums& stretch : raw) shown.push_back(combine(stretch, p.T));
+  const Eigen::MatrixXd covariance = leave_out(system, shown, p.theta.size());
+  judge(system, p, stretch_scores(system, p, raw), covariance, columns, out);
   return out;
 }
 
 Eigen::MatrixXd jackknife_covariance(const NormalSystem& system, Eigen::Index count) {
-  return leave_out(system, augmented_cells(system, {}), count);
+  return leave_out(system, {}, count);
 }
 
 }  // namespace kinescope::trace

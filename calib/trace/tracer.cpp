@@ -305,7 +305,7 @@ std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
     const EffectId& id = candidate.id;
     const Score confirmed = jackknife_test(stage.system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;
-    out.push_back({member, id, held_out_cells(stage.system, member.columns)});
+    out.push_back({member, id, held_out_instants(stage.system, member.columns).whitened});
   }
   const std::vector<Contender> all = out;
   std::erase_if(out, [&](const Contender& contender) {

@@ -47,7 +47,7 @@ class Tracer {
   struct Contender {
     TestedMember member;
     EffectId id;
-    Eigen::VectorXd held_out;  // by cell
+    Eigen::VectorXd held_out;  // whitened squared errors by instant
   };
 
   /// The model with these effects; those asked for last are kept.

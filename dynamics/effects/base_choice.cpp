@@ -27,9 +27,7 @@ struct Normal {
   }
   [[nodiscard]] Eigen::VectorXd solve() const {
     const Eigen::MatrixXd full = H.selfadjointView<Eigen::Lower>();
-    const Eigen::VectorXd diagonal = full.diagonal();
-    const Eigen::VectorXd scale =
-        (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+    const Eigen::VectorXd scale = unit_scale(full);
     const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * full * scale.asDiagonal());
     const Eigen::VectorXd& values = eigen.values;
     const double least = kUnseen * std::max(values[values.size() - 1], 1e-300);

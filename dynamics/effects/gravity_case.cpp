@@ -19,9 +19,7 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
   for (std::size_t j = 0; j < Y.size(); ++j) {
     H.noalias() += Y[j].transpose() * Y[j] / std::pow(sigma[static_cast<Eigen::Index>(j)], 2);
   }
-  const Eigen::VectorXd diagonal = H.diagonal();
-  const Eigen::VectorXd scale =
-      (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+  const Eigen::VectorXd scale = unit_scale(H);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
   const Eigen::VectorXd& values = eigen.values;
   Eigen::Index first = 0;

@@ -29,9 +29,7 @@ bool is_coupling(const Candidate& candidate) { return candidate.parameters.size(
 
 /// H x = g with columns scaled to length 1; directions that nothing determines stay.
 Eigen::VectorXd scaled_solve(const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
-  const Eigen::VectorXd diagonal = H.diagonal();
-  const Eigen::VectorXd scale =
-      (diagonal.array() > 0.0).select(diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+  const Eigen::VectorXd scale = unit_scale(H);
   Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   scaled.diagonal().array() += 1e-12;
   const Eigen::VectorXd right = scale.asDiagonal() * g;

@@ -102,9 +102,7 @@ double Sums::left_over(const Eigen::Vector3d& direction) const {
   const Eigen::MatrixXd H = T.transpose() * H_ * T;
   const Eigen::VectorXd g = T.transpose() * g_;
   // Parameters that no torque shows are left out.
-  const Eigen::VectorXd scale =
-      (H.diagonal().array() > 0.0)
-          .select(H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse(), 0.0);
+  const Eigen::VectorXd scale = unit_scale(H);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
   const Eigen::VectorXd in_modes = eigen.vectors.transpose() * (scale.cwiseProduct(g));
   double explained = 0.0;

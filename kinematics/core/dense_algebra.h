@@ -29,6 +29,10 @@ struct SymmetricEigen {
 /// The values alone, ascending: a fraction of the work for large matrices.
 [[nodiscard]] Eigen::VectorXd symmetric_eigenvalues(const Eigen::MatrixXd& matrix);
 
+/// n factors that make the diagonal of diag(s) H diag(s) ones, H a normal matrix n x n: the columns
+/// behind it then have unit length. 0 for a column of zeros.
+[[nodiscard]] Eigen::VectorXd unit_scale(const Eigen::MatrixXd& H);
+
 /// matrix = L L' of a symmetric positive definite n x n matrix, kept for several right sides.
 class CholeskyFactor {
  public:

@@ -73,12 +73,13 @@ Pose flange(const Lab& lab, int posture) {
 }
 
 Calibration run(const Lab& lab, const Measurements& measurements, const Placement& placement,
-                FreeGeometry free) {
+                FreeGeometry free, std::vector<Correction> corrections = {}) {
   CalibrationStart start;
   start.tree = lab.nominal;
   start.tree.markers = placement.markers;
   start.T_camera_base = placement.T_camera_base;
   start.nominal = true;
+  start.corrections = std::move(corrections);
   CalibrateOptions options;
   options.free = free;
   return calibrate(measurements, {}, lab.log, start, options);
@@ -326,6 +327,36 @@ TEST(Nominal, PointsOfATracker) {
   const Calibration after = run(lab, measurements, placement, FreeGeometry::kGeometry);
   EXPECT_GT(before.held_out_rms, 10.0 * kSigma);
   EXPECT_LT(after.held_out_rms, 1.5 * kDistance * kSigma);
+}
+
+// A point has no turn: nothing is known of it, and all else as before.
+TEST(Nominal, WhatMovesNoMeasurementHasNoUncertainty) {
+  const Lab lab = make_lab("a turn of a point", 0.01, 0.002);
+  Measurements measurements;
+  for (int f = 0; f < kPostures; ++f)
+    measurements.points.observations.push_back(
+        {f, TagId{0}, lab.T_tracker_base * flange(lab, f) * Eigen::Vector3d(0.02, 0.01, 0.12), "",
+         1e-4});
+  measurements.times_s = measurements.points.times_s = lab.times_s;
+  const Placement placement = place_points(lab.nominal, lab.values, measurements.points);
+  Correction turn;
+  turn.name = "turn of the point";
+  turn.block = "tag_0";
+  turn.part = CorrectedPart::kMarker;
+  turn.direction = Vector6d::Unit(1);
+  const Calibration plain = run(lab, measurements, placement, FreeGeometry::kOffsets);
+  const Calibration found = run(lab, measurements, placement, FreeGeometry::kOffsets, {turn});
+  constexpr double kOneMore = 0.005;  // parameter takes its part of the noise
+  int known = 0;
+  for (const Parameter& parameter : found.parameters) {
+    const auto before = std::ranges::find(plain.parameters, parameter.name, &Parameter::name);
+    const bool is_known = before != plain.parameters.end() && before->sigma;
+    ASSERT_EQ(parameter.sigma.has_value(), is_known) << parameter.name;
+    if (!is_known) continue;
+    ++known;
+    EXPECT_NEAR(*parameter.sigma, *before->sigma, kOneMore * *before->sigma) << parameter.name;
+  }
+  EXPECT_GE(known, 5) << "the zeros of the joints behind the first";
 }
 
 TEST(Nominal, BallInSocketsWithTheirDistance) {

@@ -138,8 +138,7 @@ TEST(ScoreTest, CovarianceIsTheSandwichOverStretches) {
   const auto stretches = static_cast<Eigen::Index>(partition.stretches);
   Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(kParameters + 2, stretches);
   for (Eigen::Index row = 0; row < left.size(); ++row) {
-    const int cell = partition.cell[static_cast<std::size_t>(row / kRows)];
-    scores.col(partition.cells[static_cast<std::size_t>(cell)].stretch) +=
+    scores.col(partition.stretch[static_cast<std::size_t>(row / kRows)]) +=
         left[row] * plain.A.row(row).transpose();
   }
   const auto m = static_cast<double>(stretches);
@@ -159,8 +158,7 @@ Eigen::MatrixXd explicit_jackknife(const Linearisation& linear, const Partition&
   for (int s = 0; s < partition.stretches; ++s) {
     Eigen::VectorXd weights = ones(linear);
     for (Eigen::Index row = 0; row < weights.size(); ++row) {
-      const int cell = partition.cell[static_cast<std::size_t>(row / kRows)];
-      if (partition.cells[static_cast<std::size_t>(cell)].stretch == s) weights[row] = 0.0;
+      if (partition.stretch[static_cast<std::size_t>(row / kRows)] == s) weights[row] = 0.0;
     }
     estimates.col(s) = plain_fit(linear, E, weights).solution.tail(count);
   }
