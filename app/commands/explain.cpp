@@ -56,11 +56,14 @@ bool is_all_explained(const Trace& trace) {
   return trace.verdict != TraceVerdict::kUnknown && trace.verdict != TraceVerdict::kNothingToSay;
 }
 
-/// Of one piece: nothing is in doubt, nothing is left.
-bool is_settled(const Explanation& of) {
-  return of.fitted && is_converged(of.fitted->calibration) && is_structure_clear(of) &&
+/// A fit of the whole that leaves nothing.
+bool is_explained(const Explanation& of) {
+  return of.fitted && is_converged(of.fitted->calibration) &&
          (of.fitted->trace.verdict == TraceVerdict::kNotRun || is_all_explained(of.fitted->trace));
 }
+
+/// Of one piece: nothing is in doubt, nothing is left.
+bool is_settled(const Explanation& of) { return is_explained(of) && is_structure_clear(of); }
 
 /// What was found is large beside the noise: tracks with it in them may have bent the structure,
 /// however certain that was of itself.
@@ -331,8 +334,7 @@ class Explainer {
         Explanation other = asked_again(
             of_structure(with_free_marker_on(*now.structure, marker, now.fitted->calibration),
                          now.fitted->trace.added));
-        if (!other.fitted || !is_all_explained(other.fitted->trace) || !is_better(other, now))
-          continue;
+        if (!is_explained(other) || !is_better(other, now)) continue;
         now = std::move(other);
         break;
       }

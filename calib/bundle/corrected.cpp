@@ -192,8 +192,7 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
   switch (correction.part) {
     case CorrectedPart::kJoint: {
       const std::size_t k = place_on_path(spec, sighting, correction.index);
-      return at.error.d_marker *
-             (at.chain.d_link[k] * moved_behind(at.corrected.joints[k], twist));
+      return at.error.d_marker * (at.chain.d_link[k] * moved_behind(at.corrected.joints[k], twist));
     }
     case CorrectedPart::kMarker:
       return at.error.d_marker * moved_behind(at.corrected.marker, twist);

@@ -165,6 +165,15 @@ TEST(Explain, AUnitThatAnEffectHidIsTheUsualOne) {
   }
 }
 
+// A marker that is bent by 0.95 mm moves with no joint exactly: the structure leaves it free.
+TEST(Explain, AMarkerThatAnEffectKeptFreeIsOnItsLink) {
+  const Answered answered = run_case(5095);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(effects(answered),
+            (std::vector<std::string>{"bent_tag tag_12", "lens_distortion camera"}));
+}
+
 // Which way things fall shows once the bump is known, and a third effect once that is known.
 TEST(Explain, GravityIsFoundBesideWhatElseWasTraced) {
   const Answered answered = run_case(398);

@@ -21,7 +21,8 @@ using truth::World;
 
 // Central differences lose half of a double's digits to the step, some more to the camera's px.
 constexpr double kDifferences = 1e-5;
-// A corner's motion between the middle row and its own is taken as even, whatever else is corrected.
+// A corner's motion between the middle row and its own is taken as even, whatever else is
+// corrected.
 constexpr double kFirstOrder = 0.05;
 constexpr int kFrame = 40;
 
