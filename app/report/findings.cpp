@@ -300,7 +300,10 @@ std::string error_words(const TypicalError& error) {
 std::string sentence(std::string text) {
   if (text.empty()) return text;
   const char first = text.front();
-  if (first >= 'a' && first <= 'z') text.front() = static_cast<char>(first - 'a' + 'A');
+  // Names of joints, markers and effects stay as they are.
+  const std::string word = text.substr(0, text.find_first_of(" :,"));
+  const bool is_name = word.find_first_of("_0123456789") != std::string::npos;
+  if (!is_name && first >= 'a' && first <= 'z') text.front() = static_cast<char>(first - 'a' + 'A');
   const char last = text.back();
   if (last != '.' && last != '!' && last != '?') text += '.';
   return text;

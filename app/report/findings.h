@@ -20,7 +20,8 @@ struct Finding {
 /// At least one: where nothing limits the model, the noise of the measurement does.
 [[nodiscard]] std::vector<Finding> find_limits(const RunSummary& run, const Analysis& analysis);
 
-/// A sentence of other rooms, begun with a capital and closed with a full stop.
+/// A sentence of other rooms, begun with a capital, but for a name ("tag_12", "q2"), and closed
+/// with a full stop.
 [[nodiscard]] std::string sentence(std::string text);
 
 /// "j6 of the nominal robot turns about x of its frame, not z: .." in one sentence with errors; one

@@ -107,7 +107,8 @@ std::string size_words(const TracedEffect& effect) {
   const std::string words =
       fmt::format("{:.{}g} ({:.{}g} to {:.{}g})", effect.size * factor, digits,
                   effect.interval.low * factor, digits, effect.interval.high * factor, digits);
-  return fmt::format("{} {}", words, small_time ? "µs" : unit.text);
+  const std::string_view name = small_time ? "µs" : std::string_view(unit.text);
+  return name.empty() ? words : fmt::format("{} {}", words, name);
 }
 
 std::string other_sizes_words(const TracedEffect& effect) {

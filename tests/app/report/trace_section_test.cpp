@@ -137,6 +137,8 @@ TEST(TraceSection, SizesGoToTheSecondDigitOfTheirInterval) {
   effect.size = -0.0399928;
   effect.interval = {-0.0400081, -0.0399775};
   EXPECT_EQ(size_words(effect), "-39.993 (-40.008 to -39.977) ms");
+  effect.unit = "";
+  EXPECT_EQ(size_words(effect), "-0.039993 (-0.040008 to -0.039977)");
 }
 
 // Curves are no wider than the other plots, and paper has the tests.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "app/report/findings.h"
 #include "app/report/report.h"
 #include "tests/app/report/synthetic_run.h"
 
@@ -144,7 +145,7 @@ TEST(Verdict, NamesWhatWasWrongWithTheNominalRobot) {
                         {.joint = 1, .exchanged_with = 2, .marker = TagId{5}}};
   const Verdict verdict = make_verdict(run);
   EXPECT_TRUE(has(verdict.found,
-                  "Q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
+                  "q1 of the nominal robot moves about -z of its joint frame, not x; taken so "
                   "(typical error of tag_4 in a first fit 20.0 mm → 1.00 mm)."))
       << verdict.found;
   EXPECT_TRUE(has(verdict.accurate, "The nominal robot, mended, at unseen postures"))
@@ -250,6 +251,13 @@ TEST(Verdict, PointsAtAMarkerThatIsRarelySeenOrOftenRejected) {
   run = synthetic_run();
   run.calibration.markers[2].rejected = 60;
   EXPECT_TRUE(has(make_verdict(run).limits, "sightings of tag_2 were left out"));
+}
+
+TEST(Verdict, NamesKeepTheirSpelling) {
+  EXPECT_EQ(report::sentence("tag 12 moves"), "Tag 12 moves.");
+  EXPECT_EQ(report::sentence("q2 drives 2 joints"), "q2 drives 2 joints.");
+  EXPECT_EQ(report::sentence("lens_distortion at camera: 0.05"),
+            "lens_distortion at camera: 0.05.");
 }
 
 }  // namespace
