@@ -9,8 +9,6 @@
 #include <optional>
 #include <set>
 
-#include <fmt/format.h>
-
 #include "calib/bundle/choose_sightings.h"
 #include "calib/bundle/folds.h"
 #include "calib/bundle/linearise.h"
@@ -89,8 +87,8 @@ struct End {
 
 // For each of the names the first correction of that name that no earlier one has; nothing where
 // one is not among the corrections.
-std::optional<std::vector<std::size_t>> places_of(const std::vector<std::string>& names,
-                                                  const std::vector<Correction>& corrections) {
+std::optional<std::vector<std::size_t>> matching(const std::vector<std::string>& names,
+                                                 const std::vector<Correction>& corrections) {
   std::vector<std::size_t> out;
   std::vector<bool> taken(corrections.size(), false);
   for (const std::string& name : names) {
@@ -283,7 +281,7 @@ void EffectBundle::Impl::begin_near(const BundleChange& change, State& state) co
     if (end.time_offset && !change.time_offset) continue;
     if (end.without_couplings != change.without_couplings) continue;
     if (best != nullptr && end.cost > best->cost) continue;
-    auto places = places_of(end.corrections, change.corrections);
+    auto places = matching(end.corrections, change.corrections);
     if (!places) continue;
     best = &end;
     best_places = std::move(*places);

@@ -175,7 +175,7 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
 
 // By how much the sum of squares falls in the step to the system's own solution.
 double still_to_gain(const NormalSystem& system) {
-  const Eigen::VectorXd step = system.inverse() * system.total().g;
+  const Eigen::VectorXd& step = system.step();
   return 2.0 * step.dot(system.total().g) - step.dot(system.total().H * step);
 }
 

@@ -28,7 +28,7 @@ inline constexpr double kSmallLoss = 0.05;
 // doubt.
 inline constexpr double kDoubtfulShare = 0.1;
 // What is left over what differs between neighbours in time. Noise, with the sensor's own errors
-// counted in, makes it 0.6 to 1.0 (`undeclared`, `real_data`); what lasts is no noise.
+// counted in, makes it 0.6 to 1.0 (`undeclared`, sample videos); what lasts is no noise.
 inline constexpr double kLasts = 1.2;
 
 class Tracer {
