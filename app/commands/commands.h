@@ -111,6 +111,9 @@ struct ContactCommandOptions {
   TorqueDataOptions data;
   ContactOptions contact;
   bool identify = false;  ///< masses and friction from the log although the URDF has some
+  /// Whose residual is looked at in place of the momentum balance: a file of dynamics --save-model,
+  /// or the name of a model to learn. Empty: none.
+  std::string model;
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   std::string owner = "contact";                ///< as DynamicsOptions
   bool force = false;                           ///< as DynamicsOptions

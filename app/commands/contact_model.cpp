@@ -144,26 +144,6 @@ RigidModel without_inertia(const RigidModel& model) {
   return out;
 }
 
-// Joints that slide in the log, or at least change their place: the others are as good as fixed.
-std::vector<Eigen::Index> joints_in_motion(const RigidModel& rigid, const TorqueLog& log) {
-  constexpr double kPlace = 0.02;  // rad or m
-  constexpr Eigen::Index kFewest = 100;
-  std::vector<Eigen::Index> counts(static_cast<std::size_t>(rigid.size()), 0);
-  for (const TorqueSamples& part : unfiltered(log, Eigen::VectorXd::Ones(rigid.size()))) {
-    const Eigen::MatrixXi states = sliding_states(rigid, part.t_s, part.q);
-    for (Eigen::Index j = 0; j < rigid.size(); ++j) {
-      const SlidCount count = slid(states, j);
-      counts[static_cast<std::size_t>(j)] += count.forward + count.backward;
-    }
-  }
-  std::vector<Eigen::Index> out;
-  for (Eigen::Index j = 0; j < rigid.size(); ++j) {
-    const double way = log.q.col(j).maxCoeff() - log.q.col(j).minCoeff();
-    if (counts[static_cast<std::size_t>(j)] >= kFewest || way > kPlace) out.push_back(j);
-  }
-  return out;
-}
-
 // The robot with its other joints held where they stand on average.
 DynamicModel with_joints_held(DynamicModel model, const std::vector<Eigen::Index>& moving,
                               const Eigen::MatrixXd& q) {
@@ -178,20 +158,6 @@ DynamicModel with_joints_held(DynamicModel model, const std::vector<Eigen::Index
     model.joints[joints[k].index()] = {};
   }
   return model;
-}
-
-TorqueSamples with_joints(const TorqueSamples& samples, const std::vector<Eigen::Index>& joints) {
-  TorqueSamples out = samples;
-  const auto chosen = [&](const Eigen::MatrixXd& all) -> Eigen::MatrixXd {
-    if (all.cols() == 0) return all;
-    return all(Eigen::all, joints);
-  };
-  out.q = chosen(samples.q);
-  out.dq = chosen(samples.dq);
-  out.ddq = chosen(samples.ddq);
-  out.torque = chosen(samples.torque);
-  out.joint_names.clear();
-  return out;
 }
 
 std::vector<TorqueSamples> with_joints(std::vector<TorqueSamples> motions,
@@ -259,6 +225,39 @@ Eigen::MatrixXd nearest_rows(const TorqueSamples& all, const Eigen::MatrixXd& va
 }
 
 }  // namespace
+
+std::vector<Eigen::Index> joints_in_motion(const RigidModel& rigid, const TorqueLog& log) {
+  constexpr double kPlace = 0.02;  // rad or m
+  constexpr Eigen::Index kFewest = 100;
+  std::vector<Eigen::Index> counts(static_cast<std::size_t>(rigid.size()), 0);
+  for (const TorqueSamples& part : unfiltered(log, Eigen::VectorXd::Ones(rigid.size()))) {
+    const Eigen::MatrixXi states = sliding_states(rigid, part.t_s, part.q);
+    for (Eigen::Index j = 0; j < rigid.size(); ++j) {
+      const SlidCount count = slid(states, j);
+      counts[static_cast<std::size_t>(j)] += count.forward + count.backward;
+    }
+  }
+  std::vector<Eigen::Index> out;
+  for (Eigen::Index j = 0; j < rigid.size(); ++j) {
+    const double way = log.q.col(j).maxCoeff() - log.q.col(j).minCoeff();
+    if (counts[static_cast<std::size_t>(j)] >= kFewest || way > kPlace) out.push_back(j);
+  }
+  return out;
+}
+
+TorqueSamples with_joints(const TorqueSamples& samples, const std::vector<Eigen::Index>& joints) {
+  TorqueSamples out = samples;
+  const auto chosen = [&](const Eigen::MatrixXd& all) -> Eigen::MatrixXd {
+    if (all.cols() == 0) return all;
+    return all(Eigen::all, joints);
+  };
+  out.q = chosen(samples.q);
+  out.dq = chosen(samples.dq);
+  out.ddq = chosen(samples.ddq);
+  out.torque = chosen(samples.torque);
+  out.joint_names.clear();
+  return out;
+}
 
 std::vector<TorqueSamples> unfiltered(const TorqueLog& log, const Eigen::VectorXd& gains) {
   const Eigen::MatrixXd dq = velocities(log);
@@ -334,12 +333,6 @@ std::vector<BalanceSample> balance_samples(const ContactModel& model, const Torq
 
 ContactModel make_contact_model(const ContactCommandOptions& options, const DynamicModel& model,
                                 const TorqueLogReport& looked_at, const TorqueLogReport& learn) {
-  if (looked_at.log.torque_unit != learn.log.torque_unit) {
-    throw bad_input(
-        options.learn_logs.front().string(),
-        fmt::format("is in {}, the log in {}", learn.log.torque_unit, looked_at.log.torque_unit),
-        "learn from a log of the same signals");
-  }
   const bool masses = has_masses(model) && looked_at.log.torque_unit != "A";
   return masses && !options.identify ? from_urdf(options, model, looked_at, learn)
                                      : from_log(options, model, learn);

@@ -28,9 +28,8 @@ struct ContactModel {
 /// `looked_at`: the log in which contacts are looked for, `learn` the one to learn from (the same
 /// where there is no other). The URDF's masses serve where it has some, unless options.identify or
 /// torques in A, which they say nothing about. Throws the refusals of compare_torque_scale (torques
-/// in another unit or with another sign than the masses'), bad_input for logs in two units,
-/// undetermined where masses are to be identified and no joint slides, and what identification
-/// throws.
+/// in another unit or with another sign than the masses'), undetermined where masses are to be
+/// identified and no joint slides, and what identification throws.
 [[nodiscard]] ContactModel make_contact_model(const ContactCommandOptions& options,
                                               const DynamicModel& model,
                                               const TorqueLogReport& looked_at,
@@ -39,6 +38,14 @@ struct ContactModel {
 /// The log as it was measured, each trajectory by itself, without the drives' gains.
 [[nodiscard]] std::vector<TorqueSamples> unfiltered(const TorqueLog& log,
                                                     const Eigen::VectorXd& gains);
+
+/// Joints that slide in the log, or at least change their place: the others are as good as fixed.
+[[nodiscard]] std::vector<Eigen::Index> joints_in_motion(const RigidModel& rigid,
+                                                         const TorqueLog& log);
+
+/// The columns of these joints.
+[[nodiscard]] TorqueSamples with_joints(const TorqueSamples& samples,
+                                        const std::vector<Eigen::Index>& joints);
 
 /// Standard deviation of the model's error from that of its parameters, in units of the noise of
 /// its fit, which it is added to: of filtered samples x the model's joints.

@@ -210,10 +210,16 @@ void add_contact(CLI::App& app, CommandLine& line) {
   add_files(command, "LOG", contact.logs, "Joint logs with torques: CSV, also gzipped", true);
   add_robot(command, contact.robot);
   add_files(command, "--learn", contact.learn_logs,
-            "Logs of free motion to learn the noise from (default: the log itself)", false);
+            "Logs of free motion to learn from beside the log itself (default: none)", false);
   command.add_flag("--identify", contact.identify,
                    "Masses and friction from the log to learn from (always so where the URDF has "
                    "none, or the log holds currents)");
+  command
+      .add_option("--model", contact.model,
+                  "Look at what a torque model does not predict, in units of its own sigma: a file "
+                  "of kinescope dynamics --save-model, or parametric, gip, semi_parametric, rbf to "
+                  "learn one (default: the balance of momentum, which is compared)")
+      ->type_name("FILE|NAME");
   command
       .add_option("--false-alarms", contact.contact.false_alarms_per_hour,
                   "False alarms an hour that are allowed")
@@ -231,7 +237,8 @@ void add_contact(CLI::App& app, CommandLine& line) {
   add_force(command, contact.force, kReplaceOthers);
   add_output_options(command, line.output);
   command.footer(fmt::format(
-      "Example:\n  kinescope contact log.csv --robot robot.urdf --learn free_motion.csv\n\n{}",
+      "Examples:\n  kinescope contact log.csv --robot robot.urdf --learn free_motion.csv\n"
+      "  kinescope contact log.csv --robot robot.urdf --model torque.json\n\n{}",
       kExitCodes));
 }
 

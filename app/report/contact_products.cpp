@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -25,8 +26,7 @@ double link_probability(const ContactEvent& event) {
              : 0.0;
 }
 
-json event_json(const ContactSummary& summary, const ContactEvent& event) {
-  const LogClock& clock = summary.clock;
+json event_json(const ContactSummary& summary, const LogClock& clock, const ContactEvent& event) {
   return {{"trajectory", text(clock.trajectory(event.onset_s))},
           {"onset_s", number(clock.time_s(event.onset_s))},
           {"end_s", number(clock.time_s(event.end_s))},
@@ -37,6 +37,21 @@ json event_json(const ContactSummary& summary, const ContactEvent& event) {
           {"torque", numbers(event.torque)},
           {"torque_sigma", numbers(event.torque_covariance.diagonal().cwiseMax(0.0).cwiseSqrt())},
           {"statistic", number(event.statistic)}};
+}
+
+json events_json(const ContactSummary& summary, const LogClock& clock,
+                 const std::vector<ContactEvent>& events) {
+  json out = json::array();
+  for (const ContactEvent& event : events) out.push_back(event_json(summary, clock, event));
+  return out;
+}
+
+json momentum_json(const ContactSummary& summary) {
+  if (!summary.momentum) return nullptr;
+  const MomentumComparison& own = *summary.momentum;
+  return {{"model", text(own.model)},
+          {"reason", text(own.reason)},
+          {"contacts", events_json(summary, own.clock, own.events)}};
 }
 
 json calibration_json(const ContactCalibration& calibration, const LogClock& clock) {
@@ -65,6 +80,40 @@ std::string cell(const std::string& value) {
   return out + "\"";
 }
 
+std::string counted(std::size_t count) {
+  return fmt::format("{} contact{}", count, count == 1 ? "" : "s");
+}
+
+std::string found_words(const ContactSummary& summary) {
+  const std::string rate = fmt::format("false alarms: {:g} an hour asked for, {:.2g} estimated",
+                                       summary.calibration.options.false_alarms_per_hour,
+                                       summary.check.extrapolated_per_hour);
+  if (summary.events.empty())
+    return fmt::format("No contact in {:.1f} s ({}).", 3600.0 * summary.check.hours, rate);
+  std::string out = fmt::format("{} ({}):", counted(summary.events.size()), rate);
+  for (const ContactEvent& event : summary.events) {
+    const std::string of = summary.clock.names.size() > 1
+                               ? fmt::format(" of {}", summary.clock.trajectory(event.onset_s))
+                               : "";
+    out += fmt::format(" {:.2f} to {:.2f} s{} at {};", summary.clock.time_s(event.onset_s),
+                       summary.clock.time_s(event.end_s), of, link_name(summary, event.link));
+  }
+  out.back() = '.';
+  return out;
+}
+
+// How the momentum balance sees the same log.
+std::string momentum_words(const ContactSummary& summary) {
+  const MomentumComparison& other = *summary.momentum;
+  if (!other.reason.empty()) {
+    return fmt::format("The momentum balance says nothing here: {}.", other.reason);
+  }
+  const auto same = same_contacts(summary);
+  const auto shared = std::ranges::count_if(same, [](const auto& at) { return at.has_value(); });
+  return fmt::format("The momentum balance on the same log: {}; {} of the above {} among them.",
+                     counted(other.events.size()), shared, shared == 1 ? "is" : "are");
+}
+
 }  // namespace
 
 std::string contacts_csv(const ContactSummary& summary) {
@@ -89,8 +138,6 @@ std::string contacts_csv(const ContactSummary& summary) {
 }
 
 json contact_json(const ContactSummary& summary) {
-  json events = json::array();
-  for (const ContactEvent& event : summary.events) events.push_back(event_json(summary, event));
   json findings = json::array();
   for (const LogFinding& finding : summary.findings) findings.push_back(text(to_line(finding)));
   return {{"schema", "kinescope.contact"},
@@ -101,33 +148,42 @@ json contact_json(const ContactSummary& summary) {
           {"joints", report::texts(summary.joints)},
           {"links", report::texts(summary.links)},
           {"learned", text(summary.learned)},
+          {"method", text(summary.method)},
           {"model", text(summary.model)},
           {"inputs", report::inputs_json(summary.inputs)},
           {"findings", findings},
+          {"new_motion", report::texts(summary.new_motion)},
           {"calibration", calibration_json(summary.calibration, summary.learn_clock)},
           {"check",
            {{"hours", number(summary.check.hours)},
             {"extrapolated_per_hour", number(summary.check.extrapolated_per_hour)}}},
-          {"contacts", events}};
+          {"contacts", events_json(summary, summary.clock, summary.events)},
+          {"momentum", momentum_json(summary)}};
+}
+
+std::vector<std::optional<std::size_t>> same_contacts(const ContactSummary& summary) {
+  std::vector<std::optional<std::size_t>> out(summary.events.size());
+  if (!summary.momentum) return out;
+  const MomentumComparison& other = *summary.momentum;
+  const double guard_s = summary.calibration.options.guard_s;
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const ContactEvent& own = summary.events[k];
+    for (std::size_t m = 0; m < other.events.size() && !out[k]; ++m) {
+      const ContactEvent& event = other.events[m];
+      const bool same =
+          other.clock.trajectory(event.onset_s) == summary.clock.trajectory(own.onset_s) &&
+          other.clock.time_s(event.onset_s) <= summary.clock.time_s(own.end_s) + guard_s &&
+          other.clock.time_s(event.end_s) >= summary.clock.time_s(own.onset_s) - guard_s;
+      if (same) out[k] = m;
+    }
+  }
+  return out;
 }
 
 std::string contact_verdict(const ContactSummary& summary) {
-  const std::string rate = fmt::format("false alarms: {:g} an hour asked for, {:.2g} estimated",
-                                       summary.calibration.options.false_alarms_per_hour,
-                                       summary.check.extrapolated_per_hour);
-  if (summary.events.empty())
-    return fmt::format("No contact in {:.1f} s ({}).", 3600.0 * summary.check.hours, rate);
-  std::string out = fmt::format("{} contact{} ({}):", summary.events.size(),
-                                summary.events.size() == 1 ? "" : "s", rate);
-  for (const ContactEvent& event : summary.events) {
-    const std::string of = summary.clock.names.size() > 1
-                               ? fmt::format(" of {}", summary.clock.trajectory(event.onset_s))
-                               : "";
-    out += fmt::format(" {:.2f} to {:.2f} s{} at {};", summary.clock.time_s(event.onset_s),
-                       summary.clock.time_s(event.end_s), of, link_name(summary, event.link));
-  }
-  out.back() = '.';
-  return out;
+  if (!summary.momentum) return found_words(summary);
+  return fmt::format("By what the {} model does not predict: {} {}", summary.method,
+                     found_words(summary), momentum_words(summary));
 }
 
 }  // namespace kinescope

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -19,12 +19,13 @@ namespace {
 using namespace report;
 
 constexpr Eigen::Index kMostPoints = 1200;  // of one curve
-constexpr std::array<ContentsEntry, 4> kContents = {{
-    {"verdict", "Verdict"},
-    {"timeline", "Contact time line"},
-    {"calibration", "Noise and thresholds"},
-    {"reproduce", "How to reproduce"},
-}};
+std::vector<ContentsEntry> contents(const ContactSummary& summary) {
+  std::vector<ContentsEntry> out{{"verdict", "Verdict"}, {"timeline", "Contact time line"}};
+  if (summary.momentum) out.push_back({"comparison", "Beside the momentum balance"});
+  out.push_back({"calibration", "Noise and thresholds"});
+  out.push_back({"reproduce", "How to reproduce"});
+  return out;
+}
 
 std::string contact_table(const ContactSummary& summary, const nlohmann::json& document) {
   if (summary.events.empty()) return "";
@@ -59,6 +60,56 @@ std::string contact_table(const ContactSummary& summary, const nlohmann::json& d
     }
   }
   return table.str();
+}
+
+// When and where both see a contact, by the torque model and by the momentum balance.
+std::string comparison(const ContactSummary& summary, const nlohmann::json& document) {
+  if (!summary.momentum) return "";
+  const MomentumComparison& other = *summary.momentum;
+  std::string out = section_head("comparison", "Beside the momentum balance");
+  if (!other.reason.empty()) {
+    return out + paragraph("The momentum balance says nothing here: " + other.reason + ".") +
+           "</section>\n";
+  }
+  out +=
+      paragraph(fmt::format("The same detector on the balance of momentum, at the same rate of "
+                            "false alarms; masses: {}.",
+                            other.model));
+  Table table("momentum-table", "Contacts by both", document);
+  table.header({"Log", "Onset, s", "Known after, ms", "Link", "Momentum: onset, s",
+                "Known after, ms", "Link"});
+  const auto same = same_contacts(summary);
+  const auto cells = [&](const nlohmann::json& contact) {
+    table.text(fmt::format("{:.2f}", contact.at("onset_s").get<double>()));
+    table.text(fmt::format("{:.0f}", 1e3 * (contact.at("alarm_s").get<double>() -
+                                            contact.at("onset_s").get<double>())));
+    table.text(contact.at("link").get<std::string>());
+  };
+  const auto none = [&] {
+    for (int k = 0; k < 3; ++k) table.text("-");
+  };
+  const nlohmann::json& theirs = document.at("momentum").at("contacts");
+  std::vector<char> matched(theirs.size(), 0);
+  for (std::size_t k = 0; k < same.size(); ++k) {
+    const nlohmann::json& own = document.at("contacts")[k];
+    table.begin_row();
+    table.text(own.at("trajectory").get<std::string>());
+    cells(own);
+    if (!same[k]) {
+      none();
+      continue;
+    }
+    matched[*same[k]] = 1;
+    cells(theirs[*same[k]]);
+  }
+  for (std::size_t m = 0; m < matched.size(); ++m) {
+    if (matched[m] != 0) continue;
+    table.begin_row();
+    table.text(theirs[m].at("trajectory").get<std::string>());
+    none();
+    cells(theirs[m]);
+  }
+  return out + table.str() + "</section>\n";
 }
 
 // Broken where another trajectory begins.
@@ -148,11 +199,11 @@ std::string calibration_section(const ContactSummary& summary, const nlohmann::j
   const FalseAlarmCheck& check = summary.check;
   out += paragraph(fmt::format(
       "Noise and thresholds were learned from {} ({:.1f} s of free motion; {} spans that look like "
-      "contacts were left out). Masses and friction: {}. Declared: {:g} false alarms an hour; "
+      "contacts were left out). {}: {}. Declared: {:g} false alarms an hour; "
       "outside the contacts found, the tail of the statistic promises {:.2g} an hour.",
       summary.learned, summary.calibration.exposure_s, summary.calibration.excluded.size(),
-      summary.model, summary.calibration.options.false_alarms_per_hour,
-      check.extrapolated_per_hour));
+      summary.momentum ? "Expected torque" : "Masses and friction", summary.model,
+      summary.calibration.options.false_alarms_per_hour, check.extrapolated_per_hour));
   Table table("noise-table", "Noise without contact", document);
   const std::string unit = common_unit(summary.torque_unit, summary.types);
   table.header({"Joint", "Velocity, per s", fmt::format("Torque, {}", unit),
@@ -165,6 +216,7 @@ std::string calibration_section(const ContactSummary& summary, const nlohmann::j
     }
   }
   out += table.str();
+  for (const std::string& words : summary.new_motion) out += paragraph(words + ".", "note");
   for (const LogFinding& finding : summary.findings) out += paragraph(to_line(finding), "note");
   return out + "</section>\n";
 }
@@ -183,11 +235,12 @@ std::string reproduce(const ContactSummary& summary) {
 
 std::string contact_report_html(const ContactSummary& summary) {
   const nlohmann::json document = contact_json(summary);
-  return page_begin("contact report", summary.robot, summary.log, summary.version, kContents) +
+  return page_begin("contact report", summary.robot, summary.log, summary.version,
+                    contents(summary)) +
          "<main>\n" + section_head("verdict", "Verdict") + paragraph(contact_verdict(summary)) +
          contact_table(summary, document) + "</section>\n" + timeline(summary) +
-         calibration_section(summary, document) + reproduce(summary) +
-         "</main>\n</body>\n</html>\n";
+         comparison(summary, document) + calibration_section(summary, document) +
+         reproduce(summary) + "</main>\n</body>\n</html>\n";
 }
 
 }  // namespace kinescope

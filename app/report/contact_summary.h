@@ -3,6 +3,7 @@
 // All products of contact detection on one log, gathered for its report.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,15 +27,28 @@ struct LogClock {
   }
 };
 
+/// The momentum balance on the same logs, beside a torque model.
+struct MomentumComparison {
+  std::string model;   ///< where its masses come from, in words
+  std::string reason;  ///< why it says nothing; empty: it does
+  LogClock clock;      ///< of its events
+  std::vector<ContactEvent> events;
+  LogClock learn_clock;            ///< of `excluded`
+  std::vector<TimeSpan> excluded;  ///< taken for contacts in the log to learn from
+};
+
 struct ContactSummary {
   std::string robot;
   std::string log;      ///< what was looked at, in words
   std::string learned;  ///< what the noise was learned from, in words
-  std::string model;    ///< where the masses come from, in words
+  std::string model;    ///< where the masses, or the predicted torques, come from, in words
+  std::string method = "momentum";  ///< or the kind of the torque model
   std::string version;
   std::string command;
   std::vector<InputFile> inputs;
   std::vector<LogFinding> findings;
+  std::vector<std::string> new_motion;  ///< where the torque model has not been, in sentences
+  std::optional<MomentumComparison> momentum;  ///< beside a torque model
 
   std::vector<std::string> joints;
   std::vector<JointType> types;    ///< beside joints
@@ -56,14 +70,19 @@ struct ContactSummary {
 /// contacts.json: schema "kinescope.contact". Torques in `unit`, times in s on the clock of
 /// the trajectory (the log's name, where it is one).
 ///
-///   robot, version, unit, joints, links, learned, model, inputs, findings
+///   robot, version, unit, joints, links, learned, method, model, inputs, findings, new_motion
 ///   calibration  declared_per_hour, thresholds, exposure_s, excluded [trajectory, begin_s, end_s],
 ///   noise
 ///                {velocity_sigma, torque_sigma, model_sigma, model_time_s}
 ///   check        hours, extrapolated_per_hour
 ///   contacts     [trajectory, onset_s, end_s, alarm_s, link, probability, open, torque,
 ///                torque_sigma, statistic]
+///   momentum     null, or model, reason, contacts: the momentum balance beside a torque model
 [[nodiscard]] nlohmann::json contact_json(const ContactSummary& summary);
+
+/// Beside each contact the one of the momentum balance that overlaps it (within the guard), if any:
+/// index of MomentumComparison::events.
+[[nodiscard]] std::vector<std::optional<std::size_t>> same_contacts(const ContactSummary& summary);
 
 /// What was found, in one or two sentences.
 [[nodiscard]] std::string contact_verdict(const ContactSummary& summary);

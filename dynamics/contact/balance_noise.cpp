@@ -196,6 +196,78 @@ double unheard_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joi
   return kFactor * largest;
 }
 
+/// Noise of one log, and which joints it tells anything of.
+struct HeardNoise {
+  BalanceNoise noise;
+  std::vector<char> heard;
+  std::size_t usable = 0;  ///< samples, of the joint that has most
+};
+
+void add_white_noise(const std::vector<BalanceSample>& samples,
+                     const std::vector<std::size_t>& anyhow, const std::vector<std::size_t>& own,
+                     Eigen::Index joint, HeardNoise& out) {
+  const bool heard = out.heard[static_cast<std::size_t>(joint)] != 0;
+  BalanceNoise& noise = out.noise;
+  if (samples[0].velocity.size() > 0) {
+    noise.velocity_sigma[joint] = white_sigma(
+        heard ? own : anyhow, [&](std::size_t k) { return samples[k].velocity[joint]; });
+  }
+  if (!heard) {
+    noise.torque_sigma[joint] = unheard_sigma(samples, joint);
+    return;
+  }
+  noise.torque_sigma[joint] =
+      white_sigma(own, [&](std::size_t k) { return samples[k].drive[joint]; });
+  if (noise.torque_sigma[joint] > 0.0) return;
+  throw undetermined("contact", "the torque of joint " + std::to_string(joint + 1) + " is constant",
+                     "log the measured torque");
+}
+
+HeardNoise heard_noise(const std::vector<BalanceSample>& samples, const std::vector<char>& use) {
+  const double step_s = median_step_s(samples);
+  const Eigen::Index n = samples[0].drive.size();
+  HeardNoise out{.noise = {.velocity_sigma = Eigen::VectorXd::Zero(n),
+                           .torque_sigma = Eigen::VectorXd::Zero(n),
+                           .model_sigma = Eigen::VectorXd::Zero(n),
+                           .model_time_s = Eigen::VectorXd::Constant(n, 1.0)},
+                 .heard = {}};
+  std::vector<std::vector<std::size_t>> first;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    first.push_back(stretches(samples, use, step_s, j));
+    const std::size_t usable = usable_samples(first.back());
+    out.heard.push_back(usable >= kFewestSamples ? 1 : 0);
+    out.usable = std::max(out.usable, usable);
+  }
+  if (out.usable < kFewestSamples) return out;
+  const std::vector<std::size_t> anyhow = stretches(samples, use, step_s, -1);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    add_white_noise(samples, anyhow, first[static_cast<std::size_t>(j)], j, out);
+  }
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto& own = first[static_cast<std::size_t>(j)];
+    if (out.heard[static_cast<std::size_t>(j)] == 0) continue;
+    const ModelError error = fit_model_error(
+        window_variances(samples, own, imbalance(samples, own, j), j, out.noise, step_s), step_s,
+        out.noise.torque_sigma[j]);
+    out.noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
+    out.noise.model_time_s[j] = error.time_s;
+  }
+  return out;
+}
+
+/// Joint by joint the larger noise; of a joint that the second log tells nothing of, the first's.
+BalanceNoise larger_of(BalanceNoise noise, const HeardNoise& own) {
+  for (Eigen::Index j = 0; j < noise.torque_sigma.size(); ++j) {
+    if (own.heard[static_cast<std::size_t>(j)] == 0) continue;
+    noise.velocity_sigma[j] = std::max(noise.velocity_sigma[j], own.noise.velocity_sigma[j]);
+    noise.torque_sigma[j] = std::max(noise.torque_sigma[j], own.noise.torque_sigma[j]);
+    if (own.noise.model_sigma[j] <= noise.model_sigma[j]) continue;
+    noise.model_sigma[j] = own.noise.model_sigma[j];
+    noise.model_time_s[j] = own.noise.model_time_s[j];
+  }
+  return noise;
+}
+
 }  // namespace
 
 double median_step_s(const std::vector<BalanceSample>& samples) {
@@ -213,52 +285,22 @@ double median_step_s(const std::vector<BalanceSample>& samples) {
 BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
                             const std::vector<char>& use) {
   KINESCOPE_CHECK(use.empty() || use.size() == samples.size(), "one mark a sample");
-  const double step_s = median_step_s(samples);
-  const Eigen::Index n = samples[0].drive.size();
-  const std::vector<std::size_t> anyhow = stretches(samples, use, step_s, -1);
-  std::vector<std::vector<std::size_t>> first;
-  std::size_t most = 0;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    first.push_back(stretches(samples, use, step_s, j));
-    most = std::max(most, usable_samples(first.back()));
-  }
-  if (most < kFewestSamples) {
-    throw undetermined("contact", "too few samples without contact: " + std::to_string(most),
-                       "record at least some seconds of free motion");
-  }
-  BalanceNoise noise{.velocity_sigma = Eigen::VectorXd::Zero(n),
-                     .torque_sigma = Eigen::VectorXd::Zero(n),
-                     .model_sigma = Eigen::VectorXd::Zero(n),
-                     .model_time_s = Eigen::VectorXd::Constant(n, 1.0)};
-  std::vector<char> heard(static_cast<std::size_t>(n), 1);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const auto& own = first[static_cast<std::size_t>(j)];
-    heard[static_cast<std::size_t>(j)] = usable_samples(own) >= kFewestSamples ? 1 : 0;
-    if (samples[0].velocity.size() > 0) {
-      const auto& all = heard[static_cast<std::size_t>(j)] != 0 ? own : anyhow;
-      noise.velocity_sigma[j] =
-          white_sigma(all, [&](std::size_t k) { return samples[k].velocity[j]; });
-    }
-    if (heard[static_cast<std::size_t>(j)] == 0) {
-      noise.torque_sigma[j] = unheard_sigma(samples, j);
-      continue;
-    }
-    noise.torque_sigma[j] = white_sigma(own, [&](std::size_t k) { return samples[k].drive[j]; });
-    if (noise.torque_sigma[j] <= 0.0) {
-      throw undetermined("contact", "the torque of joint " + std::to_string(j + 1) + " is constant",
-                         "log the measured torque");
-    }
-  }
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const auto& own = first[static_cast<std::size_t>(j)];
-    if (heard[static_cast<std::size_t>(j)] == 0) continue;
-    const ModelError error = fit_model_error(
-        window_variances(samples, own, imbalance(samples, own, j), j, noise, step_s), step_s,
-        noise.torque_sigma[j]);
-    noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
-    noise.model_time_s[j] = error.time_s;
-  }
-  return noise;
+  HeardNoise out = heard_noise(samples, use);
+  if (out.usable >= kFewestSamples) return out.noise;
+  throw undetermined("contact", "too few samples without contact: " + std::to_string(out.usable),
+                     "record at least some seconds of free motion");
+}
+
+BalanceNoise estimate_noise_of_both(const std::vector<BalanceSample>& samples,
+                                    const std::vector<char>& use, std::size_t second) {
+  const std::vector<char> all(samples.size(), 1);
+  const std::vector<char>& marks = use.empty() ? all : use;
+  const auto middle = static_cast<std::ptrdiff_t>(second);
+  const BalanceNoise learned = estimate_noise({samples.begin(), samples.begin() + middle},
+                                              {marks.begin(), marks.begin() + middle});
+  const HeardNoise own =
+      heard_noise({samples.begin() + middle, samples.end()}, {marks.begin() + middle, marks.end()});
+  return own.usable >= kFewestSamples ? larger_of(learned, own) : learned;
 }
 
 }  // namespace kinescope

@@ -29,6 +29,12 @@ struct BalanceNoise {
 [[nodiscard]] BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
                                           const std::vector<char>& use = {});
 
+/// Of a log to learn from and, from sample `second` on, the log that is looked at: joint by joint
+/// the larger one. A model errs more on motion that it was not fitted to, and how much more only
+/// that motion tells. A second log of too few usable samples adds nothing.
+[[nodiscard]] BalanceNoise estimate_noise_of_both(const std::vector<BalanceSample>& samples,
+                                                  const std::vector<char>& use, std::size_t second);
+
 /// The usual step between samples, s. Throws undetermined for fewer than two.
 [[nodiscard]] double median_step_s(const std::vector<BalanceSample>& samples);
 

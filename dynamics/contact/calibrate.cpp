@@ -208,8 +208,19 @@ void learn_from_all(const std::vector<BalanceSample>& samples, ContactCalibratio
   calibration.status = ContactCalibrationStatus::kSettled;
 }
 
-void leave_contacts_out(const std::vector<BalanceSample>& samples,
-                        ContactCalibration& calibration) {
+/// Samples that noise is learned from; those of the log that is looked at begin at `second`.
+struct CalibrationLogs {
+  std::vector<BalanceSample> samples;
+  std::size_t second = 0;
+
+  [[nodiscard]] BalanceNoise noise(const std::vector<char>& use = {}) const {
+    return second < samples.size() ? estimate_noise_of_both(samples, use, second)
+                                   : estimate_noise(samples, use);
+  }
+};
+
+void leave_contacts_out(const CalibrationLogs& logs, ContactCalibration& calibration) {
+  const std::vector<BalanceSample>& samples = logs.samples;
   const ContactOptions& options = calibration.options;
   set_first_thresholds(samples, calibration);
   calibration.status = ContactCalibrationStatus::kIterationLimit;
@@ -225,30 +236,28 @@ void leave_contacts_out(const std::vector<BalanceSample>& samples,
       calibration.status = ContactCalibrationStatus::kSettled;
       break;
     }
-    calibration.noise = estimate_noise(samples, use);
+    calibration.noise = logs.noise(use);
     set_thresholds_robustly(samples, log, use, calibration);
   }
   calibration.iterations = std::min(calibration.iterations, kMaxRounds);
 }
 
-}  // namespace
-
-ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
-                                      const ContactOptions& options) {
+ContactCalibration calibrate(const CalibrationLogs& logs, const ContactOptions& options) {
+  const std::vector<BalanceSample>& samples = logs.samples;
   validate(options);
   check_samples(samples);
   ContactCalibration calibration;
   calibration.options = options;
   calibration.step_s = median_step_s(samples);
   calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
-  calibration.noise = estimate_noise(samples);
+  calibration.noise = logs.noise();
   if (!options.may_contain_contacts) {
     learn_from_all(samples, calibration);
     return calibration;
   }
   const ContactCalibration begun = calibration;
   try {
-    leave_contacts_out(samples, calibration);
+    leave_contacts_out(logs, calibration);
   } catch (const Error& error) {
     // Too little is left: with all of it, contacts included, thresholds are high, not wrong.
     if (error.code() != ExitCode::kUndetermined) throw;
@@ -257,6 +266,37 @@ ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
     calibration.status = ContactCalibrationStatus::kIterationLimit;
   }
   return calibration;
+}
+
+/// Both logs one behind the other, far enough apart that detection begins anew.
+CalibrationLogs one_behind_the_other(const std::vector<BalanceSample>& learned,
+                                     const std::vector<BalanceSample>& looked_at,
+                                     const ContactOptions& options) {
+  CalibrationLogs out{.samples = learned, .second = learned.size()};
+  if (learned.empty() || looked_at.empty()) return out;
+  const double gap_s = 1.0 + 2.0 * options.guard_s;
+  const double shift_s = learned.back().stamp_s + gap_s - looked_at.front().stamp_s;
+  for (const BalanceSample& sample : looked_at) {
+    out.samples.push_back(sample);
+    out.samples.back().stamp_s += shift_s;
+  }
+  return out;
+}
+
+}  // namespace
+
+ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
+                                      const ContactOptions& options) {
+  return calibrate({.samples = samples, .second = samples.size()}, options);
+}
+
+ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& learned,
+                                      const std::vector<BalanceSample>& looked_at,
+                                      const ContactOptions& options) {
+  ContactCalibration out = calibrate(one_behind_the_other(learned, looked_at, options), options);
+  std::erase_if(out.excluded,
+                [&](const TimeSpan& span) { return span.begin_s > learned.back().stamp_s; });
+  return out;
 }
 
 }  // namespace kinescope

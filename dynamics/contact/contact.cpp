@@ -62,13 +62,7 @@ void validate(const ContactOptions& options) {
 
 std::vector<ContactEvent> detect_contacts(const ContactCalibration& calibration,
                                           const std::vector<BalanceSample>& samples) {
-  ContactDetector detector(calibration);
-  std::vector<ContactEvent> events;
-  for (const BalanceSample& sample : samples) {
-    if (detector.update(sample).ended) events.push_back(detector.event());
-  }
-  if (detector.finish()) events.push_back(detector.event());
-  return events;
+  return contact::log_statistics(calibration, samples).events;
 }
 
 FalseAlarmCheck check_false_alarms(const ContactCalibration& calibration,

@@ -72,6 +72,13 @@ struct ContactCalibration {
 [[nodiscard]] ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& samples,
                                                     const ContactOptions& options = {});
 
+/// Learned from a log of its own, for another one. That one is part of what is learned from: its
+/// motion may show errors of the model that the first does not (estimate_noise_of_both), and
+/// whatever stands out of both is left out as a contact.
+[[nodiscard]] ContactCalibration calibrate_contacts(const std::vector<BalanceSample>& learned,
+                                                    const std::vector<BalanceSample>& looked_at,
+                                                    const ContactOptions& options);
+
 struct ContactEvent {
   double onset_s = 0.0;  ///< when the external torque began, most likely
   double alarm_s = 0.0;  ///< when it was known

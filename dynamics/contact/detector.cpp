@@ -92,19 +92,28 @@ void ContactDetector::watch_onset(const BalanceSample& sample, ContactDecision& 
   }
   if (decision.statistic < 1.0) return;
   decision.alarm = in_contact_ = true;
-  event_ = {};
-  event_.alarm_s = sample.stamp_s;
-  event_.statistic = decision.statistic;
-  raise_alarm(age);
+  const double onset_s = look_for_onset(age);
+  decision.resumed = !event_.open && !event_.cut_off && event_.end_s >= onset_s;
+  shown_s_ = std::max(decision.resumed ? shown_s_ : 0.0, sample.stamp_s - onset_s);
+  if (decision.resumed) {
+    event_.open = true;
+    segment_ = record_.back();
+  } else {
+    raise_alarm(onset_s);
+    event_.alarm_s = sample.stamp_s;
+    event_.statistic = decision.statistic;
+  }
+  estimate(record_.size() - 1);
 }
 
 /// The bank's onsets are spaced, and its torque is constant: looks again where the impulse along
 /// the torque that was found begins to rise.
-void ContactDetector::raise_alarm(int age) {
+double ContactDetector::look_for_onset(int age) {
   const std::size_t last = record_.size() - 1;
   const auto back = std::min<std::size_t>(last, static_cast<std::size_t>(age));
-  onset_ = record_[last - back];
+  const contact::RecordEntry before = std::exchange(onset_, record_[last - back]);
   mean_torque(onset_, record_[last]);
+  onset_ = before;
   const Eigen::VectorXd direction = CholeskyFactor(covariance_).solve(mean_);
   bend_t_.clear();
   bend_y_.clear();
@@ -112,13 +121,17 @@ void ContactDetector::raise_alarm(int age) {
     bend_t_.push_back(record_[k].stamp_s);
     bend_y_.push_back(direction.dot(record_[k].imbalance - record_[0].imbalance));
   }
-  event_.onset_s = std::min(contact::bend_time(bend_t_, bend_y_), record_[last - 1].stamp_s);
-  onset_ = record_[record_.at_or_before(event_.onset_s)];
+  return std::min(contact::bend_time(bend_t_, bend_y_), record_[last - 1].stamp_s);
+}
+
+void ContactDetector::raise_alarm(double onset_s) {
+  event_ = {};
+  event_.onset_s = onset_s;
+  onset_ = record_[record_.at_or_before(onset_s)];
   segment_ = onset_;
   const bool series = is_series(calibration_.options.parents);
   segments_ = {
       .squares = Eigen::MatrixXd::Zero(series ? 1 : calibration_.joints(), calibration_.joints())};
-  estimate(last);
 }
 
 /// A torque that changes its sign shows in short segments though not in the mean.
@@ -157,7 +170,9 @@ void ContactDetector::mean_torque(const contact::RecordEntry& from,
     // What is left of the known error, averaged over the span; the rest is correlated over its
     // time.
     const double span_of_known = std::max(0.0, to.stamp_s - std::max(from.stamp_s, onset_.stamp_s));
-    mean_[j] -= error_mean_[j] * time / span * std::expm1(span_of_known / time);
+    const double before_s = std::max(0.0, to.stamp_s - onset_.stamp_s) - span_of_known;
+    mean_[j] += onset_.error_mean[j] * std::exp(-before_s / time) * time / span *
+                std::expm1(-span_of_known / time);
     covariance_(j, j) +=
         sigma * sigma * steps_s2 + error_variance_[j] * span * std::min(span, 2.0 * time);
   }
@@ -194,11 +209,11 @@ void ContactDetector::watch_end(const BalanceSample& sample, ContactDecision& de
 
 /// Seen backwards in time, the impulse begins to change where the contact ended.
 double ContactDetector::end_of_contact() {
-  const auto window =
-      static_cast<std::size_t>(in_steps(calibration_.options.end_window_s, calibration_.step_s));
+  const auto before = static_cast<std::size_t>(
+      2 * in_steps(calibration_.options.end_window_s, calibration_.step_s));
   const std::size_t last = record_.size() - 1;
-  const std::size_t first =
-      std::max(last - std::min(last, 3 * window), record_.at_or_before(onset_.stamp_s));
+  const std::size_t first = std::max(last - std::min(last, quiet_window() + before),
+                                     record_.at_or_before(onset_.stamp_s));
   mean_torque(record_[first], record_[last]);
   const Eigen::VectorXd direction = CholeskyFactor(covariance_).solve(mean_);
   bend_t_.clear();
@@ -211,10 +226,18 @@ double ContactDetector::end_of_contact() {
   return now - contact::bend_time(bend_t_, bend_y_);
 }
 
-/// No external torque in any window up to the end window.
+/// A contact that took a long window to show goes on unseen in shorter ones: it is over where a
+/// window as long as the one that showed it is quiet.
+std::size_t ContactDetector::quiet_window() const {
+  const ContactOptions& options = calibration_.options;
+  const double shown_s = std::min(options.longest_window_s, shown_s_);
+  return static_cast<std::size_t>(
+      in_steps(std::max(options.end_window_s, shown_s), calibration_.step_s));
+}
+
+/// No external torque in any window up to that one.
 bool ContactDetector::is_quiet() {
-  const auto window =
-      static_cast<std::size_t>(in_steps(calibration_.options.end_window_s, calibration_.step_s));
+  const std::size_t window = quiet_window();
   const std::size_t last = record_.size() - 1;
   if (last < window || record_[last - window].stamp_s < onset_.stamp_s) return false;
   for (std::size_t length = window; length >= 1; length /= 2) {

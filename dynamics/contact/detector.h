@@ -26,6 +26,7 @@ struct ContactDecision {
   bool contact = false;    ///< there is contact now
   bool alarm = false;      ///< it became known with this sample
   bool ended = false;      ///< event() was completed with this sample
+  bool resumed = false;    ///< the alarm is of the last event(): it began before that one's end
   double statistic = 0.0;  ///< in units of its threshold; of a free robot, alarm from 1
   SampleFault fault = SampleFault::kNone;
 };
@@ -50,8 +51,10 @@ class ContactDetector {
  private:
   void begin(const BalanceSample& sample);
   void watch_onset(const BalanceSample& sample, ContactDecision& decision);
-  void raise_alarm(int age);
+  [[nodiscard]] double look_for_onset(int age);
+  void raise_alarm(double onset_s);
   void watch_end(const BalanceSample& sample, ContactDecision& decision);
+  [[nodiscard]] std::size_t quiet_window() const;
   [[nodiscard]] bool is_quiet();
   [[nodiscard]] double end_of_contact();
   void close(double end_s);
@@ -73,6 +76,7 @@ class ContactDetector {
   Eigen::MatrixXd covariance_;                   ///< and its covariance
   std::vector<double> bend_t_, bend_y_;
   double quiet_level_ = 0.0;
+  double shown_s_ = 0.0;  ///< the longest that the contact under way took to show
   bool in_contact_ = false;
 };
 

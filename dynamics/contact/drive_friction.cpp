@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -193,11 +194,12 @@ struct FrictionInterval {
   double highest = 0.0;
 };
 
-/// `speed`: smoothed; `direction`: 0 where the joint may stick, or was not seen to slide.
-FrictionInterval interval_of(const SlidingFriction& own, double dq, double speed, int direction) {
+/// `sliding`: what it takes where it slides; `speed`: smoothed; `direction`: 0 where the joint may
+/// stick, or was not seen to slide.
+FrictionInterval interval_of(const SlidingFriction& own, double sliding, double dq, double speed,
+                             int direction) {
   const double viscous = own.viscous * dq;
   if (direction == 0) return {viscous + own.lowest, viscous + own.highest};
-  const double sliding = own.sliding(dq, direction);
   const double size = std::abs(speed);
   if (size > own.fastest_known) {
     const double more = std::abs(own.viscous) * (size - own.fastest_known);
@@ -221,6 +223,110 @@ struct JointPast {
     return kAfterBreakaway * 0.5 * (own.highest - own.lowest) / own.sigma * std::exp(-fades);
   }
 };
+
+/// Sliding friction of a joint at a sample, in a direction.
+using SlidingTorque = std::function<double(Eigen::Index, Eigen::Index, int)>;
+
+std::vector<BalanceSample> balance_of(const RigidModel& model,
+                                      const std::vector<SlidingFriction>& friction,
+                                      const TorqueSamples& motion, const MotionTerms& terms,
+                                      const Eigen::MatrixXd& sigma, const SlidingTorque& sliding,
+                                      bool knows_inertia) {
+  const Eigen::Index n = model.size();
+  const bool masses = !terms.mass.empty();
+  const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
+  const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
+  const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
+  const Eigen::VectorXd clear =
+      knows_inertia ? Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity())
+                    : clear_accelerations(model, accelerations, states);
+  const double end_s = motion.t_s[motion.size() - 1];
+  std::vector<JointPast> pasts;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
+    pasts.push_back({.stuck_until_s = motion.t_s[0],
+                     .stuck_at = motion.q(0, j),
+                     .fade_way = kAfterBreakaway_rad * (turns ? 1.0 : kLinearShare)});
+  }
+  std::vector<BalanceSample> out;
+  for (Eigen::Index t = 0; t < motion.size(); ++t) {
+    BalanceSample sample{.stamp_s = motion.t_s[t],
+                         .momentum = terms.momentum.row(t).transpose(),
+                         .drive = terms.drive.row(t).transpose(),
+                         .velocity = {},
+                         .mass = {},
+                         .sigma = sigma.size() > 0 ? sigma.row(t).transpose().eval()
+                                                   : Eigen::VectorXd::Ones(n).eval(),
+                         .sticks = Eigen::VectorXi::Zero(n)};
+    if (masses) {
+      sample.velocity = motion.dq.row(t).transpose();
+      sample.mass = terms.mass[static_cast<std::size_t>(t)];
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const SlidingFriction& own = friction[static_cast<std::size_t>(j)];
+      JointPast& past = pasts[static_cast<std::size_t>(j)];
+      const int direction = own.known(states(t, j)) ? states(t, j) : 0;
+      past.has_slid = past.has_slid || direction != 0;
+      const double rate = terms.rate(t, j);
+      const FrictionInterval taken =
+          interval_of(own, sliding(t, j, direction), motion.dq(t, j), speeds(t, j), direction);
+      const double wanted = sample.drive[j] - rate;
+      // Seen to one side only, an acceleration at the end is noise.
+      const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
+                             std::abs(accelerations(t, j)) > clear[j] &&
+                             accelerations(t, j) * (wanted - taken.highest) > 0.0 &&
+                             accelerations(t, j) * (wanted - taken.lowest) > 0.0;
+      // Without inertia, what the log begins with may be the end of a motion.
+      const bool begins = !past.has_slid && std::isfinite(clear[j]);
+      const bool anything = speeds_up || !own.known() || begins;
+      if (taken.lowest == taken.highest && !anything) {
+        sample.drive[j] -= taken.lowest;
+        sample.sigma[j] =
+            std::hypot(sample.sigma[j], past.doubt(own, motion.t_s[t], motion.q(t, j)));
+        continue;
+      }
+      sample.sticks[j] = 1;
+      const double beyond =
+          anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
+      sample.drive[j] = rate + beyond;
+      if (direction != 0) continue;
+      past.stuck_until_s = motion.t_s[t];
+      past.stuck_at = motion.q(t, j);
+    }
+    out.push_back(std::move(sample));
+  }
+  return out;
+}
+
+/// What the prediction leaves: `base` of the torque, and of the motion what no low-pass shows.
+MotionTerms terms_beyond(const PredictedTorque& predicted, const TorqueSamples& motion,
+                         const Eigen::MatrixXd& base) {
+  MotionTerms out{.drive = motion.torque - base,
+                  .momentum = Eigen::MatrixXd::Zero(motion.size(), motion.joints()),
+                  .rate = {},
+                  .mass = predicted.inertia};
+  for (Eigen::Index t = 0; t < std::ssize(out.mass); ++t) {
+    const Eigen::VectorXd beyond = (motion.dq.row(t) - predicted.speed.row(t)).transpose();
+    out.momentum.row(t) = (out.mass[static_cast<std::size_t>(t)] * beyond).transpose();
+  }
+  out.rate = windowed_rates(motion.t_s, out.momentum);
+  return out;
+}
+
+Eigen::MatrixXd left_by(const PredictedTorque& predicted, const TorqueSamples& motion,
+                        const Eigen::MatrixXd& base) {
+  const MotionTerms terms = terms_beyond(predicted, motion, base);
+  return terms.drive - terms.rate;
+}
+
+/// A predicted sigma in units of what sliding leaves; where a model has no idea, so much doubt that
+/// it hides all.
+Eigen::VectorXd in_units_of(double unit, const Eigen::VectorXd& sigma) {
+  constexpr double kMost = 1e3;
+  Eigen::VectorXd out = sigma / unit;
+  for (double& value : out) value = value < kMost ? value : kMost;
+  return out;
+}
 
 }  // namespace
 
@@ -258,9 +364,16 @@ Eigen::MatrixXd drive_residual(const RigidModel& model, const TorqueSamples& mot
 std::vector<SlidingFriction> sliding_friction(const RigidModel& model,
                                               const std::vector<TorqueSamples>& motions) {
   std::vector<Eigen::MatrixXd> residuals;
+  for (const TorqueSamples& motion : motions) residuals.push_back(drive_residual(model, motion));
+  return sliding_friction(model, motions, residuals);
+}
+
+std::vector<SlidingFriction> sliding_friction(const RigidModel& model,
+                                              const std::vector<TorqueSamples>& motions,
+                                              const std::vector<Eigen::MatrixXd>& residuals) {
+  KINESCOPE_CHECK(residuals.size() == motions.size(), "one residual a motion");
   std::vector<Eigen::MatrixXi> states;
   for (const TorqueSamples& motion : motions) {
-    residuals.push_back(drive_residual(model, motion));
     states.push_back(sliding_states(model, motion.t_s, motion.q));
   }
   std::vector<SlidingFriction> out;
@@ -308,64 +421,92 @@ std::vector<BalanceSample> sliding_balance(const RigidModel& model,
                                            const std::vector<SlidingFriction>& friction,
                                            const TorqueSamples& motion,
                                            const Eigen::MatrixXd& sigma) {
-  const Eigen::Index n = model.size();
-  KINESCOPE_CHECK(friction.size() == static_cast<std::size_t>(n), "one friction a joint");
+  KINESCOPE_CHECK(friction.size() == static_cast<std::size_t>(model.size()),
+                  "one friction a joint");
   const MotionTerms terms = terms_of(model, motion);
-  const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
-  const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
-  const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
-  const Eigen::VectorXd clear = clear_accelerations(model, accelerations, states);
-  const double end_s = motion.t_s[motion.size() - 1];
-  std::vector<JointPast> pasts;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
-    pasts.push_back({.stuck_until_s = motion.t_s[0],
-                     .stuck_at = motion.q(0, j),
-                     .fade_way = kAfterBreakaway_rad * (turns ? 1.0 : kLinearShare)});
+  const auto sliding = [&](Eigen::Index t, Eigen::Index j, int direction) {
+    return friction[static_cast<std::size_t>(j)].sliding(motion.dq(t, j), direction);
+  };
+  return balance_of(model, friction, motion, terms, sigma, sliding, false);
+}
+
+std::vector<PredictedFriction> predicted_friction(const RigidModel& model,
+                                                  const std::vector<TorqueSamples>& motions,
+                                                  const std::vector<PredictedTorque>& predicted) {
+  KINESCOPE_CHECK(predicted.size() == motions.size(), "one prediction a motion");
+  std::vector<Eigen::MatrixXd> measured;
+  std::vector<Eigen::MatrixXd> whole;
+  std::vector<Eigen::MatrixXd> unexplained;
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    measured.push_back(motions[m].torque);
+    whole.push_back(left_by(predicted[m], motions[m], predicted[m].frictionless));
+    unexplained.push_back(left_by(predicted[m], motions[m], predicted[m].mean));
   }
-  std::vector<BalanceSample> out;
-  for (Eigen::Index t = 0; t < motion.size(); ++t) {
-    BalanceSample sample{.stamp_s = motion.t_s[t],
-                         .momentum = terms.momentum.row(t).transpose(),
-                         .drive = terms.drive.row(t).transpose(),
-                         .velocity = motion.dq.row(t).transpose(),
-                         .mass = terms.mass[static_cast<std::size_t>(t)],
-                         .sigma = sigma.size() > 0 ? sigma.row(t).transpose().eval()
-                                                   : Eigen::VectorXd::Ones(n).eval(),
-                         .sticks = Eigen::VectorXi::Zero(n)};
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const SlidingFriction& own = friction[static_cast<std::size_t>(j)];
-      JointPast& past = pasts[static_cast<std::size_t>(j)];
-      const int direction = own.known(states(t, j)) ? states(t, j) : 0;
-      past.has_slid = past.has_slid || direction != 0;
-      const double rate = terms.rate(t, j);
-      const FrictionInterval taken = interval_of(own, motion.dq(t, j), speeds(t, j), direction);
-      const double wanted = sample.drive[j] - rate;
-      // Seen to one side only, an acceleration at the end is noise.
-      const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
-                             std::abs(accelerations(t, j)) > clear[j] &&
-                             accelerations(t, j) * (wanted - taken.highest) > 0.0 &&
-                             accelerations(t, j) * (wanted - taken.lowest) > 0.0;
-      // Without inertia, what the log begins with may be the end of a motion.
-      const bool begins = !past.has_slid && std::isfinite(clear[j]);
-      const bool anything = speeds_up || !own.known() || begins;
-      if (taken.lowest == taken.highest && !anything) {
-        sample.drive[j] -= taken.lowest;
-        sample.sigma[j] =
-            std::hypot(sample.sigma[j], past.doubt(own, motion.t_s[t], motion.q(t, j)));
-        continue;
-      }
-      sample.sticks[j] = 1;
-      const double beyond =
-          anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
-      sample.drive[j] = rate + beyond;
-      if (direction != 0) continue;
-      past.stuck_until_s = motion.t_s[t];
-      past.stuck_at = motion.q(t, j);
-    }
-    out.push_back(std::move(sample));
+  const std::vector<SlidingFriction> wholes = sliding_friction(model, motions, whole);
+  const std::vector<SlidingFriction> all = sliding_friction(model, motions, measured);
+  const std::vector<SlidingFriction> corrections = sliding_friction(model, motions, unexplained);
+  std::vector<PredictedFriction> out;
+  for (std::size_t j = 0; j < wholes.size(); ++j) {
+    const bool one_way = wholes[j].slides_forward != wholes[j].slides_backward;
+    out.push_back({.whole = one_way ? all[j] : wholes[j],
+                   .correction = corrections[j],
+                   .may_be_all = one_way});
+    out.back().whole.sigma = corrections[j].sigma;
   }
   return out;
+}
+
+std::vector<char> usable_inertia(const RigidModel& model, const std::vector<TorqueSamples>& motions,
+                                 const std::vector<PredictedTorque>& predicted) {
+  std::vector<Eigen::MatrixXd> with;
+  std::vector<Eigen::MatrixXd> without;
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    with.push_back(left_by(predicted[m], motions[m], predicted[m].mean));
+    without.emplace_back(motions[m].torque - predicted[m].mean);
+  }
+  const std::vector<SlidingFriction> left_with = sliding_friction(model, motions, with);
+  const std::vector<SlidingFriction> left_without = sliding_friction(model, motions, without);
+  std::vector<char> out;
+  for (std::size_t j = 0; j < left_with.size(); ++j) {
+    // Evidence against a row of as many numbers as joints (Schwarz 1978).
+    const bool worse = sliding_deviance({left_with[j]}, 0) >
+                       sliding_deviance({left_without[j]}, static_cast<int>(model.size()));
+    out.push_back(worse ? 0 : 1);
+  }
+  return out;
+}
+
+PredictedTorque with_inertia_of(PredictedTorque predicted, const std::vector<char>& joints) {
+  for (Eigen::MatrixXd& inertia : predicted.inertia) {
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (joints[j] == 0) inertia.row(static_cast<Eigen::Index>(j)).setZero();
+    }
+  }
+  return predicted;
+}
+
+std::vector<BalanceSample> predicted_balance(const RigidModel& model,
+                                             const std::vector<PredictedFriction>& friction,
+                                             const TorqueSamples& motion,
+                                             const PredictedTorque& predicted) {
+  KINESCOPE_CHECK(friction.size() == static_cast<std::size_t>(model.size()),
+                  "one friction a joint");
+  Eigen::MatrixXd base = predicted.frictionless;
+  Eigen::MatrixXd sigma = predicted.sigma;
+  std::vector<SlidingFriction> whole;
+  for (Eigen::Index j = 0; j < model.size(); ++j) {
+    const PredictedFriction& own = friction[static_cast<std::size_t>(j)];
+    if (own.may_be_all) base.col(j).setZero();
+    sigma.col(j) = own.whole.known() ? in_units_of(own.whole.sigma, sigma.col(j))
+                                     : Eigen::VectorXd::Ones(sigma.rows()).eval();
+    whole.push_back(own.whole);
+  }
+  const MotionTerms terms = terms_beyond(predicted, motion, base);
+  const auto sliding = [&](Eigen::Index t, Eigen::Index j, int direction) {
+    return predicted.mean(t, j) - base(t, j) +
+           friction[static_cast<std::size_t>(j)].correction.sliding(motion.dq(t, j), direction);
+  };
+  return balance_of(model, whole, motion, terms, sigma, sliding, true);
 }
 
 }  // namespace kinescope

@@ -49,6 +49,11 @@ struct SlidingFriction {
 [[nodiscard]] std::vector<SlidingFriction> sliding_friction(
     const RigidModel& model, const std::vector<TorqueSamples>& motions);
 
+/// The same from what some other model leaves of the torque, samples x joints of each motion.
+[[nodiscard]] std::vector<SlidingFriction> sliding_friction(
+    const RigidModel& model, const std::vector<TorqueSamples>& motions,
+    const std::vector<Eigen::MatrixXd>& residuals);
+
 /// Of a model with so many parameters beside friction, on the samples that friction was fitted to:
 /// deviance with a penalty for parameters (Schwarz 1978), stretches of 0.25 s being independent.
 [[nodiscard]] double sliding_deviance(const std::vector<SlidingFriction>& friction, int parameters);
@@ -60,5 +65,46 @@ struct SlidingFriction {
 [[nodiscard]] std::vector<BalanceSample> sliding_balance(
     const RigidModel& model, const std::vector<SlidingFriction>& friction,
     const TorqueSamples& motion, const Eigen::MatrixXd& sigma = {});
+
+/// What a torque model says of one uninterrupted motion, friction included: samples x joints.
+struct PredictedTorque {
+  Eigen::MatrixXd mean;
+  /// Without the friction of the joint's own drive, as far as the model tells it.
+  Eigen::MatrixXd frictionless;
+  Eigen::MatrixXd sigma;  ///< predictive standard deviation
+  /// d mean / d acceleration, joints x joints, one a sample. The accelerations behind `mean` are a
+  /// low-pass's; what they lack shows in the measured speed beyond `speed`, which they lead to, and
+  /// inertia times that is a momentum. Both empty: the accelerations are exact.
+  std::vector<Eigen::MatrixXd> inertia = {};
+  Eigen::MatrixXd speed = {};
+};
+
+/// Friction of a joint beside a torque model.
+struct PredictedFriction {
+  SlidingFriction whole;       ///< of what `frictionless` leaves; sigma: of what the model leaves
+  SlidingFriction correction;  ///< of what the model leaves: friction drifts with temperature
+  /// Slid one way only: no model tells its friction from other torque, and all of it may be some.
+  bool may_be_all = false;
+};
+
+[[nodiscard]] std::vector<PredictedFriction> predicted_friction(
+    const RigidModel& model, const std::vector<TorqueSamples>& motions,
+    const std::vector<PredictedTorque>& predicted);
+
+/// One a joint: 0 where PredictedTorque::inertia is significantly worse than none in the motions. A
+/// model of a hardly accelerated joint has some that is noise, and would carry the noise of speeds
+/// into the balance.
+[[nodiscard]] std::vector<char> usable_inertia(const RigidModel& model,
+                                               const std::vector<TorqueSamples>& motions,
+                                               const std::vector<PredictedTorque>& predicted);
+[[nodiscard]] PredictedTorque with_inertia_of(PredictedTorque predicted,
+                                              const std::vector<char>& joints);
+
+/// The balance of a predicted torque: `drive` is what was measured beyond it, and beyond the
+/// interval that friction may take where a joint may stick. BalanceSample::sigma is the model's
+/// own, in units of PredictedFriction::whole.sigma.
+[[nodiscard]] std::vector<BalanceSample> predicted_balance(
+    const RigidModel& model, const std::vector<PredictedFriction>& friction,
+    const TorqueSamples& motion, const PredictedTorque& predicted);
 
 }  // namespace kinescope

@@ -17,6 +17,7 @@ StatisticLog log_statistics(const ContactCalibration& calibration,
                                           std::numeric_limits<double>::quiet_NaN());
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const ContactDecision decision = detector.update(samples[k]);
+    if (decision.resumed) out.events.pop_back();
     if (decision.ended) out.events.push_back(detector.event());
     const bool free = !decision.contact || decision.alarm;
     if (!free || decision.fault != SampleFault::kNone) continue;

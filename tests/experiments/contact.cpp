@@ -2,7 +2,8 @@
 //
 // Contact detection on recordings of others, beside the momentum observer at the same false-alarm
 // rate, and `kinescope contact` as users run it. Needs the shared data; prints a table each.
-// build/test/contact [ur6] [ur5] [simulated] [logs_ur5] [logs_free] [logs_simulated]
+// build/test/contact [ur6] [ur5] [simulated] [logs_ur5] [logs_free] [logs_models]
+// [logs_simulated]
 #include <cstdio>
 #include <set>
 #include <string>
@@ -19,6 +20,7 @@ int main(int argc, char** argv) {
     if (asked("simulated")) kinescope::contact_simulated();
     if (asked("logs_ur5")) kinescope::contact_logs_ur5();
     if (asked("logs_free")) kinescope::contact_logs_free();
+    if (asked("logs_models")) kinescope::contact_logs_models();
     if (asked("logs_simulated")) kinescope::contact_logs_simulated();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

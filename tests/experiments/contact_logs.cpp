@@ -6,9 +6,11 @@
 #include <cstdio>
 #include <functional>
 #include <numbers>
+#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/torque_stages.h"
 #include "kinematics/core/error.h"
@@ -73,9 +75,11 @@ struct Found {
 };
 
 Found look(const Folder& folder, const fs::path& log, const std::vector<fs::path>& learn,
-           const fs::path& robot, const Eigen::Vector3d& gravity_m_s2) {
+           const fs::path& robot, const Eigen::Vector3d& gravity_m_s2,
+           const std::string& model = {}) {
   Found out;
   ContactCommandOptions options;
+  options.model = model;
   options.logs = {log};
   options.learn_logs = learn;
   options.robot = robot;
@@ -124,20 +128,44 @@ DynamicModel ur5_kinematics() {
                  {0, -kQuarter, 0.0823}});
 }
 
-void ur5_table(const fs::path& set, const char* title, const DynamicModel& model) {
+// The part of a sweep before the obstacle, for certain: the first 60 %.
+std::vector<fs::path> free_parts(const Folder& folder, const fs::path& set,
+                                 const std::vector<std::string>& names) {
+  std::vector<fs::path> out;
+  for (const std::string& name : names) {
+    std::vector<std::string> lines;
+    std::istringstream text(read_text_file(set / (name + ".csv")));
+    for (std::string line; std::getline(text, line);) lines.push_back(line);
+    lines.resize(lines.size() * 6 / 10);
+    write_file_atomically(folder / (name + "_free.csv"),
+                          fmt::format("{}\n", fmt::join(lines, "\n")));
+    out.push_back(folder / (name + "_free.csv"));
+  }
+  return out;
+}
+
+// `learn`: sweeps whose free parts are learned from, and which are not looked at; none: each file
+// from itself. `torque_model`: as --model.
+void ur5_table(const fs::path& set, const char* title, const DynamicModel& model,
+               const std::vector<std::string>& learn = {}, const std::string& torque_model = {}) {
   const Folder folder;
   write_file_atomically(folder / "robot.urdf", write_urdf(model));
   std::printf("ur5_contact, %s\n", title);
   int found_all = 0;
   int invented_all = 0;
+  int repeated_all = 0;
+  int looked_at = 0;
+  const std::vector<fs::path> free = free_parts(folder, set, learn);
   for (const char* name : kUr5Files) {
+    if (std::ranges::find(learn, name) != learn.end()) continue;
+    ++looked_at;
     const ChannelTable table = read_channel_table(set / (std::string(name) + ".csv"));
     const Eigen::VectorXd t_s = 1e-3 * table.values.col(*table.column("t_ms"));
     const Eigen::VectorXd q_deg = table.values.col(*table.column("q_deg1"));
     Eigen::Index at = 0;
     while (q_deg[at] < kBeforeObstacle_deg) ++at;
-    const Found found = look(folder, set / (std::string(name) + ".csv"), {}, folder / "robot.urdf",
-                             {0.0, 0.0, -kUsualGravity_m_s2});
+    const Found found = look(folder, set / (std::string(name) + ".csv"), free,
+                             folder / "robot.urdf", {0.0, 0.0, -kUsualGravity_m_s2}, torque_model);
     int hits = 0;
     int invented = 0;
     for (const DetectedContact& event : found.events) {
@@ -145,10 +173,13 @@ void ur5_table(const fs::path& set, const char* title, const DynamicModel& model
     }
     found_all += hits > 0 ? 1 : 0;
     invented_all += invented;
+    repeated_all += std::max(0, hits - 1);
     std::printf("  %-20s obstacle %6.2f to %6.2f s: found %s, invented %d |%s\n", name, t_s[at],
                 t_s[t_s.size() - 1], hits > 0 ? "yes" : "NO", invented, words(found).c_str());
   }
-  std::printf("  found %d of %zu, invented %d\n", found_all, kUr5Files.size(), invented_all);
+  std::printf("  found %d of %d, invented %d, reported again %d\n", found_all, looked_at,
+              invented_all, repeated_all);
+  std::fflush(stdout);
 }
 
 // --- Measured robots that nothing touched
@@ -359,8 +390,22 @@ void contact_logs_ur5() {
   ur5_table(*set, "joint 1 alone", lone_joint());
 }
 
-void contact_logs_free() {
-  std::printf("measured, nothing touched\n");
+void contact_logs_models() {
+  const std::vector<std::string> sweeps{"base_sweep_1degps_1", "base_sweep_3degps_1",
+                                        "base_sweep_5degps_1", "base_sweep_7degps_1"};
+  if (const auto set = shared_data("dynamics/ur5_contact")) {
+    for (const char* model : {"", "gip", "semi_parametric"}) {
+      const std::string name = *model != 0 ? model : "momentum";
+      ur5_table(*set, ("from itself, by " + name).c_str(), ur5_kinematics(), {}, model);
+      ur5_table(*set, ("learned from free sweeps, by " + name).c_str(), ur5_kinematics(), sweeps,
+                model);
+    }
+  }
+  for (const char* model : {"gip", "semi_parametric"}) contact_logs_free(model);
+}
+
+void contact_logs_free(const char* model) {
+  std::printf("measured, nothing touched%s%s\n", *model != 0 ? ", by " : "", model);
   for (const NamedFreeSet& named : free_sets()) {
     const auto folder = shared_data(named.folder);
     if (!folder) {
@@ -379,7 +424,7 @@ void contact_logs_free() {
     Count itself;
     for (std::size_t k = 0; k < logs.size(); ++k) {
       const auto judge = [&](const std::vector<fs::path>& learn) {
-        return look(work, logs[k], learn, robot, set.model.gravity_m_s2);
+        return look(work, logs[k], learn, robot, set.model.gravity_m_s2, model);
       };
       if (k > 0) apart.add(judge({logs[0]}));
       itself.add(judge({}));

@@ -18,8 +18,12 @@ void contact_simulated();
 void contact_logs_ur5();
 
 /// The same on measured robots that nothing touched, each trajectory judged by what was learned
-/// from another, and from itself.
-void contact_logs_free();
+/// from another, and from itself. `model`: as --model; empty: the momentum balance.
+void contact_logs_free(const char* model = "");
+
+/// ur5_contact by the momentum balance and by torque models, each file from itself and learned from
+/// the free parts of four sweeps; then contact_logs_free() by the torque models.
+void contact_logs_models();
 
 /// The same on simulated robots that nothing touched, at rest, starting, reversing.
 void contact_logs_simulated();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `kinescope contact` as a user meets it: contacts found in a log, products, refusals.
+// `kinescope contact` as a user meets it: contacts found in a log, by the momentum balance or by a
+// torque model, products, refusals.
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +11,7 @@
 #include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
 #include "tests/truth/contact_world.h"
+#include "tests/truth/shared_data.h"
 
 namespace kinescope {
 namespace {
@@ -33,6 +35,25 @@ class ContactCommand : public testing::Test {
                                  "--output", path("out"),     "--quiet"};
     out.insert(out.end(), more.begin(), more.end());
     return out;
+  }
+
+  [[nodiscard]] nlohmann::json contacts() const {
+    return nlohmann::json::parse(read_text_file(folder_.path() / "out/contacts.json"));
+  }
+  void expect_labelled(const nlohmann::json& found) const {
+    constexpr double kOnset = 0.05;  // s
+    ASSERT_EQ(found.size(), touched_.labels.size());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      EXPECT_NEAR(found[k].at("onset_s").get<double>(), touched_.labels[k].begin_s, kOnset);
+    }
+  }
+  /// A model of the free log, saved.
+  [[nodiscard]] std::string saved_model() const {
+    const Outcome outcome = run({"dynamics", path("free.csv"), "--robot", path("robot.urdf"),
+                                 "--model", "parametric", "--no-trace", "--save-model",
+                                 path("torque.json"), "--output", path("model"), "--quiet"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return path("torque.json");
   }
 
   RecordingFolder folder_;
@@ -121,6 +142,87 @@ TEST_F(ContactCommand, AnOffsetOfASensorIsNoContact) {
   const Outcome outcome = run(words());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(outcome.out.starts_with("3 contacts")) << outcome.out;
+}
+
+TEST_F(ContactCommand, ASavedModelServesBesideTheMomentumBalance) {
+  const Outcome outcome = run(words({"--learn", path("free.csv"), "--model", saved_model()}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("By what the parametric model does not predict: 3 contacts"))
+      << outcome.out;
+  EXPECT_NE(outcome.out.find("3 contacts; 3 of the above are among them"), std::string::npos)
+      << outcome.out;
+  const nlohmann::json document = contacts();
+  EXPECT_EQ(document.at("method"), "parametric");
+  EXPECT_NE(document.at("model").get<std::string>().find("torque.json"), std::string::npos);
+  expect_labelled(document.at("contacts"));
+  expect_labelled(document.at("momentum").at("contacts"));
+  EXPECT_EQ(document.at("inputs").back().at("name"), "torque.json");
+  EXPECT_NE(read_text_file(folder_.path() / "out/contact.html").find("Contacts by both"),
+            std::string::npos);
+  const ProductCheck check = check_products(folder_.path() / "out");
+  EXPECT_TRUE(check.passed || !check.done) << check.words;
+}
+
+TEST_F(ContactCommand, AModelIsLearnedOnTheSpotTheSameEachTime) {
+  const std::vector<std::string> learned = words({"--model", "semi_parametric", "--force"});
+  const Outcome outcome = run(learned);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  expect_labelled(contacts().at("contacts"));
+  const std::string first = read_text_file(folder_.path() / "out/contacts.json");
+  EXPECT_EQ(run(learned).code, 0);
+  EXPECT_EQ(read_text_file(folder_.path() / "out/contacts.json"), first);
+}
+
+TEST_F(ContactCommand, CurrentsNeedNoMassesWithAModel) {
+  folder_.write("free.csv", currents(free_.samples)).write("log.csv", currents(touched_.samples));
+  const Outcome outcome = run(words({"--learn", path("free.csv"), "--model", saved_model()}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(contacts().at("unit"), "A");
+  expect_labelled(contacts().at("contacts"));
+}
+
+TEST_F(ContactCommand, ModelsThatDoNotFitAreRefusedBeforeTheWork) {
+  const std::string model = saved_model();
+  const auto refused = [&](const std::string& name, ExitCode code, const char* part) {
+    expect_refusal(words({"--model", name}), code, part);
+    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out/contacts.json"));
+  };
+  refused("svr", ExitCode::kBadRequest, "svr models cannot be saved, nor be used here");
+  refused(path("none.json"), ExitCode::kBadInput, "none.json: there is no such file");
+  refused(path("log.csv"), ExitCode::kBadInput, "log.csv: this is no JSON");
+  expect_refusal(words({"--model", model, "--identify"}), ExitCode::kBadRequest,
+                 "contradicts --model");
+  const std::string whole = read_text_file(model);
+  auto document = nlohmann::json::parse(whole);
+  document["robot"] = "another";
+  folder_.write("torque.json", document.dump());
+  refused(model, ExitCode::kBadInput, "is of robot 'another'");
+  folder_.write("torque.json", whole).write("robot.urdf", write_urdf(contact_arm(2)));
+  refused(model, ExitCode::kBadInput, "has the joints");
+  folder_.write("robot.urdf", write_urdf(contact_arm(3)))
+      .write("log.csv", currents(touched_.samples));
+  refused(model, ExitCode::kBadInput, "its torques are in A, the model's in Nm");
+}
+
+/// Eleven seconds of a UR5's base in motion, against an obstacle and held there.
+TEST_F(ContactCommand, AMeasuredContactThatIsHeldIsReportedOnce) {
+  const auto log = shared_data("dynamics/ur5_contact/impact_4degps_1.csv");
+  if (!log) GTEST_SKIP() << "shared data dynamics/ur5_contact is not on this machine";
+  folder_.write("base.urdf", R"(<robot name="base"><link name="base"/><link name="link1"/>
+<joint name="joint1" type="continuous"><parent link="base"/><child link="link1"/>
+<axis xyz="0 0 1"/></joint></robot>)");
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{}, std::vector<std::string>{"--model", "gip"}}) {
+    std::vector<std::string> all{"contact",  log->string(), "--robot", path("base.urdf"),
+                                 "--output", path("out"),   "--quiet", "--force"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Outcome outcome = run(all);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json found = contacts().at("contacts");
+    ASSERT_EQ(found.size(), 1U) << outcome.out;
+    EXPECT_GT(found[0].at("onset_s").get<double>(), 8.04);  // the obstacle's place
+    EXPECT_GT(found[0].at("end_s").get<double>(), 11.4);    // the end of the log
+  }
 }
 
 TEST_F(ContactCommand, RefusesWhatCannotBe) {

@@ -190,5 +190,67 @@ TEST(Detection, WorksOnAPredictedTorque) {
   EXPECT_GE(score.link_right, 7);
 }
 
+/// So weak that only long windows show it: held, it is one contact and not one each window.
+TEST(Detection, AHeldContactIsReportedOnce) {
+  Rng rng = Rng::from_name("contact.held");
+  constexpr Eigen::Index kRows = 6000;
+  const Eigen::VectorXd t_s = Eigen::VectorXd::LinSpaced(kRows, 0.0, 0.01 * (kRows - 1));
+  Eigen::MatrixXd torque(kRows, 1);
+  for (double& value : torque.reshaped()) value = rng.normal(0.1);
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(kRows, 1);
+  const ContactCalibration calibration = calibrate_contacts(balance_samples(t_s, torque, none));
+  torque.col(0).segment(3000, 500).array() += 0.2;
+  const auto events = detect_contacts(calibration, balance_samples(t_s, torque, none));
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_NEAR(events[0].onset_s, 30.0, 0.1);
+  EXPECT_NEAR(events[0].end_s, 35.0, 0.1);
+  EXPECT_NEAR(events[0].torque[0], -0.2, 0.02);
+}
+
+/// The model's error at the onset is forgotten some thousand times over.
+TEST(Detection, ALongContactHasATorqueThoughErrorsAreShort) {
+  Rng rng = Rng::from_name("contact.long");
+  constexpr Eigen::Index kRows = 8000;
+  const Eigen::VectorXd t_s = Eigen::VectorXd::LinSpaced(kRows, 0.0, 0.01 * (kRows - 1));
+  Eigen::MatrixXd torque(kRows, 1);
+  for (double& value : torque.reshaped()) value = rng.normal(0.1);
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(kRows, 1);
+  ContactCalibration calibration = calibrate_contacts(balance_samples(t_s, torque, none));
+  calibration.noise.model_time_s.setConstant(0.02);
+  torque.col(0).segment(3000, 3000).array() += 0.5;
+  const auto events = detect_contacts(calibration, balance_samples(t_s, torque, none));
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_NEAR(events[0].torque[0], -0.5, 0.02);
+}
+
+/// A model's error with a correlation time of 0.5 s, and noise of the torque.
+Eigen::MatrixXd residual_of(double error_nm, Eigen::Index rows, Rng& rng) {
+  Eigen::MatrixXd out(rows, 1);
+  const double kept = std::exp(-0.01 / 0.5);
+  double error = 0.0;
+  for (double& value : out.reshaped()) {
+    error = kept * error + std::sqrt(1.0 - kept * kept) * rng.normal(error_nm);
+    value = error + rng.normal(0.02);
+  }
+  return out;
+}
+
+/// The model errs more on the log that is looked at than on the one to learn from.
+TEST(Detection, NoiseOfAnotherLogGivesWayToThisOnes) {
+  Rng rng = Rng::from_name("contact.other_log");
+  constexpr Eigen::Index kRows = 6000;
+  const Eigen::VectorXd t_s = Eigen::VectorXd::LinSpaced(kRows, 0.0, 0.01 * (kRows - 1));
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(kRows, 1);
+  const auto calm = balance_samples(t_s, residual_of(0.1, kRows, rng), none);
+  Eigen::MatrixXd torque = residual_of(0.5, kRows, rng);
+  torque.col(0).segment(3000, 40).array() += 3.0;
+  const auto rough = balance_samples(t_s, torque, none);
+  EXPECT_GT(detect_contacts(calibrate_contacts(calm), rough).size(), 5U)
+      << "or the test says nothing";
+  const auto events = detect_contacts(calibrate_contacts(calm, rough, {}), rough);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_NEAR(events[0].onset_s, 30.0, 0.05);
+}
+
 }  // namespace
 }  // namespace kinescope
