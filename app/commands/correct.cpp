@@ -31,9 +31,12 @@ std::optional<std::size_t> column_of(const CsvTable& table, const std::string& c
 }
 
 // The stamps and the channels that drive the robot; other columns are none of our business.
-CsvTable columns_of_run(const CsvTable& table, const std::vector<JointChannel>& channels) {
+CsvTable columns_of_run(const CsvTable& table, const CalibratedEffects& run) {
   std::set<std::string> wanted;
-  for (const JointChannel& joint : channels) {
+  for (const JointChannel& joint : run.channels) {
+    if (std::ranges::find(run.effects, EffectId{"early_reading", joint.joint}, &FittedEffect::id) !=
+        run.effects.end())
+      wanted.insert(joint.copies.begin(), joint.copies.end());
     if (!joint.channel.empty()) wanted.insert(joint.channel);
     for (const ChannelShare& share : joint.couplings) wanted.insert(share.channel);
   }
@@ -108,6 +111,7 @@ KinematicTree tree_of_run(const std::filesystem::path& run_folder,
     driven.scale = channel.scale;
     driven.offset = channel.offset;
     driven.couplings = channel.couplings;
+    driven.copies = channel.copies;
   }
   return tree;
 }
@@ -139,7 +143,7 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
   const CsvTable table = read_csv(options.log, RaggedRows::kSetAside);
-  const TableLog read = joint_log_of(columns_of_run(table, found.channels));
+  const TableLog read = joint_log_of(columns_of_run(table, found));
   const JointLog& log = read.log;
   // Beforehand: what was left out of the log may be why it is refused.
   for (const std::string& warning : log.warnings) print_warning(warning);

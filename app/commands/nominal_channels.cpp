@@ -10,6 +10,7 @@
 
 #include "app/io/nearest_name.h"
 #include "kinematics/core/error.h"
+#include "kinematics/structure/copied_channels.h"
 
 namespace kinescope {
 namespace {
@@ -66,6 +67,22 @@ void follow_others(const JointLog& log, KinematicTree& tree) {
     if (!joint.channel.empty()) continue;
     joint.scale = 1.0;
     joint.offset = 0.0;
+  }
+}
+
+// What no joint is driven by and tells the same as what one is.
+void list_copies(const JointLog& log, KinematicTree& tree) {
+  const auto name = [&log](int c) { return log.channels[static_cast<std::size_t>(c)]; };
+  const auto drives = [&tree](const std::string& column) {
+    return std::ranges::find(tree.joints, column, &Joint::channel) != tree.joints.end();
+  };
+  for (const structure_search::SameQuantity& group : structure_search::same_quantities(log)) {
+    for (Joint& joint : tree.joints) {
+      if (std::ranges::none_of(group, [&](int c) { return name(c) == joint.channel; })) continue;
+      for (const int c : group) {
+        if (!drives(name(c))) joint.copies.push_back(name(c));
+      }
+    }
   }
 }
 
@@ -153,6 +170,7 @@ NominalChannels match_channels(const Recording& recording) {
   }
   if (!named) take_in_order(log, out);
   follow_others(log, out.tree);
+  list_copies(log, out.tree);
   hold_the_others(log, out);
   return out;
 }

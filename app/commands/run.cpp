@@ -100,6 +100,7 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
   if (run.trace) {
     for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
   }
+  for (const std::string& line : second_column_lines(run.second_columns)) fmt::print("{}\n", line);
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
   if (report == kReport) {
     fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(),
@@ -184,6 +185,14 @@ bool shows_postures(const RunSummary& run) {
   return !run.log.empty() && is_posture_log(run.log, run.calibration.times_s, channels);
 }
 
+std::vector<std::pair<std::string, std::string>> copies_of(const KinematicTree& tree) {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const Joint& joint : tree.joints) {
+    for (const std::string& column : joint.copies) out.emplace_back(column, joint.channel);
+  }
+  return out;
+}
+
 std::string odd_words(const OddReading& odd, const Recording& recording) {
   return fmt::format(
       "{}: at {} = {:.6g} '{}' reads {:.6g}, but the markers it moves say {:.6g}: left out",
@@ -209,7 +218,12 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
   run.calibration = std::move(fitted.calibration);
   run.effects = std::move(fitted.effects);
   run.gravity_base = fitted.gravity_base;
-  if (options.trace) run.trace = std::move(fitted.trace);
+  if (options.trace) {
+    run.trace = std::move(fitted.trace);
+    run.second_columns =
+        second_columns(run.log, run.calibration.tree, copies_of(run.calibration.tree),
+                       run.gravity_base, shows_postures(run));
+  }
   if (fitted.stamp_jitter_s > 0.0)
     run.warnings.push_back(jitter_words(fitted.stamp_jitter_s, run.log, observed));
   // Between the readings of a motion a single wrong one is a spike, and stands apart already.

@@ -120,6 +120,18 @@ std::vector<ChannelShare> couplings_of(const json& joint, const std::filesystem:
   return out;
 }
 
+std::vector<std::string> copies_of(const json& joint, const std::filesystem::path& path) {
+  std::vector<std::string> out;
+  const auto list = joint.find("copies");
+  if (list == joint.end()) return out;
+  if (!list->is_array()) throw wrong(path, "'copies' is no list");
+  for (const json& column : *list) {
+    if (!column.is_string()) throw wrong(path, "a copy is no name of a channel");
+    out.push_back(column.get<std::string>());
+  }
+  return out;
+}
+
 std::map<std::string, double> unit_factors(const json& document,
                                            const std::filesystem::path& path) {
   std::map<std::string, double> out;
@@ -188,11 +200,12 @@ CalibratedEffects read_effects(const std::filesystem::path& calibration_json) {
     throw wrong(calibration_json, "no robot with joints");
   }
   for (const json& joint : document.at("robot").at("joints")) {
-    out.channels.push_back(
-        {word(joint, "name", calibration_json), word(joint, "channel", calibration_json),
-         finite(joint.value("scale", json()), calibration_json, "scale"),
-         finite(joint.value("offset", json()), calibration_json, "offset"),
-         couplings_of(joint, calibration_json), range_of(joint, calibration_json)});
+    out.channels.push_back({word(joint, "name", calibration_json),
+                            word(joint, "channel", calibration_json),
+                            finite(joint.value("scale", json()), calibration_json, "scale"),
+                            finite(joint.value("offset", json()), calibration_json, "offset"),
+                            couplings_of(joint, calibration_json),
+                            copies_of(joint, calibration_json), range_of(joint, calibration_json)});
   }
   const auto effects = document.find("effects");
   if (effects == document.end()) return out;

@@ -27,6 +27,7 @@ struct JointChannel {
   double scale = 1.0;
   double offset = 0.0;
   std::vector<ChannelShare> couplings;
+  std::vector<std::string> copies;   ///< `Joint`
   std::optional<JointLimits> range;  ///< of the joint's value in the recording
 };
 

@@ -84,6 +84,7 @@ json tree_json(const KinematicTree& tree) {
     for (const ChannelShare& share : joint.couplings) {
       entry["couplings"].push_back({{"channel", share.channel}, {"ratio", number(share.ratio)}});
     }
+    if (!joint.copies.empty()) entry["copies"] = joint.copies;
     if (joint.limits) {
       entry["range"] = {number(joint.limits->lower), number(joint.limits->upper)};
     }

@@ -44,7 +44,8 @@ struct Verdict {
 ///                  markers [id, link, size_m, frames_seen, share_seen, median_edge_px,
 ///                  median_sigma_px], rejected [reason, count], channels [name, samples, min, max,
 ///                  filmed_min, filmed_max (of the samples while frames were taken), joint, idle],
-///                  warnings
+///                  second_columns [column, of, joint, unit, offset, rms, rms_left, effects, words]
+///                  (of a channel that drives a joint, its command say: how it differs), warnings
 ///   structure      null for a nominal robot; else status (determined, ambiguous, undetermined),
 ///   probability, runner_up,
 ///                  runner_up_log_odds, links [name, markers], free_markers, idle_channels,

@@ -101,6 +101,30 @@ json markers_seen_json(const RunSummary& run) {
   return list;
 }
 
+json second_columns_json(const RunSummary& run) {
+  json out = json::array();
+  for (const SecondColumn& second : run.second_columns) {
+    json effects = json::array();
+    for (const TracedEffect& effect : second.trace.accepted) {
+      effects.push_back({{"effect", text(effect.id.effect)},
+                         {"place", text(effect.id.place)},
+                         {"size", number(effect.size)},
+                         {"interval", {number(effect.interval.low), number(effect.interval.high)}},
+                         {"unit", text(effect.unit)}});
+    }
+    out.push_back({{"column", text(second.column)},
+                   {"of", text(second.channel)},
+                   {"joint", text(second.joint)},
+                   {"unit", text(second.unit)},
+                   {"offset", number(second.offset)},
+                   {"rms", number(second.before)},
+                   {"rms_left", number(second.after)},
+                   {"effects", std::move(effects)},
+                   {"words", text(words_of(second))}});
+  }
+  return out;
+}
+
 json data_json(const RunSummary& run, const Analysis& analysis) {
   json rejected = json::array();
   for (const auto& [reason, count] : run.rejected) {
@@ -115,6 +139,7 @@ json data_json(const RunSummary& run, const Analysis& analysis) {
           {"markers", markers_seen_json(run)},
           {"rejected", rejected},
           {"channels", channels_json(run)},
+          {"second_columns", second_columns_json(run)},
           {"warnings", texts(run.warnings)}};
 }
 

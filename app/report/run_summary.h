@@ -11,6 +11,7 @@
 #include "calib/bundle/calibration.h"
 #include "calib/bundle/check_nominal.h"
 #include "calib/camera/marker_set.h"
+#include "calib/effects/second_column.h"
 #include "calib/effects/trace_calibration.h"
 #include "calib/quality/error_summary.h"
 #include "calib/quality/freedom_levels.h"
@@ -68,6 +69,7 @@ struct RunSummary {
   Calibration calibration;
   std::optional<Trace> trace;                   ///< none where it was not asked for
   std::vector<FittedEffect> effects;            ///< that the calibration has in it
+  std::vector<SecondColumn> second_columns;     ///< of the joints' copies; none without a trace
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   ErrorSummary errors;
   std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without

@@ -12,6 +12,7 @@
 #include "app/report/html.h"
 #include "app/report/plot.h"
 #include "app/report/sections.h"
+#include "app/report/trace_lines.h"
 
 namespace kinescope::report {
 namespace {
@@ -183,6 +184,12 @@ std::string data_section(const Facts& facts) {
   if (!lines.empty()) out += figure(lines, "When each marker was seen.", "wide");
   out += marker_table(facts) + "<div class=\"columns\">" + channel_table(facts) +
          rejected_table(facts) + "</div>\n";
+  if (!facts.run.second_columns.empty()) {
+    out += "<h3>Second columns of a joint</h3><ul id=\"second-columns\">";
+    for (const std::string& line : second_column_lines(facts.run.second_columns))
+      out += "<li>" + escaped(line) + "</li>";
+    out += "</ul>\n";
+  }
   if (!facts.run.warnings.empty()) {
     out += "<h3>Warnings</h3><ul id=\"warnings\">";
     for (const std::string& warning : facts.run.warnings)

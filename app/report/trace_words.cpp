@@ -238,4 +238,10 @@ std::vector<std::string> trace_lines(const Trace& trace) {
   return out;
 }
 
+std::vector<std::string> second_column_lines(const std::vector<SecondColumn>& columns) {
+  std::vector<std::string> out;
+  for (const SecondColumn& column : columns) out.push_back(report::sentence(words_of(column)));
+  return out;
+}
+
 }  // namespace kinescope

@@ -12,6 +12,7 @@
 #include "calib/bundle/corrected.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/median.h"
+#include "kinematics/log/unsteady_reading.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -326,7 +327,10 @@ std::vector<int> with_what_lasts(const Spec& spec, const State& state,
 ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::vector<int>& usable,
                                      double reject_sigma) {
   if (spec.kind == MeasurementKind::kPose) balance_poses(spec, state, usable);
-  const Readings readings(spec, state);
+  // A reading that jumps makes neighbours differ that the camera sees alike.
+  Spec steady = spec;
+  steady.log = steadied(std::move(steady.log));
+  const Readings readings(steady, state);
   std::map<int, Series> all;
   for (const int index : usable) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];

@@ -38,12 +38,13 @@ CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>
 // The number of a marker's shape that a correction changes.
 double& number_of(MarkerShape& shape, CorrectedPart part) {
   if (part == CorrectedPart::kMarkerSize) return shape.size;
+  if (part == CorrectedPart::kMarkerShear) return shape.shear;
   return part == CorrectedPart::kMarkerWidth ? shape.width : shape.warp_m;
 }
 
 // What a corner moves by with that number: corners are linear in all of them.
 Eigen::Vector3d d_corner(CorrectedPart part, const Eigen::Vector3d& corner_m) {
-  MarkerShape unit{0.0, 0.0, 0.0};
+  MarkerShape unit{0.0, 0.0, 0.0, 0.0};
   number_of(unit, part) = 1.0;
   return unit.corner_m(corner_m);
 }
@@ -93,6 +94,7 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
         break;
       case CorrectedPart::kMarker:
       case CorrectedPart::kMarkerWidth:
+      case CorrectedPart::kMarkerShear:
       case CorrectedPart::kMarkerWarp:
         bears = correction.index == sighting.marker;
         break;
@@ -133,6 +135,7 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         break;
       case CorrectedPart::kMarkerSize:
       case CorrectedPart::kMarkerWidth:
+      case CorrectedPart::kMarkerShear:
       case CorrectedPart::kMarkerWarp:
         number_of(out.shape, correction.part) += amount;
         break;
@@ -201,6 +204,7 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
                                   moved_before(at.corrected.camera, twist));
     case CorrectedPart::kMarkerSize:
     case CorrectedPart::kMarkerWidth:
+    case CorrectedPart::kMarkerShear:
     case CorrectedPart::kMarkerWarp: {
       Eigen::VectorXd out = Eigen::VectorXd::Zero(at.error.residual.size());
       for (std::size_t i = 0; i < sighting.geometry_m.size(); ++i) {

@@ -16,6 +16,7 @@ enum class CorrectedPart {
   kMarker,       ///< a twist of the marker in its own frame
   kMarkerSize,   ///< the marker's size over the declared one, minus 1
   kMarkerWidth,  ///< the marker's width over its height, minus 1, the size kept
+  kMarkerShear,  ///< rad by which the marker's right angles are off, its axes turned alike
   kMarkerWarp,   ///< m by which two opposite corners stand before the marker's plane, two behind it
   kCamera,       ///< a twist of everything seen, in the camera's frame
   kIntrinsic,    ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)

@@ -120,7 +120,9 @@ struct EffectBundle::Impl {
   void begin_near(const BundleChange& change, State& state) const;
   void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
-  [[nodiscard]] JointMotion motion(const std::vector<double>& times_s) const;
+  [[nodiscard]] JointMotion motion(const std::vector<double>& times_s,
+                                   const Eigen::MatrixXd& ahead_s) const;
+  void add_copies(const Spec& at, const Eigen::MatrixXd& ahead_s, JointMotion& out) const;
 };
 
 EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& markers,
@@ -324,6 +326,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   out.converged = summary.converged;
   out.reason = summary.message;
   out.time_offset_s = state.time_offset[0];
+  out.ahead_s = bundle::clock_of(with, state);
   int rows = 0;
   for (const int index : used) rows += with.sightings[static_cast<std::size_t>(index)].dimension();
   out.variance = 2.0 * summary.final_cost / std::max(1, rows);
@@ -425,14 +428,16 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   return out;
 }
 
-JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s) const {
+JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s,
+                                       const Eigen::MatrixXd& ahead_s) const {
   Spec at = spec;
   at.times_s = times_s;
-  const Readings readings(at, 0.0);
+  const Readings readings(at, ahead_s);
   const auto rows = static_cast<Eigen::Index>(times_s.size());
   const auto joints = static_cast<Eigen::Index>(spec.tree.joints.size());
-  JointMotion out{times_s, Eigen::MatrixXd::Zero(rows, joints),
-                  Eigen::MatrixXd::Zero(rows, joints)};
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(rows, joints);
+  JointMotion out{times_s, none, none, ahead_s};
+  out.read_s.colwise() += Eigen::Map<const Eigen::VectorXd>(times_s.data(), rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
     for (Eigen::Index j = 0; j < joints; ++j) {
       const auto map = start.joint_maps[static_cast<std::size_t>(j)];
@@ -440,7 +445,27 @@ JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s) const
       out.rate(i, j) = map[0] * readings.rate(static_cast<int>(i), static_cast<int>(j));
     }
   }
+  add_copies(at, ahead_s, out);
   return out;
+}
+
+// What joints' copies say at the same times: read in place of their own channels.
+void EffectBundle::Impl::add_copies(const Spec& at, const Eigen::MatrixXd& ahead_s,
+                                    JointMotion& out) const {
+  for (std::size_t j = 0; j < at.tree.joints.size(); ++j) {
+    const auto map = start.joint_maps[j];
+    for (const std::string& column : at.tree.joints[j].copies) {
+      const auto channel = at.log.channel(column);
+      if (at.channel[j] < 0 || !channel) continue;
+      Spec instead = at;
+      instead.channel[j] = *channel;
+      const Readings readings(instead, ahead_s);
+      Eigen::VectorXd value(out.value.rows());
+      for (Eigen::Index i = 0; i < value.size(); ++i)
+        value[i] = map[0] * readings.value(static_cast<int>(i), static_cast<int>(j)) + map[1];
+      out.copies[static_cast<int>(j)].push_back(std::move(value));
+    }
+  }
 }
 
 const KinematicTree& EffectBundle::tree() const { return impl_->spec.tree; }
@@ -455,9 +480,14 @@ const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->s
 double EffectBundle::start_time_offset_s() const { return impl_->offset_start_s; }
 
 JointMotion EffectBundle::motion_at_frames(double time_offset_s) const {
-  std::vector<double> times_s = impl_->spec.times_s;
-  for (double& t : times_s) t += time_offset_s;
-  return impl_->motion(times_s);
+  const Spec& spec = impl_->spec;
+  return motion_at_frames(
+      Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
+                                static_cast<Eigen::Index>(spec.tree.joints.size()), time_offset_s));
+}
+
+JointMotion EffectBundle::motion_at_frames(const Eigen::MatrixXd& ahead_s) const {
+  return impl_->motion(impl_->spec.times_s, ahead_s);
 }
 
 JointMotion EffectBundle::motion_of_log(double time_offset_s) const {
@@ -470,7 +500,9 @@ JointMotion EffectBundle::motion_of_log(double time_offset_s) const {
       times_s.push_back(t);
     }
   }
-  return impl_->motion(times_s);
+  return impl_->motion(times_s,
+                       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(times_s.size()),
+                                             static_cast<Eigen::Index>(spec.tree.joints.size())));
 }
 
 std::vector<int> EffectBundle::driven_joints() const {
@@ -487,6 +519,27 @@ double EffectBundle::chosen_beyond(const EffectBundle& other) const {
   std::vector<int> more;
   std::ranges::set_difference(impl_->used, other.impl_->used, std::back_inserter(more));
   return static_cast<double>(more.size()) / std::sqrt(static_cast<double>(impl_->used.size()));
+}
+
+double EffectBundle::finer_than(const EffectBundle& other) const {
+  struct Sum {
+    double log_ratio = 0.0;
+    int count = 0;
+  };
+  std::map<int, Sum> of_marker;
+  std::vector<int> common;
+  std::ranges::set_intersection(impl_->used, other.impl_->used, std::back_inserter(common));
+  for (const int index : common) {
+    const auto i = static_cast<std::size_t>(index);
+    const Sighting& here = impl_->spec.sightings[i];
+    Sum& sum = of_marker[here.marker];
+    sum.log_ratio += std::log(other.impl_->spec.sightings[i].sigma / here.sigma);
+    ++sum.count;
+  }
+  double out = 1.0;
+  for (const auto& [marker, sum] : of_marker)
+    out = std::max(out, std::exp(sum.log_ratio / sum.count));
+  return out;
 }
 
 std::vector<int> EffectBundle::seen_markers() const {

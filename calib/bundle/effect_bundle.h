@@ -9,6 +9,7 @@
 // Not here: what the effects are (calib/effects), the search (calib/trace).
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -42,7 +43,8 @@ struct BundleSolution {
   std::string reason;
   Eigen::VectorXd values;  ///< of the change's parameters: corrections, then the time offset
   double time_offset_s = 0.0;
-  double variance = 0.0;  ///< of a whitened row, priors' squares counted in
+  Eigen::MatrixXd ahead_s;  ///< frames x joints: joint-log time minus frame time
+  double variance = 0.0;    ///< of a whitened row, priors' squares counted in
   /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
   KinematicTree tree;
   std::shared_ptr<const bundle::State> end;  ///< for fit(), which then need not solve again
@@ -71,6 +73,9 @@ struct JointMotion {
   std::vector<double> times_s;
   Eigen::MatrixXd value;  ///< instants x joints of the tree, rad or m
   Eigen::MatrixXd rate;
+  Eigen::MatrixXd read_s = {};  ///< likewise: of the log, when each was read; of a log empty
+  /// Of joints that have some (`Joint::copies`): what each says instead.
+  std::map<int, std::vector<Eigen::VectorXd>> copies = {};
 };
 
 class EffectBundle {
@@ -104,8 +109,10 @@ class EffectBundle {
   [[nodiscard]] const std::vector<double>& frame_times_s() const;
   /// Of the plain model, where it is free.
   [[nodiscard]] double start_time_offset_s() const;
-  /// What the frames show, at a time offset.
+  /// What the frames show, read at their times and that much later: of all joints, or frames x
+  /// joints. By the frames' own times.
   [[nodiscard]] JointMotion motion_at_frames(double time_offset_s) const;
+  [[nodiscard]] JointMotion motion_at_frames(const Eigen::MatrixXd& ahead_s) const;
   /// The log's own samples, from the first to the last frame and a little beyond.
   [[nodiscard]] JointMotion motion_of_log(double time_offset_s) const;
   /// Joints that a channel drives.
@@ -115,6 +122,9 @@ class EffectBundle {
   /// Sightings that were chosen here and not there, over the square root of all: by how many
   /// standard deviations of a mean their noise, all of one sign, bends it.
   [[nodiscard]] double chosen_beyond(const EffectBundle& other) const;
+  /// How many times larger the noise of a marker's sightings is there than here: of the marker of
+  /// which it is most, the geometric mean.
+  [[nodiscard]] double finer_than(const EffectBundle& other) const;
   /// Markers (index into the tree) that are seen.
   [[nodiscard]] std::vector<int> seen_markers() const;
 

@@ -37,6 +37,20 @@ Eigen::MatrixXd constant_clock(const Spec& spec, double time_offset_s) {
                                    time_offset_s);
 }
 
+// What drives a joint at a time: its channel, and the others that move it too.
+std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
+  auto sum = interpolate(spec.log, spec.channel[joint], time_s, spec.max_gap_s);
+  for (const auto& [channel, ratio] : spec.couplings[joint]) {
+    const auto other = interpolate(spec.log, channel, time_s, spec.max_gap_s);
+    if (!sum || !other) return std::nullopt;
+    sum->value += ratio * other->value;
+    sum->rate += ratio * other->rate;
+  }
+  return sum;
+}
+
+}  // namespace
+
 Eigen::MatrixXd clock_of(const Spec& spec, const State& state) {
   Eigen::MatrixXd ahead_s = constant_clock(spec, state.time_offset[0]);
   for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
@@ -53,20 +67,6 @@ Eigen::MatrixXd clock_of(const Spec& spec, const State& state) {
   }
   return ahead_s;
 }
-
-// What drives a joint at a time: its channel, and the others that move it too.
-std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
-  auto sum = interpolate(spec.log, spec.channel[joint], time_s, spec.max_gap_s);
-  for (const auto& [channel, ratio] : spec.couplings[joint]) {
-    const auto other = interpolate(spec.log, channel, time_s, spec.max_gap_s);
-    if (!sum || !other) return std::nullopt;
-    sum->value += ratio * other->value;
-    sum->rate += ratio * other->rate;
-  }
-  return sum;
-}
-
-}  // namespace
 
 State initial_state(const Spec& spec, const CalibrationStart& start) {
   State state;
@@ -101,12 +101,12 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
 }
 
 Readings::Readings(const Spec& spec, double time_offset_s)
-    : spec_(&spec), ahead_s_(constant_clock(spec, time_offset_s)) {
-  read();
-}
+    : Readings(spec, constant_clock(spec, time_offset_s)) {}
 
-Readings::Readings(const Spec& spec, const State& state)
-    : spec_(&spec), ahead_s_(clock_of(spec, state)) {
+Readings::Readings(const Spec& spec, const State& state) : Readings(spec, clock_of(spec, state)) {}
+
+Readings::Readings(const Spec& spec, Eigen::MatrixXd ahead_s)
+    : spec_(&spec), ahead_s_(std::move(ahead_s)) {
   read();
 }
 

@@ -89,12 +89,17 @@ struct State {
 [[nodiscard]] State initial_state(const Spec& spec, const CalibrationStart& start);
 [[nodiscard]] CameraModel camera_of(const Spec& spec, const State& state);
 
+/// Frames x joints: joint-log time minus frame time, as the time offset and corrections of the
+/// clock have it.
+[[nodiscard]] Eigen::MatrixXd clock_of(const Spec& spec, const State& state);
+
 /// Channel readings and rates at every frame for the present time offset: frames x joints.
 class Readings {
  public:
   /// Without corrections of the clock.
   Readings(const Spec& spec, double time_offset_s);
   Readings(const Spec& spec, const State& state);
+  Readings(const Spec& spec, Eigen::MatrixXd ahead_s);
   void update(const State& state);
   [[nodiscard]] double value(int frame, int joint) const { return value_(frame, joint); }
   [[nodiscard]] double rate(int frame, int joint) const { return rate_(frame, joint); }
@@ -132,11 +137,13 @@ struct SightingError {
 struct MarkerShape {
   double size = 1.0;    ///< factor
   double width = 0.0;   ///< width over height, minus 1
+  double shear = 0.0;   ///< rad that its right angles are off by
   double warp_m = 0.0;  ///< two opposite corners stand as far before its plane, two behind it
 
   [[nodiscard]] Eigen::Vector3d corner_m(const Eigen::Vector3d& declared_m) const {
     const double before = declared_m.x() * declared_m.y() < 0.0 ? -1.0 : 1.0;
-    return {(size + 0.5 * width) * declared_m.x(), (size - 0.5 * width) * declared_m.y(),
+    return {(size + 0.5 * width) * declared_m.x() + 0.5 * shear * declared_m.y(),
+            (size - 0.5 * width) * declared_m.y() + 0.5 * shear * declared_m.x(),
             size * declared_m.z() + before * warp_m};
   }
 };

@@ -11,8 +11,8 @@
 
 #include "calib/bundle/effect_bundle.h"
 #include "calib/effects/error_table.h"
-#include "calib/effects/unsteady_reading.h"
 #include "calib/trace/traced_model.h"
+#include "kinematics/log/unsteady_reading.h"
 
 namespace kinescope::effects {
 
@@ -49,6 +49,10 @@ inline constexpr double kBendPeriods = 2.0;
 [[nodiscard]] inline bool is_clock_offset(const EffectId& id) {
   return id.effect == "time_offset" && id.place == "clock";
 }
+/// Of when a frame is by the log, or a joint's reading.
+[[nodiscard]] inline bool is_of_clock(const EffectId& id) {
+  return id.effect == "time_offset" || id.effect == "clock_drift" || id.effect == "clock_jump";
+}
 [[nodiscard]] inline bool is_of_reading(const EffectId& id) {
   return id.effect == "quantisation" || id.effect == "reading_noise";
 }
@@ -77,8 +81,9 @@ struct CameraEffect {
                                                                const std::vector<int>& driven,
                                                                bool postures);
 
-/// Of encoders, gears and joints: encoder_scale, eccentricity, gear_error, backlash, compliance,
-/// coupling, helical, curved_slider, axis_wobble, quantisation, reading_noise, joint_map.
+/// Of encoders, gears and joints: early_reading, encoder_scale, eccentricity, gear_error, backlash,
+/// compliance, coupling, helical, curved_slider, axis_wobble, quantisation, reading_noise,
+/// joint_map.
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,

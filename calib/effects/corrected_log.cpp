@@ -16,39 +16,11 @@
 namespace kinescope {
 namespace {
 
-// Joint values that the log says, and their rates, at its own samples.
-JointMotion motion_of(const JointLog& log, const KinematicTree& tree) {
-  const auto rows = static_cast<Eigen::Index>(log.size());
-  const auto joints = static_cast<Eigen::Index>(tree.joints.size());
-  JointMotion out{log.times_s, Eigen::MatrixXd::Zero(rows, joints),
-                  Eigen::MatrixXd::Zero(rows, joints)};
-  for (Eigen::Index j = 0; j < joints; ++j) {
-    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
-    const auto channel = log.channel(joint.channel);
-    if (!channel) continue;
-    Eigen::ArrayXd reading = log.values.col(*channel).array();
-    for (const ChannelShare& share : joint.couplings) {
-      if (const auto other = log.channel(share.channel)) {
-        reading += share.ratio * log.values.col(*other).array();
-      }
-    }
-    out.value.col(j) = (joint.scale * reading + joint.offset).matrix();
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      const Eigen::Index before = std::max<Eigen::Index>(0, i - 1);
-      const Eigen::Index after = std::min(rows - 1, i + 1);
-      const double step = log.times_s[static_cast<std::size_t>(after)] -
-                          log.times_s[static_cast<std::size_t>(before)];
-      if (step > 0.0) out.rate(i, j) = (out.value(after, j) - out.value(before, j)) / step;
-    }
-  }
-  return out;
-}
-
 effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
                               const std::optional<Eigen::Vector3d>& gravity_base) {
   effects::EffectWorld world;
   world.tree = tree;
-  world.frames = motion_of(log, tree);
+  world.frames = effects::motion_of(log, tree);
   world.log = world.frames;
   world.loaded = world.frames;
   world.gravity_base = gravity_base;
@@ -117,6 +89,11 @@ void check_place(const FittedEffect& effect, const KinematicTree& tree, const Jo
   require_channels(effect, tree.joints[joint->index()], log);
   if (const auto decides = deciding_joint(effect, tree))
     require_channels(effect, tree.joints[decides->index()], log);
+  if (effect.id.effect == "early_reading") {
+    for (const std::string& column : tree.joints[joint->index()].copies) {
+      if (!log.channel(column)) throw refused(log, effect, fmt::format("no column '{}'", column));
+    }
+  }
   if (!effects::is_sag(effect.id)) return;
   for (const Joint& other : tree.joints) {
     if (!other.channel.empty() && moves_load_of(tree, *joint, other))

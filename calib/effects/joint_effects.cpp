@@ -44,6 +44,35 @@ CameraEffect late_reading(const Suspect& s) {
   return out;
 }
 
+// A reading taken before the joint had come to rest where it was sent.
+CameraEffect early_reading(const EffectWorld& world, const Suspect& s) {
+  constexpr double kMost = 1.5;  // beyond its command by half as much again: it swings
+  const std::vector<Eigen::VectorXd>& copies = world.frames.copies.at(s.joint);
+  const std::vector<std::string>& names =
+      world.tree.joints[static_cast<std::size_t>(s.joint)].copies;
+  CameraEffect out = effect(
+      s, "early_reading",
+      fmt::format("{} stands a share of the way from its reading to another column of it", s.name),
+      {{"share", ""}}, "");
+  out.candidate.possible = [](const Eigen::VectorXd& share) { return std::abs(share[0]) < kMost; };
+  for (std::size_t k = 0; k < copies.size(); ++k)
+    out.candidate.scan.push_back(static_cast<double>(k));
+  out.candidate.scan_listed = true;
+  out.candidate.scan_name = "towards";
+  out.candidate.scan_words = [names](double k) {
+    return names[static_cast<std::size_t>(std::lround(k))];
+  };
+  out.candidate.check =
+      "that joints are read after they have come to rest, and when the camera "
+      "(or tracker) measures";
+  out.candidate.record = fmt::format("wait longer at each posture before {} is read", s.name);
+  out.corrections = [s, copies](double k) {
+    return std::vector{turn(s, "share of the way", "",
+                            copies[static_cast<std::size_t>(std::lround(k))] - s.value)};
+  };
+  return out;
+}
+
 // Where a reading rests on a step, only the camera says where in the step the joint is.
 std::vector<Correction> places_in_steps(const EffectWorld& world, const Suspect& s,
                                         const UnsteadyReading& reading) {
@@ -51,7 +80,7 @@ std::vector<Correction> places_in_steps(const EffectWorld& world, const Suspect&
   for (const Hold& hold : reading.holds) {
     Eigen::VectorXd share(s.value.size());
     for (Eigen::Index i = 0; i < share.size(); ++i)
-      share[i] = hold.share(world.frames.times_s[static_cast<std::size_t>(i)]);
+      share[i] = hold.share(world.frames.read_s(i, s.joint));
     if (share.isZero(0.0)) continue;
     out.push_back(turn(s, fmt::format("place in its step from {:.3f} s", hold.first_s), s.unit,
                        std::move(share)));
@@ -79,7 +108,7 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
                             : "potentiometer, shielding and filter of this encoder";
   out.candidate.record = fmt::format("move {} more slowly, and log it at a higher rate", s.name);
   const Eigen::VectorXd share =
-      (read_at(reading.times_s, reading.motion, world.frames.times_s) - s.value) / reading.size;
+      (read_at(reading.times_s, reading.motion, world.frames, s.joint) - s.value) / reading.size;
   out.corrections = [s, parameter, share](double) {
     return std::vector{turn(s, parameter, s.unit, share)};
   };
@@ -198,17 +227,15 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   out.candidate.check = "gear mesh, keys, belt tension";
   out.candidate.record = fmt::format("move {} to the same places from both sides", s.name);
   const Eigen::VectorXd drive = world.log.value.col(s.joint);
-  out.corrections = [s, drive, log_s = world.log.times_s,
-                     frames_s = world.frames.times_s](double width) {
+  out.corrections = [s, drive, log_s = world.log.times_s, frames = world.frames](double width) {
     return std::vector{
-        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames_s))};
+        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames, s.joint))};
   };
   if (world.known) return out;
   // A robot that rests at first rests anywhere in its gap.
-  out.nuisances = [s, drive, log_s = world.log.times_s,
-                   frames_s = world.frames.times_s](double width) {
+  out.nuisances = [s, drive, log_s = world.log.times_s, frames = world.frames](double width) {
     std::vector<Correction> start;
-    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames_s);
+    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames, s.joint);
     if (share.isZero(0.0)) return start;
     start.push_back(turn(s, "place in its gap at the start", s.unit, std::move(share)));
     start.back().is_nuisance = true;
@@ -430,6 +457,7 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     const Suspect s = suspect(world, joint);
     if (!world.known && !(s.value.maxCoeff() > s.value.minCoeff())) continue;
     if (!world.postures && world.driven.size() > 1) out.push_back(late_reading(s));
+    if (world.frames.copies.contains(joint)) out.push_back(early_reading(world, s));
     out.push_back(encoder_scale(s));
     if (s.turns) out.push_back(eccentricity(world, s));
     if (CameraEffect gear = gear_error(s); world.known || !gear.candidate.scan.empty()) {

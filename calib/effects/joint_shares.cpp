@@ -36,7 +36,47 @@ std::vector<Eigen::Vector3d> middles(const KinematicTree& tree) {
   return sum;
 }
 
+Eigen::VectorXd central_rate(const std::vector<double>& times_s, const Eigen::VectorXd& values) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(values.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Eigen::Index before = std::max<Eigen::Index>(0, i - 1);
+    const Eigen::Index after = std::min(values.size() - 1, i + 1);
+    const double step =
+        times_s[static_cast<std::size_t>(after)] - times_s[static_cast<std::size_t>(before)];
+    if (step > 0.0) out[i] = (values[after] - values[before]) / step;
+  }
+  return out;
+}
+
 }  // namespace
+
+Eigen::VectorXd joint_values(const JointLog& log, const Joint& joint, int channel) {
+  Eigen::ArrayXd reading = log.values.col(channel).array();
+  for (const ChannelShare& share : joint.couplings) {
+    if (const auto other = log.channel(share.channel))
+      reading += share.ratio * log.values.col(*other).array();
+  }
+  return (joint.scale * reading + joint.offset).matrix();
+}
+
+JointMotion motion_of(const JointLog& log, const KinematicTree& tree) {
+  const auto rows = static_cast<Eigen::Index>(log.size());
+  const auto joints = static_cast<Eigen::Index>(tree.joints.size());
+  JointMotion out{log.times_s, Eigen::MatrixXd::Zero(rows, joints),
+                  Eigen::MatrixXd::Zero(rows, joints)};
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
+    const auto channel = log.channel(joint.channel);
+    if (!channel) continue;
+    out.value.col(j) = joint_values(log, joint, *channel);
+    for (const std::string& column : joint.copies) {
+      if (const auto copy = log.channel(column))
+        out.copies[static_cast<int>(j)].push_back(joint_values(log, joint, *copy));
+    }
+    out.rate.col(j) = central_rate(log.times_s, out.value.col(j));
+  }
+  return out;
+}
 
 Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width) {
   Eigen::VectorXd out(drive.size());
@@ -85,6 +125,13 @@ Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd
     }
   }
   return out;
+}
+
+Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd& values,
+                        const JointMotion& to, int joint) {
+  if (to.read_s.size() == 0) return read_at(from_s, values, to.times_s);
+  const auto when = to.read_s.col(joint);
+  return read_at(from_s, values, {when.begin(), when.end()});
 }
 
 namespace {

@@ -13,6 +13,14 @@
 
 namespace kinescope::effects {
 
+/// A joint's value at the log's samples where `channel`, a column in the unit of its own one, says
+/// where it is; columns that it is coupled to and that the log lacks count as 0.
+[[nodiscard]] Eigen::VectorXd joint_values(const JointLog& log, const Joint& joint, int channel);
+
+/// Joint values that the log says, and their rates, at its own samples; 0 for joints without a
+/// column.
+[[nodiscard]] JointMotion motion_of(const JointLog& log, const KinematicTree& tree);
+
 /// Where the play of a gear stands: -1/2 when the drive has last pushed the link forwards, 1/2 when
 /// backwards, in between while the gap is crossed; link = drive + width x this. `width` in the
 /// unit of `drive`. Visintin 1994, section III.2 (the play operator).
@@ -27,6 +35,11 @@ namespace kinescope::effects {
 [[nodiscard]] Eigen::VectorXd read_at(const std::vector<double>& from_s,
                                       const Eigen::VectorXd& values,
                                       const std::vector<double>& to_s);
+
+/// The same, at the instants of a motion: when it read the joint there.
+[[nodiscard]] Eigen::VectorXd read_at(const std::vector<double>& from_s,
+                                      const Eigen::VectorXd& values, const JointMotion& to,
+                                      int joint);
 
 /// A load that a joint may give way under.
 struct Load {

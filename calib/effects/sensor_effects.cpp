@@ -127,6 +127,23 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
   return out;
 }
 
+// Seen from before, a sheet that is bent across one direction is shorter along that: smaller, and
+// no longer square, by the square of the bend.
+std::vector<Correction> foreshortening(int marker, const std::string& name) {
+  constexpr double kMost = 0.02;  // of its size: bent by 5 % of it
+  std::vector<Correction> out;
+  for (const auto& [part, what] : {std::pair{CorrectedPart::kMarkerSize, "shortened"},
+                                   std::pair{CorrectedPart::kMarkerShear, "sheared"}}) {
+    Correction& one = out.emplace_back();
+    one.name = fmt::format("{} {}", name, what);
+    one.part = part;
+    one.index = marker;
+    one.is_nuisance = true;
+    one.prior_sigma = kMost;
+  }
+  return out;
+}
+
 // A sheet of paper that does not lie flat.
 CameraEffect bent_tag(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
@@ -154,6 +171,7 @@ CameraEffect bent_tag(const EffectWorld& world, int marker) {
     return std::vector{correct(CorrectedPart::kMarkerWarp, like, 0, marker),
                        correct(CorrectedPart::kMarkerWidth, like, 1, marker)};
   };
+  out.nuisances = [marker, name](double) { return foreshortening(marker, name); };
   return out;
 }
 

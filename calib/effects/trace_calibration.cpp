@@ -102,6 +102,31 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   return again;
 }
 
+// Corrections beside which sightings are chosen, on readings without steps and noise.
+std::vector<Correction> without_readings(const CalibrationTrace& found) {
+  std::vector<Correction> out;
+  auto next = found.corrections.begin();
+  for (const FittedEffect& effect : found.effects) {
+    if (effects::is_clock_offset(effect.id)) continue;
+    const auto end = next + effect.values.size();
+    if (!effects::is_of_reading(effect.id)) out.insert(out.end(), next, end);
+    next = end;
+  }
+  out.insert(out.end(), next, found.corrections.end());
+  return out;
+}
+
+// Without the effects, what they do passed for noise: of postures what goes against them stood out,
+// of films what changes from one frame to the next.
+bool judges_better(const EffectBundle& beside, const EffectBundle& without) {
+  // Where it was 0.9 and more (`undeclared`, numbers 5064, 5215, 5335) a rest was seen that is not
+  // there; at 0.2 (5135) and less a second search says hardly more.
+  constexpr double kBent = 0.5;
+  constexpr double kFiner = 1.5;
+  return beside.postures() ? beside.chosen_beyond(without) > kBent
+                           : beside.finer_than(without) > kFiner;
+}
+
 }  // namespace
 
 CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
@@ -110,16 +135,11 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
                                    const Progress& progress) {
   const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
   CalibrationTrace out = traced_with_gravity(bundle, options, progress);
-  if (!bundle.postures() || out.corrections.empty()) return out;
-  // Of postures the model says what stands out, and without the effects it said so of what goes
-  // against them: of noise of one sign.
+  if (out.corrections.empty()) return out;
   CalibrationStart known = start;
-  known.corrections = out.corrections;
+  known.corrections = without_readings(out);
   const EffectBundle chosen(measurements, markers, log, known, options.calibrate);
-  // Where it was 0.9 and more (`undeclared`, numbers 5064, 5215, 5335) a rest was seen that is not
-  // there; at 0.2 (5135) and less a second search says hardly more.
-  constexpr double kBent = 0.5;
-  if (chosen.chosen_beyond(bundle) < kBent) return out;
+  if (!judges_better(chosen, bundle)) return out;
   CalibrationTraceOptions begun = options;
   begun.gravity_base = out.gravity_base;
   begun.trace.start = out.trace.added;

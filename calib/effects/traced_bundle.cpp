@@ -334,7 +334,7 @@ BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
   return out;
 }
 
-EffectWorld TracedBundle::world_at(double time_offset_s) const {
+EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   EffectWorld world;
   world.tree = bundle_->tree();
   world.camera = bundle_->camera();
@@ -342,9 +342,9 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
   world.postures = bundle_->postures();
   world.driven = bundle_->driven_joints();
   world.seen = bundle_->seen_markers();
-  world.frames = bundle_->motion_at_frames(time_offset_s);
+  world.frames = bundle_->motion_at_frames(ahead_s);
   world.loaded = world.frames;
-  if (!world.postures) world.log = bundle_->motion_of_log(time_offset_s);
+  if (!world.postures) world.log = bundle_->motion_of_log(ahead_s.mean());
   world.unsteady = unsteady_;
   world.gravity_base = options_.gravity_base;
   world.clock_free = options_.calibrate.estimate_time_offset;
@@ -353,28 +353,40 @@ EffectWorld TracedBundle::world_at(double time_offset_s) const {
   return world;
 }
 
-// Shares are taken where the joints are at the time offset that the fit finds, and loads where the
+// The clock as the last fit with an effect of it had it: the next is near.
+Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effects) const {
+  if (std::ranges::none_of(effects, is_of_clock, &AddedEffect::id)) return clock_ahead(0.0);
+  return last_ahead_s_ ? *last_ahead_s_ : clock_ahead(bundle_->start_time_offset_s());
+}
+
+Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
+  return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(bundle_->frame_times_s().size()),
+                                   static_cast<Eigen::Index>(bundle_->tree().joints.size()),
+                                   time_offset_s);
+}
+
+// Shares are taken where the joints are by the clock that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
 TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
   constexpr int kRounds = 2;           // each leaves of its error what the effect's size is, in rad
   constexpr double kSameTime = 20e-6;  // s: no joint moves noticeably
-  const bool clock = std::ranges::any_of(effects, is_clock_offset, &AddedEffect::id);
-  double offset_s = clock ? last_offset_s_.value_or(bundle_->start_time_offset_s()) : 0.0;
+  const bool clock = std::ranges::any_of(effects, is_of_clock, &AddedEffect::id);
+  Eigen::MatrixXd ahead_s = likely_clock(effects);
   Ready out;
-  out.world = world_at(offset_s);
+  out.world = world_at(ahead_s);
   out.library = all_effects(out.world);
   out.change = change_of(out.library, effects);
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
   const int rounds = by_size ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
     BundleSolution solution = bundle_->solve(out.change);
-    if (clock && solution.converged) last_offset_s_ = solution.time_offset_s;
-    if (!by_size && std::abs(solution.time_offset_s - offset_s) < kSameTime) {
+    if (clock && solution.converged) last_ahead_s_ = solution.ahead_s;
+    if (!by_size && (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime) {
       out.solved = std::move(solution);
       break;
     }
-    offset_s = solution.time_offset_s;
-    out.world = world_at(offset_s);
+    ahead_s = solution.ahead_s;
+    out.world = world_at(ahead_s);
     if (by_size && solution.converged) {
       out.world.tree = solution.tree;
       add_values(out.change.corrections, solution, out.world.loaded.value);
@@ -387,7 +399,7 @@ TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effe
 }
 
 std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects) const {
-  const std::vector<CameraEffect> library = all_effects(world_at(0.0));
+  const std::vector<CameraEffect> library = all_effects(world_at(clock_ahead(0.0)));
   std::erase_if(effects, [&](const AddedEffect& added) {
     return std::ranges::none_of(library, [&](const CameraEffect& effect) {
       return effect.candidate.id == added.id && !effect.candidate.is_curve();

@@ -42,7 +42,10 @@ class TracedBundle final : public TracedModel {
     std::optional<BundleSolution> solved;  ///< of the change, where that is known
   };
   [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
-  [[nodiscard]] EffectWorld world_at(double time_offset_s) const;
+  /// `ahead_s`: frames x joints, joint-log time minus frame time.
+  [[nodiscard]] EffectWorld world_at(const Eigen::MatrixXd& ahead_s) const;
+  [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
+  [[nodiscard]] Eigen::MatrixXd likely_clock(const std::vector<AddedEffect>& effects) const;
   [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
                                        const std::vector<AddedEffect>& effects) const;
 
@@ -50,7 +53,7 @@ class TracedBundle final : public TracedModel {
   CalibrationTraceOptions options_;
   std::vector<std::size_t> without_couplings_;
   std::map<int, UnsteadyReading> unsteady_;
-  mutable std::optional<double> last_offset_s_;  ///< that a fit found: the next is near
+  mutable std::optional<Eigen::MatrixXd> last_ahead_s_;
 };
 
 }  // namespace kinescope::effects

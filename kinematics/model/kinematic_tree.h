@@ -48,8 +48,9 @@ struct Joint {
   Pose T_parent_joint;                              ///< where the joint sits on its parent
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit, in the joint frame
   std::string channel;                              ///< log channel that drives it; may be empty
-  double scale = 1.0;                               ///< rad (or m) per unit of the channel
-  double offset = 0.0;                              ///< of the value, see below
+  std::vector<std::string> copies;  ///< channels that tell the same (its command, say), unused
+  double scale = 1.0;               ///< rad (or m) per unit of the channel
+  double offset = 0.0;              ///< of the value, see below
   /// value = scale * (reading + ratio * its reading + ..) + offset
   std::vector<ChannelShare> couplings;
   std::optional<JointLimits> limits;

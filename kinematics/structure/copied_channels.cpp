@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "kinematics/structure/time_offset.h"
@@ -13,9 +14,14 @@ namespace {
 // Samples that are compared.
 constexpr std::size_t kMostSamples = 400;
 constexpr std::size_t kFewestSamples = 20;
-// Spreads of one quantity agree to this, slopes of one on the other, too.
-constexpr double kSameUnit = 0.01;
-constexpr double kSameMotion = 0.9999;
+/// How much alike columns of one quantity are.
+struct Likeness {
+  double unit = 0.0;    ///< spreads agree to this, slopes of one on the other, too
+  double motion = 0.0;  ///< correlation
+};
+constexpr Likeness kTheSame{.unit = 0.01, .motion = 0.9999};
+// Of a servo that stays a twentieth of its motion behind its command.
+constexpr Likeness kLoosely{.unit = 0.1, .motion = 0.998};
 // Drives follow their command faster than this, s.
 constexpr double kMostDelay = 0.25;
 // How much better (-2 ln likelihood) another copy has to be.
@@ -64,25 +70,26 @@ Sampled sampled(const JointLog& log, int first, int second, double delay_s) {
   return {centred(values), centred(later_values), centred(later_rates)};
 }
 
-bool are_alike(const Sampled& s) {
-  return std::abs(s.slope() - 1.0) < kSameUnit && s.correlation() > kSameMotion;
+bool are_alike(const Sampled& s, const Likeness& least) {
+  return std::abs(s.slope() - 1.0) < least.unit && s.correlation() > least.motion;
 }
 
-bool tell_the_same(const JointLog& log, int first, int second) {
+// The correlation at the first delay, of those that lead to the best one, at which they are alike.
+std::optional<double> likeness(const JointLog& log, int first, int second, const Likeness& least) {
   const double a = spread(log, first);
-  if (!(a > 0.0) || std::abs(spread(log, second) / a - 1.0) > kSameUnit) return false;
+  if (!(a > 0.0) || std::abs(spread(log, second) / a - 1.0) > least.unit) return std::nullopt;
   constexpr int kPasses = 5;
   double delay_s = 0.0;
   for (int pass = 0; pass < kPasses; ++pass) {
     const Sampled s = sampled(log, first, second, delay_s);
-    if (are_alike(s)) return true;
+    if (are_alike(s, least)) return s.correlation();
     // Postures far apart cannot be interpolated.
     if (2 * s.first.size() < static_cast<Eigen::Index>(std::min(log.size(), kMostSamples)))
-      return false;
+      return std::nullopt;
     delay_s += (s.rate * (s.first - s.second)).sum() / std::max(1e-300, s.rate.square().sum());
-    if (!(std::abs(delay_s) < kMostDelay)) return false;
+    if (!(std::abs(delay_s) < kMostDelay)) return std::nullopt;
   }
-  return false;
+  return std::nullopt;
 }
 
 // The tree with its channels renamed.
@@ -163,8 +170,9 @@ class Comparison {
 std::vector<SameQuantity> same_quantities(const JointLog& log) {
   std::vector<SameQuantity> groups;
   for (int c = 0; c < static_cast<int>(log.channels.size()); ++c) {
-    const auto group = std::ranges::find_if(
-        groups, [&](const SameQuantity& g) { return tell_the_same(log, g.front(), c); });
+    const auto group = std::ranges::find_if(groups, [&](const SameQuantity& g) {
+      return likeness(log, g.front(), c, kTheSame).has_value();
+    });
     if (group == groups.end()) {
       groups.push_back({c});
     } else {
@@ -227,6 +235,23 @@ std::vector<int> best_copies(const FoundTree& found, const Series& series, const
     }
   }
   return chosen;
+}
+
+std::vector<ChannelCopy> repeated_loosely(const JointLog& log, const std::vector<int>& idle,
+                                          const std::vector<int>& driving) {
+  std::vector<ChannelCopy> out;
+  for (const int c : idle) {
+    ChannelCopy copy{c, -1};
+    double most = 0.0;
+    for (const int d : driving) {
+      const double like = likeness(log, d, c, kLoosely).value_or(0.0);
+      if (like <= most) continue;
+      most = like;
+      copy.of = d;
+    }
+    if (copy.of >= 0) out.push_back(copy);
+  }
+  return out;
 }
 
 }  // namespace kinescope::structure_search

@@ -2,7 +2,7 @@
 //
 // Takes   a joint log, and a tree grown without the copies in it.
 // Gives   which columns tell one quantity twice (command and measured value, say), and which of
-//         them the markers follow best.
+//         them the markers follow best; which of the columns that drive nothing repeat another.
 // Method  one column regressed on the other at the delay that fits best (Gauss-Newton on the
 //         delay).
 #pragma once
@@ -11,6 +11,7 @@
 
 #include "kinematics/log/joint_log.h"
 #include "kinematics/structure/search.h"
+#include "kinematics/structure/structure.h"
 
 namespace kinescope::structure_search {
 
@@ -37,5 +38,12 @@ using SameQuantity = std::vector<int>;
                                            const std::vector<SameQuantity>& groups,
                                            std::vector<int> chosen,
                                            const StructureOptions& options);
+
+/// Of channels that drive nothing those that tell less exactly what a driving one tells: a command
+/// that a drive follows with a delay, a dead band, a droop under load. Each with the one it is most
+/// like. O(idle * driving * samples).
+[[nodiscard]] std::vector<ChannelCopy> repeated_loosely(const JointLog& log,
+                                                        const std::vector<int>& idle,
+                                                        const std::vector<int>& driving);
 
 }  // namespace kinescope::structure_search

@@ -20,7 +20,7 @@ OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups) {
   return own_log(log, std::move(groups), std::move(first));
 }
 
-void in_whole_log(const OwnLog& own, Structure& out) {
+void in_whole_log(const OwnLog& own, const JointLog& log, Structure& out) {
   const auto whole = [&](int c) { return own.channels[static_cast<std::size_t>(c)]; };
   std::vector<int> driving;
   for (StructureJoint& joint : out.joints) {
@@ -43,6 +43,12 @@ void in_whole_log(const OwnLog& own, Structure& out) {
         out.idle_channels.push_back(c);
       }
     }
+  }
+  std::ranges::sort(driving);
+  driving.erase(std::ranges::unique(driving).begin(), driving.end());
+  for (const ChannelCopy& copy : repeated_loosely(log, out.idle_channels, driving)) {
+    std::erase(out.idle_channels, copy.channel);
+    out.copied_channels.push_back(copy);
   }
   std::ranges::sort(out.idle_channels);
   std::ranges::sort(out.copied_channels, {}, &ChannelCopy::channel);

@@ -26,7 +26,7 @@ struct OwnLog {
 [[nodiscard]] OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups);
 
 /// Channels of the log without copies become those of the whole log; copies of such that drive a
-/// joint are listed, the others are idle.
-void in_whole_log(const OwnLog& own, Structure& out);
+/// joint are listed, exact ones or not, the others are idle.
+void in_whole_log(const OwnLog& own, const JointLog& log, Structure& out);
 
 }  // namespace kinescope::structure_search

@@ -92,7 +92,7 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   const GrownTree fitted = refit_tree(s.tree, full, every);
   Structure out = assemble(fitted, full, every, verdict);
   if (used_channels(fitted) > 0) doubt_unpaired(every, own, out);
-  in_whole_log(own, out);
+  in_whole_log(own, log, out);
   doubt_shared_channels(log, out);
   doubt_copies(log, out);
   doubt_allowance(answer, out);

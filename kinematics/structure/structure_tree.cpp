@@ -64,6 +64,10 @@ KinematicTree structure_tree(const Structure& structure, const JointLog& log) {
     if (!joint.channel) continue;
     out.channel = log.channels[static_cast<std::size_t>(joint.channel->channel)];
     out.scale = joint.channel->scale;
+    for (const ChannelCopy& copy : structure.copied_channels) {
+      if (copy.of == joint.channel->channel)
+        out.copies.push_back(log.channels[static_cast<std::size_t>(copy.channel)]);
+    }
   }
   for (std::size_t l = 0; l < structure.links.size(); ++l) {
     const StructureLink& link = structure.links[l];

@@ -53,7 +53,8 @@ json document_of(const std::vector<FittedEffect>& effects) {
                {"channel", "b"},
                {"scale", 1e-3},
                {"offset", 0.1},
-               {"couplings", {{{"channel", "a"}, {"ratio", -1.0}}}}}}}}},
+               {"couplings", {{{"channel", "a"}, {"ratio", -1.0}}}},
+               {"copies", {"b_cmd"}}}}}}},
           {"gravity_base", {0.0, 0.6, -0.8}},
           {"effects", effects_json(effects)}};
 }
@@ -98,6 +99,8 @@ TEST_F(EffectsFile, ComesBackToTheLastBit) {
   EXPECT_EQ(back.channels[1].scale, 1e-3);
   EXPECT_EQ(back.channels[1].offset, 0.1);
   EXPECT_TRUE(back.channels[0].couplings.empty());
+  EXPECT_TRUE(back.channels[0].copies.empty());
+  EXPECT_EQ(back.channels[1].copies, std::vector<std::string>{"b_cmd"});
   EXPECT_EQ(back.channels[1].couplings, (std::vector<ChannelShare>{{"a", -1.0}}));
   ASSERT_TRUE(back.gravity_base);
   EXPECT_EQ(*back.gravity_base, Eigen::Vector3d(0.0, 0.6, -0.8));
@@ -221,6 +224,11 @@ TEST_F(EffectsFile, WhatIsNoNumberIsRefused) {
     document = document_of({eccentricity()});
     document["robot"]["joints"][1]["couplings"] = couplings;
     refused(document, "");
+  }
+  for (const json& copies : {json(7), json{3}}) {
+    document = document_of({eccentricity()});
+    document["robot"]["joints"][1]["copies"] = copies;
+    refused(document, "cop");
   }
   for (const json& gravity : {json{0.0, 1.0}, json{0.0, nullptr, 1.0}, json("down")}) {
     document = document_of({eccentricity()});

@@ -12,7 +12,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 #include "kinematics/model/kinematic_tree.h"
-#include "tests/truth/camera_effects.h"
+#include "tests/calib/effects/traced_worlds.h"
 
 namespace kinescope {
 namespace {
@@ -22,60 +22,8 @@ using truth::InjectedEffect;
 using truth::make_effect_world;
 using truth::World;
 
-// What is left of an effect when it has been corrected, as error on unseen frames.
-constexpr double kWithoutAfterOverClean = 1.05;
-constexpr double kSizeTolerance = 0.1;
-constexpr double kSigma = 0.03;  // px, of a corner's coordinate
 // Of 6000 coordinates' rms: 1 % by chance, parameters that were fitted, sightings left out.
 constexpr double kSigmaTolerance = 0.0015;
-
-EffectWorldOptions filmed(std::vector<InjectedEffect> effects = {}, int frames = 200) {
-  EffectWorldOptions options;
-  options.seed = 7003;
-  options.frames = frames;
-  options.frame_rate_hz = frames / 33.0;  // 33 s of motion
-  options.sigma_px = kSigma;
-  options.effects = std::move(effects);
-  return options;
-}
-
-CalibrationStart start_of(const World& world) {
-  return truth::perturbed_start(world, 0.005, 0.001, 1);
-}
-
-CalibrationTrace trace_of(const World& world) {
-  return trace_calibration(world.measurements, world.markers, world.log, start_of(world), {});
-}
-
-// Ten times what tracing is asked to see at the least.
-InjectedEffect strong(const std::string& effect, const std::string& place) {
-  for (InjectedEffect found : truth::weakest_effects(effect, truth::robot_of(filmed()))) {
-    if (truth::place_in_library(found) != place) continue;
-    found.size *= 10.0;
-    return found;
-  }
-  throw std::logic_error(effect + " cannot sit on " + place);
-}
-
-const CalibrationTrace& clean_trace() {
-  static const CalibrationTrace trace = trace_of(make_effect_world(filmed()));
-  return trace;
-}
-
-std::string answer(const Trace& trace) {
-  std::string out = std::string(to_string(trace.verdict)) + ": " + trace.reason;
-  for (const TracedEffect& effect : trace.accepted)
-    out += "; " + effect.id.effect + " " + effect.id.place;
-  return out;
-}
-
-// Signs are a convention of the place; sizes are compared without.
-bool size_is_right(const TracedEffect& found, double size) {
-  const double low = std::min(std::abs(found.interval.low), std::abs(found.interval.high));
-  const double high = std::max(std::abs(found.interval.low), std::abs(found.interval.high));
-  return (low <= std::abs(size) && std::abs(size) <= high) ||
-         std::abs(std::abs(found.size) - std::abs(size)) <= kSizeTolerance * std::abs(size);
-}
 
 class Named : public ::testing::TestWithParam<std::pair<std::string, std::string>> {};
 
@@ -96,7 +44,8 @@ TEST_P(Named, SizedAndCorrected) {
   // What goes on to the calibration and to the log says the same, and leaves only noise.
   ASSERT_EQ(found.effects.size(), 1U);
   EXPECT_EQ(found.effects.front().id, trace.accepted.front().id);
-  EXPECT_EQ(found.corrections.size(), found.effects.front().parameters.size());
+  EXPECT_EQ(std::ranges::count(found.corrections, false, &Correction::is_nuisance),
+            std::ssize(found.effects.front().parameters));
   CalibrationStart start = start_of(world);
   start.corrections = found.corrections;
   const Calibration corrected =
@@ -155,6 +104,44 @@ TEST(TraceCalibration, WhereAJointRestsInAStepOfItsReadingIsNoJump) {
   ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
   EXPECT_EQ(trace.accepted.front().id, (EffectId{"quantisation", "q2"})) << answer(trace);
   EXPECT_LT(trace.held_out_after.value, 1.3 * clean_trace().trace.held_out_after.value);
+}
+
+// What a step does from one frame to the next is no noise of the camera's.
+TEST(TraceCalibration, SightingsWeighNoLessBesideReadingsInSteps) {
+  const World clean = make_effect_world(filmed());
+  const World stepping = make_effect_world(filmed({strong("quantisation", "q2")}));
+  const EffectBundle without(clean.measurements, clean.markers, clean.log, start_of(clean), {});
+  const EffectBundle with(stepping.measurements, stepping.markers, stepping.log, start_of(stepping),
+                          {});
+  EXPECT_LT(without.finer_than(with), 1.3);
+}
+
+// A clock that is 60 ms ahead at the end tells another reading for the frame, in another step.
+TEST(TraceCalibration, WhichStepAReadingIsInIsToldByTheClockThatIsFound) {
+  const InjectedEffect steps = strong("quantisation", "q2");
+  const World world = make_effect_world(filmed({{"clock_drift", "clock", 0.002, 0.5}, steps}, 300));
+  const Trace trace = trace_of(world).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 2U) << answer(trace);
+  EXPECT_EQ(trace.accepted[0].id, (EffectId{"clock_drift", "clock"}));
+  EXPECT_EQ(trace.accepted[1].id, (EffectId{"quantisation", "q2"}));
+  EXPECT_TRUE(size_is_right(trace.accepted[1], steps.size)) << trace.accepted[1].size;
+  EXPECT_LT(trace.held_out_after.value, 1.3 * clean_trace().trace.held_out_after.value);
+}
+
+// Bent by a twentieth of its size a marker is a hundredth shorter one way: no size of its own.
+TEST(TraceCalibration, AMarkerThatIsMuchBentIsShorterToo) {
+  const World flat = make_effect_world(filmed());
+  constexpr double kOfSize = 0.05;
+  const double bend = kOfSize * flat.markers.size_m(TagId{12});
+  const Trace trace =
+      trace_of(make_effect_world(filmed({{"bent_tag", "tag_12", bend, 0.6}}))).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"bent_tag", "tag_12"}));
+  EXPECT_TRUE(size_is_right(trace.accepted.front(), bend)) << trace.accepted.front().size;
+  EXPECT_LT(trace.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
 class Unnamed : public ::testing::TestWithParam<std::string> {};
@@ -471,171 +458,6 @@ TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {
   const CalibrationTrace found = trace_of_coupled(0.31, 0.3);
   expect_coupling(found, 0.31);
   EXPECT_EQ(found.corrections.size(), 1U);
-}
-
-// The robot at rest before a tracker, posture after posture.
-World tracked(truth::RobotKind kind, int postures, std::vector<InjectedEffect> effects) {
-  constexpr double kSigmaM = 2e-4;
-  constexpr double kSigmaRad = 1e-3;
-  EffectWorldOptions options = filmed(std::move(effects), postures);
-  options.kind = kind;
-  options.frame_rate_hz = 0.4;
-  options.log_rate_hz = 50.0;
-  options.clock_jitter = 0.0;
-  options.poses = true;
-  World world = make_effect_world(options);
-  const truth::FilmedRobot robot = truth::robot_of(options);
-  world.log.times_s = world.measurements.times_s;
-  world.log.values.resize(static_cast<Eigen::Index>(world.log.times_s.size()),
-                          world.log.values.cols());
-  for (Eigen::Index i = 0; i < world.log.values.rows(); ++i) {
-    world.log.values.row(i) =
-        robot.encoders(world.log.times_s[static_cast<std::size_t>(i)]).transpose();
-  }
-  Rng rng = Rng::from_name("tracker");
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(kSigmaRad), Eigen::Vector3d::Constant(kSigmaM);
-  variance = variance.cwiseAbs2().eval();
-  for (PoseTrack& track : world.measurements.poses.tracks) {
-    for (PoseSample& sample : track.samples) {
-      Vector6d noise;
-      noise << rng.normal3(kSigmaRad), rng.normal3(kSigmaM);
-      sample.T_camera_marker = sample.T_camera_marker * exp_pose(noise);
-      sample.covariance = variance.asDiagonal();
-    }
-  }
-  world.measurements.corners.clear();
-  return world;
-}
-
-// The last joint's errors are those of one marker: a quarter of its sightings stands out, at either
-// end of the joint's range. A part of a wave would explain the same; it need not be so straight.
-TEST(TraceCalibration, WhatStandsOutAtTheEndsOfAJointsRangeIsItsScale) {
-  constexpr double kScale = 0.025;
-  const World world =
-      tracked(truth::RobotKind::kPlanar, 150, {{"encoder_scale", "q4", kScale, 0.0}});
-  const Trace trace = trace_of(world).trace;
-  ASSERT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
-  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
-  EXPECT_EQ(trace.accepted.front().id, (EffectId{"encoder_scale", "q4"})) << answer(trace);
-  EXPECT_TRUE(size_is_right(trace.accepted.front(), kScale)) << trace.accepted.front().size;
-}
-
-// Without the effect those are left out whose noise adds to it; the others seem to follow a curve.
-TEST(TraceCalibration, SightingsAreChosenAgainBesideTheEffect) {
-  for (const double scale : {0.02, 0.025, 0.03}) {
-    const World world =
-        tracked(truth::RobotKind::kWrist, 90, {{"encoder_scale", "q1", scale, 0.0}});
-    const CalibrationTrace found = trace_of(world);
-    EXPECT_EQ(found.trace.verdict, TraceVerdict::kEffects) << answer(found.trace);
-    CalibrationStart start = start_of(world);
-    const EffectBundle without(world.measurements, world.markers, world.log, start, {});
-    start.corrections = found.corrections;
-    const EffectBundle beside(world.measurements, world.markers, world.log, start, {});
-    EXPECT_GT(beside.chosen_beyond(without), 0.5) << scale;
-    EXPECT_NEAR(found.trace.accepted.front().size, scale, 0.01 * scale);
-  }
-}
-
-// A curve over neither joint shows what two do together.
-TEST(TraceCalibration, WhatTwoJointsDoTogetherIsUnknownOverTheirProduct) {
-  const World world =
-      tracked(truth::RobotKind::kScara, 100, {{"own_product", "q2", 0.01, 0.0, "q4"}});
-  const Trace trace = trace_of(world).trace;
-  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
-  // What it explains is not counted again for another curve that explains nothing.
-  ASSERT_EQ(trace.rest.size(), 1U) << answer(trace);
-  EXPECT_EQ(trace.rest.front().place, "q2");
-  EXPECT_EQ(trace.rest.front().covariate, "value of q2 times value of q4");
-}
-
-TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
-  const Trace trace = trace_of(make_effect_world(filmed({strong("own_tanh", "q2")}))).trace;
-  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
-  ASSERT_FALSE(trace.rest.empty());
-  EXPECT_EQ(trace.rest.front().place, "q2");
-}
-
-// An error of no known shape that repeats with the joint's value is no riddle to who uses the
-// robot: it is measured, said over which range, and undone.
-TEST(TraceCalibration, WhatRepeatsWithAJointsValueIsAMapOfIt) {
-  constexpr double kStep = 0.01;  // rad, of a smooth step about 0
-  const World world = make_effect_world(filmed({{"own_tanh", "q2", kStep, 0.0, "q2"}}, 400));
-  const CalibrationTrace found = trace_of(world);
-  const Trace& trace = found.trace;
-  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
-  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
-  const TracedEffect& map = trace.accepted.front();
-  EXPECT_EQ(map.id, (EffectId{"joint_map", "q2"}));
-  EXPECT_LT(map.held_out_after.value,
-            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
-  EXPECT_GT(map.held_out_before.value, 3.0 * map.held_out_after.value);
-
-  ASSERT_EQ(found.effects.size(), 1U);
-  const ErrorTable& table = found.effects.front().table;
-  const CorrectedLog corrected = corrected_log(world.log, world.tree, found.effects, std::nullopt);
-  ASSERT_EQ(corrected.undone.size(), 1U);
-  const int channel = value_of(world.log.channel("q2"));
-  const Eigen::VectorXd logged = world.log.values.col(channel);
-  const double reach = logged.cwiseAbs().maxCoeff();
-  const Eigen::ArrayXd truth = kStep * (5.0 * logged.array() / reach).tanh();
-  const Eigen::ArrayXd undone = corrected.log.values.col(channel) - logged;
-  // A constant is the joint's zero, and a slope nearly the links' lengths.
-  Eigen::MatrixXd line(logged.size(), 2);
-  line << Eigen::VectorXd::Ones(logged.size()), logged;
-  const Eigen::VectorXd miss = (undone - truth).matrix();
-  const Eigen::VectorXd left = miss - line * line.colPivHouseholderQr().solve(miss);
-  EXPECT_LT(left.cwiseAbs().maxCoeff(), 0.05 * kStep);
-
-  // Beyond what was seen it says nothing.
-  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, 10.0))[0], 0.0);
-  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, -10.0))[0], 0.0);
-}
-
-// Named shapes are not taken for maps, nor maps invented beside them.
-TEST(TraceCalibration, AWaveWithANameIsNoMap) {
-  const Trace trace = trace_of(make_effect_world(filmed({strong("eccentricity", "q2")}))).trace;
-  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
-  EXPECT_EQ(trace.accepted.front().id, (EffectId{"eccentricity", "q2"}));
-  EXPECT_FALSE(trace.accepted.front().is_curve());
-}
-
-// At the place seen, a corner's error would be explained by itself, held out or not.
-TEST(TraceCalibration, APlaceInTheImageIsWhereTheCornerIsExpected) {
-  const auto places_of = [](double sigma_px) {
-    EffectWorldOptions options = filmed({}, 60);
-    options.sigma_px = sigma_px;
-    const World world = make_effect_world(options);
-    const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
-    return bundle.fit({}, {}).place_px;
-  };
-  // The same errors, of two sizes.
-  constexpr double kNoise = 0.5;  // px
-  const Eigen::MatrixX2d once = places_of(kNoise);
-  const Eigen::MatrixX2d twice = places_of(2.0 * kNoise);
-  ASSERT_EQ(once.rows(), twice.rows());
-  double sum = 0.0;
-  int count = 0;
-  for (Eigen::Index row = 0; row < once.rows(); ++row) {
-    if (!once.row(row).allFinite()) continue;
-    sum += (once.row(row) - twice.row(row)).squaredNorm();
-    count += 2;
-  }
-  ASSERT_GT(count, 1000);
-  EXPECT_LT(std::sqrt(sum / count), 0.3 * kNoise);
-}
-
-TEST(TraceCalibration, AShiftByPlaceIsUnknownOverThePlaceInTheImage) {
-  InjectedEffect chequer = strong("own_chequer", "camera");
-  chequer.detail = 90.0;  // px, a field
-  const Trace trace = trace_of(make_effect_world(filmed({chequer}))).trace;
-  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
-  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
-  ASSERT_EQ(trace.rest.size(), 1U);
-  EXPECT_EQ(trace.rest.front().place, "camera");
-  EXPECT_EQ(trace.rest.front().covariate, "place in the image");
-  EXPECT_TRUE(trace.rest.front().is_field());
-  EXPECT_LT(trace.held_out_after.value, 0.9 * trace.held_out_before.value);
 }
 
 TEST(TraceCalibration, ARecordingTooShortSaysSo) {

@@ -29,6 +29,7 @@ void add_slide(Calibration& calibration) {
                                      .child = LinkId{1},
                                      .T_parent_joint = {},
                                      .channel = "",
+                                     .copies = {},
                                      .couplings = {},
                                      .limits = {},
                                      .effort = {},

@@ -67,6 +67,26 @@ TEST(CopiedChannels, CommandsBesideMeasuredValuesAreOneChannelEach) {
   }
 }
 
+// A servo stays behind its command by what it carries: too far for the same quantity, and yet no
+// channel that drives nothing.
+TEST(CopiedChannels, CommandsThatAreFollowedLooselyDriveNothingElse) {
+  constexpr double kDroop = 2.5 * kDegree;
+  const Scene scene = make_scene("Goals", {.joints = 4, .prismatic_share = 0.0}, noisy());
+  JointLog log = with_commands(scene.recording.log, 0.05, 0.0, false);
+  for (Eigen::Index c = 0; c < 4; ++c)
+    log.values.col(4 + c).array() += kDroop * log.values.col((c + 1) % 4).array().cos();
+  EXPECT_LT(structure_search::same_quantities(log).size(), 4U);
+  const Structure s = find_structure(scene.recording.tracks, log);
+  expect_one_of_each(s, log, false);
+  EXPECT_EQ(described(s, scene.robot), described(scene));
+}
+
+// Neither does a channel that moves otherwise repeat one.
+TEST(CopiedChannels, AChannelThatMovesByItselfRepeatsNone) {
+  const Scene scene = make_scene("Goals", {.joints = 3}, noisy());
+  EXPECT_TRUE(structure_search::repeated_loosely(scene.recording.log, {0}, {1, 2}).empty());
+}
+
 // The first where they fit alike, the better one where not.
 TEST(CopiedChannels, TheColumnThatTheMarkersFollowIsUsed) {
   RecordingOptions o;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/effects/unsteady_reading.h"
+#include "kinematics/log/unsteady_reading.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "kinematics/log/smoothing_spline.h"
 
-namespace kinescope::effects {
+namespace kinescope {
 namespace {
 
 // Of a grid rounded to its steps, and of any value within one.
@@ -232,4 +232,12 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   return out;
 }
 
-}  // namespace kinescope::effects
+JointLog steadied(JointLog log) {
+  for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
+    if (const auto found = unsteady_reading(log.times_s, log.values.col(c)))
+      log.values.col(c) = found->motion;
+  }
+  return log;
+}
+
+}  // namespace kinescope

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/effects/unsteady_reading.h"
+#include "kinematics/log/unsteady_reading.h"
 
 #include <cmath>
 #include <numbers>
@@ -10,7 +10,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 
-namespace kinescope::effects {
+namespace kinescope {
 namespace {
 
 constexpr double kStep = 0.01;
@@ -151,5 +151,17 @@ TEST(UnsteadyReading, NoiseIsAsLargeAsItIs) {
   EXPECT_LT(rms_left(read), 0.4 * kNoise);
 }
 
+TEST(UnsteadyReading, ALogIsSteadiedWhereItJumps) {
+  const Read read = in_steps(kStep);
+  JointLog log;
+  log.times_s = read.times_s;
+  log.channels = {"steps", "smooth"};
+  log.values.resize(read.truth.size(), 2);
+  log.values << read.reading, read.truth;
+  const JointLog steady = steadied(log);
+  EXPECT_LT(rms(steady.values.col(0) - read.truth), 0.3 * rms(read.reading - read.truth));
+  EXPECT_EQ(steady.values.col(1), log.values.col(1));
+}
+
 }  // namespace
-}  // namespace kinescope::effects
+}  // namespace kinescope

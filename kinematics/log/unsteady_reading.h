@@ -13,7 +13,9 @@
 
 #include <Eigen/Core>
 
-namespace kinescope::effects {
+#include "kinematics/log/joint_log.h"
+
+namespace kinescope {
 
 /// A time over which the reading stays on one step: the value may be anywhere within it.
 struct Hold {
@@ -50,4 +52,7 @@ struct UnsteadyReading {
 [[nodiscard]] std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
                                                               const Eigen::VectorXd& values);
 
-}  // namespace kinescope::effects
+/// The log with the motion in place of readings that are unsteady.
+[[nodiscard]] JointLog steadied(JointLog log);
+
+}  // namespace kinescope

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "calib/bundle/effect_bundle.h"
+#include "calib/effects/corrected_log.h"
+#include "calib/effects/trace_calibration.h"
+#include "kinematics/core/error.h"
+#include "tests/calib/effects/traced_worlds.h"
+
+namespace kinescope {
+namespace {
+
+using truth::EffectWorldOptions;
+using truth::InjectedEffect;
+using truth::make_effect_world;
+using truth::World;
+
+TEST(TraceCalibration, AnEffectOfNoLibraryIsUnknownAtItsJoint) {
+  const Trace trace = trace_of(make_effect_world(filmed({strong("own_tanh", "q2")}))).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  ASSERT_FALSE(trace.rest.empty());
+  EXPECT_EQ(trace.rest.front().place, "q2");
+}
+
+// An error of no known shape that repeats with the joint's value is no riddle to who uses the
+// robot: it is measured, said over which range, and undone.
+TEST(TraceCalibration, WhatRepeatsWithAJointsValueIsAMapOfIt) {
+  constexpr double kStep = 0.01;  // rad, of a smooth step about 0
+  const World world = make_effect_world(filmed({{"own_tanh", "q2", kStep, 0.0, "q2"}}, 400));
+  const CalibrationTrace found = trace_of(world);
+  const Trace& trace = found.trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& map = trace.accepted.front();
+  EXPECT_EQ(map.id, (EffectId{"joint_map", "q2"}));
+  EXPECT_LT(map.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+  EXPECT_GT(map.held_out_before.value, 3.0 * map.held_out_after.value);
+
+  ASSERT_EQ(found.effects.size(), 1U);
+  const ErrorTable& table = found.effects.front().table;
+  const CorrectedLog corrected = corrected_log(world.log, world.tree, found.effects, std::nullopt);
+  ASSERT_EQ(corrected.undone.size(), 1U);
+  const int channel = value_of(world.log.channel("q2"));
+  const Eigen::VectorXd logged = world.log.values.col(channel);
+  const double reach = logged.cwiseAbs().maxCoeff();
+  const Eigen::ArrayXd truth = kStep * (5.0 * logged.array() / reach).tanh();
+  const Eigen::ArrayXd undone = corrected.log.values.col(channel) - logged;
+  // A constant is the joint's zero, and a slope nearly the links' lengths.
+  Eigen::MatrixXd line(logged.size(), 2);
+  line << Eigen::VectorXd::Ones(logged.size()), logged;
+  const Eigen::VectorXd miss = (undone - truth).matrix();
+  const Eigen::VectorXd left = miss - line * line.colPivHouseholderQr().solve(miss);
+  EXPECT_LT(left.cwiseAbs().maxCoeff(), 0.05 * kStep);
+
+  // Beyond what was seen it says nothing.
+  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, 10.0))[0], 0.0);
+  EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, -10.0))[0], 0.0);
+}
+
+// Named shapes are not taken for maps, nor maps invented beside them.
+TEST(TraceCalibration, AWaveWithANameIsNoMap) {
+  const Trace trace = trace_of(make_effect_world(filmed({strong("eccentricity", "q2")}))).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"eccentricity", "q2"}));
+  EXPECT_FALSE(trace.accepted.front().is_curve());
+}
+
+// At the place seen, a corner's error would be explained by itself, held out or not.
+TEST(TraceCalibration, APlaceInTheImageIsWhereTheCornerIsExpected) {
+  const auto places_of = [](double sigma_px) {
+    EffectWorldOptions options = filmed({}, 60);
+    options.sigma_px = sigma_px;
+    const World world = make_effect_world(options);
+    const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
+    return bundle.fit({}, {}).place_px;
+  };
+  // The same errors, of two sizes.
+  constexpr double kNoise = 0.5;  // px
+  const Eigen::MatrixX2d once = places_of(kNoise);
+  const Eigen::MatrixX2d twice = places_of(2.0 * kNoise);
+  ASSERT_EQ(once.rows(), twice.rows());
+  double sum = 0.0;
+  int count = 0;
+  for (Eigen::Index row = 0; row < once.rows(); ++row) {
+    if (!once.row(row).allFinite()) continue;
+    sum += (once.row(row) - twice.row(row)).squaredNorm();
+    count += 2;
+  }
+  ASSERT_GT(count, 1000);
+  EXPECT_LT(std::sqrt(sum / count), 0.3 * kNoise);
+}
+
+TEST(TraceCalibration, AShiftByPlaceIsUnknownOverThePlaceInTheImage) {
+  InjectedEffect chequer = strong("own_chequer", "camera");
+  chequer.detail = 90.0;  // px, a field
+  const Trace trace = trace_of(make_effect_world(filmed({chequer}))).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  ASSERT_EQ(trace.rest.size(), 1U);
+  EXPECT_EQ(trace.rest.front().place, "camera");
+  EXPECT_EQ(trace.rest.front().covariate, "place in the image");
+  EXPECT_TRUE(trace.rest.front().is_field());
+  EXPECT_LT(trace.held_out_after.value, 0.9 * trace.held_out_before.value);
+}
+
+}  // namespace
+}  // namespace kinescope
