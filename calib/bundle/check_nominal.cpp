@@ -122,6 +122,7 @@ void mend(const NominalFault& fault, KinematicTree& tree) {
   if (fault.exchanged_with) {
     Joint& other = tree.joints[static_cast<std::size_t>(*fault.exchanged_with)];
     std::swap(joint.channel, other.channel);
+    std::swap(joint.copies, other.copies);
     std::swap(joint.scale, other.scale);
     std::swap(joint.offset, other.offset);
   }

@@ -73,7 +73,7 @@ struct JointMotion {
   std::vector<double> times_s;
   Eigen::MatrixXd value;  ///< instants x joints of the tree, rad or m
   Eigen::MatrixXd rate;
-  Eigen::MatrixXd read_s = {};  ///< likewise: of the log, when each was read; of a log empty
+  Eigen::MatrixXd read_s = {};  ///< likewise: when each was read, by the log; empty: at times_s
   /// Of joints that have some (`Joint::copies`): what each says instead.
   std::map<int, std::vector<Eigen::VectorXd>> copies = {};
 };
