@@ -185,14 +185,6 @@ bool shows_postures(const RunSummary& run) {
   return !run.log.empty() && is_posture_log(run.log, run.calibration.times_s, channels);
 }
 
-std::vector<std::pair<std::string, std::string>> copies_of(const KinematicTree& tree) {
-  std::vector<std::pair<std::string, std::string>> out;
-  for (const Joint& joint : tree.joints) {
-    for (const std::string& column : joint.copies) out.emplace_back(column, joint.channel);
-  }
-  return out;
-}
-
 std::string odd_words(const OddReading& odd, const Recording& recording) {
   return fmt::format(
       "{}: at {} = {:.6g} '{}' reads {:.6g}, but the markers it moves say {:.6g}: left out",
@@ -221,8 +213,7 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
   if (options.trace) {
     run.trace = std::move(fitted.trace);
     run.second_columns =
-        second_columns(run.log, run.calibration.tree, copies_of(run.calibration.tree),
-                       run.gravity_base, shows_postures(run));
+        second_columns(run.log, run.calibration.tree, run.gravity_base, shows_postures(run));
   }
   if (fitted.stamp_jitter_s > 0.0)
     run.warnings.push_back(jitter_words(fitted.stamp_jitter_s, run.log, observed));

@@ -108,7 +108,8 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
                             : "potentiometer, shielding and filter of this encoder";
   out.candidate.record = fmt::format("move {} more slowly, and log it at a higher rate", s.name);
   const Eigen::VectorXd share =
-      (read_at(reading.times_s, reading.motion, world.frames, s.joint) - s.value) / reading.size;
+      (read_at(reading.times_s, reading.motion, read_times(world.frames, s.joint)) - s.value) /
+      reading.size;
   out.corrections = [s, parameter, share](double) {
     return std::vector{turn(s, parameter, s.unit, share)};
   };
@@ -227,15 +228,17 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   out.candidate.check = "gear mesh, keys, belt tension";
   out.candidate.record = fmt::format("move {} to the same places from both sides", s.name);
   const Eigen::VectorXd drive = world.log.value.col(s.joint);
-  out.corrections = [s, drive, log_s = world.log.times_s, frames = world.frames](double width) {
+  out.corrections = [s, drive, log_s = world.log.times_s,
+                     frames_s = read_times(world.frames, s.joint)](double width) {
     return std::vector{
-        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames, s.joint))};
+        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames_s))};
   };
   if (world.known) return out;
   // A robot that rests at first rests anywhere in its gap.
-  out.nuisances = [s, drive, log_s = world.log.times_s, frames = world.frames](double width) {
+  out.nuisances = [s, drive, log_s = world.log.times_s,
+                   frames_s = read_times(world.frames, s.joint)](double width) {
     std::vector<Correction> start;
-    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames, s.joint);
+    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames_s);
     if (share.isZero(0.0)) return start;
     start.push_back(turn(s, "place in its gap at the start", s.unit, std::move(share)));
     start.back().is_nuisance = true;

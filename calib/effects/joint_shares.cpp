@@ -127,11 +127,10 @@ Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd
   return out;
 }
 
-Eigen::VectorXd read_at(const std::vector<double>& from_s, const Eigen::VectorXd& values,
-                        const JointMotion& to, int joint) {
-  if (to.read_s.size() == 0) return read_at(from_s, values, to.times_s);
-  const auto when = to.read_s.col(joint);
-  return read_at(from_s, values, {when.begin(), when.end()});
+std::vector<double> read_times(const JointMotion& motion, int joint) {
+  if (motion.read_s.size() == 0) return motion.times_s;
+  const auto when = motion.read_s.col(joint);
+  return {when.begin(), when.end()};
 }
 
 namespace {

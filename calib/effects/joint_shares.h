@@ -36,10 +36,8 @@ namespace kinescope::effects {
                                       const Eigen::VectorXd& values,
                                       const std::vector<double>& to_s);
 
-/// The same, at the instants of a motion: when it read the joint there.
-[[nodiscard]] Eigen::VectorXd read_at(const std::vector<double>& from_s,
-                                      const Eigen::VectorXd& values, const JointMotion& to,
-                                      int joint);
+/// When a motion's instants read the joint, by the log.
+[[nodiscard]] std::vector<double> read_times(const JointMotion& motion, int joint);
 
 /// A load that a joint may give way under.
 struct Load {

@@ -62,27 +62,30 @@ void trace_difference(const effects::ColumnPair& pair, const KinematicTree& tree
 
 }  // namespace
 
-std::vector<SecondColumn> second_columns(
-    const JointLog& log, const KinematicTree& tree,
-    const std::vector<std::pair<std::string, std::string>>& copies,
-    const std::optional<Eigen::Vector3d>& gravity_base, bool postures) {
+std::vector<SecondColumn> second_columns(const JointLog& log, const KinematicTree& tree,
+                                         const std::optional<Eigen::Vector3d>& gravity_base,
+                                         bool postures) {
   std::vector<SecondColumn> out;
-  if (log.empty() || copies.empty()) return out;
+  if (log.empty() ||
+      std::ranges::all_of(tree.joints, &std::vector<std::string>::empty, &Joint::copies))
+    return out;
   const JointLog samples = thinned(log);
   const JointMotion used = effects::motion_of(samples, tree);
-  for (const auto& [column, channel] : copies) {
-    const auto other = samples.channel(column);
-    const auto joint = std::ranges::find(tree.joints, channel, &Joint::channel);
-    if (!other || joint == tree.joints.end() || !samples.channel(channel)) continue;
-    const effects::ColumnPair pair{column, static_cast<int>(joint - tree.joints.begin()), used,
-                                   effects::joint_values(samples, *joint, *other), postures};
-    SecondColumn& second = out.emplace_back();
-    second.column = column;
-    second.channel = channel;
-    second.joint = joint->name;
-    second.unit = joint->type == JointType::kRevolute ? "rad" : "m";
-    take_difference(pair, second);
-    trace_difference(pair, tree, gravity_base, second);
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const Joint& joint = tree.joints[j];
+    for (const std::string& column : joint.copies) {
+      const auto other = samples.channel(column);
+      if (!other || !samples.channel(joint.channel)) continue;
+      const effects::ColumnPair pair{column, static_cast<int>(j), used,
+                                     effects::joint_values(samples, joint, *other), postures};
+      SecondColumn& second = out.emplace_back();
+      second.column = column;
+      second.channel = joint.channel;
+      second.joint = joint.name;
+      second.unit = joint.type == JointType::kRevolute ? "rad" : "m";
+      take_difference(pair, second);
+      trace_difference(pair, tree, gravity_base, second);
+    }
   }
   return out;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a joint log, the robot, and which columns tell what another one tells, too.
+// Takes   a joint log, and the robot with the columns that tell a joint's value again.
 // Gives   SecondColumn: how such a column differs from the one that the robot was made with (early
 //         or late, drooping, dead-banded, scaled, in steps) and by how much.
 // Units   rad or m, s.
@@ -11,7 +11,6 @@
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,12 +38,11 @@ struct SecondColumn {
   Trace trace = {};
 };
 
-/// `copies`: a column, and the joint's own channel that it tells again; those that the log or the
-/// tree does not have are passed over. `gravity_base`: unit vector along which things fall, where
+/// Of every joint's copies (`Joint`); columns that the log does not have are passed over.
+/// `gravity_base`: unit vector along which things fall, where
 /// it is known. `postures`: samples at rest, one by one; no delay, no dead band.
 [[nodiscard]] std::vector<SecondColumn> second_columns(
     const JointLog& log, const KinematicTree& tree,
-    const std::vector<std::pair<std::string, std::string>>& copies,
     const std::optional<Eigen::Vector3d>& gravity_base, bool postures);
 
 /// "q1_cmd is 60.0 (59.8 to 60.2) ms ahead of q1; q1 stays behind q1_cmd by up to 1.90 (1.88 to

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "calib/effects/second_column.h"
+#include "calib/trace/tracer.h"
 
 namespace kinescope {
 namespace {
@@ -108,10 +109,9 @@ std::string rivals_words(const std::vector<Ambiguity>& ambiguities) {
 
 // "noise", or by how much it is more; of postures nobody knows.
 std::string nature_of_rest(const SecondColumn& second) {
-  constexpr double kLasts = 1.2;  // as the tracer has it
   if (second.noise == 0.0) return "unexplained";
   const double over = second.after / second.noise;
-  if (over <= kLasts) return "noise";
+  if (over <= trace::kLasts) return "noise";
   return fmt::format("{:.1f} times what neighbouring samples differ by: not noise alone", over);
 }
 

@@ -53,6 +53,16 @@ KinematicTree arm() {
   return tree;
 }
 
+// `copies`: a column, and the channel that it tells again.
+KinematicTree with_copies(KinematicTree tree,
+                          const std::vector<std::pair<std::string, std::string>>& copies) {
+  for (const auto& [column, channel] : copies) {
+    const auto joint = std::ranges::find(tree.joints, channel, &Joint::channel);
+    if (joint != tree.joints.end()) joint->copies.push_back(column);
+  }
+  return tree;
+}
+
 // Moves for 2 s of every 3 where it rests: smooth time that stands still in between.
 double own_time(double t, bool rests) {
   if (!rests) return t;
@@ -143,7 +153,8 @@ JointLog servo(double bandwidth, double friction, double droop) {
 }
 
 std::vector<SecondColumn> both(const JointLog& log) {
-  return second_columns(log, arm(), {{"q1_cmd", "q1"}, {"q2_cmd", "q2"}}, kDown, false);
+  return second_columns(log, with_copies(arm(), {{"q1_cmd", "q1"}, {"q2_cmd", "q2"}}), kDown,
+                        false);
 }
 
 const TracedEffect* find_effect(const SecondColumn& second, const std::string& name) {
@@ -296,7 +307,7 @@ TEST(SecondColumn, RolesTheOtherWayRound) {
   tree.joints[0].channel = "q1_cmd";
   const JointLog log = simulated({.lag_s = kLag_s, .droop = kDroop, .band = kBand});
   const std::vector<SecondColumn> seconds =
-      second_columns(log, tree, {{"q1", "q1_cmd"}}, kDown, false);
+      second_columns(log, with_copies(tree, {{"q1", "q1_cmd"}}), kDown, false);
   ASSERT_EQ(seconds.size(), 1U);
   expect_only(seconds.front(), {"time_offset", "droop", "dead_band"});
   expect_size(seconds.front(), "time_offset", -kLag_s);
@@ -390,7 +401,7 @@ TEST(SecondColumn, PosturesHaveNoTime) {
   }
   log.values = log.values(rows, Eigen::all).eval();
   const std::vector<SecondColumn> seconds =
-      second_columns(log, arm(), {{"q2_cmd", "q2"}}, kDown, true);
+      second_columns(log, with_copies(arm(), {{"q2_cmd", "q2"}}), kDown, true);
   ASSERT_EQ(seconds.size(), 1U);
   expect_only(seconds.front(), {"droop", "encoder_scale"});
   // Of the command, which says more of the droop, too.
@@ -417,13 +428,13 @@ TEST(SecondColumn, SizesAreOfTheJointsValue) {
     log.values.col(own) -= 200.0 * log.values.col(0);
   }
   const std::vector<SecondColumn> turns =
-      second_columns(log, tree, {{"q2_cmd", "q2"}}, kDown, false);
+      second_columns(log, with_copies(tree, {{"q2_cmd", "q2"}}), kDown, false);
   ASSERT_EQ(turns.size(), 1U);
   expect_size(turns.front(), "dead_band", kBand);
   tree = arm();
   tree.joints[1].type = JointType::kPrismatic;
   const std::vector<SecondColumn> slides =
-      second_columns(log, tree, {{"q2_cmd", "q2"}}, kDown, false);
+      second_columns(log, with_copies(tree, {{"q2_cmd", "q2"}}), kDown, false);
   ASSERT_EQ(slides.size(), 1U);
   EXPECT_EQ(slides.front().unit, "m");
   EXPECT_NE(words_of(slides.front()).find(" mm, is "), std::string::npos);
@@ -431,8 +442,11 @@ TEST(SecondColumn, SizesAreOfTheJointsValue) {
 
 TEST(SecondColumn, ColumnsThatAreNotThereArePassedOver) {
   const JointLog log = simulated({.length_s = 2.0});
+  KinematicTree other = arm();
+  other.joints[1].channel = "q3";
   EXPECT_TRUE(
-      second_columns(log, arm(), {{"q3_cmd", "q1"}, {"q1_cmd", "q3"}}, kDown, false).empty());
+      second_columns(log, with_copies(other, {{"q3_cmd", "q1"}, {"q1_cmd", "q3"}}), kDown, false)
+          .empty());
 }
 
 TEST(SecondColumn, WordsSayWhoIsBehindWhomAndByHowMuch) {
