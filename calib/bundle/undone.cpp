@@ -20,6 +20,15 @@ Pose displaced(const Pose& T_camera_marker, Vector6d displacement, MeasurementKi
   return T_camera_marker * exp_pose(displacement);
 }
 
+// The camera sees a marker as uncertain along its line of sight as before, however it is turned
+// now.
+Matrix6d turned(const Matrix6d& covariance, const Eigen::Matrix3d& R_now_before) {
+  Matrix6d R = Matrix6d::Zero();
+  R.topLeftCorner<3, 3>() = R_now_before;
+  R.bottomRightCorner<3, 3>() = R_now_before;
+  return R * covariance * R.transpose();
+}
+
 }  // namespace
 
 PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks) {
@@ -35,8 +44,13 @@ PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks
       const auto residual = residuals.find({sample.frame, track.id});
       const auto frame = static_cast<std::size_t>(sample.frame);
       if (residual == residuals.end() || !residual->second->used || links[frame].empty()) continue;
-      sample.T_camera_marker = displaced(links[frame][marker->link.index()] * marker->T_link_marker,
+      const Pose undone_pose = displaced(links[frame][marker->link.index()] * marker->T_link_marker,
                                          residual->second->displacement, calibration.kind);
+      if (calibration.kind == MeasurementKind::kCorners) {
+        sample.covariance = turned(sample.covariance, undone_pose.matrix3().transpose() *
+                                                          sample.T_camera_marker.matrix3());
+      }
+      sample.T_camera_marker = undone_pose;
       sample.T_camera_marker_alternative.reset();
       undone.push_back(std::move(sample));
     }

@@ -62,6 +62,41 @@ TEST(Undone, TracksOfABumpedCameraAreThoseOfOneThatStoodStill) {
   }
 }
 
+// A lens that is not as declared turns what the camera sees of a marker; what a sighting leaves
+// open lies along the line of sight all the same.
+TEST(Undone, WhatACameraLeavesOpenStaysAlongItsLineOfSight) {
+  truth::WorldOptions options;
+  options.sigma_px = 0.0;
+  const truth::World world = truth::make_world(options);
+  const Marker& marker = world.tree.markers.front();
+  const auto links = forward_kinematics(world.tree, world.joint_values.row(0));
+  const Pose T_camera_marker =
+      world.T_camera_base * links[marker.link.index()] * marker.T_link_marker;
+  Calibration calibration;
+  calibration.kind = MeasurementKind::kCorners;
+  calibration.tree = world.tree;
+  calibration.T_camera_base = world.T_camera_base;
+  calibration.joint_values = world.joint_values;
+  calibration.times_s = world.measurements.times_s;
+  SightingResidual residual;
+  residual.id = marker.id;
+  residual.used = true;
+  calibration.residuals = {residual};
+  PoseSample sample;
+  sample.T_camera_marker = T_camera_marker * Pose{exp_rotation({0.1, -0.2, 0.0}), {0.0, 0.0, 0.0}};
+  const Eigen::Vector3d camera_variances(1e-10, 1e-10, 1e-6);
+  const Eigen::Matrix3d R_before = sample.T_camera_marker.matrix3();
+  sample.covariance.bottomRightCorner<3, 3>() =
+      R_before.transpose() * camera_variances.asDiagonal() * R_before;
+  const PoseTracks undone =
+      with_effects_undone(calibration, {{0.0}, {PoseTrack{marker.id, {sample}}}});
+  ASSERT_EQ(undone.tracks.front().samples.size(), 1U);
+  const PoseSample& now = undone.tracks.front().samples.front();
+  const Eigen::Matrix3d R = now.T_camera_marker.matrix3();
+  const Eigen::Matrix3d in_camera = R * now.covariance.bottomRightCorner<3, 3>() * R.transpose();
+  EXPECT_LT((in_camera - Eigen::Matrix3d(camera_variances.asDiagonal())).norm(), 1e-15);
+}
+
 TEST(Undone, MarkersThatAreNotOnTheRobotStayAsTheyAre) {
   PoseTracks tracks;
   tracks.times_s = {0.0};
