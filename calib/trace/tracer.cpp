@@ -117,7 +117,10 @@ void Tracer::forward() {
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
     StagePtr next = refit_best(contenders(*now_, family), round_);
-    if (!next) next = look_ahead(family);
+    if (!next) {
+      next = look_ahead(family);
+      if (next && is_of_the_sensor(*next, family)) return;
+    }
     if (!next) return;
     const std::size_t before = now_->added.size();
     now_ = std::move(next);
@@ -175,6 +178,23 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
       best = std::move(several);
   }
   return best;
+}
+
+// What is below the floors is not looked for, but it is there: several effects together may stand
+// in for it.
+bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family) {
+  const TestedMember* below = nullptr;
+  for (const TestedMember& member : family) {
+    const Candidate& candidate = now_->fit.candidates[member.index];
+    const bool counts = member.p_value <= level_ && !member.score.hidden() &&
+                        !is_large(candidate, member.score) && !removed_.contains(candidate.id);
+    if (counts && (below == nullptr || member.score.gain > below->score.gain)) below = &member;
+  }
+  if (below == nullptr) return false;
+  std::vector<AddedEffect> effects = now_->added;
+  effects.push_back({now_->fit.candidates[below->index].id, below->scan});
+  const StagePtr stage = stage_of(std::move(effects));
+  return stage->fit.converged && stage->held_out_sum() <= found.held_out_sum();
 }
 
 StagePtr Tracer::without_idle(StagePtr stage, std::size_t known) {

@@ -64,6 +64,7 @@ class Tracer {
                                                   const std::vector<TestedMember>& family) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
+  [[nodiscard]] bool is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family);
   /// Of those that may be added, the one that explains most, significant or not.
   [[nodiscard]] const TestedMember* most_telling(const Stage& stage,
                                                  const std::vector<TestedMember>& family) const;

@@ -109,6 +109,7 @@ Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
   if (effect.shape == "gear") return (effect.detail * q.array() + 0.7).sin();
   if (effect.shape == "direction") return direction_of(q);
   if (effect.shape == "step") return (time_s_.array() >= effect.detail).cast<double>();
+  if (effect.shape == "weave") return (9.0 * q.array()).sin() * (7.0 * other.array()).sin();
   return (5.0 * (other.array() - 0.2)).tanh();
 }
 
@@ -151,6 +152,19 @@ std::vector<Candidate> LinearWorld::candidates() const {
     Candidate bend = simple("bend", 0, 1);
     bend.columns = [](double) { return std::vector<EffectColumn>{{0, {}}}; };
     out.push_back(std::move(bend));
+  }
+  if (options_.stands_in) {
+    const Eigen::VectorXd weave = share({0, "weave"});
+    const Eigen::VectorXd large = 2.0 * (2.1 * time_s_.array()).sin();
+    const auto add = [&](const char* name, const Eigen::VectorXd& shape, double floor) {
+      Candidate candidate = simple(name, 0, 1);
+      candidate.floor = floor;
+      candidate.columns = [shape](double) { return std::vector<EffectColumn>{{0, shape}}; };
+      out.push_back(std::move(candidate));
+    };
+    add("weave", weave, 1e3);
+    add("first_half", large + 0.5 * weave, 0.0);
+    add("second_half", 0.5 * weave - large, 0.0);
   }
   return out;
 }

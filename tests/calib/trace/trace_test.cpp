@@ -169,6 +169,18 @@ TEST(TraceTest, TwoEffectsAtOnceAreBothFound) {
   EXPECT_GE(right, 2 * kRuns - 2);
 }
 
+// Below what the sensor itself errs by it is not looked for, nor is it told by the names of two
+// effects that look like it together.
+TEST(TraceTest, WhatIsBelowItsFloorHasNoOtherNames) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    LinearWorldOptions world;
+    world.seed = seed;
+    world.stands_in = true;
+    const Trace trace = trace_effects(LinearWorld(world, {{0, "weave", 1.0}}));
+    EXPECT_TRUE(trace.accepted.empty()) << seed << ": " << trace.accepted.front().id.effect;
+  }
+}
+
 TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
   LinearWorldOptions options;
   options.seed = 4;
