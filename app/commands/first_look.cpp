@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "app/commands/declared.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/log_faults.h"
+#include "kinematics/structure/flange_log.h"
 
 namespace kinescope {
 namespace {
@@ -57,6 +59,32 @@ constexpr std::array<Convention, 4> kConventions{
      {"with the quaternions in the order w, x, y, z", w_first},
      {"with the quaternions conjugated", conjugated},
      {"with the quaternions in the order w, x, y, z and the poses inverted", w_first_inverted}}};
+
+std::string names_of(const std::vector<int>& channels, const JointLog& log) {
+  std::vector<std::string> names;
+  for (const int channel : channels)
+    names.push_back(fmt::format("'{}'", log.channels[static_cast<std::size_t>(channel)]));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+void refuse_flange_poses(const JointLog& log, const PoseTracks& tracks,
+                         const CalibrateOptions& options) {
+  constexpr double kClocksS = 1.0;  // by which they may be apart
+  const auto flange = flange_columns(tracks, log, options.estimate_time_offset ? kClocksS : 0.0);
+  if (!flange) return;
+  throw undetermined(
+      log.source,
+      fmt::format(
+          "{} ({}) beside {} are poses, not joint values: tag_{} turns from frame to frame "
+          "as they say, to {:.2g} deg{}",
+          names_of(flange->rotation, log), flange->convention, names_of(flange->position, log),
+          flange->marker.value, flange->misfit_rad * 180.0 / std::numbers::pi,
+          flange->inverted ? ", where the camera is on the hand, or they are of the base in "
+                             "the flange's frame"
+                           : ""),
+      "log the values of the joints; poses of a flange calibrate a camera to a hand, which is not "
+      "done here");
+}
 
 std::string file_named(const Recording& recording, std::string_view entry) {
   return (recording.folder / fmt::format("{}.csv", entry)).string();
@@ -175,6 +203,7 @@ void require_plausible_motion(const Recording& recording, const PoseTracks& trac
                               const CalibrateOptions& options) {
   if (recording.nominal || tracks.tracks.empty() || tracks.times_s.size() < 2) return;
   const JointLog& log = recording.log;
+  refuse_flange_poses(log, tracks, options);
   const auto first = structure_of(recording, tracks, log, options);
   if (!first || is_robot(*first)) return;
   const bool idle = first->idle_channels.size() >= kFewestIdle && !is_driven(*first);

@@ -87,6 +87,29 @@ TEST_F(RunRefusals, TwoJointsThatMoveTogether) {
       << line;
 }
 
+// What a robot's controller logs in place of joint values.
+TEST_F(RunRefusals, PosesOfTheHand) {
+  Rng rng = Rng::from_name("hand");
+  const RandomRobot robot =
+      random_robot({.joints = 6, .prismatic_share = 0.0, .unmarked_links = {1, 2, 3, 4, 5}}, rng);
+  RobotRecording recording = record(robot, {.frames = 200, .amplitude_rad = 0.3}, rng);
+  JointLog poses;
+  poses.times_s = recording.tracks.times_s;
+  poses.channels = {"x", "y", "z", "qx", "qy", "qz", "qw"};
+  poses.values.resize(recording.joint_values.rows(), 7);
+  for (Eigen::Index f = 0; f < poses.values.rows(); ++f) {
+    const Pose hand =
+        forward_kinematics(robot.tree, recording.joint_values.row(f).transpose()).back();
+    poses.values.row(f) << hand.translation.transpose(), hand.rotation.coeffs().transpose();
+  }
+  recording.log = poses;
+  write_poses(recording);
+  const std::string line = refused(ExitCode::kUndetermined, "joints.csv: 'qx', 'qy', 'qz', 'qw'");
+  EXPECT_NE(line.find("(quaternion, w last) beside 'x', 'y', 'z' are poses, not joint values"),
+            std::string::npos)
+      << line;
+}
+
 TEST_F(RunRefusals, MarkersThatNeverMove) {
   RecordingOptions options;
   options.still_joints = {0, 1, 2};
