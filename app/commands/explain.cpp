@@ -19,6 +19,7 @@
 #include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
+#include "kinematics/structure/slight_turn.h"
 
 namespace kinescope {
 namespace {
@@ -237,8 +238,9 @@ class Explainer {
   [[nodiscard]] Explanation improved(Explanation now) const {
     std::set<Shape> tried;
     if (now.structure) tried.insert(shape_of(*now.structure));
-    for (const auto& propose : {&Explainer::with_half_the_recording,
-                                &Explainer::with_errors_allowed, &Explainer::with_camera_doubted}) {
+    for (const auto& propose :
+         {&Explainer::with_slides_for_slight_turns, &Explainer::with_half_the_recording,
+          &Explainer::with_errors_allowed, &Explainer::with_camera_doubted}) {
       if (is_settled(now)) break;
       for (const Proposal& proposal : (this->*propose)(now)) {
         // A structure alone is no news where it was fitted before.
@@ -349,6 +351,17 @@ class Explainer {
     const Pose T_link_marker =
         marker.link.value == 0 ? robot.T_camera_base * marker.T_link_marker : marker.T_link_marker;
     return with_marker_on(structure, marker.id, marker.link.value, T_link_marker);
+  }
+
+  // What a lens bends looks like an arc.
+  [[nodiscard]] std::vector<Proposal> with_slides_for_slight_turns(const Explanation& now) const {
+    std::vector<Proposal> out;
+    if (!now.structure) return out;
+    for (std::size_t j = 0; j < now.structure->joints.size(); ++j) {
+      if (auto slide = with_slide_for_slight_turn(*now.structure, j, recording().log))
+        out.push_back({std::move(*slide), {}});
+    }
+    return out;
   }
 
   // Of two halves of a recording in which something happened once (a bump, a slip), one shows the
