@@ -2,9 +2,8 @@
 //
 // Torque effects of known size in logs of random robots: which name and joint the trace gives, and
 // how large. `trace_torque [alone|pairs|clean|unknown|coverage|all] [ROBOTS [FIRST_SEED]]`;
-// default: all
-// 3. `coverage`: of the 95 % intervals of several effects together, whose friction turns round
-// within another width than the model's nominal one, dips at low speed, or has Dahl's state.
+// default: all 3. `coverage`: of the 95 % intervals of several effects together, where friction
+// turns round within another width than the nominal one, dips at low speed, or has Dahl's state.
 // Every case has a clean twin: the same robot, motion and noise without the effect.
 #include "dynamics/effects/trace_torque.h"
 
