@@ -39,6 +39,14 @@ std::vector<std::string> joint_names(const RigidModel& rigid) {
   return out;
 }
 
+/// Links and joints as another URDF places them; files of robots are rounded to six digits.
+bool same_geometry(const RigidBody& a, const RigidBody& b) {
+  constexpr double kRounding = 1e-5;  // m, and of directions
+  return (a.p_parent_joint - b.p_parent_joint).norm() <= kRounding &&
+         (a.R_parent_joint - b.R_parent_joint).norm() <= kRounding &&
+         (a.axis - b.axis).norm() <= kRounding;
+}
+
 void check_robot(const fs::path& path, const SavedTorqueModel& model, const DynamicModel& robot,
                  const fs::path& urdf) {
   const RigidModel own = make_rigid_model(robot);
@@ -53,13 +61,14 @@ void check_robot(const fs::path& path, const SavedTorqueModel& model, const Dyna
   }
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (model.rigid.bodies[j].type == own.bodies[j].type &&
-        model.rigid.bodies[j].parent == own.bodies[j].parent) {
+        model.rigid.bodies[j].parent == own.bodies[j].parent &&
+        same_geometry(model.rigid.bodies[j], own.bodies[j])) {
       continue;
     }
-    throw bad_input(
-        path.string(),
-        fmt::format("joint '{}' is another one in {}", joints[j], urdf.filename().string()),
-        "give the URDF that the model was learned with");
+    throw bad_input(path.string(),
+                    fmt::format("joint '{}' is another one, or elsewhere, in {}", joints[j],
+                                urdf.filename().string()),
+                    "give the URDF that the model was learned with");
   }
   if (model.robot == robot.tree.name) return;
   throw bad_input(path.string(),
@@ -88,9 +97,24 @@ TorqueLog trajectory_of(const TorqueLog& log, int number) {
   return keep_rows(log, keep);
 }
 
+const TorqueFilter& filter_of(const TorqueModelFile& file) {
+  return file.traced ? file.traced->filter : file.filter;
+}
+
+/// The model's own low-pass is part of what it learned.
+void require_own_cutoff(const TorqueModelFile& file, double stated_hz, const fs::path& path) {
+  constexpr double kRounding = 1e-6;  // as printed
+  const double own_hz = filter_of(file).cutoff_hz;
+  if (!(stated_hz > 0.0) || std::abs(stated_hz - own_hz) <= kRounding * own_hz) return;
+  throw bad_request("--cutoff",
+                    fmt::format("is {:.6g} Hz, {} was learned behind {:.6g} Hz", stated_hz,
+                                path.string(), own_hz),
+                    "leave it out (and cutoff_hz in recording.yaml), or learn the model with it");
+}
+
 MotionOptions motion_as_learned(const TorqueModelFile& file, const MotionOptions& given) {
   MotionOptions out = given;
-  const TorqueFilter& filter = file.traced ? file.traced->filter : file.filter;
+  const TorqueFilter& filter = filter_of(file);
   out.filter = filter.kind;
   out.cutoff_hz = filter.cutoff_hz;
   out.edge_periods = 0.0;  // contacts often end a log
@@ -277,6 +301,7 @@ ContactModelChoice choose_contact_model(const ContactCommandOptions& options,
   out.file = read_torque_model(path);
   out.kind = out.file->model.kind;
   check_robot(path, out.file->model, robot, options.robot);
+  require_own_cutoff(*out.file, options.data.motion.cutoff_hz, path);
   return out;
 }
 

@@ -28,8 +28,9 @@ struct ContactModelChoice {
   TorqueModelKind kind{};
 };
 
-/// Throws bad_request for a kind that SavedTorqueModel does not hold and beside --identify,
-/// bad_input for what is no model, or that of another robot. Reads no log.
+/// Throws bad_request for a kind that SavedTorqueModel does not hold, beside --identify and beside
+/// another cut-off than the file's; bad_input for what is no model, or that of another robot
+/// (joints, geometry). Reads no log.
 [[nodiscard]] ContactModelChoice choose_contact_model(const ContactCommandOptions& options,
                                                       const DynamicModel& robot);
 

@@ -245,6 +245,7 @@ std::optional<SavedTrace> add_trace(const DynamicsOptions& options, const Dynami
   const TracedLog traced =
       trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
   summary.trace = traced.trace.trace;
+  take_traced_drives(traced.trace, model, summary.drives);
   for (const TracedEffect& effect : summary.trace->accepted) {
     if (effect.id.effect != "gravity_direction") continue;
     summary.traced_gravity_m_s2 = traced.trace.corrected.model.gravity_m_s2;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/torque_trace_stage.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -74,6 +77,67 @@ void remove_corrected(const OutputFolder& folder) {
 }
 
 }  // namespace
+
+namespace {
+
+struct DriveTerm {
+  std::string_view effect;
+  std::string_view term;
+  double JointDynamics::* declared;  // none: the URDF knows no such thing
+};
+constexpr std::array<DriveTerm, 4> kDriveTerms{
+    {{"viscous", "viscous", &JointDynamics::viscous},
+     {"coulomb", "coulomb", &JointDynamics::coulomb},
+     {"motor_inertia", "motor inertia", &JointDynamics::motor_inertia},
+     {"torque_offset", "offset", nullptr}}};
+constexpr std::array<std::string_view, 6> kFrictionCurves{
+    "asymmetric", "stribeck", "cubic_viscous", "load_friction", "position_friction", "hysteresis"};
+constexpr double kSigmas = 1.96;  // of half a 95 % interval
+
+double declared_value(const DynamicModel& model, const DriveTerm& term, const std::string& joint) {
+  if (term.declared == nullptr) return 0.0;
+  for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
+    if (model.tree.joints[j].name == joint) return model.joints[j].*term.declared;
+  }
+  return 0.0;
+}
+
+void drop_friction_not_found(const Trace& trace, std::vector<DriveEstimate>& drives) {
+  std::erase_if(drives, [&](const DriveEstimate& drive) {
+    if (drive.term != "viscous" && drive.term != "coulomb") return false;
+    const auto at_joint = [&](const auto& wanted) {
+      return std::ranges::any_of(trace.accepted, [&](const TracedEffect& effect) {
+        return effect.id.place == drive.joint && wanted(effect.id.effect);
+      });
+    };
+    return !at_joint([&](const std::string& name) { return name == drive.term; }) &&
+           at_joint([&](const std::string& name) {
+             return std::ranges::find(kFrictionCurves, name) != kFrictionCurves.end();
+           });
+  });
+}
+
+}  // namespace
+
+void take_traced_drives(const TorqueTrace& trace, const DynamicModel& declared,
+                        std::vector<DriveEstimate>& drives) {
+  const bool of_urdf = trace.base.kind == TorqueBaseKind::kDeclared;
+  if (!of_urdf) drop_friction_not_found(trace.trace, drives);
+  for (const TracedEffect& effect : trace.trace.accepted) {
+    const auto term = std::ranges::find(kDriveTerms, effect.id.effect, &DriveTerm::effect);
+    if (term == kDriveTerms.end()) continue;
+    const auto own = std::ranges::find_if(drives, [&](const DriveEstimate& drive) {
+      return drive.term == term->term && drive.joint == effect.id.place;
+    });
+    DriveEstimate& drive = own != drives.end()
+                               ? *own
+                               : drives.emplace_back(DriveEstimate{std::string(term->term),
+                                                                   effect.id.place, 0.0, 0.0});
+    drive.value = effect.size + (of_urdf ? declared_value(declared, *term, drive.joint) : 0.0);
+    drive.sigma = 0.5 * (effect.interval.high - effect.interval.low) / kSigmas;
+  }
+  std::ranges::stable_sort(drives, {}, &DriveEstimate::joint);
+}
 
 void remove_torque_trace(const std::string& trace_file, const OutputFolder& folder) {
   remove_corrected(folder);

@@ -7,6 +7,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
 #include "app/io/torque_model_file.h"
+#include "app/report/torque_summary.h"
 #include "dynamics/effects/trace_torque.h"
 
 namespace kinescope {
@@ -15,6 +16,13 @@ struct TracedLog {
   TorqueTrace trace;
   SavedTrace saved;
 };
+
+/// One answer for each drive: where tracing sizes a term of a joint, its value (with what the URDF
+/// declares, where the trace is of its masses) takes the place of the parametric model's, which had
+/// to make up for effects that it lacks. So it is with viscous and Coulomb friction that tracing
+/// found not to be there beside another kind of friction: they are left out.
+void take_traced_drives(const TorqueTrace& trace, const DynamicModel& declared,
+                        std::vector<DriveEstimate>& drives);
 
 /// Filters the log at the cut-off that tracing asks for, given the one chosen for identification.
 /// Writes trace.json (or the name given), robot_traced.urdf and torque_compensated.csv. Throws as

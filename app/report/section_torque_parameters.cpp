@@ -16,17 +16,15 @@ namespace {
 constexpr int kBins = 24;
 constexpr std::size_t kMostParameters = 120;
 
-const DriveEstimate* drive(const TorqueSummary& summary, std::string_view term,
-                           const std::string& joint) {
-  for (const DriveEstimate& estimate : summary.drives) {
-    if (estimate.term == term && estimate.joint == joint) return &estimate;
-  }
-  return nullptr;
-}
-
+// Of the parametric model, which the plots show; what tracing found beside it has its own.
 double drive_value(const TorqueSummary& summary, std::string_view term, const std::string& joint) {
-  const DriveEstimate* found = drive(summary, term, joint);
-  return found == nullptr ? 0.0 : found->value;
+  const Identification& found = summary.identification;
+  const std::string name = fmt::format("{}({})", term, joint);
+  for (std::size_t k = 0; k < found.names.size(); ++k) {
+    const bool alone = found.names[k] == name || found.names[k].starts_with(name + " ");
+    if (alone) return found.parameters[static_cast<Eigen::Index>(k)];
+  }
+  return 0.0;
 }
 
 // What is left of the torque without the rigid body, over velocity: the friction as measured.
@@ -115,7 +113,11 @@ std::string_view first_place(std::string_view combination) {
 }
 
 std::string drive_table(const TorqueFacts& facts) {
-  Table table("drives-table", "Drives (expanded uncertainty, k = 2)", facts.result);
+  Table table("drives-table",
+              facts.summary.trace
+                  ? "Drives (expanded uncertainty, k = 2); as traced where tracing sizes them"
+                  : "Drives (expanded uncertainty, k = 2)",
+              facts.result);
   table.header({"Joint", "Term", "Value", "U", "Unit"});
   for (std::size_t k = 0; k < facts.summary.drives.size(); ++k) {
     const DriveEstimate& estimate = facts.summary.drives[k];
@@ -132,7 +134,11 @@ std::string drive_table(const TorqueFacts& facts) {
 }
 
 std::string parameter_table(const TorqueFacts& facts) {
-  Table table("parameters-table", "Base parameters: all that this torque can tell", facts.result);
+  Table table("parameters-table",
+              facts.summary.trace
+                  ? "Base parameters of the parametric model, without what tracing found"
+                  : "Base parameters: all that this torque can tell",
+              facts.result);
   table.header({"Combination of inertial parameters", "Value", "U (k = 2)", "Unit of the first"});
   const Identification& found = facts.summary.identification;
   const auto count = std::min<std::size_t>(kMostParameters, found.names.size());

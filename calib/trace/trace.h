@@ -29,6 +29,9 @@ struct TraceOptions {
   double noise_floor = 0.0;
   /// Effects that the model has already: they stay if they earn their place.
   std::vector<AddedEffect> start = {};
+  /// So many effects without a scan may together name what is left at one place, judged among
+  /// themselves: that something is left there has been shown. 0: none.
+  int plain_causes = 0;
   int fewest_stretches = 12;  ///< of time; with fewer nothing is said
 };
 

@@ -65,7 +65,8 @@ void Tracer::search() {
   }
   do {
     look_for_rest();
-  } while (name_the_rest() || choose_by_rest() || drop_what_leaves_too_much());
+  } while (name_the_rest() || name_by_plain_causes() || choose_by_rest() ||
+           drop_what_leaves_too_much());
   while (take_the_rest_as_curves()) look_beside_curves();
   describe_curves();
   summarise();

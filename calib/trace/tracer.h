@@ -2,7 +2,7 @@
 //
 // The search: forward selection (tracer.cpp), backward check and what cannot be told apart
 // (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp), what is left and repeats
-// (tracer_curves.cpp).
+// (tracer_curves.cpp), its plain causes (tracer_plain.cpp).
 #pragma once
 
 #include <cstddef>
@@ -102,6 +102,16 @@ class Tracer {
   /// True where an effect that is small in the mean over the rows it touches says as much as what
   /// was found to be left.
   [[nodiscard]] bool name_the_rest();
+  /// The same of effects without a scan at one place, together, by the tests of that place alone.
+  [[nodiscard]] bool name_by_plain_causes();
+  /// Nothing where they do not explain what the curve explains.
+  [[nodiscard]] StagePtr plain_causes_of(const FoundRest& found);
+  [[nodiscard]] std::optional<AddedEffect> plainest_at(const Stage& stage,
+                                                       const std::string& place) const;
+  [[nodiscard]] bool all_shown(const Stage& stage, std::size_t known);
+  /// By which an effect's single p-value is multiplied.
+  [[nodiscard]] double tests_of(const std::vector<Candidate>& candidates,
+                                const Candidate& candidate) const;
   /// Of effects that say the same, one that leaves nothing takes the place of one that does.
   [[nodiscard]] bool choose_by_rest();
   [[nodiscard]] std::optional<FoundRest> next_rest() const;
@@ -147,6 +157,7 @@ class Tracer {
   std::vector<Detail> details_;  // beside now_->added, filled by the backward check
   std::set<EffectId> removed_;
   std::set<EffectId> small_;   // may be added below the floors
+  std::set<EffectId> plain_;   // found as causes of what was left at their place
   std::set<EffectId> needed_;  // a plainer one in their place leaves a rest
   std::vector<FoundRest> rests_;
   int round_ = 0;

@@ -223,7 +223,7 @@ bool Tracer::drop_what_rests_explain() {
     const Linearisation linear = with_rests(stage->fit.linear, others);
     const NormalSystem system(linear, stage->system.partition());
     const Score score = jackknife_test(system, candidate->columns(effect.scan));
-    const double tests = number_of_tests(stage->fit.candidates, *candidate);
+    const double tests = tests_of(stage->fit.candidates, *candidate);
     if (!score.hidden() && score.p_value * tests < level_) continue;
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);

@@ -175,7 +175,7 @@ bool Tracer::check(std::size_t index) {
   own.scan = effect.scan;
   own.columns = candidate->columns(effect.scan);
   own.score = jackknife_test(stage->system, own.columns);
-  own.tests = number_of_tests(stage->fit.candidates, *candidate);
+  own.tests = tests_of(stage->fit.candidates, *candidate);
   own.p_value = std::min(1.0, own.score.p_value * own.tests);
   details_[index].score = own.score;
   TracedEffect& detail = details_[index].effect;

@@ -188,9 +188,14 @@ std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t j
   return {{"coulomb", context.joints[joint]}, {"viscous", context.joints[joint]}};
 }
 
-/// Of what the model declares and the effect adds together.
+/// Of what the model declares and the effect adds together. A Stribeck excess is positive
+/// (Armstrong-Helouvry, Dupont, Canudas de Wit 1994): less friction at low speed is sub-linear
+/// viscous friction.
 void forbid_driving(const EffectContext& c, std::size_t j, Candidate& out) {
   if (c.least_coulomb.size() == 0) return;
+  if (out.id.effect == "stribeck") {
+    out.possible = [](const Eigen::VectorXd& theta) { return theta[0] > 0.0; };
+  }
   const bool viscous = out.id.effect == "viscous";
   if (!viscous && out.id.effect != "coulomb") return;
   const double least = (viscous ? c.least_viscous : c.least_coulomb)[static_cast<Eigen::Index>(j)];

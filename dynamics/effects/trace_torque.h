@@ -19,7 +19,8 @@ namespace kinescope {
 
 struct TorqueTraceOptions {
   TracedTorqueOptions model = {};
-  TraceOptions trace = {.max_effects = 80};  ///< every joint has friction of its own
+  /// Every joint has friction of its own: offset, Coulomb, viscous are its plain causes.
+  TraceOptions trace = {.max_effects = 80, .plain_causes = 3};
   /// Effects that move no torque by more than this share of its noise are not looked for.
   double noise_share = 0.1;
   bool contacts = true;  ///< look for spans in which the robot was touched

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Torque effects of known size in logs of random robots: which name and joint the trace gives, and
-// how large. `trace_torque [alone|pairs|clean|unknown|all] [ROBOTS [FIRST_SEED]]`; default: all 3.
+// how large. `trace_torque [alone|pairs|clean|unknown|coverage|all] [ROBOTS [FIRST_SEED]]`;
+// default: all 3. `coverage`: of the 95 % intervals of several effects together, where friction
+// turns round within another width than the nominal one, dips at low speed, or has Dahl's state.
 // Every case has a clean twin: the same robot, motion and noise without the effect.
 #include "dynamics/effects/trace_torque.h"
 
@@ -224,6 +226,55 @@ void unknown(int robots, std::uint64_t first) {
   fmt::print("unknown: said so in {} of {}\n", said, 5 * robots);
 }
 
+/// What a joint's friction really is.
+const std::vector<std::vector<std::string>>& friction_laws() {
+  static const std::vector<std::vector<std::string>> laws{{"coulomb", "viscous"},
+                                                          {"coulomb", "viscous", "stribeck"},
+                                                          {"hysteresis", "viscous"},
+                                                          {"coulomb", "viscous", "ripple"}};
+  return laws;
+}
+
+void coverage(int robots, std::uint64_t first) {
+  constexpr double kWidest = 4.0;                      // of the turn, times the usual one
+  std::map<std::string, std::pair<int, int>> covered;  // inside, named
+  for (int k = 0; k < 10 * robots; ++k) {
+    const std::uint64_t seed = first + 9000 + static_cast<std::uint64_t>(k);
+    Rng rng = Rng::from_name("trace_torque", seed);
+    EffectWorldOptions options;
+    options.joints = 4;
+    options.declared_coulomb = options.declared_viscous = 0.0;
+    options.width_rad_s *= std::pow(kWidest, rng.uniform(-1.0, 1.0));
+    std::vector<TrueEffect> effects;
+    for (int joint = 0; joint < options.joints; ++joint) {
+      const std::size_t law = static_cast<std::size_t>(joint + k) % friction_laws().size();
+      for (const std::string& name : friction_laws()[law])
+        effects.push_back({name, joint, 0, kStrong * strength_of(name)});
+    }
+    const EffectWorld world = effect_world(effects, options, rng);
+    const Trace trace = trace_world(world).trace;
+    for (const KnownEffect& truth : world.effects) {
+      const auto found = std::ranges::find_if(
+          trace.accepted, [&](const TracedEffect& e) { return same_place(e, truth); });
+      if (found == trace.accepted.end() || truth.size == 0.0) continue;
+      const bool inside = found->interval.low <= truth.size && truth.size <= found->interval.high;
+      for (const std::string& name : {truth.effect, std::string("all effects")}) {
+        covered[name].first += inside ? 1 : 0;
+        ++covered[name].second;
+      }
+      if (!inside && std::getenv("TRACE_VERBOSE") != nullptr) {
+        fmt::print("    seed {} {}@{}: {:.4g} ({:.4g} to {:.4g}), truth {:.4g}\n", seed,
+                   truth.effect, truth.place, found->size, found->interval.low,
+                   found->interval.high, truth.size);
+      }
+    }
+  }
+  for (const auto& [name, counts] : covered) {
+    fmt::print("{:<20} {:4d} named, the 95 % interval holds the truth in {:5.1f} %\n", name,
+               counts.second, 100.0 * counts.first / counts.second);
+  }
+}
+
 }  // namespace
 }  // namespace kinescope
 
@@ -237,6 +288,7 @@ int main(int argc, char** argv) {
   if (what == "pairs" || what == "all") kinescope::pairs(robots, first);
   if (what == "clean" || what == "all") kinescope::clean(robots, first);
   if (what == "unknown" || what == "all") kinescope::unknown(robots, first);
+  if (what == "coverage" || what == "all") kinescope::coverage(robots, first);
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
   fmt::print("{:.0f} s\n", time.count());
   return 0;

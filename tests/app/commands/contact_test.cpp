@@ -192,6 +192,14 @@ TEST_F(ContactCommand, ModelsThatDoNotFitAreRefusedBeforeTheWork) {
   refused(path("log.csv"), ExitCode::kBadInput, "log.csv: this is no JSON");
   expect_refusal(words({"--model", model, "--identify"}), ExitCode::kBadRequest,
                  "contradicts --model");
+  expect_refusal(words({"--model", model, "--cutoff", "3.5"}), ExitCode::kBadRequest,
+                 "is 3.5 Hz, " + model + " was learned behind");
+  const DynamicModel arm = contact_arm(3);
+  DynamicModel longer = arm;
+  longer.tree.joints.back().T_parent_joint.translation.x() += 1e-3;  // m
+  folder_.write("robot.urdf", write_urdf(longer));
+  refused(model, ExitCode::kBadInput, "is another one, or elsewhere, in robot.urdf");
+  folder_.write("robot.urdf", write_urdf(arm));
   const std::string whole = read_text_file(model);
   auto document = nlohmann::json::parse(whole);
   document["robot"] = "another";

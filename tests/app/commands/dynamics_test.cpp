@@ -60,6 +60,26 @@ TEST_F(DynamicsCommand, GivesModelUrdfAndReport) {
   EXPECT_NE(page.find("Models side by side"), std::string::npos);
 }
 
+// Friction that the URDF does not declare is sized once: by tracing, where it is traced.
+TEST_F(DynamicsCommand, ADriveHasOneAnswer) {
+  DynamicModel bare = model_;
+  for (JointDynamics& joint : bare.joints) joint.viscous = joint.coulomb = 0.0;
+  folder_.write("robot.urdf", write_urdf(bare));
+  const Outcome outcome = run(words());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  int traced = 0;
+  for (const auto& effect : document.at("trace").at("accepted")) {
+    for (const auto& drive : document.at("drives")) {
+      if (drive.at("term") != effect.at("effect") || drive.at("joint") != effect.at("place"))
+        continue;
+      EXPECT_EQ(drive.at("value"), effect.at("size")) << drive;
+      ++traced;
+    }
+  }
+  EXPECT_GE(traced, 2) << document.at("trace").dump(1);
+}
+
 // By default: parametric, and two processes through inducing points; each says what it learned
 // from.
 TEST_F(DynamicsCommand, UsualModelsAreLearnedQuicklyAndSayFromWhat) {

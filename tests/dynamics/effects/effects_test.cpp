@@ -155,6 +155,54 @@ TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
   EXPECT_TRUE(out.contacts.empty());
 }
 
+/// Viscous friction in a short log whose torque noise lasts: significant as a curve over the speed,
+/// but not as one of all effects of the library (both seeds: `plain_causes` = 0 leaves the curve).
+TEST(TorqueEffects, what_is_left_over_the_speed_is_viscous_friction_where_that_explains_it) {
+  struct Weak {
+    std::uint64_t seed;
+    double strength;
+  };
+  for (const auto& [seed, strength] : {Weak{23, 0.05}, Weak{7, 0.1}}) {
+    Rng rng = Rng::from_name("plain", seed);
+    const EffectWorld world = effect_world({{"viscous", 1, 0, strength}},
+                                           {.joints = 3,
+                                            .prismatic_share = 0.0,
+                                            .duration_s = 14.0,
+                                            .highest_hz = 0.3,
+                                            .noise = 0.03,
+                                            .noise_memory = 0.99,
+                                            .declared_coulomb = 0.0,
+                                            .declared_viscous = 0.0},
+                                           rng);
+    MotionOptions motion;
+    motion.cutoff_hz = tracing_cutoff_hz(derive_motion(world.log).cutoff);
+    const Motion derived = derive_motion(world.log, motion);
+    TorqueTraceOptions options;
+    options.contacts = false;
+    options.model.filter = {derived.filter, derived.cutoff.cutoff_hz};
+    const Trace trace = trace_torque(world.model, derived.samples, options).trace;
+    EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << seed << ": " << trace.reason;
+    ASSERT_EQ(trace.accepted.size(), 1U) << seed << ": " << trace.reason;
+    EXPECT_EQ(trace.accepted.front().id, (EffectId{"viscous", "joint2"})) << seed;
+    options.trace.plain_causes = 0;
+    EXPECT_EQ(trace_torque(world.model, derived.samples, options).trace.verdict,
+              TraceVerdict::kUnknown)
+        << seed << ": no case of it any more";
+  }
+}
+
+TEST(TorqueEffects, less_friction_at_low_speed_is_no_stribeck_effect) {
+  Rng rng = Rng::from_name("effects", 12);
+  const EffectWorld world = effect_world({}, quiet_world(), rng);
+  const TracedFit fit =
+      TorqueTracedModel(world.model, exact_samples(world), declared_options()).fit({});
+  const Candidate& stribeck = candidate(fit, {"stribeck", "joint2"});
+  ASSERT_TRUE(stribeck.possible);
+  EXPECT_TRUE(stribeck.possible(Eigen::VectorXd::Constant(1, 0.3)));
+  EXPECT_FALSE(stribeck.possible(Eigen::VectorXd::Constant(1, -13.2)));
+  EXPECT_FALSE(candidate(fit, {"cubic_viscous", "joint2"}).possible) << "it may be sub-linear";
+}
+
 // A step over the position is in no library. A spring and three ripples come near to it.
 TEST(TorqueEffects, a_snag_is_no_sum_of_ripples) {
   for (const std::uint64_t seed : {8044U, 8049U, 8052U}) {
