@@ -14,13 +14,13 @@
 #include <fmt/format.h>
 
 #include "app/report/plot.h"
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/gp/hyperparameters.h"
 #include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/models/torque_model.h"
 #include "tests/experiments/command_line.h"
 #include "tests/experiments/figure.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

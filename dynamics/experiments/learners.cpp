@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/experiments/learners.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include "dynamics/gp/robot_kernels.h"
+#include "dynamics/gp/workers.h"
+#include "dynamics/identify/model_features.h"
+#include "dynamics/models/neural_network.h"
+#include "dynamics/rigid/rigid_model.h"
+
+namespace kinescope::experiments {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+constexpr std::array<std::pair<std::string_view, Learner>, 6> kNames = {
+    {{"gip", Learner::kGip},
+     {"rbf", Learner::kRbf},
+     {"network", Learner::kNetwork},
+     {"semi_parametric", Learner::kSemiParametric},
+     {"model_based", Learner::kModelBased},
+     {"parametric", Learner::kParametric}}};
+
+// Variance of the noise to begin with, of normalised torques.
+constexpr double kNoiseStart = 1e-3;
+// Ranges of the search. With 1e-4 to 1e4, the squared exponential of a torque that is linear in one
+// acceleration (a sliding joint) ended at 11 of its bounds with 1.8 times the error.
+constexpr double kLowest = 1e-8;
+constexpr double kHighest = 1e8;
+// As much further as it goes: 1e-5 stopped within 0.2 of the log likelihood of 600 samples.
+constexpr double kTolerance = 1e-8;
+constexpr int kMostIterations = 500;
+
+gp::JointKinds kinds_of(const DynamicModel& model) {
+  gp::JointKinds kinds;
+  for (const RigidBody& body : make_rigid_model(model).bodies) {
+    kinds.push_back(body.type == JointType::kPrismatic ? gp::JointKind::kPrismatic
+                                                       : gp::JointKind::kRevolute);
+  }
+  return kinds;
+}
+
+gp::Kernel kernel_of(Learner learner, const DynamicModel& believed, const TorqueSamples& train,
+                     int joint) {
+  const int joints = static_cast<int>(train.joints());
+  const DriveTerms drives;
+  if (learner == Learner::kRbf) return gp::rbf(gp::first_columns(3 * joints));
+  if (learner == Learner::kGip) {
+    return gp::gip(kinds_of(believed), motion_inputs(train.q, train.dq, train.ddq)) +
+           gp::joint_friction(joints, joint, drives.coulomb_width_rad_s);
+  }
+  const ModelFeatures features = model_features(believed, train, joint, drives);
+  if (learner == Learner::kModelBased) return gp::feature_kernel(features.map, features.prior);
+  return gp::semi_parametric(features.map, features.prior, gp::first_columns(3 * joints));
+}
+
+Matrix by_processes(Learner learner, const DynamicModel& believed, const TorqueSamples& train,
+                    const TorqueSamples& test, const LearnOptions& options) {
+  const Matrix inputs = motion_inputs(train.q, train.dq, train.ddq);
+  const Matrix wanted = motion_inputs(test.q, test.dq, test.ddq);
+  Matrix out(test.size(), test.joints());
+  gp::Workers workers(options.threads);
+  workers.run(train.joints(), [&](Eigen::Index j, gp::Scratch&) {
+    const gp::Dataset data{inputs, train.torque.col(j), {}, {}};
+    const gp::GpModel start = gp::make_model(
+        kernel_of(learner, believed, train, static_cast<int>(j)), kNoiseStart,
+        learner == Learner::kRbf ? gp::standardise(data) : gp::standardise_targets(data));
+    const gp::Estimate found = search(start, data, options.search, 1);
+    const gp::FittedGp fitted = gp::fit(found.model, data, {.threads = 1});
+    out.col(j) = gp::predict(fitted, wanted, {.variance = false, .threads = 1}).mean;
+  });
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(Learner learner) {
+  return std::ranges::find(kNames, learner, [](const auto& one) { return one.second; })->first;
+}
+
+std::optional<Learner> learner_of(std::string_view name) {
+  const auto found = std::ranges::find(kNames, name, [](const auto& one) { return one.first; });
+  if (found == kNames.end()) return {};
+  return found->second;
+}
+
+const std::vector<Learner>& all_learners() {
+  static const std::vector<Learner> learners = [] {
+    std::vector<Learner> out;
+    for (const auto& [name, learner] : kNames) out.push_back(learner);
+    return out;
+  }();
+  return learners;
+}
+
+gp::Estimate search(const gp::GpModel& start, const gp::Dataset& data, const SearchOptions& options,
+                    int threads) {
+  gp::GpModel model = start;
+  std::vector<gp::Parameter> parameters = model.kernel.parameters();
+  for (gp::Parameter& parameter : parameters) {
+    parameter.lower = std::min(parameter.lower, kLowest);
+    parameter.upper = std::max(parameter.upper, kHighest);
+  }
+  model.kernel = model.kernel.with_parameters(std::move(parameters));
+  gp::EstimateOptions estimate;
+  estimate.starts = options.starts;
+  estimate.samples_for_starts = options.samples;
+  estimate.seed = options.seed;
+  estimate.max_iterations = kMostIterations;
+  estimate.relative_tolerance = kTolerance;
+  estimate.fit.threads = threads;
+  return gp::estimate_hyperparameters(
+      model, gp::subset(data, evenly_chosen(data.samples(), options.samples)), estimate);
+}
+
+Eigen::MatrixXd predict_by(Learner learner, const DynamicModel& believed,
+                           const TorqueSamples& train, const TorqueSamples& test,
+                           const LearnOptions& options) {
+  if (learner == Learner::kParametric) {
+    const Identification found = identify_dynamics(believed, train);
+    return predict_torque_mean(found, found.parameters, test.q, test.dq, test.ddq);
+  }
+  if (learner == Learner::kNetwork) {
+    return models::fit_neural_network(train, options.network, options.search.seed)
+        .predict(test.q, test.dq, test.ddq)
+        .mean;
+  }
+  return by_processes(learner, believed, train, test, options);
+}
+
+}  // namespace kinescope::experiments
