@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/experiments/experiments.h"
+#include "app/experiments/experiment_choice.h"
 #include "app/io/recording.h"
 #include "calib/bundle/calibrate.h"
 #include "calib/vision/board.h"
@@ -125,7 +125,7 @@ struct ContactCommandOptions {
                                        const Console& console);
 
 struct ExperimentOptions {
-  std::string name;  ///< of all_experiments()
+  std::string name;  ///< scara, barrett, ..
   ExperimentChoice choice;
   std::filesystem::path log;    ///< in place of the experiment's own worlds; empty: none
   std::filesystem::path robot;  ///< URDF, with a log

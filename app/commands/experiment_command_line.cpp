@@ -8,6 +8,7 @@
 
 #include "app/commands/command_options.h"
 #include "app/commands/torque_command_line.h"
+#include "app/experiments/experiments.h"
 #include "app/io/nearest_name.h"
 
 namespace kinescope {
@@ -23,9 +24,7 @@ std::vector<std::string> experiment_names() {
 
 std::vector<std::string> learner_names() {
   std::vector<std::string> out;
-  for (const experiments::Learner learner : experiments::all_learners()) {
-    out.emplace_back(to_string(learner));
-  }
+  for (const std::string_view name : experiments::learner_names()) out.emplace_back(name);
   return out;
 }
 
@@ -82,9 +81,17 @@ void add_choices(CLI::App& command, ExperimentChoice& choice) {
             for (const std::string& word : words)
               choice.learners->push_back(*experiments::learner_of(word));
           },
-          "gip, rbf, network, semi_parametric, model_based, parametric; some of them")
+          "Some of gip, rbf, network, semi_parametric, model_based, parametric, lip (slow)")
       ->delimiter(',')
       ->check(one_of(learner_names()))
+      ->type_name("LIST")
+      ->group(kWhat);
+  command
+      .add_option_function<std::vector<int>>(
+          "--joints", [&choice](const std::vector<int>& joints) { choice.joints = joints; },
+          "Joints of the arm, counted from its base; several numbers: one after another")
+      ->delimiter(',')
+      ->check(number_in(2, 7))
       ->type_name("LIST")
       ->group(kWhat);
   add_count(command, "--starts", choice.starts, 1, 100,

@@ -16,6 +16,16 @@ const std::vector<Experiment>& all_experiments() {
        {"--runs", "--samples", "--noise", "--models", "--starts", "--search-samples", "--log"},
        {"medians", "spread", "runs"},
        efficiency_experiment},
+      {"panda",
+       "Torque models on simulated Pandas of more and more joints",
+       {"--runs", "--joints", "--models", "--starts", "--search-samples"},
+       {"medians", "spread", "runs"},
+       panda_experiment},
+      {"barrett",
+       "Joint 4 of a WAM: outliers, friction, gravity and the mass of a sensor",
+       {"--samples"},
+       {"fits", "grid", "choices", "friction", "gravity", "sensor"},
+       barrett_experiment},
   };
   return experiments;
 }

@@ -6,39 +6,14 @@
 // Not here: the command line and the files (app/commands/experiment.cpp).
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
 #include <string_view>
 #include <vector>
 
+#include "app/experiments/experiment_choice.h"
 #include "app/report/experiment.h"
-#include "dynamics/experiments/learners.h"
 #include "kinematics/core/progress.h"
 
 namespace kinescope {
-
-/// A robot and its log, judged in place of an experiment's own worlds.
-struct ExperimentLog {
-  DynamicModel robot;
-  TorqueSamples samples;
-  std::vector<std::string> joints;
-};
-
-/// What was chosen; nothing: the experiment's own.
-struct ExperimentChoice {
-  std::optional<int> runs;
-  std::optional<int> samples;
-  std::optional<double> noise;  ///< share of the spread of each joint's torque
-  std::optional<std::vector<double>> tilts_deg;
-  std::optional<std::vector<double>> shifts_m;  ///< as many as tilts
-  std::optional<std::vector<experiments::Learner>> learners;
-  std::optional<int> starts;          ///< of every search of hyperparameters
-  std::optional<int> search_samples;  ///< that the search sees
-  std::uint64_t seed = 1;
-  int threads = 0;  ///< 0: all of the machine; never changes a result
-  std::optional<ExperimentLog> log;
-};
 
 struct Experiment {
   std::string_view name;
@@ -54,5 +29,10 @@ struct Experiment {
                                                  const Progress& progress);
 [[nodiscard]] ExperimentSummary efficiency_experiment(const ExperimentChoice& choice,
                                                       const Progress& progress);
+
+[[nodiscard]] ExperimentSummary panda_experiment(const ExperimentChoice& choice,
+                                                 const Progress& progress);
+[[nodiscard]] ExperimentSummary barrett_experiment(const ExperimentChoice& choice,
+                                                   const Progress& progress);
 
 }  // namespace kinescope

@@ -10,7 +10,7 @@ namespace kinescope {
 using experiments::ComparisonCase;
 
 std::vector<experiments::Learner> chosen_learners(const ExperimentChoice& choice) {
-  return choice.learners.value_or(experiments::all_learners());
+  return choice.learners.value_or(experiments::usual_learners());
 }
 
 experiments::LearnOptions learn_options(const ExperimentChoice& choice) {

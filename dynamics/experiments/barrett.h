@@ -42,6 +42,14 @@ struct WamMotion {
 };
 [[nodiscard]] const std::vector<WamMotion>& wam_motions();
 
+inline constexpr Eigen::Index kWamJoint = 3;     ///< the one that moves
+inline constexpr double kWamShoulder_rad = 0.6;  ///< joint 2; the others are held at 0
+
+[[nodiscard]] double wam_friction(double dq, const BarrettOptions& options);
+/// Torque of joint 4 without friction, N m.
+[[nodiscard]] Eigen::VectorXd wam_torque(const DynamicModel& arm, const Eigen::VectorXd& q,
+                                         const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq);
+
 /// Joint 4 alone: one column. A trajectory each motion.
 struct BarrettLog {
   TorqueSamples measured;
@@ -61,10 +69,11 @@ struct BarrettFit {
   Eigen::VectorXd at_log;  ///< mean at the log's samples
 };
 
-/// A place of the grid: a common length scale, in standard deviations of each signal, and the
-/// noise's share of the spread.
+/// A place of the grid: length scales in standard deviations of the signals, and the noise's share
+/// of the spread.
 struct GridPoint {
-  double length = 0.0;
+  double length = 0.0;  ///< of position and acceleration
+  double speed = 0.0;   ///< of the velocity, in which friction jumps
   double noise = 0.0;
   double chunk_rms = 0.0;  ///< left out in ten random chunks
   double block_rms = 0.0;  ///< left out in ten blocks of consecutive samples

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
+#include "dynamics/gp/lip_kernel.h"
 #include "dynamics/gp/robot_kernels.h"
 #include "dynamics/gp/workers.h"
 #include "dynamics/identify/model_features.h"
@@ -17,13 +19,14 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-constexpr std::array<std::pair<std::string_view, Learner>, 6> kNames = {
+constexpr std::array<std::pair<std::string_view, Learner>, 7> kNames = {
     {{"gip", Learner::kGip},
      {"rbf", Learner::kRbf},
      {"network", Learner::kNetwork},
      {"semi_parametric", Learner::kSemiParametric},
      {"model_based", Learner::kModelBased},
-     {"parametric", Learner::kParametric}}};
+     {"parametric", Learner::kParametric},
+     {"lip", Learner::kLip}}};
 
 // Variance of the noise to begin with, of normalised torques.
 constexpr double kNoiseStart = 1e-3;
@@ -34,6 +37,12 @@ constexpr double kHighest = 1e8;
 // As much further as it goes: 1e-5 stopped within 0.2 of the log likelihood of 600 samples.
 constexpr double kTolerance = 1e-8;
 constexpr int kMostIterations = 500;
+// A kernel of all joints costs their number cubed: its search is shorter and on fewer samples.
+constexpr double kLipNoiseStart = 1e-4;
+constexpr int kLipIterations = 80;
+constexpr double kLipTolerance = 1e-6;
+constexpr Eigen::Index kLipStartSamples = 120;
+constexpr int kLipSearchSamples = 250;
 
 gp::JointKinds kinds_of(const DynamicModel& model) {
   gp::JointKinds kinds;
@@ -76,6 +85,34 @@ Matrix by_processes(Learner learner, const DynamicModel& believed, const TorqueS
   return out;
 }
 
+// One process of all joints, whose matrix is as many times as wide. One scale for all torques and
+// no shift: a Lagrangian ties them to each other as they are.
+Matrix by_lip(const DynamicModel& believed, const TorqueSamples& train, const TorqueSamples& test,
+              const LearnOptions& options) {
+  const gp::Dataset data{motion_inputs(train.q, train.dq, train.ddq), train.torque, {}, {}};
+  const Eigen::Index joints = train.joints();
+  gp::Normalisation scale;
+  scale.target_shift = Eigen::RowVectorXd::Zero(joints);
+  scale.target_scale = Eigen::RowVectorXd::Constant(
+      joints, std::sqrt(data.targets.squaredNorm() / static_cast<double>(data.targets.size())));
+  const gp::GpModel start =
+      gp::make_model(gp::lip(kinds_of(believed)), kLipNoiseStart, scale, true);
+  gp::EstimateOptions estimate;
+  estimate.starts = options.search.starts;
+  estimate.seed = options.search.seed;
+  estimate.max_iterations = kLipIterations;
+  estimate.relative_tolerance = kLipTolerance;
+  estimate.samples_for_starts = kLipStartSamples;
+  estimate.fit.threads = options.threads;
+  const int few = std::min(options.search.samples, kLipSearchSamples);
+  const gp::Estimate found = gp::estimate_hyperparameters(
+      start, gp::subset(data, evenly_chosen(data.samples(), few)), estimate);
+  const gp::FittedGp fitted = gp::fit(found.model, data, {.threads = options.threads});
+  return gp::predict(fitted, motion_inputs(test.q, test.dq, test.ddq),
+                     {.variance = false, .threads = options.threads})
+      .mean;
+}
+
 }  // namespace
 
 std::string_view to_string(Learner learner) {
@@ -88,10 +125,18 @@ std::optional<Learner> learner_of(std::string_view name) {
   return found->second;
 }
 
-const std::vector<Learner>& all_learners() {
+std::vector<std::string_view> learner_names() {
+  std::vector<std::string_view> out;
+  for (const auto& [name, learner] : kNames) out.push_back(name);
+  return out;
+}
+
+const std::vector<Learner>& usual_learners() {
   static const std::vector<Learner> learners = [] {
     std::vector<Learner> out;
-    for (const auto& [name, learner] : kNames) out.push_back(learner);
+    for (const auto& [name, learner] : kNames) {
+      if (learner != Learner::kLip) out.push_back(learner);
+    }
     return out;
   }();
   return learners;
@@ -129,6 +174,7 @@ Eigen::MatrixXd predict_by(Learner learner, const DynamicModel& believed,
         .predict(test.q, test.dq, test.ddq)
         .mean;
   }
+  if (learner == Learner::kLip) return by_lip(believed, train, test, options);
   return by_processes(learner, believed, train, test, options);
 }
 

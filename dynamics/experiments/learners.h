@@ -25,14 +25,17 @@ enum class Learner {
   kNetwork,         ///< two layers of 400 sigmoids
   kSemiParametric,  ///< features of the believed model plus a squared exponential, zero mean
   kModelBased,      ///< features of the believed model alone
-  kParametric       ///< base parameters of the believed model by weighted least squares
+  kParametric,      ///< base parameters of the believed model by weighted least squares
+  kLip              ///< Lagrangian-inspired polynomial of all joints together, and no friction
 };
 
-/// "gip", "rbf", "network", "semi_parametric", "model_based", "parametric".
+/// "gip", "rbf", "network", "semi_parametric", "model_based", "parametric", "lip".
 [[nodiscard]] std::string_view to_string(Learner learner);
 /// Nothing for an unknown name.
 [[nodiscard]] std::optional<Learner> learner_of(std::string_view name);
-[[nodiscard]] const std::vector<Learner>& all_learners();
+[[nodiscard]] std::vector<std::string_view> learner_names();
+/// All but LIP, which takes minutes.
+[[nodiscard]] const std::vector<Learner>& usual_learners();
 
 struct SearchOptions {
   int starts = 3;

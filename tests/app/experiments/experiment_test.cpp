@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `kinescope experiment scara` and `efficiency` in small: products, the page against its table,
+// `kinescope experiment` in small: products, the page against its table,
 // refusals.
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "app/experiments/experiments.h"
+#include "dynamics/experiments/scara.h"
 #include "kinematics/core/file.h"
+#include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
+#include "tests/app/commands/torque_log_text.h"
 #include "tests/app/experiments/experiment_page.h"
 #include "tests/app/io/check_products.h"
+#include "tests/app/io/recording_folder.h"
 #include "tests/truth/temporary_path.h"
 
 namespace kinescope {
@@ -23,6 +30,10 @@ std::vector<std::string> small(const std::string& name, const std::filesystem::p
           "--search-samples", "75",    "--models", "gip,rbf,parametric",
           "--threads",        threads, "-o",       folder.string(),
           "--quiet"};
+}
+
+const Experiment& experiment_named(std::string_view name) {
+  return *std::ranges::find(all_experiments(), name, &Experiment::name);
 }
 
 TEST(Experiment, ThePageShowsTheTable) {
@@ -57,6 +68,50 @@ TEST(Experiment, ThreadsChangeNothing) {
   ASSERT_EQ(run(small("efficiency", two, "2")).code, 0);
   for (const char* table : {"medians.csv", "spread.csv", "runs.csv"}) {
     EXPECT_EQ(read_text_file(one / table), read_text_file(two / table)) << table;
+  }
+}
+
+TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
+  const std::filesystem::path folder = truth::temporary_path("others");
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"barrett", "--samples", "150"},
+        std::vector<std::string>{"panda", "--runs", "1", "--joints", "2,3", "--models",
+                                 "rbf,parametric", "--starts", "1", "--search-samples", "60"}}) {
+    std::vector<std::string> command{"experiment"};
+    command.insert(command.end(), words.begin(), words.end());
+    const std::filesystem::path out = folder / words.front();
+    command.insert(command.end(), {"-o", out.string(), "--quiet"});
+    const Outcome outcome = run(command);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const ProductCheck check = check_products(out);
+    if (check.done) {
+      EXPECT_TRUE(check.passed) << check.words;
+    }
+    for (const std::string_view table : experiment_named(words.front()).tables) {
+      EXPECT_TRUE(std::filesystem::exists(out / (std::string(table) + ".csv"))) << table;
+    }
+  }
+}
+
+TEST(Experiment, OnALogOfOnesOwn) {
+  const experiments::ComparisonCase one =
+      experiments::scara_case({}, 0, {.samples = 1200, .test_samples = 10});
+  const RecordingFolder folder;
+  folder.write("robot.urdf", write_urdf(one.believed)).write("log.csv", torque_log_csv(one.train));
+  const std::filesystem::path out = folder.path() / "out";
+  for (const char* name : {"scara", "efficiency"}) {
+    const Outcome outcome =
+        run({"experiment", name, "--log", (folder.path() / "log.csv").string(), "--robot",
+             (folder.path() / "robot.urdf").string(), "--runs", "2", "--models", "parametric,rbf",
+             "--search-samples", "60", "--starts", "1", "-o", out.string(), "--quiet"});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const auto rows = read_csv_rows(read_text_file(out / "medians.csv"));
+    ASSERT_GE(rows.size(), 2U);
+    const auto& most = rows[rows.size() - 2];  // of most samples
+    ASSERT_EQ(most.at("Model"), "parametric");
+    EXPECT_LT(std::stod(most.at("all joints")), 1.0);  // noise of 1 %: 0.01 %, and filters
+    const auto document = nlohmann::json::parse(read_text_file(out / "experiment.json"));
+    EXPECT_EQ(document.at("inputs").size(), 2U);
   }
 }
 
