@@ -60,7 +60,7 @@ Figure of_grid(const BarrettResult& result) {
   return {report::curve_plot(
               "Left-out error over the length scale",
               {.label = "length scale of the velocity, standard deviations", .log10 = true},
-              {.label = "left-out rms, N m", .log10 = true},
+              {.label = "left-out rms, N m"},
               {along_speed(result.grid, &GridPoint::chunk_rms, "ten random chunks"),
                along_speed(result.grid, &GridPoint::block_rms, "ten blocks")}),
           "Cross-validation over the grid: the least over the other length scale and the noise"};
@@ -199,7 +199,7 @@ std::vector<ExperimentSection> sections_of(const BarrettResult& result) {
   out.push_back({"grid",
                  "Hyperparameters by cross-validation",
                  {"Ten random chunks leave neighbours in time on both sides, ten blocks do not."},
-                 {"choices", "grid"},
+                 {"choices"},
                  {of_grid(result)}});
   out.push_back({"parts",
                  "Friction and gravity",

@@ -37,6 +37,9 @@ constexpr double kHighest = 1e8;
 // As much further as it goes: 1e-5 stopped within 0.2 of the log likelihood of 600 samples.
 constexpr double kTolerance = 1e-8;
 constexpr int kMostIterations = 500;
+// Of each start before the best goes on: of 200 samples of a sliding joint, after 20 even ten
+// starts ended 0.1 below the maximum that three find after 100.
+constexpr int kStartIterations = 100;
 // A kernel of all joints costs their number cubed: its search is shorter and on fewer samples.
 constexpr double kLipNoiseStart = 1e-4;
 constexpr int kLipIterations = 80;
@@ -156,6 +159,7 @@ gp::Estimate search(const gp::GpModel& start, const gp::Dataset& data, const Sea
   estimate.samples_for_starts = options.samples;
   estimate.seed = options.seed;
   estimate.max_iterations = kMostIterations;
+  estimate.start_iterations = kStartIterations;
   estimate.relative_tolerance = kTolerance;
   estimate.fit.threads = threads;
   return gp::estimate_hyperparameters(

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/experiments/quartiles.h"
+#include "dynamics/identify/model_features.h"
 #include "kinematics/core/rng.h"
 
 namespace kinescope::experiments {
@@ -31,6 +32,21 @@ TEST(ScaraExperiment, MisplacementBitesWhatBelievesTheSheet) {
             30.0 * worst_of_first_two(Learner::kParametric, small));
   EXPECT_LT(worst_of_first_two(Learner::kParametric, {}), 0.1);
   EXPECT_GT(worst_of_first_two(Learner::kParametric, large), 1.0);
+}
+
+// The slide's torque is linear in one acceleration: long scales and a large variance, which a range
+// of 1e-4 to 1e4 does not hold.
+TEST(Learners, ThreeStartsFindWhatEightFindAndNarrowRangesDoNot) {
+  const ComparisonCase one = scara_case({}, 0, {.samples = 200, .test_samples = 10});
+  const gp::Dataset data{
+      motion_inputs(one.train.q, one.train.dq, one.train.ddq), one.train.torque.col(2), {}, {}};
+  const gp::GpModel start =
+      gp::make_model(gp::rbf(gp::first_columns(12)), 1e-3, gp::standardise(data));
+  const gp::Estimate usual = search(start, data, {.starts = 3, .samples = 200}, 1);
+  const gp::Estimate many = search(start, data, {.starts = 8, .samples = 200, .seed = 7}, 1);
+  EXPECT_NEAR(usual.score, many.score, 1e-3 * 200.0);  // of the log likelihood, a sample
+  // With ranges of 1e-4 to 1e4, whatever the starts.
+  EXPECT_GT(usual.score, gp::estimate_hyperparameters(start, data, {.starts = 8}).score + 1.0);
 }
 
 TEST(ScaraExperiment, RunsDifferInEverythingAndSizesInGeometryAlone) {
