@@ -66,7 +66,9 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, dynamics, predict, contact, inspect or camera; see kinescope --help";
+        "run, trace, correct, dynamics, predict, contact, experiment, inspect or camera; see "
+        "kinescope "
+        "--help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -177,6 +179,13 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     line.contact.data = log_settings(line, line.contact.logs.front(), line.contact.data);
     return contact_command(line.contact, console);
   }
+  if (app.got_subcommand("experiment")) {
+    ExperimentOptions& experiment = line.experiment;
+    if (experiment.output.empty()) experiment.output = experiment.name + "_experiment";
+    if (!experiment.log.empty())
+      experiment.data = log_settings(line, experiment.log, experiment.data);
+    return experiment_command(experiment, console);
+  }
   if (app.got_subcommand("inspect")) {
     if (std::filesystem::is_regular_file(line.inspect.recording.folder))
       line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
@@ -241,6 +250,7 @@ int run_program(int argc, const char* const* argv) {
   line.run.arguments.assign(argv + 1, argv + argc);
   line.dynamics.command_line = line.run.command_line;
   line.contact.command_line = line.run.command_line;
+  line.experiment.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

@@ -25,6 +25,7 @@ struct CommandLine {
   DynamicsOptions dynamics;
   PredictOptions predict;
   ContactCommandOptions contact;
+  ExperimentOptions experiment;
   InspectOptions inspect;
   CameraOptions camera;
   TraceCommandOptions trace;

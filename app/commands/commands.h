@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "app/experiments/experiment_choice.h"
 #include "app/io/recording.h"
 #include "calib/bundle/calibrate.h"
 #include "calib/vision/board.h"
@@ -122,6 +123,20 @@ struct ContactCommandOptions {
 
 [[nodiscard]] ExitCode contact_command(const ContactCommandOptions& options,
                                        const Console& console);
+
+struct ExperimentOptions {
+  std::string name;  ///< scara, barrett, ..
+  ExperimentChoice choice;
+  std::filesystem::path log;    ///< in place of the experiment's own worlds; empty: none
+  std::filesystem::path robot;  ///< URDF, with a log
+  TorqueDataOptions data;
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< as DynamicsOptions
+  std::filesystem::path output;                 ///< folder
+  bool force = false;                           ///< as DynamicsOptions
+  std::string command_line;                     ///< for the page
+};
+
+[[nodiscard]] ExitCode experiment_command(const ExperimentOptions& options, const Console& console);
 
 struct InspectOptions {
   RecordingPaths recording;                    ///< its folder may be a file: a torque log

@@ -22,6 +22,17 @@ CLI::Option* add_files(CLI::App& command, const char* name, Path& paths, const c
       ->type_name("FILE");
 }
 
+void add_robot(CLI::App& command, std::filesystem::path& robot) {
+  command
+      .add_option_function<std::string>(
+          "--robot", [&robot](const std::string& text) { robot = text; },
+          "The robot (URDF), from kinescope run or any other")
+      ->required()
+      ->type_name("FILE");
+}
+
+}  // namespace
+
 void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& data) {
   const char* group = "What the log's columns are (default: by their names)";
   LogMapping& mapping = data.mapping;
@@ -67,15 +78,6 @@ void add_cutoff(CLI::App& command, TorqueDataOptions& data) {
       ->type_name("HZ");
 }
 
-void add_robot(CLI::App& command, std::filesystem::path& robot) {
-  command
-      .add_option_function<std::string>(
-          "--robot", [&robot](const std::string& text) { robot = text; },
-          "The robot (URDF), from kinescope run or any other")
-      ->required()
-      ->type_name("FILE");
-}
-
 void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2) {
   command
       .add_option_function<std::vector<double>>(
@@ -89,8 +91,6 @@ void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2
       ->check(number_in(-100, 100))
       ->type_name("X,Y,Z");
 }
-
-}  // namespace
 
 void add_inspect_log_options(CLI::App& inspect, CommandLine& line) {
   inspect

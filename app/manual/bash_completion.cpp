@@ -61,6 +61,16 @@ std::string_view positional_kind(const CommandPage& page) {
   return page.positionals.empty() ? "NONE" : "FOLDER";
 }
 
+/// What stands where no option takes it: files, or one of some words, where an option may stand
+/// too.
+std::string positional_case(const CommandPage& page) {
+  for (const OptionEntry& positional : page.positionals) {
+    if (positional.words.empty()) continue;
+    return fmt::format("argument=NONE words='{}'", fmt::join(positional.words, " "));
+  }
+  return fmt::format("argument={}", positional_kind(page));
+}
+
 void add_page(std::string_view pattern, const CommandPage& page, std::string& out) {
   std::vector<std::string> names;
   std::string cases;
@@ -72,7 +82,7 @@ void add_page(std::string_view pattern, const CommandPage& page, std::string& ou
   }
   out += fmt::format("    {})\n      options='{}'\n      case $before in\n{}", pattern,
                      fmt::join(names, " "), cases);
-  out += fmt::format("        *) argument={} ;;\n      esac\n      ;;\n", positional_kind(page));
+  out += fmt::format("        *) {} ;;\n      esac\n      ;;\n", positional_case(page));
 }
 
 }  // namespace

@@ -16,7 +16,6 @@ namespace {
 constexpr double kLegendRow = 15.0;
 constexpr double kCharacterWidth = 6.1;  ///< of an 11 px label
 constexpr double kAxisName = 24.0;       ///< left of the ticks' labels
-constexpr double kRowNameWidth = 96.0;
 constexpr double kArrowHead = 4.0;
 
 std::string pair_text(const Eigen::Vector2d& p) { return drawn(p.x()) + " " + drawn(p.y()); }
@@ -101,9 +100,14 @@ Plot::Plot(std::string_view name, PlotAxis x, PlotAxis y, PlotSize size)
     : name_(name), x_(std::move(x)), y_(std::move(y)), size_(size) {
   if (!(x_.upper > x_.lower)) pad_range(x_.lower, x_.upper);
   if (!(y_.upper > y_.lower)) pad_range(y_.lower, y_.upper);
-  for (const auto& [tick, text] : ticks_of(y_)) {
+  // Settled before the first mark is placed.
+  const auto make_room = [this](const std::string& text) {
     left_ = std::max(left_, kAxisName + kCharacterWidth * static_cast<double>(text.size()));
+  };
+  if (y_.row_names.empty()) {
+    for (const auto& [tick, text] : ticks_of(y_)) make_room(text);
   }
+  for (const std::string& row : y_.row_names) make_room(row);
 }
 
 Eigen::Vector2d Plot::place(const Eigen::Vector2d& point) const {
@@ -192,11 +196,6 @@ void Plot::legend(std::string_view text, std::string_view css_class) {
   legend_.emplace_back(text, css_class);
 }
 
-void Plot::row_names(const std::vector<std::string>& names) {
-  row_names_ = names;
-  left_ = kRowNameWidth;
-}
-
 std::string Plot::x_axis() const {
   const double y0 = size_.height - bottom_;
   std::string grid, text;
@@ -219,15 +218,15 @@ std::string Plot::y_axis() const {
     text += fmt::format("<text class=\"tick\" x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
                         drawn(x0 - 5), drawn(y + 4), name);
   };
-  if (row_names_.empty()) {
+  if (y_.row_names.empty()) {
     for (const auto& [tick, name] : ticks_of(y_)) {
       const double y = place({x_.lower, tick}).y();
       grid += fmt::format("M{} {}H{}", drawn(x0), drawn(y), drawn(size_.width - right_));
       write(y, name);
     }
   }
-  for (std::size_t k = 0; k < row_names_.size(); ++k) {
-    write(place({x_.lower, static_cast<double>(k)}).y(), escaped(row_names_[k]));
+  for (std::size_t k = 0; k < y_.row_names.size(); ++k) {
+    write(place({x_.lower, static_cast<double>(k)}).y(), escaped(y_.row_names[k]));
   }
   text += fmt::format(
       "<text class=\"axis\" x=\"12\" y=\"{0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 "

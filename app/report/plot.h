@@ -28,6 +28,8 @@ struct PlotAxis {
   bool down = false;  ///< grows downward (image rows)
   int ticks = 5;
   bool log10 = false;  ///< the data are decimal logarithms; the ticks show the numbers themselves
+  /// y axis only: words in place of its numbers, one a row, row k at y = k.
+  std::vector<std::string> row_names = {};
 };
 
 struct PlotSize {
@@ -55,8 +57,6 @@ class Plot {
                std::string_view css_class);
   void label(const Eigen::Vector2d& at, std::string_view text, std::string_view css_class = "");
   void legend(std::string_view text, std::string_view css_class);
-  /// Words in place of the numbers of the y axis, one a row: row k at y = k.
-  void row_names(const std::vector<std::string>& names);
   /// Marks the plot's x axis as time: the 3-D view draws its cursor here and follows a click.
   void is_time_axis() { time_axis_ = true; }
 
@@ -79,7 +79,6 @@ class Plot {
   bool time_axis_ = false;
   std::string marks_;
   std::vector<std::pair<std::string, std::string>> legend_;  ///< text, class
-  std::vector<std::string> row_names_;
 };
 
 }  // namespace kinescope::report

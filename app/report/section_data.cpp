@@ -69,20 +69,19 @@ std::string timeline(const Facts& facts) {
   const std::map<TagId, Sightings> sightings = sightings_of(facts.run);
   if (times.size() < 2 || sightings.empty()) return "";
   const double rows = static_cast<double>(sightings.size());
+  std::vector<std::string> names;
+  for (const auto& [id, frames] : sightings) names.push_back(marker_name(id));
   Plot plot("When each marker was seen",
             {.label = "time, s", .lower = times.front(), .upper = times.back(), .ticks = 10},
-            {.label = "", .lower = -0.6, .upper = rows - 0.4, .down = true},
+            {.label = "", .lower = -0.6, .upper = rows - 0.4, .down = true, .row_names = names},
             {.width = kTimelineWidth, .height = 50.0 + kTimelineRow * rows});
   plot.is_time_axis();
-  std::vector<std::string> names;
   double row = 0.0;
   for (const auto& [id, frames] : sightings) {
-    names.push_back(marker_name(id));
     draw_runs(plot, frames.seen, times, row, "seen");
     draw_runs(plot, frames.left_out, times, row, "left-out");
     row += 1.0;
   }
-  plot.row_names(names);
   plot.legend("seen", "seen");
   plot.legend("left out of the fit as an outlier", "left-out");
   return plot.str();

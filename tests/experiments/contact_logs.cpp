@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/torque_stages.h"
+#include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -21,7 +22,6 @@
 #include "tests/experiments/torque_robots.h"
 #include "tests/truth/contact_world.h"
 #include "tests/truth/drive_world.h"
-#include "tests/truth/reference_arms.h"
 #include "tests/truth/shared_data.h"
 #include "tests/truth/temporary_path.h"
 

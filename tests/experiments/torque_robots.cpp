@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"
 #include "tests/experiments/real_logs.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

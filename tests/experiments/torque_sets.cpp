@@ -3,9 +3,9 @@
 
 #include "dynamics/data/motion.h"
 #include "dynamics/data/splits.h"
+#include "dynamics/experiments/reference_arms.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/experiments/torque_robots.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

@@ -12,10 +12,10 @@
 
 #include "dynamics/data/torque_data.h"
 #include "dynamics/effects/trace_torque.h"
+#include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/experiments/torque_robots.h"
-#include "tests/truth/reference_arms.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/truth/reference_arms.h"
+#include "dynamics/experiments/reference_arms.h"
 
 #include <cmath>
 #include <numbers>

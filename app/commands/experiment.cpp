@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope experiment`: choices checked, the experiment run, its products written.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/commands/commands.h"
+#include "app/commands/output_folder.h"
+#include "app/commands/torque_inputs.h"
+#include "app/experiments/experiments.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+const Experiment& experiment_of(const std::string& name) {
+  const auto found = std::ranges::find(all_experiments(), name, &Experiment::name);
+  KINESCOPE_CHECK(found != all_experiments().end(), "the command line takes known names only");
+  return *found;
+}
+
+// An option that would do nothing is refused.
+void require_known(const Experiment& experiment, const ExperimentOptions& options) {
+  const ExperimentChoice& choice = options.choice;
+  const std::array<std::pair<std::string_view, bool>, 10> given = {
+      {{"--runs", choice.runs.has_value()},
+       {"--samples", choice.samples.has_value()},
+       {"--noise", choice.noise.has_value()},
+       {"--tilt", choice.tilts_deg.has_value()},
+       {"--shift", choice.shifts_m.has_value()},
+       {"--models", choice.learners.has_value()},
+       {"--joints", choice.joints.has_value()},
+       {"--starts", choice.starts.has_value()},
+       {"--search-samples", choice.search_samples.has_value()},
+       {"--log", !options.log.empty()}}};
+  for (const auto& [name, is_given] : given) {
+    if (!is_given) continue;
+    if (std::ranges::find(experiment.options, name) == experiment.options.end()) {
+      throw bad_request(std::string(name),
+                        fmt::format("is no option of the experiment {}", experiment.name),
+                        fmt::format("it takes {}", fmt::join(experiment.options, ", ")));
+    }
+    const bool of_worlds = name == "--noise" || name == "--tilt" || name == "--shift";
+    if (of_worlds && !options.log.empty()) {
+      throw bad_request(std::string(name), "is of the experiment's worlds, and there is a --log",
+                        "leave one of them out");
+    }
+  }
+  if (options.log.empty() != options.robot.empty()) {
+    throw bad_request(options.log.empty() ? "--robot" : "--log",
+                      options.log.empty() ? "a robot without its log" : "a log without its robot",
+                      "give --log and --robot together");
+  }
+}
+
+ExperimentLog read_log(const ExperimentOptions& options) {
+  const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
+  std::vector<WantedJoint> wanted;
+  for (const RigidBody& body : make_rigid_model(robot.model).bodies) {
+    wanted.push_back({body.joint, body.type == JointType::kPrismatic});
+  }
+  TorqueData data = read_torque_data({options.log}, wanted, options.data);
+  put_into_place({options.log}, data.findings);
+  throw_refusals(data.findings);
+  for (const LogFinding& finding : data.findings) {
+    if (finding.weight == FaultWeight::kWarning)
+      fmt::print(stderr, "warning: {}\n", to_line(finding));
+  }
+  return {robot.model, std::move(data.samples), robot.joints};
+}
+
+}  // namespace
+
+ExitCode experiment_command(const ExperimentOptions& options, const Console& console) {
+  const Experiment& experiment = experiment_of(options.name);
+  require_known(experiment, options);
+  Writer writer{.command = "experiment", .products = {}, .inputs = {}, .force = options.force};
+  writer.products = {"experiment.json", "experiment.html"};
+  for (const std::string_view table : experiment.tables) {
+    writer.products.push_back(std::string(table) + ".csv");
+  }
+  ExperimentChoice choice = options.choice;
+  std::vector<InputFile> inputs;
+  if (!options.log.empty()) {
+    writer.inputs = {options.log, options.robot};
+    inputs = hashed_inputs({{options.log}, {options.robot}});
+    choice.log = read_log(options);
+  }
+  const OutputFolder folder(options.output, writer);
+  ExperimentSummary summary = experiment.run(choice, console.progress);
+  summary.name = experiment.name;
+  summary.title = experiment.title;
+  summary.version = program_version();
+  summary.command = options.command_line;
+  summary.inputs = std::move(inputs);
+  for (const ExperimentTable& table : summary.tables) {
+    folder.write(table.id + ".csv", experiment_csv(table));
+  }
+  const nlohmann::json document = experiment_json(summary);
+  folder.write("experiment.json", document.dump(1) + "\n");
+  folder.write("experiment.html", experiment_html(summary));
+  if (console.json) {
+    fmt::print("{}\n", document.dump(2));
+    return ExitCode::kDone;
+  }
+  for (const std::string& finding : summary.findings) fmt::print("{}\n", finding);
+  fmt::print("tables  {}\npage    {}\n", folder.file("experiment.json").string(),
+             folder.file("experiment.html").string());
+  return ExitCode::kDone;
+}
+
+}  // namespace kinescope
