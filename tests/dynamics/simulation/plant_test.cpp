@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "dynamics/simulation/robot_effects.h"
 #include "dynamics/simulation/simulation.h"
 #include "tests/truth/reference_arms.h"
 
@@ -107,23 +108,13 @@ INSTANTIATE_TEST_SUITE_P(EveryEffect, SameLaw, testing::ValuesIn(cases()),
 
 TEST(Plant, every_effect_of_the_library_can_be_simulated) {
   const DynamicModel arm = panda_arm();
-  EffectContext context;
-  context.motion = std::make_shared<const EffectMotion>(panda_motion(arm),
-                                                        EffectMotionOptions{.every_sample = true});
-  context.cache = std::make_shared<ColumnCache>();
-  context.rigid = make_rigid_model(arm);
-  for (const RigidBody& body : context.rigid.bodies) {
-    context.joints.push_back(body.joint);
-    context.turns.push_back(1);
-  }
-  context.widths = Eigen::VectorXd::Zero(7);
-  describe_log(context);
-  for (const Candidate& candidate : make_candidates(context)) {
+  const RobotEffects known = effects_of_robot(arm, panda_motion(arm));
+  for (const Candidate& candidate : known.candidates) {
     TorqueEffect effect;
     effect.id = candidate.id;
     effect.scan = candidate.scan.empty() ? 0.0 : candidate.scan.back();
     effect.values = Eigen::VectorXd::Constant(std::ssize(candidate.parameters), 1e-3);
-    const Plant plant = make_plant(with_effects(arm, {effect}, context.travels, context.log));
+    const Plant plant = make_plant(with_effects(arm, {effect}, known.travels, known.log));
     EXPECT_TRUE(plant.left_out.empty()) << candidate.id.effect;
   }
 }
