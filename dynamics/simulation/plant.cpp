@@ -235,13 +235,4 @@ Plant sticking(Plant plant) {
   return plant;
 }
 
-Plant without_drives(const Plant& plant) {
-  Plant out = plant;
-  out.coupled_inertia.setZero();
-  out.viscous.setZero();
-  out.coupled.clear();
-  std::ranges::fill(out.drives, JointDrive{});
-  return out;
-}
-
 }  // namespace kinescope

@@ -91,7 +91,4 @@ struct Plant {
 /// law) in place of one that is smooth within a width of speeds.
 [[nodiscard]] Plant sticking(Plant plant);
 
-/// Without any effect: the bodies, with motor inertias.
-[[nodiscard]] Plant without_drives(const Plant& plant);
-
 }  // namespace kinescope

@@ -70,26 +70,10 @@ std::vector<Window> windows_of(const TorqueSamples& samples, double horizon_s, i
 
 /// True torques of the actuators at the samples: the sensors' gains and delays undone.
 Eigen::MatrixXd true_torques(const Plant& plant, const TorqueSamples& samples) {
+  const EffectMotion motion(samples, {.every_sample = true});
   Eigen::MatrixXd in_time = samples.torque;
   for (Eigen::Index j = 0; j < in_time.cols(); ++j) {
-    if (plant.delay_s[j] == 0.0) continue;
-    Eigen::Index at = 0;
-    for (Eigen::Index i = 0; i < in_time.rows(); ++i) {
-      at = std::max(at, i);
-      const double t_s = samples.t_s[i] + plant.delay_s[j];
-      if (plant.delay_s[j] < 0.0) at = 0;
-      while (at + 2 < in_time.rows() && samples.trajectory[at + 2] == samples.trajectory[i] &&
-             samples.t_s[at + 1] < t_s) {
-        ++at;
-      }
-      if (at + 1 >= in_time.rows() || samples.trajectory[at] != samples.trajectory[i] ||
-          samples.trajectory[at + 1] != samples.trajectory[i]) {
-        continue;
-      }
-      const double share =
-          std::clamp((t_s - samples.t_s[at]) / (samples.t_s[at + 1] - samples.t_s[at]), 0.0, 1.0);
-      in_time(i, j) = (1.0 - share) * samples.torque(at, j) + share * samples.torque(at + 1, j);
-    }
+    if (plant.delay_s[j] != 0.0) in_time.col(j) = motion.shifted(in_time.col(j), plant.delay_s[j]);
   }
   return plant.gain.fullPivLu().solve(in_time.transpose()).transpose();
 }
