@@ -66,9 +66,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, dynamics, predict, contact, experiment, inspect or camera; see "
-        "kinescope "
-        "--help";
+        "run, trace, correct, dynamics, predict, simulate, export, contact, experiment, inspect or "
+        "camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -172,6 +171,8 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     line.predict.data = log_settings(line, line.predict.logs.front(), line.predict.data);
     return predict_command(line.predict, console);
   }
+  if (app.got_subcommand("simulate")) return simulate_command(line.simulate, console);
+  if (app.got_subcommand("export")) return export_command(line.exported, console);
   if (app.got_subcommand("contact")) {
     if (line.contact.output.empty()) {
       line.contact.output = log_name(line.contact.logs.front()) + "_contact";

@@ -6,6 +6,7 @@
 
 #include "app/commands/command_options.h"
 #include "app/commands/experiment_command_line.h"
+#include "app/commands/simulation_command_line.h"
 #include "app/commands/torque_command_line.h"
 #include "app/io/nearest_name.h"
 #include "kinematics/core/csv.h"
@@ -294,6 +295,8 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_correct(app, line);
   add_dynamics(app, line);
   add_predict(app, line);
+  add_simulate(app, line);
+  add_export(app, line);
   add_contact(app, line);
   add_experiment(app, line);
   add_inspect(app, line);

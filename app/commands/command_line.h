@@ -24,6 +24,8 @@ struct CommandLine {
   RunOptions run;
   DynamicsOptions dynamics;
   PredictOptions predict;
+  SimulateOptions simulate;
+  ExportOptions exported;
   ContactCommandOptions contact;
   ExperimentOptions experiment;
   InspectOptions inspect;

@@ -26,6 +26,9 @@ inline constexpr const char* kReplaceOthers =
     "Replace what others wrote: files in the output folder, and files that were named";
 void add_force(CLI::App& command, bool& force, const char* help);
 
+/// --gravity X,Y,Z in the base frame.
+void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2);
+
 /// --json and --quiet.
 void add_output_options(CLI::App& command, OutputOptions& output);
 

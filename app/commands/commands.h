@@ -17,6 +17,7 @@
 #include "dynamics/contact/contact.h"
 #include "dynamics/data/torque_data.h"
 #include "dynamics/models/torque_model.h"
+#include "dynamics/simulation/servo.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/progress.h"
 
@@ -103,6 +104,29 @@ struct PredictOptions {
 };
 
 [[nodiscard]] ExitCode predict_command(const PredictOptions& options, const Console& console);
+
+struct SimulateOptions {
+  std::filesystem::path robot;                   ///< URDF with masses
+  std::filesystem::path trajectory;              ///< joint positions over time
+  std::optional<std::filesystem::path> effects;  ///< trace.json or YAML; none: the URDF's friction
+  std::filesystem::path output;                  ///< CSV
+  ServoOptions servo;
+  bool in_servo = false;  ///< in a servo loop; else inverse dynamics along the trajectory itself
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
+  std::uint64_t seed = 1;
+  bool force = false;  ///< replace a file that is there
+};
+
+[[nodiscard]] ExitCode simulate_command(const SimulateOptions& options, const Console& console);
+
+struct ExportOptions {
+  std::filesystem::path source;                 ///< folder of run or dynamics, or a URDF
+  std::filesystem::path mjcf;                   ///< file for MuJoCo
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: the folder's
+  bool force = false;                           ///< replace a file that is there
+};
+
+[[nodiscard]] ExitCode export_command(const ExportOptions& options, const Console& console);
 
 struct ContactCommandOptions {
   std::vector<std::filesystem::path> logs;

@@ -250,6 +250,10 @@ std::optional<SavedTrace> add_trace(const DynamicsOptions& options, const Dynami
     if (effect.id.effect != "gravity_direction") continue;
     summary.traced_gravity_m_s2 = traced.trace.corrected.model.gravity_m_s2;
   }
+  if (summary.trace->verdict != TraceVerdict::kNothingToSay) {
+    summary.rollout = {roll_out(traced.trace.corrected, model.tree, summary.test),
+                       options.test_logs.empty()};
+  }
   // Without effects it would be the identified model again, less exactly.
   if (traced.saved.corrected.effects.empty()) return std::nullopt;
   return traced.saved;
@@ -376,6 +380,7 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
   if (!verdict.payload.empty()) fmt::print("{}\n", verdict.payload);
   if (!verdict.gravity.empty()) fmt::print("{}\n", verdict.gravity);
+  if (!verdict.rollout.empty()) fmt::print("{}\n", verdict.rollout);
   print_scores(summary);
   if (summary.trace) {
     for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);

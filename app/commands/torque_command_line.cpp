@@ -78,20 +78,6 @@ void add_cutoff(CLI::App& command, TorqueDataOptions& data) {
       ->type_name("HZ");
 }
 
-void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2) {
-  command
-      .add_option_function<std::vector<double>>(
-          "--gravity",
-          [&gravity_m_s2](const std::vector<double>& g) {
-            gravity_m_s2 = Eigen::Vector3d(g[0], g[1], g[2]);
-          },
-          "Acceleration of free fall in the base frame, m/s^2 (default: 0,0,-9.81)")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(number_in(-100, 100))
-      ->type_name("X,Y,Z");
-}
-
 void add_inspect_log_options(CLI::App& inspect, CommandLine& line) {
   inspect
       .add_option_function<std::string>(

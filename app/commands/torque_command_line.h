@@ -15,8 +15,7 @@ void add_contact(CLI::App& app, CommandLine& line);
 
 /// What the columns of a torque log are, where their names do not say it.
 void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& data);
-/// --cutoff and --gravity.
+/// --cutoff.
 void add_cutoff(CLI::App& command, TorqueDataOptions& data);
-void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2);
 
 }  // namespace kinescope

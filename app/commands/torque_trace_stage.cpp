@@ -54,6 +54,17 @@ nlohmann::json corrected_json(const CorrectedTorqueModel& corrected) {
   return list;
 }
 
+nlohmann::json motion_json(const CorrectedTorqueModel& corrected) {
+  nlohmann::json joints = nlohmann::json::array();
+  for (std::size_t j = 0; j < corrected.travels.size(); ++j) {
+    joints.push_back({{"name", report::text(corrected.base.rigid.bodies[j].joint)},
+                      {"high_speed", corrected.travels[j].high_speed}});
+  }
+  return {{"begin_s", corrected.log.begin_s},
+          {"duration_s", corrected.log.duration_s},
+          {"joints", std::move(joints)}};
+}
+
 nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts,
                              const TorqueSamples& samples) {
   nlohmann::json list = nlohmann::json::array();
@@ -157,6 +168,7 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
   nlohmann::json document = trace_json(out.trace);
   document["base"] = {{"masses", to_string(out.base.kind)}, {"reason", out.base.reason}};
   document["effects"] = corrected_json(out.corrected);
+  document["motion"] = motion_json(out.corrected);
   document["left_out"] = contacts_json(out.contacts, traced.samples);
   folder.write(options.trace_file, document.dump(1) + "\n");
   if (out.trace.verdict == TraceVerdict::kNothingToSay) {

@@ -191,6 +191,27 @@ json payload_json(const TorqueSummary& summary) {
           {"at_rest", payload.at_rest ? estimate_json(*payload.at_rest, summary.joints) : json()}};
 }
 
+json rollout_error_json(const RolloutError& error) {
+  return {{"joints", numbers(error.joints)}, {"tool_m", number(error.tool_m)}};
+}
+
+json rollout_json(const TorqueSummary& summary) {
+  if (!summary.rollout) return nullptr;
+  const Rollout& rollout = summary.rollout->found;
+  json horizons = json::array();
+  for (const RolloutHorizon& horizon : rollout.horizons) {
+    horizons.push_back({{"horizon_s", number(horizon.horizon_s)},
+                        {"windows", horizon.windows},
+                        {"with_effects", rollout_error_json(horizon.with_effects)},
+                        {"without_effects", rollout_error_json(horizon.without_effects)},
+                        {"held", rollout_error_json(horizon.held)}});
+  }
+  return {{"tip", text(rollout.tip)},
+          {"seen_by_trace", summary.rollout->seen_by_trace},
+          {"failure", text(rollout.failure)},
+          {"horizons", std::move(horizons)}};
+}
+
 json best_model(const TorqueSummary& summary) {
   if (summary.scores.empty()) return {};
   const TorqueScore& best = summary.scores[static_cast<std::size_t>(summary.best)];
@@ -225,6 +246,7 @@ json torque_json(const TorqueSummary& summary) {
           {"drives", drives_json(summary.drives)},
           {"robust", robust_json(summary.robust)},
           {"payload", payload_json(summary)},
+          {"rollout", rollout_json(summary)},
           {"consistent", consistent_json(summary.consistent)},
           {"trace", summary.trace ? trace_json(*summary.trace) : json(nullptr)},
           {"warnings", report::texts(summary.warnings)}};

@@ -18,6 +18,7 @@ std::vector<report::ContentsEntry> contents(const TorqueSummary& summary) {
   if (summary.payload) out.emplace_back("payload", "Payload");
   out.emplace_back("parameters", "Friction and parameters");
   if (summary.trace) out.emplace_back("trace", "Closing the loop");
+  if (summary.rollout) out.emplace_back("rollout", "Forward in time");
   out.emplace_back("reproduce", "How to reproduce");
   return out;
 }
@@ -33,7 +34,8 @@ std::string torque_report_html(const TorqueSummary& summary) {
          report::torque_robust_section(facts) + report::torque_payload_section(facts) +
          report::torque_parameters_section(facts) +
          (facts.summary.trace ? report::trace_section(*facts.summary.trace) : "") +
-         report::torque_reproduce_section(facts) + "</main>\n</body>\n</html>\n";
+         report::torque_rollout_section(facts) + report::torque_reproduce_section(facts) +
+         "</main>\n</body>\n</html>\n";
 }
 
 }  // namespace kinescope

@@ -26,6 +26,8 @@ struct TorqueFacts {
 [[nodiscard]] std::string torque_payload_section(const TorqueFacts& facts);
 /// Friction over velocity, drive and base parameters.
 [[nodiscard]] std::string torque_parameters_section(const TorqueFacts& facts);
+/// The traced model driven by measured torques alone; empty without a trace.
+[[nodiscard]] std::string torque_rollout_section(const TorqueFacts& facts);
 [[nodiscard]] std::string torque_reproduce_section(const TorqueFacts& facts);
 
 }  // namespace kinescope::report

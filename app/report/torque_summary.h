@@ -15,6 +15,7 @@
 #include "dynamics/identify/payload.h"
 #include "dynamics/identify/robust_torque.h"
 #include "dynamics/models/comparison.h"
+#include "dynamics/simulation/rollout.h"
 
 namespace kinescope {
 
@@ -54,6 +55,12 @@ struct PayloadSummary {
   bool by_gains = false;  ///< torques are currents times declared gains: the mass scales with them
 };
 
+/// The traced model forward in time, on `test`.
+struct RolloutSummary {
+  Rollout found;
+  bool seen_by_trace = false;  ///< tracing learned from this part of the log, too
+};
+
 struct TorqueSummary {
   std::string robot;
   std::string log;      ///< what was learned from, in words
@@ -87,6 +94,7 @@ struct TorqueSummary {
   TorquePrediction prediction;            ///< of `test`
   BandFactors bands;                      ///< of that model
   std::optional<Trace> trace;             ///< none where it was not asked for
+  std::optional<RolloutSummary> rollout;  ///< none without a trace
   std::string saved_model;                ///< which one a file was written of; empty: none
   std::vector<std::string> warnings;
 };
@@ -117,6 +125,8 @@ struct TorqueSummary {
 ///   payload   null, or against, by_gains, link, motion and at_rest {mass_kg, sigma_kg, lower_kg,
 ///             upper_kg (95 %), freedom, centre_m, centre_sigma_m, disagreement,
 ///             joints [joint, mass_kg, sigma_kg]}
+///   rollout   null, or tip, seen_by_trace, failure, horizons [horizon_s, windows, with_effects,
+///             without_effects, held {joints (rad or m), tool_m}]: medians at the windows' ends
 ///   consistent  links [name, mass_kg, first_moment_kg_m, inertia_kg_m2 (Ixx Ixy Ixz Iyy Iyz Izz)],
 ///             joints [viscous, coulomb, motor_inertia], misfit
 [[nodiscard]] nlohmann::json torque_json(const TorqueSummary& summary);
@@ -127,6 +137,7 @@ struct TorqueVerdict {
   std::string accurate;
   std::string limits;
   std::string payload;  ///< what it carries; empty where it was not asked for
+  std::string rollout;  ///< how far the traced model gets by itself; empty without a trace
   std::string gravity;  ///< where it was taken to point and nobody said so; empty where declared
 };
 [[nodiscard]] TorqueVerdict torque_verdict(const TorqueSummary& summary);

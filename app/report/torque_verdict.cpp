@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/report/numbers.h"
 #include "app/report/torque_summary.h"
 #include "app/report/torque_unit.h"
 
@@ -111,6 +112,26 @@ std::string payload_words(const PayloadSummary& payload) {
   return out;
 }
 
+// At the middle horizon: the first is passed by almost any model, the last by almost none.
+std::string rollout_words(const RolloutSummary& rollout) {
+  const Rollout& found = rollout.found;
+  if (!found.failure.empty()) return "No rollout of the traced model: " + found.failure + ".";
+  const RolloutHorizon& horizon = found.horizons[found.horizons.size() / 2];
+  const bool tool = !found.tip.empty();
+  const auto size = [tool](const RolloutError& error) {
+    const double value = tool ? error.tool_m : error.joints.maxCoeff();
+    if (!std::isfinite(value)) return std::string("lost");
+    return report::text_with_unit(value,
+                                  tool ? report::Quantity::kLength : report::Quantity::kAngle);
+  };
+  return fmt::format(
+      "Driven by the measured torques alone for {:.3g} s, the traced model is {} from the measured "
+      "{}; without the effects {}; the motion itself is {}{}.",
+      horizon.horizon_s, size(horizon.with_effects), tool ? found.tip : "posture (worst joint)",
+      size(horizon.without_effects), size(horizon.held),
+      rollout.seen_by_trace ? " (motion that tracing has seen; name another log with --test)" : "");
+}
+
 // Masses for its size that no robot has; empty where they are likely, or of currents.
 std::string mass_words(const TorqueSummary& summary) {
   constexpr double kHeaviest = 1000.0;  // kg a metre of reach: three times a heavy foundry robot
@@ -200,6 +221,7 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
   TorqueVerdict out;
   if (summary.payload) out.payload = payload_words(*summary.payload);
   out.gravity = gravity_words(summary);
+  if (summary.rollout) out.rollout = rollout_words(*summary.rollout);
   const Identification& found = summary.identification;
   out.found = fmt::format(
       "{} joints; {} base and drive parameters from {} samples; noise cut at {:.3g} Hz.",

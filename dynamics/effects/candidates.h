@@ -46,8 +46,6 @@ struct Carriers {
 [[nodiscard]] Eigen::VectorXd turning_column(
     const EffectContext& context, std::size_t joint, const std::string& name,
     const std::function<Eigen::ArrayXd(const FinePath&, double width)>& torque);
-/// Smoothed sign of the speed, as Coulomb friction has it.
-[[nodiscard]] Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width);
 [[nodiscard]] Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint);
 /// Friction in its simplest form, which all that refines it waits for.
 [[nodiscard]] std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t joint);

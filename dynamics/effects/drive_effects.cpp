@@ -7,13 +7,10 @@
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
+#include "dynamics/effects/drive_laws.h"
 
 namespace kinescope::effects {
 namespace {
-
-constexpr double kFullTurn = 6.283185307179586;
-
-constexpr double kTurn_rad_s = 0.01;  // of a coupled drive's friction
 
 Candidate motor_inertia(const SharedContext& c, std::size_t j) {
   Candidate out;
@@ -63,33 +60,17 @@ Candidate ripple(const SharedContext& c, std::size_t j) {
   out.size_weights = Eigen::Vector2d::Ones();
   out.scan = ripple_periods(*c, j);
   out.scan_name = c->turns[j] != 0 ? "periods a turn" : "periods a metre";
-  const double wave = c->turns[j] != 0 ? 1.0 : kFullTurn;
-  out.columns = [c, j, wave](double periods) {
-    const double w = wave * periods;
+  out.columns = [c, j](double periods) {
+    const double w = wave_number(c->turns[j] != 0, periods);
     return std::vector<EffectColumn>{
-        {static_cast<int>(j),
-         joint_column(*c, j, fmt::format("ripple sin {:.17g}", w),
-                      [&](const FinePath& p) { return (w * p.q).sin().eval(); })},
+        {static_cast<int>(j), joint_column(*c, j, fmt::format("ripple sin {:.17g}", w),
+                                           [&](const FinePath& p) { return wave_sine(p.q, w); })},
         {static_cast<int>(j),
          joint_column(*c, j, fmt::format("ripple cos {:.17g}", w),
-                      [&](const FinePath& p) { return (w * p.q).cos().eval(); })}};
+                      [&](const FinePath& p) { return wave_cosine(p.q, w); })}};
   };
   return out;
 }
-
-/// From 0 at the start of the log to 1 at its end, settling with a time constant; long ones are
-/// straight.
-struct Settling {
-  double begin_s = 0.0;
-  double duration_s = 1.0;
-  double constant_s = 1.0;
-
-  [[nodiscard]] double end() const { return 1.0 - std::exp(-duration_s / constant_s); }
-  [[nodiscard]] Eigen::VectorXd at(const Eigen::VectorXd& time_s) const {
-    return ((1.0 - (-(time_s.array() - begin_s) / constant_s).exp()) / end()).matrix();
-  }
-  [[nodiscard]] double mean() const { return 1.0 / end() - constant_s / duration_s; }
-};
 
 /// The torque's zero goes with the shape itself, friction with its difference from the mean:
 /// friction that does not drift is no matter of this effect.
@@ -175,8 +156,8 @@ Candidate coupled_drive(const SharedContext& c, std::size_t j, bool sum) {
   out.columns = [c, j, sum, weights, carrier, high](double) {
     const std::string name = fmt::format("pair {} {}", j, sum ? "sum" : "difference");
     const Eigen::VectorXd& way = c->cache->get(name, [&] {
-      return c->motion->column(weights,
-                               [&](const FinePath& p) { return direction(p.dq, kTurn_rad_s); });
+      return c->motion->column(
+          weights, [&](const FinePath& p) { return direction(p.dq, kCoupledWidth_rad_s); });
     });
     const TorqueSamples& samples = c->motion->samples();
     return std::vector<EffectColumn>{{carrier, way},

@@ -10,6 +10,7 @@
 
 #include "dynamics/data/statistics.h"
 #include "dynamics/effects/candidates.h"
+#include "dynamics/effects/drive_laws.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/regressor.h"
 #include "kinematics/core/error.h"
@@ -125,11 +126,6 @@ Eigen::VectorXd turning_column(
                         [&](const FinePath& path) { return torque(path, std::pow(kRatio, k)); });
   }
   return out;
-}
-
-Eigen::ArrayXd direction(const Eigen::ArrayXd& dq, double width) {
-  if (width == 0.0) return dq.sign();
-  return (dq / width).tanh();
 }
 
 Eigen::VectorXd direction_column(const EffectContext& context, std::size_t joint) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
+#include "dynamics/effects/drive_laws.h"
 
 namespace kinescope::effects {
 namespace {
@@ -77,10 +78,10 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   out.scan_unit = c->angle(j) + "/s";
   out.columns = [c, j](double speed) {
     return one_column(
-        j, turning_column(
-               *c, j, fmt::format("stribeck {:.17g}", speed), [&](const FinePath& p, double width) {
-                 return (direction(p.dq, width) * (-(p.dq / speed).square()).exp()).eval();
-               }));
+        j, turning_column(*c, j, fmt::format("stribeck {:.17g}", speed),
+                          [&](const FinePath& p, double width) {
+                            return (direction(p.dq, width) * stribeck_decay(p.dq, speed)).eval();
+                          }));
   };
   return out;
 }
@@ -98,9 +99,8 @@ Candidate cubic_viscous(const SharedContext& c, std::size_t j) {
   const double high = c->travels[j].high_speed;
   out.columns = [c, j, high](double power) {
     return one_column(
-        j, joint_column(*c, j, fmt::format("power {:.17g}", power), [&](const FinePath& p) {
-          return (p.dq.sign() * (p.dq.abs() / high).pow(power)).eval();
-        }));
+        j, joint_column(*c, j, fmt::format("power {:.17g}", power),
+                        [&](const FinePath& p) { return speed_power(p.dq, high, power); }));
   };
   return out;
 }
@@ -133,32 +133,29 @@ Candidate position_friction(const SharedContext& c, std::size_t j) {
     for (double& periods : out.scan) periods /= turn;
   }
   out.scan_name = c->turns[j] != 0 ? "periods a turn" : "periods a metre";
-  const double wave = c->turns[j] != 0 ? 1.0 : kFullTurn;
-  out.columns = [c, j, wave](double periods) {
-    const double w = wave * periods;
+  out.columns = [c, j](double periods) {
+    const double w = wave_number(c->turns[j] != 0, periods);
     const auto joint = static_cast<int>(j);
     return std::vector<EffectColumn>{
         {joint, turning_column(*c, j, fmt::format("position cos {:.17g}", w),
                                [&](const FinePath& p, double width) {
-                                 return (direction(p.dq, width) * (w * p.q).cos()).eval();
+                                 return (direction(p.dq, width) * wave_cosine(p.q, w)).eval();
                                })},
         {joint, turning_column(*c, j, fmt::format("position sin {:.17g}", w),
                                [&](const FinePath& p, double width) {
-                                 return (direction(p.dq, width) * (w * p.q).sin()).eval();
+                                 return (direction(p.dq, width) * wave_sine(p.q, w)).eval();
                                })}};
   };
   return out;
 }
 
-/// Dahl's state z, between -1 and 1: dz/dq = (1 - z sign(dq)) / length. Solved exactly over each
-/// step, in which the joint turns one way. Before the log, the joint slid on as it moves at first.
+/// Dahl's state, between -1 and 1; within each step the joint turns one way. Before the log, the
+/// joint slid on as it moves at first.
 Eigen::ArrayXd dahl_state(const Eigen::ArrayXd& q, double length) {
   Eigen::ArrayXd z(q.size());
   double state = q.size() > 1 && q(1) != q(0) ? (q(1) < q(0) ? -1.0 : 1.0) : 0.0;
   for (Eigen::Index k = 0; k < q.size(); ++k) {
-    const double moved = k > 0 ? q(k) - q(k - 1) : 0.0;
-    const double way = moved < 0.0 ? -1.0 : 1.0;
-    if (moved != 0.0) state = way + (state - way) * std::exp(-std::abs(moved) / length);
+    if (k > 0) state = dahl_after(state, q(k) - q(k - 1), length);
     z(k) = state;
   }
   return z;

@@ -10,6 +10,7 @@
 #include "dynamics/data/splits.h"
 #include "dynamics/effects/base_choice.h"
 #include "dynamics/effects/candidates.h"
+#include "dynamics/effects/drive_laws.h"
 #include "dynamics/effects/torque_parts.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/regressor.h"
@@ -84,7 +85,7 @@ Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data
   const Eigen::VectorXd way = effects::direction_column(context, joint);
   const Eigen::VectorXd dip = effects::turning_column(
       context, joint, "base stribeck", [&](const FinePath& p, double width) {
-        return (effects::direction(p.dq, width) * (-(p.dq / slow).square()).exp()).eval();
+        return (effects::direction(p.dq, width) * effects::stribeck_decay(p.dq, slow)).eval();
       });
   const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
   const double duration = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-12);
