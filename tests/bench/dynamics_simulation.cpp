@@ -5,8 +5,8 @@
 // joint constraints, no collisions.
 #include <benchmark/benchmark.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/simulation/simulation.h"
-#include "tests/truth/reference_arms.h"
 #ifdef KINESCOPE_HAVE_MUJOCO
 #include "tests/truth/mujoco_model.h"
 #endif

@@ -3,11 +3,11 @@
 // Accelerations and motion of bodies without friction: MuJoCo's own, and conservation of energy.
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/rigid/mass_matrix.h"
 #include "dynamics/simulation/simulation.h"
 #include "tests/kinematics/model/random_tree.h"
 #include "tests/truth/random_dynamics.h"
-#include "tests/truth/reference_arms.h"
 #ifdef KINESCOPE_HAVE_MUJOCO
 #include "tests/truth/mujoco_model.h"
 #endif

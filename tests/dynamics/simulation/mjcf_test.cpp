@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/simulation/simulation.h"
 #include "kinematics/core/error.h"
-#include "tests/truth/reference_arms.h"
 #include "tests/truth/temporary_path.h"
 #ifdef KINESCOPE_HAVE_MUJOCO
 #include "tests/truth/mujoco_model.h"

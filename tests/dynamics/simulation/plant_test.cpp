@@ -5,9 +5,9 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/simulation/robot_effects.h"
 #include "dynamics/simulation/simulation.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/simulation/servo.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {

@@ -3,9 +3,9 @@
 // Friction at rest and about it.
 #include <gtest/gtest.h>
 
+#include "dynamics/experiments/reference_arms.h"
 #include "dynamics/simulation/simulation.h"
 #include "kinematics/core/error.h"
-#include "tests/truth/reference_arms.h"
 
 namespace kinescope {
 namespace {
