@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/gp/blas.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -200,6 +201,7 @@ JointColumns compact_columns(const Eigen::MatrixXd& all) {
 
 Eigen::MatrixXd gram(const StackedSystem& system, const Eigen::MatrixXd& weights,
                      Eigen::Index first, Eigen::Index rows) {
+  const gp::SingleThreadedBlas guard;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(system.parameters, system.parameters);
   for (std::size_t j = 0; j < system.joints.size(); ++j) {
     const JointColumns& joint = system.joints[j];
@@ -210,7 +212,7 @@ Eigen::MatrixXd gram(const StackedSystem& system, const Eigen::MatrixXd& weights
       const Eigen::Index count = std::min(kStretch, first + rows - at);
       scaled = weights.col(static_cast<Eigen::Index>(j)).segment(at, count).asDiagonal() *
                joint.W.middleRows(at, count);
-      own.noalias() += scaled.transpose() * joint.W.middleRows(at, count);
+      gp::transposed_product(1.0, scaled, joint.W.middleRows(at, count), 1.0, own);
     }
     H(joint.parameters, joint.parameters) += 0.5 * (own + own.transpose());
   }

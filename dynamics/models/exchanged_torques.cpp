@@ -37,6 +37,14 @@ std::optional<Eigen::VectorXd> left_out_percent_of(const DynamicModel& model,
   return left_out_nmse_percent(*left);
 }
 
+// Of the samples that the fit has seen: what does not explain these explains no others.
+Eigen::VectorXd fitted_percent_of(const DynamicModel& model, const TorqueSamples& samples,
+                                  const IdentifyOptions& options) {
+  const TorquePrediction fitted = predict_torque(identify_dynamics(model, samples, options),
+                                                 samples.q, samples.dq, samples.ddq);
+  return normalised_error_percent(samples.torque, fitted.mean);
+}
+
 }  // namespace
 
 TorqueSamples with_exchanged_torques(TorqueSamples samples, int first, int second) {
@@ -56,13 +64,15 @@ std::optional<ExchangedTorques> find_exchanged_torques(const DynamicModel& model
     for (std::size_t b = a + 1; b < bad.size(); ++b) {
       const int i = bad[a];
       const int j = bad[b];
-      const auto percent =
-          left_out_percent_of(model, with_exchanged_torques(few, i, j), options, folds);
-      if (!percent) return std::nullopt;
-      const auto explained = [&](int joint) {
-        return (*percent)[joint] < kBetter * left_out_percent[joint];
+      const auto explains_both = [&](const Eigen::VectorXd& percent) {
+        return percent[i] < kBetter * left_out_percent[i] &&
+               percent[j] < kBetter * left_out_percent[j];
       };
-      if (!explained(i) || !explained(j)) continue;
+      const TorqueSamples exchanged = with_exchanged_torques(few, i, j);
+      if (!explains_both(fitted_percent_of(model, exchanged, options))) continue;
+      const auto percent = left_out_percent_of(model, exchanged, options, folds);
+      if (!percent) return std::nullopt;
+      if (!explains_both(*percent)) continue;
       if (best && percent->sum() >= best->exchanged_percent.sum()) continue;
       best = ExchangedTorques{i, j, left_out_percent, *percent};
     }
