@@ -160,7 +160,7 @@ std::vector<std::string> findings_of(const BarrettResult& result, const BarrettO
   const SensorMass& mass = result.sensor;
   return {
       fmt::format("Sensor of {:g} kg: {:.4f} kg, 95 % interval {:.4f} to {:.4f} (published, on the "
-                  "real arm: 0.254 +- 0.009).",
+                  "real arm: 0.254 ± 0.009).",
                   options.sensor_kg, mass.kg, mass.lower_kg, mass.upper_kg),
       fmt::format("Taking the worst tenth out: {} of {} outliers are in it; in-sample error {:.3f} "
                   "to {:.3f} N m, which falls already because the worst are not counted; on a "
