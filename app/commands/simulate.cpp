@@ -13,6 +13,7 @@
 #include "app/commands/torque_inputs.h"
 #include "app/io/torque_effects_file.h"
 #include "app/report/result_values.h"
+#include "dynamics/data/log_checks.h"
 #include "dynamics/simulation/robot_effects.h"
 #include "kinematics/core/file.h"
 #include "kinematics/log/joint_log.h"
@@ -48,6 +49,22 @@ std::vector<int> channels_of(const JointLog& log, const TorqueRobot& robot) {
                   fmt::format("name the columns t, {}", fmt::join(robot.joints, ", ")));
 }
 
+/// Values that are too large to be rad or m.
+void require_plausible_units(const JointLog& log, const Eigen::MatrixXd& values,
+                             const std::vector<int>& channels, const TorqueRobot& robot) {
+  TorqueLog checked;
+  checked.sources = {log.source};
+  checked.q = values;
+  checked.source.assign(static_cast<std::size_t>(values.rows()), 0);
+  checked.lines.assign(static_cast<std::size_t>(values.rows()), 0);
+  for (std::size_t j = 0; j < channels.size(); ++j) {
+    checked.joints.push_back({robot.joints[j], robot.types[j] == JointType::kPrismatic});
+    checked.q_columns.push_back(log.channels[static_cast<std::size_t>(channels[j])]);
+  }
+  for (const LogFinding& finding : check_ranges(checked))
+    throw bad_input(log.source, finding.what, "write the trajectory in rad and m");
+}
+
 /// The trajectory as a smooth motion in even steps.
 TorqueSamples reference_motion(const JointLog& log, const TorqueRobot& robot, double rate_hz) {
   constexpr std::size_t kFewest = 8;  // of the spline
@@ -60,6 +77,7 @@ TorqueSamples reference_motion(const JointLog& log, const TorqueRobot& robot, do
   for (std::size_t j = 0; j < channels.size(); ++j) {
     values.col(static_cast<Eigen::Index>(j)) = log.values.col(channels[j]);
   }
+  require_plausible_units(log, values, channels, robot);
   const Eigen::VectorXd t_s =
       Eigen::Map<const Eigen::VectorXd>(log.times_s.data(), std::ssize(log.times_s));
   const double span_s = t_s[t_s.size() - 1] - t_s[0];
@@ -150,13 +168,20 @@ ExitCode simulate_command(const SimulateOptions& options, const Console& console
     throw bad_input(options.robot.string(), "no link has a mass",
                     "give a robot with masses: robot_dynamics.urdf of kinescope dynamics");
   }
-  const TorqueSamples motion =
-      reference_motion(read_joint_log(options.trajectory), robot, options.servo.rate_hz);
+  const JointLog trajectory = read_joint_log(options.trajectory);
+  for (const std::string& warning : trajectory.warnings)
+    fmt::print(stderr, "warning: {}\n", warning);
+  const TorqueSamples motion = reference_motion(trajectory, robot, options.servo.rate_hz);
   const CorrectedTorqueModel model = model_of(options, robot.model, motion);
   const Plant plant = make_plant(model);
   Rng rng(options.seed);
   const ServoLog log = options.in_servo ? run_servo(plant, motion, options.servo, rng)
                                         : exact_log(model, motion, options.servo.torque_noise, rng);
+  if (!log.samples.torque.allFinite()) {
+    throw bad_input(options.trajectory.string(),
+                    "moves faster than any torque could move the robot",
+                    "check its unit and its stamps");
+  }
   write_file_atomically(options.output, log_csv(log.samples, robot.joints));
   for (const std::string& effect : plant.left_out) {
     fmt::print(stderr, "warning: {} is left out: the temperature is not simulated\n", effect);

@@ -100,7 +100,7 @@ class Simulate : public testing::Test {
   std::vector<std::string> joints_;
 };
 
-TEST_F(Simulate, dynamics_traces_back_what_was_put_in) {
+TEST_F(Simulate, DynamicsTracesBackWhatWasPutIn) {
   const Outcome simulated = run(words(
       {"--effects", path("effects.yaml"), "--torque-noise", "0.05", "--rate", "500"}, "path.csv"));
   ASSERT_EQ(simulated.code, 0) << simulated.err;
@@ -143,7 +143,7 @@ TEST_F(Simulate, dynamics_traces_back_what_was_put_in) {
   EXPECT_NE(mjcf.find("damping="), std::string::npos);
 }
 
-TEST_F(Simulate, a_servo_gives_the_log_of_a_robot_that_sticks) {
+TEST_F(Simulate, AServoGivesTheLogOfARobotThatSticks) {
   const Outcome simulated = run(words({"--effects", path("effects.yaml"), "--servo", "--json"}));
   ASSERT_EQ(simulated.code, 0) << simulated.err;
   for (const auto& joint : nlohmann::json::parse(simulated.out).at("joints")) {
@@ -152,7 +152,7 @@ TEST_F(Simulate, a_servo_gives_the_log_of_a_robot_that_sticks) {
   }
 }
 
-TEST_F(Simulate, the_same_seed_gives_the_same_bytes) {
+TEST_F(Simulate, TheSameSeedGivesTheSameBytes) {
   ASSERT_EQ(run(words({"--servo", "--torque-noise", "0.1", "--seed", "5"})).code, 0);
   const std::string first = read_text_file(path("log.csv"));
   ASSERT_EQ(run(words({"--servo", "--torque-noise", "0.1", "--seed", "5"})).code, 0);
@@ -161,7 +161,20 @@ TEST_F(Simulate, the_same_seed_gives_the_same_bytes) {
   EXPECT_NE(read_text_file(path("log.csv")), first);
 }
 
-TEST_F(Simulate, refuses_what_it_cannot_simulate) {
+TEST_F(Simulate, ATrajectoryInDegreesIsRefused) {
+  std::string degrees = "t";
+  for (const std::string& joint : joints_) degrees += "," + joint;
+  degrees += "\n";
+  for (int i = 0; i < 200; ++i) {
+    const double t = i / kRate_hz;
+    degrees += fmt::format("{0},{1},{1},{1}\n", t, 90.0 * std::sin(3.0 * t));
+  }
+  folder_.write("degrees.csv", degrees);
+  expect_refusal(words({}, "degrees.csv"), ExitCode::kBadInput, "is it in degrees?");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "log.csv"));
+}
+
+TEST_F(Simulate, RefusesWhatItCannotSimulate) {
   folder_
       .write("stribek.yaml",
              with_names("effects:\n  - {effect: stribek, joint: JOINT1, parameters: {}}\n"))

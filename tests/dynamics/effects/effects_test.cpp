@@ -75,7 +75,7 @@ AddedEffect best(const TorqueTracedModel& model, const Candidate& candidate) {
 
 class EveryEffect : public testing::TestWithParam<std::string> {};
 
-TEST_P(EveryEffect, explains_the_torque_that_the_generator_made_and_has_its_size) {
+TEST_P(EveryEffect, ExplainsTheTorqueThatTheGeneratorMadeAndHasItsSize) {
   Rng rng = Rng::from_name("effects", 7);
   const double strength = GetParam() == "gravity_direction" ? 5.0
                           : GetParam() == "torque_delay"    ? 0.01
@@ -109,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(library, EveryEffect,
                                          "torque_delay", "drift", "gravity_direction"),
                          [](const auto& tested) { return tested.param; });
 
-TEST(TorqueEffects, every_fixed_name_is_offered_once_at_each_place) {
+TEST(TorqueEffects, EveryFixedNameIsOfferedOnceAtEachPlace) {
   Rng rng = Rng::from_name("effects", 1);
   const EffectWorld world = effect_world({}, quiet_world(), rng);
   const TracedFit fit =
@@ -125,7 +125,7 @@ TEST(TorqueEffects, every_fixed_name_is_offered_once_at_each_place) {
   }
 }
 
-TEST(TorqueEffects, columns_are_the_derivatives_of_the_fits_prediction) {
+TEST(TorqueEffects, ColumnsAreTheDerivativesOfTheFitsPrediction) {
   Rng rng = Rng::from_name("effects", 2);
   const EffectWorld world = effect_world({{"payload", 0, 0, 0.2}}, quiet_world(), rng);
   const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
@@ -142,7 +142,7 @@ TEST(TorqueEffects, columns_are_the_derivatives_of_the_fits_prediction) {
   }
 }
 
-TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
+TEST(TorqueEffects, ACleanLogOfADeclaredRobotIsClean) {
   Rng rng = Rng::from_name("effects", 3);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.01;
@@ -157,7 +157,7 @@ TEST(TorqueEffects, a_clean_log_of_a_declared_robot_is_clean) {
 
 /// Viscous friction in a short log whose torque noise lasts: significant as a curve over the speed,
 /// but not as one of all effects of the library (both seeds: `plain_causes` = 0 leaves the curve).
-TEST(TorqueEffects, what_is_left_over_the_speed_is_viscous_friction_where_that_explains_it) {
+TEST(TorqueEffects, WhatIsLeftOverTheSpeedIsViscousFrictionWhereThatExplainsIt) {
   struct Weak {
     std::uint64_t seed;
     double strength;
@@ -191,7 +191,7 @@ TEST(TorqueEffects, what_is_left_over_the_speed_is_viscous_friction_where_that_e
   }
 }
 
-TEST(TorqueEffects, less_friction_at_low_speed_is_no_stribeck_effect) {
+TEST(TorqueEffects, LessFrictionAtLowSpeedIsNoStribeckEffect) {
   Rng rng = Rng::from_name("effects", 12);
   const EffectWorld world = effect_world({}, quiet_world(), rng);
   const TracedFit fit =
@@ -204,7 +204,7 @@ TEST(TorqueEffects, less_friction_at_low_speed_is_no_stribeck_effect) {
 }
 
 // A step over the position is in no library. A spring and three ripples come near to it.
-TEST(TorqueEffects, a_snag_is_no_sum_of_ripples) {
+TEST(TorqueEffects, ASnagIsNoSumOfRipples) {
   for (const std::uint64_t seed : {8044U, 8049U, 8052U}) {
     Rng rng = Rng::from_name("trace_torque", seed);
     const int joint = static_cast<int>(seed % 5);
@@ -222,7 +222,7 @@ TEST(TorqueEffects, a_snag_is_no_sum_of_ripples) {
   }
 }
 
-TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
+TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);
   // Not by one factor: that would be what gains of all sensors do.
@@ -239,7 +239,7 @@ TEST(TorqueEffects, masses_that_are_wrong_are_not_trusted) {
 
 // A drive whose gain is wrong says another mass than the others do: how well all of them are known
 // together is then no matter of noise.
-TEST(TorqueEffects, joints_that_disagree_about_a_payload_widen_its_interval) {
+TEST(TorqueEffects, JointsThatDisagreeAboutAPayloadWidenItsInterval) {
   const auto payload_of = [](const std::vector<TrueEffect>& effects) {
     Rng rng = Rng::from_name("disagreement", 4);
     const EffectWorld world = effect_world(effects, quiet_world(), rng);
@@ -264,7 +264,7 @@ TEST(TorqueEffects, joints_that_disagree_about_a_payload_widen_its_interval) {
   EXPECT_GT(width(beside), 3.0 * width(alone));
 }
 
-TEST(TorqueEffects, found_friction_goes_into_the_model_and_out_of_the_log) {
+TEST(TorqueEffects, FoundFrictionGoesIntoTheModelAndOutOfTheLog) {
   Rng rng = Rng::from_name("effects", 5);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.005;
@@ -297,7 +297,7 @@ TEST(TorqueEffects, found_friction_goes_into_the_model_and_out_of_the_log) {
   EXPECT_LT(rms(error), 0.05 * coulomb);
 }
 
-TEST(TorqueEffects, identified_masses_predict_what_was_fitted) {
+TEST(TorqueEffects, IdentifiedMassesPredictWhatWasFitted) {
   Rng rng = Rng::from_name("effects", 10);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.005;
@@ -320,7 +320,7 @@ TEST(TorqueEffects, identified_masses_predict_what_was_fitted) {
   EXPECT_LT((predicted - fitted).norm(), kShare * fitted.norm());
 }
 
-TEST(TorqueEffects, repeats_of_a_path_are_held_out_together) {
+TEST(TorqueEffects, RepeatsOfAPathAreHeldOutTogether) {
   Rng rng = Rng::from_name("effects", 11);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.005;
@@ -345,7 +345,7 @@ TEST(TorqueEffects, repeats_of_a_path_are_held_out_together) {
   EXPECT_LT(fold_at.size(), model.motion().kept().size());
 }
 
-TEST(TorqueEffects, a_push_is_found_and_left_out) {
+TEST(TorqueEffects, APushIsFoundAndLeftOut) {
   Rng rng = Rng::from_name("effects", 6);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.01;
@@ -364,7 +364,7 @@ TEST(TorqueEffects, a_push_is_found_and_left_out) {
   EXPECT_EQ(out.trace.accepted.front().id.effect, "contact");
 }
 
-TEST(ContactSpans, lie_in_one_trajectory_on_its_own_clock) {
+TEST(ContactSpans, LieInOneTrajectoryOnItsOwnClock) {
   constexpr Eigen::Index kRows = 400;  // of each of two trajectories, 0.01 s apart
   TorqueSamples samples;
   samples.t_s.resize(2 * kRows);
@@ -392,7 +392,7 @@ TEST(ContactSpans, lie_in_one_trajectory_on_its_own_clock) {
   EXPECT_NEAR(spans[2].to.t_s, 7.3, kWindow_s);
 }
 
-TEST(TorqueEffects, logs_that_do_not_fit_are_refused) {
+TEST(TorqueEffects, LogsThatDoNotFitAreRefused) {
   Rng rng = Rng::from_name("effects", 8);
   const EffectWorld world = effect_world({}, quiet_world(), rng);
   TorqueSamples samples = exact_samples(world);

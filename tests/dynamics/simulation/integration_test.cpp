@@ -48,7 +48,7 @@ Eigen::VectorXd mujoco_acceleration(const DynamicModel& model, const mjModel& th
   return out;
 }
 
-TEST(Simulation, mujoco_finds_the_same_accelerations) {
+TEST(Simulation, MujocoFindsTheSameAccelerations) {
   Rng rng = Rng::from_name("Simulation.mujoco_finds_the_same_accelerations");
   int joints_seen = 0;
   for (int robot = 0; robot < 30; ++robot) {
@@ -74,7 +74,7 @@ TEST(Simulation, mujoco_finds_the_same_accelerations) {
   EXPECT_GT(joints_seen, 80);
 }
 #else
-TEST(Simulation, mujoco_finds_the_same_accelerations) {
+TEST(Simulation, MujocoFindsTheSameAccelerations) {
   GTEST_SKIP() << "MuJoCo (package libmujoco-dev) was not installed when this was built";
 }
 #endif
@@ -102,7 +102,7 @@ double energy_error(const DynamicModel& model, double step_s) {
   return error / swing;
 }
 
-TEST(Simulation, energy_is_kept_to_second_order) {
+TEST(Simulation, EnergyIsKeptToSecondOrder) {
   // The Panda with stiff wrists, falling freely for 10 s: joints reach 20 rad/s.
   DynamicModel arm = without_friction(panda_arm());
   for (JointDynamics& joint : arm.joints) joint.motor_inertia = 0.1;
@@ -114,7 +114,7 @@ TEST(Simulation, energy_is_kept_to_second_order) {
   EXPECT_LT(fine, coarse / 8.0);  // 16 for a method of order 2
 }
 
-TEST(Simulation, a_pendulum_swings_with_its_period) {
+TEST(Simulation, APendulumSwingsWithItsPeriod) {
   // Closed form: small swings of a point mass on a rod of 1 m.
   DynamicModel model = dh_arm({{0.0, 0.0, 0.0}});
   for (InertialParameters& link : model.links) link = {};

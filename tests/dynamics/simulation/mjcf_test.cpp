@@ -75,7 +75,7 @@ Eigen::VectorXd mujoco_end(const DynamicModel& model, const MjcfOptions& options
   return out;
 }
 
-TEST(Mjcf, moves_in_mujoco_as_in_our_simulation) {
+TEST(Mjcf, MovesInMujocoAsInOurSimulation) {
   const DynamicModel model = arm(0.0);
   const Eigen::VectorXd ours = our_end(model, {});
   const Eigen::VectorXd theirs = mujoco_end(model, {.step_s = kStep_s});
@@ -88,7 +88,7 @@ TEST(Mjcf, moves_in_mujoco_as_in_our_simulation) {
   EXPECT_LT((ours - finer).norm(), 0.4 * (ours - theirs).norm());
 }
 
-TEST(Mjcf, rubs_in_mujoco_as_in_our_simulation) {
+TEST(Mjcf, RubsInMujocoAsInOurSimulation) {
   const DynamicModel model = arm(1.5);
   const Eigen::VectorXd ours = our_end(model, {});
   const Eigen::VectorXd theirs = mujoco_end(model, {.step_s = kStep_s});
@@ -100,7 +100,7 @@ TEST(Mjcf, rubs_in_mujoco_as_in_our_simulation) {
   EXPECT_LT((ours - theirs).norm(), 0.05 * (ours - without).norm());
 }
 
-TEST(Mjcf, springs_pull_in_mujoco_as_in_our_simulation) {
+TEST(Mjcf, SpringsPullInMujocoAsInOurSimulation) {
   const DynamicModel model = arm(0.0);
   const std::string joint = model.tree.joints[moving_joints(model.tree)[1].index()].name;
   TorqueEffect spring;
@@ -112,12 +112,12 @@ TEST(Mjcf, springs_pull_in_mujoco_as_in_our_simulation) {
   EXPECT_GT((our_end(model, {spring}) - our_end(model, {})).norm(), 0.1);
 }
 #else
-TEST(Mjcf, moves_in_mujoco_as_in_our_simulation) {
+TEST(Mjcf, MovesInMujocoAsInOurSimulation) {
   GTEST_SKIP() << "MuJoCo (package libmujoco-dev) was not installed when this was built";
 }
 #endif
 
-TEST(Mjcf, refuses_bodies_that_mujoco_refuses) {
+TEST(Mjcf, RefusesBodiesThatMujocoRefuses) {
   DynamicModel weightless = arm(0.0);
   for (InertialParameters& link : weightless.links) link = {};
   EXPECT_THROW((void)write_mjcf(weightless), Error);
@@ -126,7 +126,7 @@ TEST(Mjcf, refuses_bodies_that_mujoco_refuses) {
   EXPECT_THROW((void)write_mjcf(impossible), Error);
 }
 
-TEST(Mjcf, the_same_model_gives_the_same_text) {
+TEST(Mjcf, TheSameModelGivesTheSameText) {
   EXPECT_EQ(write_mjcf(arm(1.0), {.notes = {"a -- b"}}),
             write_mjcf(arm(1.0), {.notes = {"a -- b"}}));
   EXPECT_EQ(write_mjcf(arm(1.0), {.notes = {"a -- b"}}).find("a -- b"), std::string::npos);

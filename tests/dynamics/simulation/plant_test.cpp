@@ -69,7 +69,7 @@ std::string place_on(const DynamicModel& arm, std::string place) {
 
 class SameLaw : public testing::TestWithParam<Case> {};
 
-TEST_P(SameLaw, torques_of_the_library_give_the_motion_back) {
+TEST_P(SameLaw, TorquesOfTheLibraryGiveTheMotionBack) {
   const Case& c = GetParam();
   const DynamicModel arm = panda_arm();
   const TorqueSamples motion = panda_motion(arm);
@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(EveryEffect, SameLaw, testing::ValuesIn(cases()),
                                   std::to_string(param.index);
                          });
 
-TEST(Plant, every_effect_of_the_library_can_be_simulated) {
+TEST(Plant, EveryEffectOfTheLibraryCanBeSimulated) {
   const DynamicModel arm = panda_arm();
   const RobotEffects known = effects_of_robot(arm, panda_motion(arm));
   for (const Candidate& candidate : known.candidates) {

@@ -36,7 +36,7 @@ TorqueSamples log_of(const CorrectedTorqueModel& model) {
   return run_servo(make_plant(model), reference, {}, rng).samples;
 }
 
-TEST(Rollout, the_true_model_follows_its_own_log) {
+TEST(Rollout, TheTrueModelFollowsItsOwnLog) {
   const DynamicModel model = arm();
   const CorrectedTorqueModel truth = with_effects(model, friction(model));
   const TorqueSamples log = log_of(truth);
@@ -53,7 +53,7 @@ TEST(Rollout, the_true_model_follows_its_own_log) {
   EXPECT_LT(out.horizons[0].with_effects.tool_m, out.horizons[2].with_effects.tool_m);
 }
 
-TEST(Rollout, undoes_what_the_sensors_do) {
+TEST(Rollout, UndoesWhatTheSensorsDo) {
   const DynamicModel model = arm();
   std::vector<TorqueEffect> effects = friction(model);
   const std::string joint = model.tree.joints[moving_joints(model.tree)[1].index()].name;
@@ -70,7 +70,7 @@ TEST(Rollout, undoes_what_the_sensors_do) {
   EXPECT_GT(out.horizons[0].without_effects.joints[1], out.horizons[0].with_effects.joints[1]);
 }
 
-TEST(Rollout, says_why_there_is_none) {
+TEST(Rollout, SaysWhyThereIsNone) {
   const DynamicModel model = arm();
   TorqueSamples log = log_of(with_effects(model));
   const Rollout brief = roll_out(with_effects(model), model.tree, log, {.horizons_s = {100.0}});

@@ -28,7 +28,7 @@ ServoLog log_of(const ServoOptions& options, std::uint64_t seed = 1) {
   return run_servo(make_plant(with_effects(model)), reference(model), options, rng);
 }
 
-TEST(Servo, logged_torques_are_those_of_the_logged_motion) {
+TEST(Servo, LoggedTorquesAreThoseOfTheLoggedMotion) {
   const ServoLog log = log_of({});
   const Eigen::MatrixXd expected = predict_torque(with_effects(arm()), log.samples);
   // Rounding; friction of a joint that turns round within a period is not that of its sign.
@@ -41,17 +41,17 @@ TEST(Servo, logged_torques_are_those_of_the_logged_motion) {
   EXPECT_LT(log.tracking_error.maxCoeff(), 1e-2);
 }
 
-TEST(Servo, friction_costs_a_slow_loop_more) {
+TEST(Servo, FrictionCostsASlowLoopMore) {
   EXPECT_GT(log_of({.bandwidth_hz = 2.0}).tracking_error.maxCoeff(),
             3.0 * log_of({.bandwidth_hz = 20.0}).tracking_error.maxCoeff());
 }
 
-TEST(Servo, feed_forward_spares_the_loop_its_error) {
+TEST(Servo, FeedForwardSparesTheLoopItsError) {
   EXPECT_GT(log_of({.feed_forward = false}).tracking_error.maxCoeff(),
             3.0 * log_of({}).tracking_error.maxCoeff());
 }
 
-TEST(Servo, keeps_its_torque_limits) {
+TEST(Servo, KeepsItsTorqueLimits) {
   ServoOptions options;
   options.torque_limit = Eigen::VectorXd::Constant(7, 5.0);
   const ServoLog log = log_of(options);
@@ -59,14 +59,14 @@ TEST(Servo, keeps_its_torque_limits) {
   EXPECT_EQ(log.samples.torque.cwiseAbs().maxCoeff(), 5.0);
 }
 
-TEST(Servo, positions_are_those_of_the_encoders) {
+TEST(Servo, PositionsAreThoseOfTheEncoders) {
   constexpr double kStep = 1e-3;
   const ServoLog log = log_of({.encoder_step = kStep});
   const Eigen::MatrixXd steps = log.samples.q / kStep;
   EXPECT_LT((steps.array() - steps.array().round()).abs().maxCoeff(), 1e-9);
 }
 
-TEST(Servo, noise_comes_from_the_seed) {
+TEST(Servo, NoiseComesFromTheSeed) {
   const ServoOptions noisy{.torque_noise = 0.1};
   EXPECT_EQ(log_of(noisy, 7).samples.torque, log_of(noisy, 7).samples.torque);
   const Eigen::MatrixXd noise = log_of(noisy, 7).samples.torque - log_of({}).samples.torque;
@@ -74,12 +74,12 @@ TEST(Servo, noise_comes_from_the_seed) {
   EXPECT_GT((log_of(noisy, 8).samples.torque - log_of(noisy, 7).samples.torque).norm(), 1.0);
 }
 
-TEST(Servo, a_late_loop_is_unstable) {
+TEST(Servo, ALateLoopIsUnstable) {
   // Half a period of the loop's own oscillation late.
   EXPECT_THROW((void)log_of({.bandwidth_hz = 50.0, .delay_s = 0.05}), Error);
 }
 
-TEST(Servo, refuses_options_that_make_no_loop) {
+TEST(Servo, RefusesOptionsThatMakeNoLoop) {
   EXPECT_THROW((void)log_of({.rate_hz = 0.0}), Error);
   EXPECT_THROW((void)log_of({.steps = 0}), Error);
   EXPECT_THROW((void)log_of({.bandwidth_hz = std::nan("")}), Error);

@@ -38,7 +38,7 @@ Simulation at_rest(const std::vector<TorqueEffect>& effects) {
   return {plant, PlantState::at(plant, one(0.5), one(0.0))};
 }
 
-TEST(Sticking, holds_exactly_up_to_breakaway) {
+TEST(Sticking, HoldsExactlyUpToBreakaway) {
   const std::string joint = flywheel().tree.joints[0].name;
   Simulation simulation =
       at_rest({effect("coulomb", joint, 0.0, {kCoulomb}), effect("stribeck", joint, 0.1, {1.0})});
@@ -50,7 +50,7 @@ TEST(Sticking, holds_exactly_up_to_breakaway) {
   EXPECT_GT(simulation.state().q[0], 0.5 + 1e-4);
 }
 
-TEST(Sticking, slides_to_a_stop_where_the_equation_says) {
+TEST(Sticking, SlidesToAStopWhereTheEquationSays) {
   const std::string joint = flywheel().tree.joints[0].name;
   const Plant plant =
       make_plant(with_effects(flywheel(), {effect("coulomb", joint, 0.0, {kCoulomb})}));
@@ -60,7 +60,7 @@ TEST(Sticking, slides_to_a_stop_where_the_equation_says) {
   EXPECT_EQ(simulation.state().dq[0], 0.0);
 }
 
-TEST(Sticking, viscous_friction_decays_exponentially) {
+TEST(Sticking, ViscousFrictionDecaysExponentially) {
   const std::string joint = flywheel().tree.joints[0].name;
   const Plant plant = make_plant(with_effects(flywheel(), {effect("viscous", joint, 0.0, {3.0})}));
   Simulation simulation(plant, PlantState::at(plant, one(0.0), one(1.0)));
@@ -68,7 +68,7 @@ TEST(Sticking, viscous_friction_decays_exponentially) {
   EXPECT_NEAR(simulation.state().dq[0], std::exp(-3.0), 1e-6);
 }
 
-TEST(Sticking, presliding_springs_back) {
+TEST(Sticking, PreslidingSpringsBack) {
   // Below Dahl's friction the joint is a spring of friction / length.
   const std::string joint = flywheel().tree.joints[0].name;
   constexpr double kLength = 1e-2;
@@ -79,7 +79,7 @@ TEST(Sticking, presliding_springs_back) {
   EXPECT_NEAR(simulation.state().q[0] - 0.5, kPush * kLength / kCoulomb, 2e-7);
 }
 
-TEST(Sticking, smooth_friction_creeps_by_its_width) {
+TEST(Sticking, SmoothFrictionCreepsByItsWidth) {
   const std::string joint = flywheel().tree.joints[0].name;
   CorrectedTorqueModel model =
       with_effects(flywheel(), {effect("coulomb", joint, 0.0, {kCoulomb})});
@@ -93,7 +93,7 @@ TEST(Sticking, smooth_friction_creeps_by_its_width) {
   EXPECT_EQ(held.state().q[0], 0.0);
 }
 
-TEST(Sticking, an_arm_under_its_weight_rests_where_friction_holds_it) {
+TEST(Sticking, AnArmUnderItsWeightRestsWhereFrictionHoldsIt) {
   DynamicModel arm = panda_arm();
   for (const JointId id : moving_joints(arm.tree)) arm.joints[id.index()].coulomb = 200.0;
   const Plant plant = make_plant(with_effects(arm));
@@ -106,7 +106,7 @@ TEST(Sticking, an_arm_under_its_weight_rests_where_friction_holds_it) {
   EXPECT_GT((stopped - q).norm(), 0.0);
 }
 
-TEST(Sticking, refuses_effects_of_another_robot) {
+TEST(Sticking, RefusesEffectsOfAnotherRobot) {
   const auto assemble = [](const TorqueEffect& e) {
     (void)make_plant(with_effects(flywheel(), {e}));
   };
