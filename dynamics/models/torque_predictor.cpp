@@ -66,19 +66,24 @@ void check(const SavedTorqueModel& model, std::size_t terms) {
 class TermColumns {
  public:
   TermColumns(const RigidModel& rigid, const DriveTerms& drives)
-      : rigid_(rigid), drives_(drives), terms_(torque_terms(rigid, drives)) {}
+      : rigid_(rigid),
+        drives_(drives),
+        terms_(torque_terms(rigid, drives)),
+        regressor_(rigid),
+        dq_(rigid.size()),
+        ddq_(rigid.size()) {}
 
   [[nodiscard]] std::size_t count() const { return terms_.size(); }
 
   void at(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq) {
-    regressor_ = regressor(rigid_, q, dq, ddq);
+    inertial_ = &regressor_.at(q, dq, ddq);
     dq_ = dq;
     ddq_ = ddq;
   }
 
   [[nodiscard]] double operator()(Index joint, int term) const {
     const TorqueTerm& own = terms_[static_cast<std::size_t>(term)];
-    if (own.kind == TermKind::kInertial) return regressor_(joint, own.index);
+    if (own.kind == TermKind::kInertial) return (*inertial_)(joint, own.index);
     if (own.kind >= TermKind::kCoupledInertia) return coupled(joint, own);
     if (own.index != joint) return 0.0;
     switch (own.kind) {
@@ -120,7 +125,8 @@ class TermColumns {
   RigidModel rigid_;
   DriveTerms drives_;
   std::vector<TorqueTerm> terms_;
-  Eigen::MatrixXd regressor_;
+  SampleRegressor regressor_;
+  const Eigen::MatrixXd* inertial_ = nullptr;  // of the last sample
   Eigen::VectorXd dq_, ddq_;
 };
 
@@ -212,6 +218,7 @@ struct TorquePredictor::State {
       for (const int k : own.undetermined) {
         if (std::abs(column[k]) > own.acting[k]) variance = std::numeric_limits<double>::infinity();
       }
+      if (std::isnan(variance)) variance = std::numeric_limits<double>::infinity();  // overflow
       model_sigma[j] = std::abs(own.gains[j]) * std::sqrt(std::max(0.0, variance));
     }
   }
