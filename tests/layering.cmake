@@ -35,7 +35,7 @@ set(rooms
     "app/experiments: kinematics/* dynamics/* app/report"
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report app/experiments"
     "app/manual: kinematics/core app/commands"
-    "app/examples: kinematics/* calib/* app/io app/commands"
+    "app/examples: kinematics/* calib/* dynamics/control app/io app/commands"
     "app: app/commands")
 
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
