@@ -41,7 +41,7 @@ namespace {
 void say(std::string_view what, char* error, std::size_t size) noexcept {
   if (error == nullptr || size == 0) return;
   const std::size_t length = std::min(what.size(), size - 1);
-  std::copy_n(what.data(), length, error);
+  std::ranges::copy(what.substr(0, length), error);
   error[length] = '\0';
 }
 

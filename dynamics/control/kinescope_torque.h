@@ -12,6 +12,9 @@
 extern "C" {
 #endif
 
+/* Names and typedefs are those of C. */
+/* NOLINTBEGIN(modernize-use-using,readability-identifier-naming) */
+
 typedef struct kinescope_torque_model kinescope_torque_model;
 
 enum {
