@@ -45,6 +45,8 @@ int kinescope_torque_mean_and_band(kinescope_torque_model* model, const double* 
                                    const double* ddq, double* torque, double* half_width,
                                    int percent);
 
+/* NOLINTEND(modernize-use-using,readability-identifier-naming) */
+
 #ifdef __cplusplus
 }
 #endif

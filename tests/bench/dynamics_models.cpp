@@ -99,7 +99,9 @@ void controller(benchmark::State& state) {
   model.kind = state.range(0) != 0 ? TorqueModelKind::kGip : TorqueModelKind::kRbf;
   model.rigid = make_rigid_model(random_masses(robot.tree, {}, rng));
   model.motions = random_matrix(points, 3L * kJoints);
-  model.processes.assign(kJoints, SavedProcess{process(state.range(0) != 0, points)});
+  SavedProcess one;
+  one.gp = process(state.range(0) != 0, points);
+  model.processes.assign(kJoints, one);
   model.parts = {Eigen::VectorXd::Ones(kJoints), Eigen::VectorXd::Ones(kJoints)};
   TorqueEvaluator evaluator(model);
   const std::array<double, kJoints> x{0.2, 0.3, -0.1, 0.5, 0.2, -0.7, 0.1};
