@@ -27,7 +27,7 @@ set(rooms
     "dynamics/contact: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
     "dynamics/experiments: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/models dynamics/contact"
     "dynamics/simulation: kinematics/* calib/trace dynamics/data dynamics/rigid dynamics/effects"
-    "dynamics/control: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/effects dynamics/contact dynamics/simulation"
+    "dynamics/control: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/models dynamics/effects dynamics/contact dynamics/simulation"
     "dynamics/policy: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/effects dynamics/contact dynamics/simulation dynamics/control"
     "app/config: kinematics/* calib/* dynamics/*"
     "app/io: kinematics/* calib/* dynamics/* app/config"
@@ -35,7 +35,7 @@ set(rooms
     "app/experiments: kinematics/* dynamics/* app/report"
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report app/experiments"
     "app/manual: kinematics/core app/commands"
-    "app/examples: kinematics/* calib/* app/io app/commands"
+    "app/examples: kinematics/* calib/* dynamics/control app/io app/commands"
     "app: app/commands")
 
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
@@ -55,7 +55,7 @@ set(third_parties
     "yaml-cpp/: calib/camera app/io"
     "openssl/: app/io"
     "zlib.h: kinematics/core"
-    "nlohmann/: app/io app/report app/commands"
+    "nlohmann/: app/io app/report app/commands dynamics/models"
     "CLI/: app/commands app/manual"
     "gtest/: none")
 

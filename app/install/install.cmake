@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # What `cmake --install` copies, in two components: `program` (with manual, completion and schemas) and
-# `development` (libraries, headers, CMake package, pkg-config file, example).
+# `development` (libraries, headers, CMake package, pkg-config files, examples).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -35,10 +35,30 @@ set(kinescope_archives "")
 foreach(room IN LISTS rooms)
   string(PREPEND kinescope_archives "-l${room} ")
 endforeach()
+# Those of kinescope_torque alone.
+get_property(below TARGET kinescope_torque PROPERTY LINK_LIBRARIES)
+set(torque_rooms kinescope_torque)
+while(below)
+  list(POP_FRONT below target)
+  string(REPLACE "kinescope::" "kinescope_" room "${target}")
+  if(room IN_LIST rooms AND NOT room IN_LIST torque_rooms)
+    list(APPEND torque_rooms ${room})
+    get_property(next TARGET ${room} PROPERTY LINK_LIBRARIES)
+    list(APPEND below ${next})
+  endif()
+endwhile()
+set(kinescope_torque_archives "")
+foreach(room IN LISTS rooms)
+  if(room IN_LIST torque_rooms)
+    string(PREPEND kinescope_torque_archives "-l${room} ")
+  endif()
+endforeach()
 # Also where the prefix is moved.
 file(RELATIVE_PATH KINESCOPE_PC_TO_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" KINESCOPE_PC_TO_PREFIX "${KINESCOPE_PC_TO_PREFIX}")
-configure_file(app/install/kinescope.pc.in kinescope.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinescope.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
-        COMPONENT development)
+foreach(package kinescope kinescope_torque)
+  configure_file(app/install/${package}.pc.in ${package}.pc @ONLY)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${package}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+          COMPONENT development)
+endforeach()
 install(DIRECTORY app/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/kinescope COMPONENT development)

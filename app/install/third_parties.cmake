@@ -20,6 +20,9 @@ set(kinescope_packages
     ZLIB
     PkgConfig)
 
+# The same of kinescope::torque and the rooms below it.
+set(kinescope_torque_packages "Eigen3 3.4 NO_MODULE" fmt nlohmann_json Ceres Threads ZLIB)
+
 # What is not installed; empty when all is there.
 set(kinescope_missing "")
 
@@ -38,16 +41,20 @@ macro(kinescope_find_libraries target)
   endif()
 endmacro()
 
-# To be called when PkgConfig is found.
-macro(kinescope_find_third_parties)
-  # The CMake files of Ubuntu 24.04's package point beside its libraries.
-  kinescope_find_libraries(kinescope_apriltag apriltag apriltag-utils)
+macro(kinescope_find_torque_third_parties)
   # OpenBLAS must stand before Ceres on every link line: Debian's Ceres names ATLAS, which otherwise
   # wins the BLAS symbols and is four times slower (tests/acceptance checks the running program).
   kinescope_find_libraries(kinescope_blas openblas)
   kinescope_find_libraries(kinescope_libsvm svm)
   # Debian's dlibConfig.cmake asks for libraries of its pictures and windows; the network needs none.
   kinescope_find_libraries(kinescope_dlib dlib)
+endmacro()
+
+# To be called when PkgConfig is found.
+macro(kinescope_find_third_parties)
+  # The CMake files of Ubuntu 24.04's package point beside its libraries.
+  kinescope_find_libraries(kinescope_apriltag apriltag apriltag-utils)
+  kinescope_find_torque_third_parties()
   pkg_check_modules(KINESCOPE_LIBAV QUIET IMPORTED_TARGET libavformat libavcodec libavutil libswscale)
   if(NOT KINESCOPE_LIBAV_FOUND)
     list(APPEND kinescope_missing libavformat libavcodec libavutil libswscale)

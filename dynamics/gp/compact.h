@@ -59,7 +59,7 @@ class CompactPredictor {
                    const Eigen::MatrixXd& features);
 
   [[nodiscard]] double mean(const Eigen::VectorXd& motion, const Eigen::VectorXd& features);
-  /// Of the function, at the sample of the last `mean`.
+  /// Of the function, at the sample of the last `mean`; infinite where it overflows.
   [[nodiscard]] double variance();
 
  private:

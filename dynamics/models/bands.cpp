@@ -10,6 +10,7 @@
 
 #include "dynamics/data/splits.h"
 #include "dynamics/gp/workers.h"
+#include "dynamics/models/normal_widths.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -17,9 +18,6 @@ namespace {
 
 using Eigen::Index;
 
-// Two-sided quantiles of the normal distribution.
-constexpr double kNormal90 = 1.6448536;
-constexpr double kNormal95 = 1.9599640;
 // Below so many residuals the 95 % quantile is the largest one or nearly so.
 constexpr std::size_t kFewest = 40;
 
@@ -203,14 +201,6 @@ BandFactors bands_from(const LeftOutTorques& left, const SigmaOf& sigma_of) {
 }
 
 }  // namespace
-
-double BandFactors::width_90(Index joint) const {
-  return of_90.size() > 0 ? of_90[joint] : kNormal90;
-}
-
-double BandFactors::width_95(Index joint) const {
-  return of_95.size() > 0 ? of_95[joint] : kNormal95;
-}
 
 std::optional<LeftOutTorques> leave_folds_out(const TorqueSamples& samples, int folds,
                                               Index most_rows, const FoldPredictor& predict,

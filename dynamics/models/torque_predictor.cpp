@@ -5,9 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "dynamics/gp/workers.h"
-#include "dynamics/identify/model_features.h"
-#include "dynamics/identify/term_size.h"
 #include "dynamics/rigid/regressor.h"
 #include "kinematics/core/error.h"
 
@@ -66,19 +63,24 @@ void check(const SavedTorqueModel& model, std::size_t terms) {
 class TermColumns {
  public:
   TermColumns(const RigidModel& rigid, const DriveTerms& drives)
-      : rigid_(rigid), drives_(drives), terms_(torque_terms(rigid, drives)) {}
+      : rigid_(rigid),
+        drives_(drives),
+        terms_(torque_terms(rigid, drives)),
+        regressor_(rigid),
+        dq_(rigid.size()),
+        ddq_(rigid.size()) {}
 
   [[nodiscard]] std::size_t count() const { return terms_.size(); }
 
   void at(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq) {
-    regressor_ = regressor(rigid_, q, dq, ddq);
+    inertial_ = &regressor_.at(q, dq, ddq);
     dq_ = dq;
     ddq_ = ddq;
   }
 
   [[nodiscard]] double operator()(Index joint, int term) const {
     const TorqueTerm& own = terms_[static_cast<std::size_t>(term)];
-    if (own.kind == TermKind::kInertial) return regressor_(joint, own.index);
+    if (own.kind == TermKind::kInertial) return (*inertial_)(joint, own.index);
     if (own.kind >= TermKind::kCoupledInertia) return coupled(joint, own);
     if (own.index != joint) return 0.0;
     switch (own.kind) {
@@ -120,7 +122,8 @@ class TermColumns {
   RigidModel rigid_;
   DriveTerms drives_;
   std::vector<TorqueTerm> terms_;
-  Eigen::MatrixXd regressor_;
+  SampleRegressor regressor_;
+  const Eigen::MatrixXd* inertial_ = nullptr;  // of the last sample
   Eigen::VectorXd dq_, ddq_;
 };
 
@@ -212,6 +215,7 @@ struct TorquePredictor::State {
       for (const int k : own.undetermined) {
         if (std::abs(column[k]) > own.acting[k]) variance = std::numeric_limits<double>::infinity();
       }
+      if (std::isnan(variance)) variance = std::numeric_limits<double>::infinity();  // overflow
       model_sigma[j] = std::abs(own.gains[j]) * std::sqrt(std::max(0.0, variance));
     }
   }
@@ -280,51 +284,5 @@ const Eigen::VectorXd& TorquePredictor::sigma() {
 }
 
 const Eigen::VectorXd& TorquePredictor::model_sigma() const { return state_->model_sigma; }
-
-TorquePrediction predict_torque(const SavedTorqueModel& model, const Eigen::MatrixXd& q,
-                                const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
-                                int threads) {
-  TorquePrediction out{Eigen::MatrixXd(q.rows(), q.cols()), Eigen::MatrixXd(q.rows(), q.cols()),
-                       Eigen::MatrixXd(q.rows(), q.cols())};
-  gp::Workers workers(threads);
-  const Index parts = std::min<Index>(workers.count(), std::max<Index>(1, q.rows()));
-  workers.run(parts, [&](Index part, gp::Scratch&) {
-    TorquePredictor predictor(model);
-    for (Index i = part * q.rows() / parts; i < (part + 1) * q.rows() / parts; ++i) {
-      out.mean.row(i) =
-          predictor.mean(q.row(i).transpose(), dq.row(i).transpose(), ddq.row(i).transpose());
-      out.sigma.row(i) = predictor.sigma();
-      out.model_sigma.row(i) = predictor.model_sigma();
-    }
-  });
-  return out;
-}
-
-SavedParametric saved_parametric(const Identification& identification) {
-  SavedParametric out;
-  out.terms = identification.basis.kept;
-  out.parameters = identification.parameters;
-  out.covariance = identification.covariance;
-  out.undetermined = identification.undetermined;
-  out.gains = identification.gains;
-  out.sigma = identification.sigma;
-  for (const int k : out.undetermined) {
-    out.covariance.row(k).setZero();
-    out.covariance.col(k).setZero();
-  }
-  // To the last bit: files hold one triangle.
-  out.covariance = (0.5 * (out.covariance + out.covariance.transpose())).eval();
-  if (out.undetermined.empty()) return out;
-  std::vector<TorqueTerm> kept;
-  for (const int k : out.terms) kept.push_back(identification.terms[static_cast<std::size_t>(k)]);
-  out.acting =
-      identify::kAtRest * identify::usual_sizes(identification.rigid, identification.drives, kept);
-  return out;
-}
-
-MotionSpan span_of(const TorqueSamples& samples) {
-  return {samples.q.colwise().minCoeff(), samples.q.colwise().maxCoeff(),
-          samples.dq.cwiseAbs().colwise().maxCoeff(), samples.ddq.cwiseAbs().colwise().maxCoeff()};
-}
 
 }  // namespace kinescope

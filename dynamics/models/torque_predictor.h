@@ -69,7 +69,7 @@ struct SavedTorqueModel {
   MotionSpan learned;
 };
 
-/// One sample after another, one predictor a thread. A process needs no allocation after the first.
+/// One sample after another, one predictor a thread; mean and sigma do not allocate.
 class TorquePredictor {
  public:
   /// Throws bad_request for parts that do not fit each other.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/rigid/regressor.h"
 
+#include <cassert>
+
 #include "dynamics/rigid/body_motions.h"
 #include "kinematics/core/error.h"
 
@@ -89,8 +91,27 @@ void check_sizes(const RigidModel& model, const Eigen::MatrixXd& q, const Eigen:
 Eigen::MatrixXd regressor(const RigidModel& model, const Eigen::VectorXd& q,
                           const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq) {
   check_sizes(model, q.transpose(), dq.transpose(), ddq.transpose());
-  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(model.size(), 10 * model.size());
-  RegressorRecursion(model).fill(q, dq, ddq, [&](int joint, std::size_t body, const Row10& row) {
+  return SampleRegressor(model).at(q, dq, ddq);
+}
+
+// Entries of joints that do not carry a body are never written and stay zero.
+struct SampleRegressor::State {
+  RegressorRecursion recursion;
+  Eigen::MatrixXd Y;
+};
+
+SampleRegressor::SampleRegressor(const RigidModel& model)
+    : state_(std::make_unique<State>(State{
+          RegressorRecursion(model), Eigen::MatrixXd::Zero(model.size(), 10 * model.size())})) {}
+SampleRegressor::~SampleRegressor() = default;
+SampleRegressor::SampleRegressor(SampleRegressor&&) noexcept = default;
+SampleRegressor& SampleRegressor::operator=(SampleRegressor&&) noexcept = default;
+
+const Eigen::MatrixXd& SampleRegressor::at(const Eigen::VectorXd& q, const Eigen::VectorXd& dq,
+                                           const Eigen::VectorXd& ddq) {
+  Eigen::MatrixXd& Y = state_->Y;
+  assert(q.size() == Y.rows() && dq.size() == Y.rows() && ddq.size() == Y.rows());
+  state_->recursion.fill(q, dq, ddq, [&Y](int joint, std::size_t body, const Row10& row) {
     Y.block<1, 10>(joint, 10 * static_cast<Eigen::Index>(body)) = row;
   });
   return Y;

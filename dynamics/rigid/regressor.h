@@ -4,6 +4,8 @@
 // inertia * ddq). Y is also linear in gravity.
 #pragma once
 
+#include <memory>
+
 #include "dynamics/rigid/rigid_model.h"
 
 namespace kinescope {
@@ -13,6 +15,23 @@ namespace kinescope {
 /// depth).
 [[nodiscard]] Eigen::MatrixXd regressor(const RigidModel& model, const Eigen::VectorXd& q,
                                         const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq);
+
+/// regressor() of one sample after another, without allocation; one for each thread.
+class SampleRegressor {
+ public:
+  explicit SampleRegressor(const RigidModel& model);
+  ~SampleRegressor();
+  SampleRegressor(SampleRegressor&&) noexcept;
+  SampleRegressor& operator=(SampleRegressor&&) noexcept;
+
+  /// Vectors of one entry a joint (asserted). Y is valid until the next call.
+  [[nodiscard]] const Eigen::MatrixXd& at(const Eigen::VectorXd& q, const Eigen::VectorXd& dq,
+                                          const Eigen::VectorXd& ddq);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// Y, joints x 10 links, for the stacked parameters of all links of the tree, each in its own
 /// frame.

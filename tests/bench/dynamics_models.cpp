@@ -4,11 +4,13 @@
 //   build/test/bench_dynamics_models
 // A process of one joint of seven (21 columns) that learned from N samples, with 256 points that
 // carry its variance; and a whole saved robot, all joints.
+#include <array>
 #include <cmath>
 #include <numeric>
 
 #include <benchmark/benchmark.h>
 
+#include "dynamics/control/torque_evaluator.h"
 #include "dynamics/gp/compact.h"
 #include "dynamics/models/torque_model.h"
 #include "tests/truth/torque_world.h"
@@ -86,6 +88,35 @@ BENCHMARK(one_robot)
     ->Arg(static_cast<int>(TorqueModelKind::kGip))
     ->Arg(static_cast<int>(TorqueModelKind::kSemiParametric))
     ->ArgName("kind")
+    ->Unit(benchmark::kMicrosecond);
+
+// What a controller calls, every joint by a process of N samples: mean, or mean and band.
+void controller(benchmark::State& state) {
+  Rng rng = Rng::from_name("bench robot");
+  const RandomRobot robot = random_robot({.joints = kJoints, .prismatic_share = 0.0}, rng);
+  const auto points = static_cast<int>(state.range(1));
+  SavedTorqueModel model;
+  model.kind = state.range(0) != 0 ? TorqueModelKind::kGip : TorqueModelKind::kRbf;
+  model.rigid = make_rigid_model(random_masses(robot.tree, {}, rng));
+  model.motions = random_matrix(points, 3L * kJoints);
+  SavedProcess one;
+  one.gp = process(state.range(0) != 0, points);
+  model.processes.assign(kJoints, one);
+  model.parts = {Eigen::VectorXd::Ones(kJoints), Eigen::VectorXd::Ones(kJoints)};
+  TorqueEvaluator evaluator(model);
+  const std::array<double, kJoints> x{0.2, 0.3, -0.1, 0.5, 0.2, -0.7, 0.1};
+  std::array<double, kJoints> torque{}, half_width{};
+  for (auto _ : state) {
+    const TorqueStatus status = state.range(2) != 0
+                                    ? evaluator.mean_and_band(x, x, x, torque, half_width)
+                                    : evaluator.mean(x, x, x, torque);
+    if (status != TorqueStatus::kDone) state.SkipWithError("refused");
+    benchmark::DoNotOptimize(torque);
+  }
+}
+BENCHMARK(controller)
+    ->ArgsProduct({{0, 1}, {2000}, {0, 1}})
+    ->ArgNames({"gip", "N", "band"})
     ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
