@@ -26,6 +26,10 @@ using Figure = ExperimentSection::Figure;
 constexpr const char* kDetector = "detector";
 constexpr const char* kObserver = "momentum observer";
 
+std::string titled(const ContactKind& kind) {
+  return fmt::format("{} contacts", kind.shape == ContactShape::kHalfSine ? "Hard" : "Soft");
+}
+
 double milliseconds(double seconds) { return 1e3 * seconds; }
 double percent(int part, int of) { return 100.0 * part / of; }
 
@@ -37,15 +41,18 @@ std::string observer_name(const ObserverSetting& setting) {
 
 std::vector<TorqueGroup> all_groups(const ContactDetection& contacts) {
   std::vector<TorqueGroup> out;
-  for (std::size_t kind = 0; kind < contact_kinds().size(); ++kind) {
+  for (std::size_t kind = 0; kind < contacts.kinds.size(); ++kind) {
     for (TorqueGroup& group : groups_by_torque(contacts, kind)) out.push_back(std::move(group));
   }
   return out;
 }
 
-std::string name_of(std::size_t kind) { return std::string(contact_kinds()[kind].name); }
+std::string name_of(const ContactDetection& contacts, std::size_t kind) {
+  return std::string(contacts.kinds[kind].name);
+}
 
-ExperimentTable detection_table(const std::vector<TorqueGroup>& groups) {
+ExperimentTable detection_table(const ContactDetection& contacts,
+                                const std::vector<TorqueGroup>& groups) {
   ExperimentTable out{
       "detection",
       "Contacts in groups of ascending torque (peak of the norm of the external joint torque): "
@@ -56,7 +63,7 @@ ExperimentTable detection_table(const std::vector<TorqueGroup>& groups) {
       {}};
   for (const TorqueGroup& group : groups) {
     out.rows.push_back(
-        {{name_of(group.kind)},
+        {{name_of(contacts, group.kind)},
          {group.torque_nm.median, static_cast<double>(group.contacts),
           percent(group.detector.found, group.contacts),
           percent(group.observer.found, group.contacts),
@@ -72,7 +79,7 @@ ExperimentTable::Row detector_row(const ContactDetection& contacts, std::size_t 
   const AlarmRate rate = alarm_rate(measure.invented, measure.hours);
   std::string name = observer ? observer_name(contacts.observers[*observer]) : kDetector;
   if (observer == contacts.chosen[kind]) name += " (chosen)";
-  return {{name_of(kind), std::move(name)},
+  return {{name_of(contacts, kind), std::move(name)},
           {static_cast<double>(measure.contacts), percent(measure.found.found, measure.contacts),
            milliseconds(measure.found.delay_s.median), static_cast<double>(measure.invented),
            rate.per_hour, rate.lower_per_hour, rate.upper_per_hour}};
@@ -84,7 +91,7 @@ ExperimentTable detectors_table(const ContactDetection& contacts) {
                       {"Contact", "Detector"},
                       {"contacts", "found (%)", "delay (ms)", "invented", "an hour", "from", "to"},
                       {}};
-  for (std::size_t kind = 0; kind < contact_kinds().size(); ++kind) {
+  for (std::size_t kind = 0; kind < contacts.kinds.size(); ++kind) {
     out.rows.push_back(detector_row(contacts, kind, {}));
     for (std::size_t o = 0; o < contacts.observers.size(); ++o) {
       out.rows.push_back(detector_row(contacts, kind, o));
@@ -111,7 +118,7 @@ ExperimentTable runs_table(const ContactDetection& contacts) {
       link_right += trial.detector.link_right ? 1 : 0;
     }
     out.rows.push_back(
-        {{name_of(run.kind)},
+        {{name_of(contacts, run.kind)},
          {static_cast<double>(run.run), run.force_n, static_cast<double>(run.trials.size()),
           static_cast<double>(found), static_cast<double>(theirs), static_cast<double>(link_right),
           run.detector_invented / run.hours, run.observers_invented[chosen] / run.hours}});
@@ -130,7 +137,7 @@ ExperimentTable contacts_table(const ContactDetection& contacts) {
     for (const ContactTrial& trial : run.trials) {
       const ContactOutcome& observer = trial.observers[contacts.chosen[run.kind]];
       out.rows.push_back(
-          {{name_of(run.kind), fmt::format("link{}", trial.link + 1)},
+          {{name_of(contacts, run.kind), fmt::format("link{}", trial.link + 1)},
            {static_cast<double>(run.run), run.force_n, trial.begin_s, trial.torque_nm,
             trial.detector.found ? 1.0 : 0.0, milliseconds(trial.detector.delay_s),
             trial.detector.link_right ? 1.0 : 0.0, observer.found ? 1.0 : 0.0,
@@ -187,13 +194,13 @@ Curve delay_curve(const std::vector<TorqueGroup>& groups, std::size_t kind,
   return out;
 }
 
-ExperimentSection kind_section(const std::vector<TorqueGroup>& groups, std::size_t kind) {
-  const ContactKind& own = contact_kinds()[kind];
+ExperimentSection kind_section(const ContactKind& own, const std::vector<TorqueGroup>& groups,
+                               std::size_t kind) {
   const report::CurveAxis torque{.label = "external joint torque, N m", .log10 = true};
   const char* shape = own.shape == ContactShape::kHalfSine ? "half-sines" : "trapezoids";
   ExperimentSection out{
       std::string(own.name),
-      fmt::format("{} contacts", own.name == "soft" ? "Soft" : "Hard"),
+      titled(own),
       {fmt::format("Forces of {:g} to {:g} N in random directions, {} of {:g} ms, on the links in "
                    "turn.",
                    own.forces_n.front(), own.forces_n.back(), shape, milliseconds(own.contact_s))},
@@ -237,9 +244,9 @@ ExperimentSection alarms_section(const ContactDetection& contacts) {
   std::vector<Curve> curves{
       alarm_curve(contacts, kDetector, [](const FalseAlarmPoint& p) { return p.detector; })};
   for (std::size_t kind = 0; kind < contacts.chosen.size(); ++kind) {
-    curves.push_back(
-        alarm_curve(contacts, fmt::format("observer for {} contacts", contact_kinds()[kind].name),
-                    [kind](const FalseAlarmPoint& p) { return p.observers[kind]; }));
+    curves.push_back(alarm_curve(contacts,
+                                 fmt::format("observer for {} contacts", contacts.kinds[kind].name),
+                                 [kind](const FalseAlarmPoint& p) { return p.observers[kind]; }));
   }
   curves.push_back(std::move(declared));
   return {
@@ -260,10 +267,10 @@ std::string kind_finding(const ContactDetection& contacts, std::size_t kind) {
   const KindMeasure observer = measure_kind(contacts, kind, chosen);
   const PairedDelay both = paired_delay(contacts, kind);
   std::string out = fmt::format(
-      "{} contacts: {} of {} found, {} of them at the right link, {} invented in {:.2f} h; {} at "
+      "{}: {} of {} found, {} of them at the right link, {} invented in {:.2f} h; {} at "
       "its best: {} found, {} invented.",
-      contact_kinds()[kind].name == "soft" ? "Soft" : "Hard", detector.found.found,
-      detector.contacts, detector.found.link_right, detector.invented, detector.hours,
+      titled(contacts.kinds[kind]), detector.found.found, detector.contacts,
+      detector.found.link_right, detector.invented, detector.hours,
       observer_name(contacts.observers[chosen]), observer.found.found, observer.invented);
   if (both.contacts == 0) return out;
   return out + fmt::format(" Median delay of the {} that both found: {:.1f} ms, {:.1f} ms.",
@@ -303,9 +310,9 @@ ExperimentSummary contact_experiment(const ExperimentChoice& choice, const Progr
                                    : fmt::format("{:g} N m at joint 1, 0.6 of it at each next one",
                                                  ContactWorldOptions{}.torque_sigma_nm)},
       {"Declared false alarms", fmt::format("{:g} an hour", options.declared_per_hour)}};
-  for (std::size_t kind = 0; kind < contact_kinds().size(); ++kind) {
+  for (std::size_t kind = 0; kind < contacts.kinds.size(); ++kind) {
     out.findings.push_back(kind_finding(contacts, kind));
-    out.sections.push_back(kind_section(groups, kind));
+    out.sections.push_back(kind_section(contacts.kinds[kind], groups, kind));
   }
   out.findings.push_back(alarms_finding(contacts));
   out.sections.push_back(alarms_section(contacts));
@@ -320,7 +327,7 @@ ExperimentSummary contact_experiment(const ExperimentChoice& choice, const Progr
                     kContactJoints)},
        {"detection", "detectors"},
        {}});
-  out.tables = {detection_table(groups), detectors_table(contacts), runs_table(contacts),
+  out.tables = {detection_table(contacts, groups), detectors_table(contacts), runs_table(contacts),
                 contacts_table(contacts), false_alarms_table(contacts)};
   return out;
 }

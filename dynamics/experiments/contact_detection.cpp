@@ -14,7 +14,6 @@
 namespace kinescope::experiments {
 namespace {
 
-constexpr int kFreeLogs = 6;  // a run: a rate takes longer to count than contacts
 constexpr double kSecondsPerHour = 3600.0;
 
 std::vector<ObserverSetting> observer_settings() {
@@ -113,7 +112,7 @@ double peak_torque(const ContactWorld& world, const ContactLabel& label) {
 
 ContactRun run_of(const Arm& arm, const Detectors& detectors, std::size_t kind, double force_n,
                   int run, const ContactDetectionOptions& options) {
-  const ContactKind& own = contact_kinds()[kind];
+  const ContactKind& own = options.kinds[kind];
   const std::string name =
       std::string(own.name) + " " + std::to_string(force_n) + " " + std::to_string(run);
   const ContactWorld world = world_of(arm,
@@ -160,20 +159,23 @@ class Runner {
   Runner(const ContactDetectionOptions& options, int threads, const Progress& progress)
       : options_(options), threads_(threads), progress_(progress), arm_(arm_of(options)) {
     free_ = balance_of(arm_, world_of(arm_, learned_from(options), "free", options.seed));
-    total_ = kFreeLogs;
-    for (const ContactKind& kind : contact_kinds())
-      total_ += static_cast<int>(kind.forces_n.size());
+    total_ = options.free_logs;
+    for (const ContactKind& kind : options.kinds) total_ += static_cast<int>(kind.forces_n.size());
   }
 
   ContactDetection run() {
-    ContactDetection out{.observers = observer_settings(), .runs = {}, .chosen = {}, .free = {}};
+    ContactDetection out{.kinds = options_.kinds,
+                         .observers = observer_settings(),
+                         .runs = {},
+                         .chosen = {},
+                         .free = {}};
     const Detectors detectors = learn(free_, options_.declared_per_hour, out.observers);
-    for (std::size_t kind = 0; kind < contact_kinds().size(); ++kind) {
-      for (const double force_n : contact_kinds()[kind].forces_n) {
+    for (std::size_t kind = 0; kind < options_.kinds.size(); ++kind) {
+      for (const double force_n : options_.kinds[kind].forces_n) {
         add_runs(detectors, kind, force_n, out.runs);
       }
     }
-    for (std::size_t kind = 0; kind < contact_kinds().size(); ++kind) {
+    for (std::size_t kind = 0; kind < options_.kinds.size(); ++kind) {
       out.chosen.push_back(best_observer(out, kind));
     }
     out.free = free_motion(out);
@@ -201,14 +203,14 @@ class Runner {
     for (const std::size_t chosen : contacts.chosen) settings.push_back(contacts.observers[chosen]);
     std::vector<Detectors> by_rate;
     std::vector<FalseAlarmPoint> out;
-    const int logs = kFreeLogs * options_.runs;
+    const int logs = options_.free_logs * options_.runs;
     for (const double rate : options_.rates_per_hour) {
       by_rate.push_back(learn(free_, rate, settings));
       out.push_back({.declared_per_hour = rate,
                      .hours = logs * options_.seconds / kSecondsPerHour,
                      .observers = std::vector<int>(settings.size(), 0)});
     }
-    for (int block = 0; block < kFreeLogs; ++block) add_free(by_rate, block, out);
+    for (int block = 0; block < options_.free_logs; ++block) add_free(by_rate, block, out);
     return out;
   }
 
@@ -246,16 +248,15 @@ class Runner {
 
 }  // namespace
 
-const std::vector<ContactKind>& contact_kinds() {
-  static const std::vector<ContactKind> kinds{{.name = "soft",
-                                               .shape = ContactShape::kTrapezoid,
-                                               .contact_s = 0.2,
-                                               .forces_n = {1.25, 2.5, 5.0, 10.0, 20.0}},
-                                              {.name = "hard",
-                                               .shape = ContactShape::kHalfSine,
-                                               .contact_s = 0.03,
-                                               .forces_n = {6.25, 12.5, 25.0, 50.0, 100.0}}};
-  return kinds;
+std::vector<ContactKind> usual_contact_kinds() {
+  return {{.name = "soft",
+           .shape = ContactShape::kTrapezoid,
+           .contact_s = 0.2,
+           .forces_n = {1.25, 2.5, 5.0, 10.0, 20.0}},
+          {.name = "hard",
+           .shape = ContactShape::kHalfSine,
+           .contact_s = 0.03,
+           .forces_n = {6.25, 12.5, 25.0, 50.0, 100.0}}};
 }
 
 ContactDetection run_contact_detection(const ContactDetectionOptions& options, int threads,

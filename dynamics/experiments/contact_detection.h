@@ -28,20 +28,22 @@ struct ContactKind {
   std::vector<double> forces_n;
 };
 /// "soft": trapezoids of 200 ms; "hard": half-sines of 30 ms.
-[[nodiscard]] const std::vector<ContactKind>& contact_kinds();
+[[nodiscard]] std::vector<ContactKind> usual_contact_kinds();
 
 /// Of the seven-joint arm's controller.
 inline constexpr double kContactRate_hz = 1000.0;
 inline constexpr int kContactJoints = 7;
 
 struct ContactDetectionOptions {
+  std::vector<ContactKind> kinds = usual_contact_kinds();
   int runs = 10;          ///< logs of each kind and force
-  double seconds = 30.0;  ///< of each, a contact a second; free motion is six times as much
+  double seconds = 30.0;  ///< of each log, a contact a second
   int samples = 60000;    ///< of motion without contact, that the detectors learn from
   /// White noise of the torques, share of each joint's spread; none: ContactWorldOptions' own.
   std::optional<double> noise;
   double declared_per_hour = 1.0;
-  std::vector<double> rates_per_hour{1.0, 10.0, 100.0, 1000.0};  ///< of the free motion
+  std::vector<double> rates_per_hour{1.0, 10.0, 100.0, 1000.0};  ///< declared for the free motion
+  int free_logs = 6;  ///< of unseen motion without contact, for each of `runs`
   std::uint64_t seed = 1;
 };
 
@@ -67,7 +69,7 @@ struct ContactTrial {
 
 /// One log.
 struct ContactRun {
-  std::size_t kind = 0;
+  std::size_t kind = 0;  ///< of ContactDetection::kinds
   double force_n = 0.0;
   int run = 0;
   double hours = 0.0;
@@ -85,6 +87,7 @@ struct FalseAlarmPoint {
 };
 
 struct ContactDetection {
+  std::vector<ContactKind> kinds;
   std::vector<ObserverSetting> observers;
   std::vector<ContactRun> runs;  ///< in the order of kinds, forces, runs
   /// One a kind: the observer that found most, the fastest of these; chosen on the very contacts
