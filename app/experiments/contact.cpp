@@ -42,7 +42,7 @@ std::string observer_name(const ObserverSetting& setting) {
 std::vector<TorqueGroup> all_groups(const ContactDetection& contacts) {
   std::vector<TorqueGroup> out;
   for (std::size_t kind = 0; kind < contacts.kinds.size(); ++kind) {
-    for (TorqueGroup& group : groups_by_torque(contacts, kind)) out.push_back(std::move(group));
+    for (const TorqueGroup& group : groups_by_torque(contacts, kind)) out.push_back(group);
   }
   return out;
 }

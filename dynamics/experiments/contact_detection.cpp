@@ -201,11 +201,14 @@ class Runner {
   std::vector<FalseAlarmPoint> free_motion(const ContactDetection& contacts) {
     std::vector<ObserverSetting> settings;
     for (const std::size_t chosen : contacts.chosen) settings.push_back(contacts.observers[chosen]);
-    std::vector<Detectors> by_rate;
+    const std::vector<double>& rates = options_.rates_per_hour;
+    std::vector<Detectors> by_rate(rates.size());
+    parallel_for(
+        rates.size(), [&](std::size_t k) { by_rate[k] = learn(free_, rates[k], settings); },
+        threads_);
     std::vector<FalseAlarmPoint> out;
     const int logs = options_.free_logs * options_.runs;
-    for (const double rate : options_.rates_per_hour) {
-      by_rate.push_back(learn(free_, rate, settings));
+    for (const double rate : rates) {
       out.push_back({.declared_per_hour = rate,
                      .hours = logs * options_.seconds / kSecondsPerHour,
                      .observers = std::vector<int>(settings.size(), 0)});

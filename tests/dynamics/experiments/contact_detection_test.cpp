@@ -24,8 +24,13 @@ ContactDetectionOptions small(double force_n) {
           .free_logs = 1};
 }
 
+const ContactDetection& firm() {
+  static const ContactDetection contacts = run_contact_detection(small(20.0), 1);
+  return contacts;
+}
+
 TEST(ContactDetection, FindsFirmContactsBeforeTheObserver) {
-  const ContactDetection contacts = run_contact_detection(small(20.0), 1);
+  const ContactDetection& contacts = firm();
   const KindMeasure ours = measure_kind(contacts, 0, {});
   EXPECT_EQ(ours.contacts, 10);
   EXPECT_EQ(ours.found.found, 10);
@@ -41,6 +46,7 @@ TEST(ContactDetection, ForcesBelowTheNoiseAreNotFound) {
   ContactDetectionOptions options = small(20.0);
   options.noise = 1.0;  // as much as the motion's own torque
   options.kinds.front().forces_n = {0.01};
+  options.rates_per_hour.clear();
   const ContactDetection contacts = run_contact_detection(options, 2);
   EXPECT_EQ(measure_kind(contacts, 0, {}).found.found, 0);
   EXPECT_EQ(measure_kind(contacts, 0, contacts.chosen[0]).found.found, 0);
@@ -49,8 +55,8 @@ TEST(ContactDetection, ForcesBelowTheNoiseAreNotFound) {
 }
 
 TEST(ContactDetection, ThreadsChangeNothing) {
-  const ContactDetection one = run_contact_detection(small(2.0), 1);
-  const ContactDetection two = run_contact_detection(small(2.0), 2);
+  const ContactDetection& one = firm();
+  const ContactDetection two = run_contact_detection(small(20.0), 2);
   ASSERT_EQ(one.runs.size(), two.runs.size());
   EXPECT_EQ(one.chosen, two.chosen);
   EXPECT_EQ(one.free.front().detector, two.free.front().detector);
