@@ -66,7 +66,8 @@ struct Detectors {
 
 Detectors learn(const std::vector<BalanceSample>& free, double per_hour,
                 const std::vector<ObserverSetting>& settings) {
-  Detectors out{.detector = calibrate_contacts(free, {.false_alarms_per_hour = per_hour}),
+  Detectors out{.detector = calibrate_contacts(
+                    free, {.false_alarms_per_hour = per_hour, .may_contain_contacts = false}),
                 .observers = {}};
   for (const ObserverSetting& setting : settings) {
     out.observers.push_back(

@@ -36,7 +36,7 @@ inline constexpr int kContactJoints = 7;
 
 struct ContactDetectionOptions {
   std::vector<ContactKind> kinds = usual_contact_kinds();
-  int runs = 10;          ///< logs of each kind and force
+  int runs = 5;           ///< logs of each kind and force
   double seconds = 30.0;  ///< of each log, a contact a second
   int samples = 60000;    ///< of motion without contact, that the detectors learn from
   /// White noise of the torques, share of each joint's spread; none: ContactWorldOptions' own.
