@@ -162,9 +162,9 @@ ExperimentTable false_alarms_table(const ContactDetection& contacts) {
                       {}};
   for (const FalseAlarmPoint& point : contacts.free) {
     add_alarms(out, point, kDetector, point.detector);
-    for (std::size_t kind = 0; kind < point.observers.size(); ++kind) {
-      add_alarms(out, point, observer_name(contacts.observers[contacts.chosen[kind]]),
-                 point.observers[kind]);
+    for (std::size_t o = 0; o < point.observers.size(); ++o) {
+      add_alarms(out, point, observer_name(contacts.observers[contacts.free_observers[o]]),
+                 point.observers[o]);
     }
   }
   return out;
@@ -243,10 +243,10 @@ ExperimentSection alarms_section(const ContactDetection& contacts) {
   }
   std::vector<Curve> curves{
       alarm_curve(contacts, kDetector, [](const FalseAlarmPoint& p) { return p.detector; })};
-  for (std::size_t kind = 0; kind < contacts.chosen.size(); ++kind) {
+  for (std::size_t o = 0; o < contacts.free_observers.size(); ++o) {
     curves.push_back(alarm_curve(contacts,
-                                 fmt::format("observer for {} contacts", contacts.kinds[kind].name),
-                                 [kind](const FalseAlarmPoint& p) { return p.observers[kind]; }));
+                                 observer_name(contacts.observers[contacts.free_observers[o]]),
+                                 [o](const FalseAlarmPoint& p) { return p.observers[o]; }));
   }
   curves.push_back(std::move(declared));
   return {

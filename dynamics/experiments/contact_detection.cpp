@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -19,7 +20,8 @@ constexpr double kSecondsPerHour = 3600.0;
 std::vector<ObserverSetting> observer_settings() {
   std::vector<ObserverSetting> out;
   for (const ObserverTest test : {ObserverTest::kLargestJoint, ObserverTest::kAllJoints}) {
-    for (const double gain : {15.0, 25.0, 40.0, 60.0, 90.0, 140.0}) out.push_back({gain, test});
+    for (const double gain : {5.0, 9.0, 15.0, 25.0, 40.0, 60.0, 90.0, 140.0})
+      out.push_back({gain, test});
   }
   return out;
 }
@@ -165,11 +167,9 @@ class Runner {
   }
 
   ContactDetection run() {
-    ContactDetection out{.kinds = options_.kinds,
-                         .observers = observer_settings(),
-                         .runs = {},
-                         .chosen = {},
-                         .free = {}};
+    ContactDetection out;
+    out.kinds = options_.kinds;
+    out.observers = observer_settings();
     const Detectors detectors = learn(free_, options_.declared_per_hour, out.observers);
     for (std::size_t kind = 0; kind < options_.kinds.size(); ++kind) {
       for (const double force_n : options_.kinds[kind].forces_n) {
@@ -179,6 +179,8 @@ class Runner {
     for (std::size_t kind = 0; kind < options_.kinds.size(); ++kind) {
       out.chosen.push_back(best_observer(out, kind));
     }
+    const std::set<std::size_t> each(out.chosen.begin(), out.chosen.end());
+    out.free_observers.assign(each.begin(), each.end());
     out.free = free_motion(out);
     return out;
   }
@@ -201,7 +203,7 @@ class Runner {
 
   std::vector<FalseAlarmPoint> free_motion(const ContactDetection& contacts) {
     std::vector<ObserverSetting> settings;
-    for (const std::size_t chosen : contacts.chosen) settings.push_back(contacts.observers[chosen]);
+    for (const std::size_t k : contacts.free_observers) settings.push_back(contacts.observers[k]);
     const std::vector<double>& rates = options_.rates_per_hour;
     std::vector<Detectors> by_rate(rates.size());
     parallel_for(

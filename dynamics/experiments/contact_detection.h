@@ -83,7 +83,7 @@ struct FalseAlarmPoint {
   double declared_per_hour = 0.0;
   double hours = 0.0;
   int detector = 0;
-  std::vector<int> observers;  ///< one a kind: the one chosen for it
+  std::vector<int> observers;  ///< as ContactDetection::free_observers
 };
 
 struct ContactDetection {
@@ -93,6 +93,7 @@ struct ContactDetection {
   /// One a kind: the observer that found most, the fastest of these; chosen on the very contacts
   /// that it is judged on, which is in its favour.
   std::vector<std::size_t> chosen;
+  std::vector<std::size_t> free_observers;  ///< those chosen, each once
   std::vector<FalseAlarmPoint> free;
 };
 
