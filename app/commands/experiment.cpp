@@ -26,9 +26,10 @@ const Experiment& experiment_of(const std::string& name) {
 // An option that would do nothing is refused.
 void require_known(const Experiment& experiment, const ExperimentOptions& options) {
   const ExperimentChoice& choice = options.choice;
-  const std::array<std::pair<std::string_view, bool>, 10> given = {
+  const std::array<std::pair<std::string_view, bool>, 11> given = {
       {{"--runs", choice.runs.has_value()},
        {"--samples", choice.samples.has_value()},
+       {"--seconds", choice.seconds.has_value()},
        {"--noise", choice.noise.has_value()},
        {"--tilt", choice.tilts_deg.has_value()},
        {"--shift", choice.shifts_m.has_value()},

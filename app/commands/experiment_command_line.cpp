@@ -66,6 +66,13 @@ void add_choices(CLI::App& command, ExperimentChoice& choice) {
   add_count(command, "--samples", choice.samples, 50, 40000, "Samples to learn from");
   command
       .add_option_function<double>(
+          "--seconds", [&choice](const double& seconds) { choice.seconds = seconds; },
+          "Of each simulated log")
+      ->check(number_in(5, 3600))
+      ->type_name("S")
+      ->group(kWhat);
+  command
+      .add_option_function<double>(
           "--noise", [&choice](const double& noise) { choice.noise = noise; },
           "Of the torques, share of their spread")
       ->check(number_in(0, 1))

@@ -23,7 +23,8 @@ struct ExperimentLog {
 struct ExperimentChoice {
   std::optional<int> runs;
   std::optional<int> samples;
-  std::optional<double> noise;  ///< share of the spread of each joint's torque
+  std::optional<double> seconds;  ///< of each simulated log
+  std::optional<double> noise;    ///< share of the spread of each joint's torque
   std::optional<std::vector<double>> tilts_deg;
   std::optional<std::vector<double>> shifts_m;  ///< as many as tilts
   std::optional<std::vector<experiments::Learner>> learners;

@@ -26,6 +26,11 @@ const std::vector<Experiment>& all_experiments() {
        {"--samples"},
        {"fits", "grid", "choices", "friction", "gravity", "sensor"},
        barrett_experiment},
+      {"contact",
+       "Contact detection and the momentum observer on a simulated arm",
+       {"--runs", "--samples", "--seconds", "--noise"},
+       {"detection", "detectors", "runs", "contacts", "false_alarms"},
+       contact_experiment},
   };
   return experiments;
 }

@@ -34,5 +34,7 @@ struct Experiment {
                                                  const Progress& progress);
 [[nodiscard]] ExperimentSummary barrett_experiment(const ExperimentChoice& choice,
                                                    const Progress& progress);
+[[nodiscard]] ExperimentSummary contact_experiment(const ExperimentChoice& choice,
+                                                   const Progress& progress);
 
 }  // namespace kinescope

@@ -22,11 +22,12 @@ void require(bool good, const char* option, const char* remedy) {
 double poisson_limit(int count, bool above) {
   if (above && count == 0) return 0.0;
   const auto tail = [&](double mean) {
-    double term = std::exp(-mean);
-    double sum = term;
+    // By logarithms: exp(-mean) alone underflows at 745.
+    double log_term = -mean;
+    double sum = std::exp(log_term);
     for (int k = 1; k <= (above ? count - 1 : count); ++k) {
-      term *= mean / k;
-      sum += term;
+      log_term += std::log(mean / k);
+      sum += std::exp(log_term);
     }
     return above ? 1.0 - sum : sum;
   };
@@ -42,6 +43,12 @@ double poisson_limit(int count, bool above) {
 }
 
 }  // namespace
+
+AlarmRate alarm_rate(int alarms, double hours) {
+  return {.per_hour = alarms / hours,
+          .lower_per_hour = poisson_limit(alarms, true) / hours,
+          .upper_per_hour = poisson_limit(alarms, false) / hours};
+}
 
 void validate(const ContactOptions& options) {
   require(options.false_alarms_per_hour > 0.0 && options.false_alarms_per_hour <= 3600.0,
@@ -82,9 +89,10 @@ FalseAlarmCheck check_false_alarms(const ContactCalibration& calibration,
     }
     check.alarms += inside ? 0 : 1;
   }
-  check.observed_per_hour = check.alarms / check.hours;
-  check.lower_per_hour = poisson_limit(check.alarms, true) / check.hours;
-  check.upper_per_hour = poisson_limit(check.alarms, false) / check.hours;
+  const AlarmRate rate = alarm_rate(check.alarms, check.hours);
+  check.observed_per_hour = rate.per_hour;
+  check.lower_per_hour = rate.lower_per_hour;
+  check.upper_per_hour = rate.upper_per_hour;
   const StatisticRecord record{.values = contact::largest_ratio(log, calibration.thresholds, use),
                                .step_s = calibration.step_s,
                                .fewest_peaks = 1};

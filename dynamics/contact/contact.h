@@ -100,13 +100,21 @@ struct ContactEvent {
 [[nodiscard]] std::vector<ContactEvent> detect_contacts(const ContactCalibration& calibration,
                                                         const std::vector<BalanceSample>& samples);
 
+/// Observed rate with the 95 % interval of the rate behind so many alarms (Garwood 1936).
+struct AlarmRate {
+  double per_hour = 0.0;
+  double lower_per_hour = 0.0;
+  double upper_per_hour = 0.0;
+};
+[[nodiscard]] AlarmRate alarm_rate(int alarms, double hours);
+
 /// Declared against observed, on a log without contacts that the calibration has not seen.
 struct FalseAlarmCheck {
   double hours = 0.0;
   int alarms = 0;
   double declared_per_hour = 0.0;
   double observed_per_hour = 0.0;
-  /// 95 % interval of the rate behind that many alarms (Garwood 1936).
+  /// See AlarmRate.
   double lower_per_hour = 0.0;
   double upper_per_hour = 0.0;
   /// From the tail of this log's own statistic: says more than a count of zero in a few seconds.

@@ -6,10 +6,12 @@
 
 #include "dynamics/contact/detector.h"
 #include "dynamics/contact/momentum_observer.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 struct Log {
   DynamicModel model;

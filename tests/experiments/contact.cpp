@@ -2,7 +2,7 @@
 //
 // Contact detection on recordings of others, beside the momentum observer at the same false-alarm
 // rate, and `kinescope contact` as users run it. Needs the shared data; prints a table each.
-// build/test/contact [ur6] [ur5] [simulated] [logs_ur5] [logs_free] [logs_models]
+// build/test/contact [ur6] [ur5] [logs_ur5] [logs_free] [logs_models]
 // [logs_simulated]
 #include <cstdio>
 #include <set>
@@ -17,7 +17,6 @@ int main(int argc, char** argv) {
   try {
     if (asked("ur6")) kinescope::contact_on_ur6();
     if (asked("ur5")) kinescope::contact_on_ur5();
-    if (asked("simulated")) kinescope::contact_simulated();
     if (asked("logs_ur5")) kinescope::contact_logs_ur5();
     if (asked("logs_free")) kinescope::contact_logs_free();
     if (asked("logs_models")) kinescope::contact_logs_models();

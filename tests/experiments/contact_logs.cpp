@@ -20,13 +20,15 @@
 #include "tests/experiments/contact_sets.h"
 #include "tests/experiments/real_logs.h"
 #include "tests/experiments/torque_robots.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 #include "tests/truth/drive_world.h"
 #include "tests/truth/shared_data.h"
 #include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 namespace fs = std::filesystem;
 

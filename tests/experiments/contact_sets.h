@@ -11,9 +11,6 @@ void contact_on_ur6();
 /// on the free parts of the other files.
 void contact_on_ur5();
 
-/// Constructed worlds: hard and soft contacts, and free motion.
-void contact_simulated();
-
 /// `kinescope contact` on ur5_contact with nothing but each file: found and invented.
 void contact_logs_ur5();
 

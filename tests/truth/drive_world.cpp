@@ -9,6 +9,8 @@
 namespace kinescope {
 namespace {
 
+using experiments::ContactWorld;
+
 constexpr double kStart_s = 0.15;  ///< from rest to a constant speed
 
 /// Rate and its derivative of a start (share 0 to 1) to unit speed, a raised cosine.

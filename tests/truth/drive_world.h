@@ -6,7 +6,7 @@
 // speed (Stribeck), whatever it was at rest; the torque follows by inverse dynamics.
 #pragma once
 
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 namespace kinescope {
 
@@ -30,7 +30,7 @@ struct DriveWorldOptions {
   double torque_sigma_nm = 0.05;
 };
 
-[[nodiscard]] ContactWorld drive_world(const DynamicModel& model, const DriveWorldOptions& options,
-                                       Rng& rng);
+[[nodiscard]] experiments::ContactWorld drive_world(const DynamicModel& model,
+                                                    const DriveWorldOptions& options, Rng& rng);
 
 }  // namespace kinescope

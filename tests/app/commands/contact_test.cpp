@@ -10,11 +10,13 @@
 #include "tests/app/commands/torque_log_text.h"
 #include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 class ContactCommand : public testing::Test {
  protected:

@@ -75,6 +75,7 @@ TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
   const std::filesystem::path folder = truth::temporary_path("others");
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"barrett", "--samples", "150"},
+        std::vector<std::string>{"contact", "--runs", "1", "--seconds", "5", "--samples", "8000"},
         std::vector<std::string>{"panda", "--runs", "1", "--joints", "2,3", "--models",
                                  "rbf,parametric", "--starts", "1", "--search-samples", "60"}}) {
     std::vector<std::string> command{"experiment"};
@@ -122,6 +123,8 @@ TEST(Experiment, Refusals) {
   expect_refusal({"experiment", "scara", "--models", "gipp"}, code, "did you mean 'gip'?");
   expect_refusal({"experiment", "efficiency", "--tilt", "2"}, code,
                  "--tilt: is no option of the experiment efficiency");
+  expect_refusal({"experiment", "scara", "--seconds", "20"}, code,
+                 "--seconds: is no option of the experiment scara");
   expect_refusal({"experiment", "scara", "--tilt", "1,2", "--shift", "0.01"}, code,
                  "1 of them, and 2 of --tilt");
   expect_refusal({"experiment", "scara", "--robot", "arm.urdf"}, code, "a robot without its log");

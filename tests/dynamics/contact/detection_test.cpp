@@ -8,10 +8,12 @@
 #include "dynamics/contact/contact.h"
 #include "dynamics/contact/contact_score.h"
 #include "dynamics/contact/momentum_observer.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 constexpr int kJoints = 4;
 

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/contact/contact.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 std::vector<BalanceSample> free_motion(const DynamicModel& model, double duration_s, Rng& rng) {
   const ContactWorld world =

@@ -15,6 +15,8 @@
 namespace kinescope {
 namespace {
 
+using namespace experiments;
+
 /// A model that knows the masses and, at any speed, Coulomb friction as the sign of the rate.
 PredictedTorque prediction(const RigidModel& rigid, const TorqueSamples& motion) {
   PredictedTorque out;

@@ -10,6 +10,8 @@
 namespace kinescope {
 namespace {
 
+using namespace experiments;
+
 constexpr double kStep_s = 0.004;
 
 /// Rest, forward, rest, backward, a second each.

@@ -7,7 +7,7 @@
 
 #include "dynamics/contact/detector.h"
 #include "kinematics/core/error.h"
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 namespace {
 std::size_t allocations = 0;
@@ -24,6 +24,8 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace kinescope {
 namespace {
+
+using namespace experiments;
 
 struct World {
   DynamicModel model = contact_arm(3);

@@ -12,7 +12,7 @@
 #include "kinematics/core/rng.h"
 #include "kinematics/model/dynamic_model.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 
 /// An arm of links in series, moderate masses, axes alternately across and along the links.
 [[nodiscard]] DynamicModel contact_arm(int joints);
@@ -32,6 +32,7 @@ struct ContactWorldOptions {
   double position_quantum_rad = 4.8e-5;
   double velocity_sigma_rad_s = 1e-3;
   double torque_sigma_nm = 0.08;  ///< of joint 1; 0.6 times that of the joint before for the others
+  Eigen::VectorXd torque_sigmas_nm = {};  ///< one a joint in place of these; empty: these
 };
 
 struct ContactWorld {
@@ -43,4 +44,4 @@ struct ContactWorld {
 [[nodiscard]] ContactWorld contact_world(const DynamicModel& model,
                                          const ContactWorldOptions& options, Rng& rng);
 
-}  // namespace kinescope
+}  // namespace kinescope::experiments

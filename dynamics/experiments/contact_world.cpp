@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/truth/contact_world.h"
+#include "dynamics/experiments/contact_world.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,7 +7,7 @@
 
 #include "dynamics/rigid/inverse_dynamics.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
 
 constexpr int kSines = 6;
@@ -99,10 +99,15 @@ void add_contact(const RigidModel& model, const Motion& motion, const ContactWor
                           .link = body});
 }
 
+double torque_sigma(const ContactWorldOptions& options, Eigen::Index joint) {
+  if (options.torque_sigmas_nm.size() > 0) return options.torque_sigmas_nm[joint];
+  return options.torque_sigma_nm * std::pow(0.6, static_cast<double>(joint));
+}
+
 void add_noise(const ContactWorldOptions& options, TorqueSamples& samples, Rng& rng) {
   const double quantum = options.position_quantum_rad;
   for (Eigen::Index j = 0; j < samples.q.cols(); ++j) {
-    const double torque_sigma_nm = options.torque_sigma_nm * std::pow(0.6, static_cast<double>(j));
+    const double torque_sigma_nm = torque_sigma(options, j);
     for (Eigen::Index k = 0; k < samples.q.rows(); ++k) {
       if (quantum > 0.0) samples.q(k, j) = quantum * std::round(samples.q(k, j) / quantum);
       samples.dq(k, j) += rng.normal(options.velocity_sigma_rad_s);
@@ -172,4 +177,4 @@ ContactWorld contact_world(const DynamicModel& model, const ContactWorldOptions&
   return world;
 }
 
-}  // namespace kinescope
+}  // namespace kinescope::experiments
