@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "dynamics/experiments/contact_world.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
 #include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
-#include "dynamics/experiments/contact_world.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
