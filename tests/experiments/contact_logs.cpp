@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/torque_stages.h"
+#include "dynamics/experiments/contact_world.h"
 #include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
@@ -20,7 +21,6 @@
 #include "tests/experiments/contact_sets.h"
 #include "tests/experiments/real_logs.h"
 #include "tests/experiments/torque_robots.h"
-#include "dynamics/experiments/contact_world.h"
 #include "tests/truth/drive_world.h"
 #include "tests/truth/shared_data.h"
 #include "tests/truth/temporary_path.h"

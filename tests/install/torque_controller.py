@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""torque_controller.py PREFIX LIBDIR SCRATCH CMAKE GENERATOR CONFIG COMPILER FLAGS: the installed example in C++ and
+"""torque_controller.py PREFIX LIBDIR SCRATCH CMAKE GENERATOR CONFIG COMPILER [FLAGS]: the installed example in C++ and
 C, built by CMake and by pkg-config, gives the torques of the robot that the model was learned from."""
 import math
 import os
@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 prefix, libdir, scratch = map(Path, sys.argv[1:4])
-cmake, generator, config, compiler, flags = sys.argv[4:]
+cmake, generator, config, compiler, *flags = sys.argv[4:]
+flags = " ".join(flags)  # CMake leaves an empty argument out
 source = prefix / "share/kinescope/examples/torque_controller"
 program = prefix / "bin/kinescope"
 

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/contact/detector.h"
-#include "kinematics/core/error.h"
 #include "dynamics/experiments/contact_world.h"
+#include "kinematics/core/error.h"
 
 namespace {
 std::size_t allocations = 0;
