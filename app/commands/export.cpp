@@ -31,7 +31,7 @@ struct Exported {
 /// The trace of torques of a folder of `dynamics` or `run`; none where there is none.
 std::optional<fs::path> trace_of(const fs::path& folder) {
   for (const char* name : {"dynamics_trace.json", "trace.json"}) {
-    const fs::path path = folder / name;
+    fs::path path = folder / name;
     if (!fs::exists(path)) continue;
     const auto document = nlohmann::json::parse(read_text_file(path), nullptr, false);
     if (document.is_object() && document.contains("base")) return path;
