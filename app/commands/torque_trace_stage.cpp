@@ -87,10 +87,6 @@ void remove_corrected(const OutputFolder& folder) {
   for (const char* name : {"robot_traced.urdf", "torque_compensated.csv"}) folder.remove(name);
 }
 
-}  // namespace
-
-namespace {
-
 struct DriveTerm {
   std::string_view effect;
   std::string_view term;

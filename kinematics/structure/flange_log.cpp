@@ -6,8 +6,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/SVD>
+
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -140,13 +143,17 @@ Pairs pairs_of(const Poses& marker, const Poses& flange) {
   return out;
 }
 
-// Kabsch 1976: R of the least |marker - R flange|.
-Eigen::Matrix3d best_rotation(const Pairs& pairs) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(pairs.marker * pairs.flange.transpose(),
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+// In the sense of Frobenius.
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
   sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
   return svd.matrixU() * sign * svd.matrixV().transpose();
+}
+
+// Kabsch 1976: R of the least |marker - R flange|.
+Eigen::Matrix3d best_rotation(const Pairs& pairs) {
+  return nearest_rotation(pairs.marker * pairs.flange.transpose());
 }
 
 bool turns_about_two_axes(const Eigen::Matrix3Xd& turns) {
@@ -171,8 +178,7 @@ double explained_positions(const Poses& marker, const Poses& flange, const Eigen
     both.push_back(i);
     sum += marker[i]->matrix3() * R_X.transpose() * flange[i]->matrix3().transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d R_Z = svd.matrixU() * svd.matrixV().transpose();
+  const Eigen::Matrix3d R_Z = nearest_rotation(sum);
   constexpr int kUnknowns = 7;
   const auto rows = 3 * std::ssize(both);
   Eigen::MatrixXd A(rows, kUnknowns);
@@ -220,10 +226,7 @@ bool is_at_rest(const Pairs& pairs, double flange_rad) {
   std::vector<double> sizes;
   for (Eigen::Index k = 0; k < pairs.marker.cols(); ++k)
     sizes.push_back(pairs.marker.col(k).norm());
-  if (sizes.empty()) return true;
-  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
-  std::ranges::nth_element(sizes, middle);
-  return *middle < kAtRest * flange_rad;
+  return sizes.empty() || median_of(std::move(sizes)) < kAtRest * flange_rad;
 }
 
 class FlangeSearch {
