@@ -4,9 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
-
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/nearest_rotation.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -98,14 +97,6 @@ std::vector<Eigen::Matrix3d> rotations_of_a_cube() {
 }
 
 }  // namespace
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const SingularValues svd = singular_value_decomposition(matrix);
-  const Eigen::Matrix3d V = svd.V;
-  Eigen::Matrix3d U = svd.U;
-  if ((U * V.transpose()).determinant() < 0.0) U.col(2) *= -1.0;
-  return U * V.transpose();
-}
 
 void HandEyeCost::add(const HandEyeCost& other, double weight) {
   quadratic += weight * other.quadratic;

@@ -50,7 +50,4 @@ struct MountFit {
 };
 [[nodiscard]] MountFit fit_mount(const std::vector<PosePair>& pairs, const Pose& T_camera_base);
 
-/// The rotation nearest to a 3 x 3 matrix in the sense of Frobenius.
-[[nodiscard]] Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
-
 }  // namespace kinescope::bundle

@@ -10,6 +10,7 @@
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
+#include "kinematics/core/nearest_rotation.h"
 
 namespace kinescope {
 
@@ -18,7 +19,6 @@ using bundle::fit_mount;
 using bundle::hand_eye_cost;
 using bundle::HandEyeCost;
 using bundle::MountFit;
-using bundle::nearest_rotation;
 using bundle::PosePair;
 
 namespace {

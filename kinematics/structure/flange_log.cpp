@@ -11,6 +11,7 @@
 #include <Eigen/SVD>
 
 #include "kinematics/core/median.h"
+#include "kinematics/core/nearest_rotation.h"
 
 namespace kinescope {
 namespace {
@@ -141,14 +142,6 @@ Pairs pairs_of(const Poses& marker, const Poses& flange) {
   out.marker.conservativeResize(Eigen::NoChange, n);
   out.flange.conservativeResize(Eigen::NoChange, n);
   return out;
-}
-
-// In the sense of Frobenius.
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
-  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  return svd.matrixU() * sign * svd.matrixV().transpose();
 }
 
 // Kabsch 1976: R of the least |marker - R flange|.
