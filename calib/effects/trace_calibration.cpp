@@ -10,6 +10,7 @@
 #include "calib/effects/gravity_by_sag.h"
 #include "calib/effects/traced_bundle.h"
 #include "calib/trace/family.h"
+#include "calib/trace/held_out.h"
 
 namespace kinescope {
 namespace {
@@ -88,13 +89,17 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   const bool needs_more =
       again.trace.accepted.size() > std::max<std::size_t>(1, out.trace.accepted.size()) &&
       again.trace.held_out_after.value >= before.interval.low;
+  // What needs fewer and leaves nothing is plainer, and stays unless it predicts clearly worse.
+  const bool plainer = again.trace.verdict == TraceVerdict::kEffects &&
+                       again.trace.accepted.size() < out.trace.accepted.size() &&
+                       !trace::predicts_clearly_worse(again.trace, out.trace);
   // What was only likely is told by gravity, or gravity by nothing.
   const bool told = names(out.trace, *sag) || names(again.trace, *sag);
   // Other effects say it, too, and give way to what predicts clearly better.
   const bool others_say = out.trace.verdict == TraceVerdict::kEffects && !names(out.trace, *sag);
   const double bar = others_say ? before.interval.low : before.value;
-  if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || (needs_more && !says_all) ||
-      again.trace.held_out_after.value >= bar) {
+  const bool better = again.trace.held_out_after.value < bar && !(needs_more && !says_all);
+  if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || !(better || plainer)) {
     return out;
   }
   again.trace.steps.front().words =

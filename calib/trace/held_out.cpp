@@ -95,6 +95,10 @@ double paired_t(const Partition& partition, const Eigen::VectorXd& worse,
   return mean / std::sqrt(variance / n);
 }
 
+bool predicts_clearly_worse(const Trace& one, const Trace& other) {
+  return paired_t(other.partition, one.held_out_whitened, other.held_out_whitened) > kClearlyWorse;
+}
+
 double paired_p_value(const Partition& partition, const Eigen::VectorXd& worse,
                       const Eigen::VectorXd& better) {
   const double t = paired_t(partition, worse, better);

@@ -32,5 +32,7 @@ struct HeldOutInstants {
                                     const Eigen::VectorXd& better);
 /// From this t on one of two needs no refit to be called worse.
 inline constexpr double kClearlyWorse = 3.0;
+/// The first of two traces of the same measurements, by what their effects leave.
+[[nodiscard]] bool predicts_clearly_worse(const Trace& one, const Trace& other);
 
 }  // namespace kinescope::trace

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "calib/trace/partition.h"
 #include "calib/trace/traced_model.h"
 
 namespace kinescope {
@@ -184,6 +185,9 @@ struct Trace {
   /// or less, what lasts more; 0 where rows were not weighted so.
   double over_neighbours = 0.0;
   int stretches = 0;  ///< of time, over which the noise was judged
+  /// Of every instant, its fold held out: squared errors beside the effects, in variances.
+  Eigen::VectorXd held_out_whitened;
+  trace::Partition partition;  ///< of the instants
   double false_alarm_rate = 0.0;
 };
 

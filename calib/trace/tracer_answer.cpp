@@ -346,7 +346,9 @@ void Tracer::summarise() {
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
   if (const auto over = over_neighbours(now_->system.total().rr)) trace_.over_neighbours = *over;
-  trace_.stretches = now_->system.partition().stretches;
+  trace_.partition = now_->system.partition();
+  trace_.stretches = trace_.partition.stretches;
+  trace_.held_out_whitened = now_->held_out.whitened;
   for (FoundRest& found : rests_) trace_.rest.push_back(std::move(found.rest));
   Eigen::Index count = 0;
   for (const Eigen::VectorXd& values : now_->fit.values) count += values.size();

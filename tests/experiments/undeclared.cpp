@@ -7,6 +7,7 @@
 //   STRUCTURE  another robot
 //   CRASH      no exit code of the program's own
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -66,6 +67,9 @@ struct Outcome {
   bool sized = false;   ///< every interval holds the truth, or the size is right to 10 %
   bool wrong_name = false;
   std::vector<double> visible;  ///< of each effect, in standard deviations of the noise
+  int named = 0;                ///< effects that are there
+  int covered = 0;              ///< of these, whose 95 % interval holds the truth
+  double probability = 0.0;     ///< that is stated of the structure
   double error = 0.0;           ///< held out, over that of the noise
   double seconds = 0.0;
   std::string answer;
@@ -108,14 +112,18 @@ std::vector<InjectedEffect> as_recorded(const truth::EffectWorldOptions& options
 }
 
 // Signs are a convention of the place (which way an axis points); sizes are compared without.
-bool is_sized(const json& found, const InjectedEffect& injected) {
+bool is_covered(const json& found, const InjectedEffect& injected) {
   const double truth = std::abs(injected.size);
-  const double size = std::abs(found.at("size").get<double>());
   const double a = found.at("interval")[0].get<double>();
   const double b = found.at("interval")[1].get<double>();
   const double low = a * b <= 0.0 ? 0.0 : std::min(std::abs(a), std::abs(b));
-  return std::abs(size - truth) <= 0.1 * truth ||
-         (low <= truth && truth <= std::max(std::abs(a), std::abs(b)));
+  return low <= truth && truth <= std::max(std::abs(a), std::abs(b));
+}
+
+bool is_sized(const json& found, const InjectedEffect& injected) {
+  const double truth = std::abs(injected.size);
+  const double size = std::abs(found.at("size").get<double>());
+  return std::abs(size - truth) <= 0.1 * truth || is_covered(found, injected);
 }
 
 void judge_trace(const json& trace, const UndeclaredCase& of, Outcome& out) {
@@ -148,6 +156,9 @@ void judge_trace(const json& trace, const UndeclaredCase& of, Outcome& out) {
         accepted, [&](const json& candidate) { return is_at(candidate, effect); });
     out.exact = out.exact && found != accepted.end();
     out.sized = out.sized && found != accepted.end() && is_sized(*found, effect);
+    if (found == accepted.end()) continue;
+    ++out.named;
+    out.covered += is_covered(*found, effect) ? 1 : 0;
   }
   const auto is_told = [&](const json& found) {
     return std::ranges::any_of(injected, [&](const InjectedEffect& effect) {
@@ -202,6 +213,10 @@ Outcome run_case(const UndeclaredCase& of, const Request& request, const fs::pat
     out.structure =
         read_text_file(folder / "out.txt").find("no logged channel drives") != std::string::npos;
   }
+  if (fs::exists(run / "structure.json")) {
+    const json structure = json::parse(read_text_file(run / "structure.json"));
+    out.probability = structure.value("probability", 0.0);
+  }
   if (fs::exists(run / "trace.json"))
     judge_trace(json::parse(read_text_file(run / "trace.json")), of, out);
   // A corner's (point's) distance from where it is, in two (three) coordinates.
@@ -231,6 +246,41 @@ struct Count {
   }
 };
 
+// How often the structure is right where its stated probability lies in a range; and how often
+// 95 % intervals of effects that are there hold the truth.
+class Reliability {
+ public:
+  void add(const Outcome& o) {
+    named_ += o.named;
+    covered_ += o.covered;
+    if (o.exit_code != kDone && o.exit_code != kUndetermined) return;
+    const auto bin = std::ranges::upper_bound(kFrom, o.probability) - kFrom.begin() - 1;
+    Bin& at = bins_[static_cast<std::size_t>(bin)];
+    ++at.n;
+    at.right += o.structure ? 1 : 0;
+    at.stated += o.probability;
+  }
+  void print() const {
+    fmt::print("stated probability of the structure: how many, mean stated, share right\n");
+    for (std::size_t k = 0; k < bins_.size(); ++k) {
+      const Bin& bin = bins_[k];
+      if (bin.n == 0) continue;
+      fmt::print("  from {:<8} {:4} {:9.6f} {:6.3f} ({} wrong)\n", kFrom[k], bin.n,
+                 bin.stated / bin.n, static_cast<double>(bin.right) / bin.n, bin.n - bin.right);
+    }
+    fmt::print("95 % intervals of named effects that hold the truth: {} of {}\n", covered_, named_);
+  }
+
+ private:
+  struct Bin {
+    int n = 0, right = 0;
+    double stated = 0.0;
+  };
+  static constexpr std::array kFrom = {0.0, 0.5, 0.9, 0.99, 0.999, 0.999999};
+  std::array<Bin, kFrom.size()> bins_{};
+  int named_ = 0, covered_ = 0;
+};
+
 std::string words_of(const UndeclaredCase& of) {
   std::string effects;
   for (const InjectedEffect& effect : of.world.effects)
@@ -251,8 +301,8 @@ void print(const UndeclaredCase& of, const Outcome& out) {
   if (flags.empty() && !out.sized) flags = " SIZE";
   std::string visible;
   for (const double sigmas : out.visible) visible += fmt::format(" {:.1f}", sigmas);
-  fmt::print("{} visible{} exit {} err {:6.2f} {:5.1f} s{} : {}\n", words_of(of), visible,
-             out.exit_code, out.error, out.seconds, flags, out.answer);
+  fmt::print("{} visible{} exit {} err {:6.2f} p {:.6f} {:5.1f} s{} : {}\n", words_of(of), visible,
+             out.exit_code, out.error, out.probability, out.seconds, flags, out.answer);
   std::fflush(stdout);
 }
 
@@ -268,6 +318,7 @@ void print_table(const std::map<std::string, Count>& counts) {
 
 void run(const Request& request) {
   std::map<std::string, Count> counts;
+  Reliability reliability;
   for (int number = request.first; number < request.first + request.count; ++number) {
     const UndeclaredCase of = undeclared_case(number);
     if (!request.kind.empty() && to_string(of.kind) != request.kind) continue;
@@ -283,9 +334,12 @@ void run(const Request& request) {
     print(of, out);
     counts[fmt::format("{}{}", to_string(of.kind), of.postures ? " postures" : "")].add(out);
     counts["~ all"].add(out);
+    reliability.add(out);
     if (!keeps) fs::remove_all(folder);
   }
-  if (!request.only_list) print_table(counts);
+  if (request.only_list) return;
+  print_table(counts);
+  reliability.print();
 }
 
 }  // namespace
