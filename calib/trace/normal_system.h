@@ -37,7 +37,9 @@ struct EffectSums {
 class NormalSystem {
  public:
   /// Keeps a reference to `linear`.
+  /// `linear` has to outlive it.
   NormalSystem(const Linearisation& linear, Partition partition);
+  NormalSystem(const Linearisation&& linear, Partition partition) = delete;
 
   [[nodiscard]] const Linearisation& linear() const { return *linear_; }
   [[nodiscard]] const Partition& partition() const { return partition_; }

@@ -125,6 +125,8 @@ class Tracer {
   /// True where a rest is large enough beside what an effect explains to put its name in doubt.
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   [[nodiscard]] bool drop_what_rests_explain();
+  [[nodiscard]] bool says_as_much(const Stage& without, FoundRest alone,
+                                  const FoundRest& found) const;
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
   /// What is left, in squares, over what differs between neighbours in time: as an rms; nothing
   /// where that is not known.

@@ -236,9 +236,24 @@ bool Tracer::drop_what_rests_explain() {
   return dropped;
 }
 
+// Without the effect: `alone`, with further curves at the same place, beside `found` with it.
+bool Tracer::says_as_much(const Stage& without, FoundRest alone, const FoundRest& found) const {
+  std::vector<FoundRest> curves = {std::move(alone)};
+  while (predicts_clearly_worse(curves.back().held_out, found.held_out)) {
+    if (found.rest.is_field() || curves.size() >= kMostRests) return false;
+    const Linearisation linear = with_rests(without.fit.linear, curves);
+    const NormalSystem beside(linear, without.system.partition());
+    std::optional<FoundRest> next = find_rest(
+        beside, without.fit.rest_places, without.fit.covariates, curves, rest_level(), options_);
+    if (!next || next->rest.place != found.rest.place) return false;
+    curves.push_back(std::move(*next));
+  }
+  return true;
+}
+
 // An effect of the library can stand in for one that is not in it. Then the rest at its place is
-// large, and a curve without the effect predicts no worse than the curve with it, or the effect is
-// no more than the curve's slope: one cause, which is not that of the straight line.
+// large, and curves without the effect predict no worse than the curve with it, or the effect is
+// no more than the curve's slope: one cause, which is not that of the effect.
 bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
@@ -252,7 +267,7 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
     if (!alone || alone->rest.place != found.rest.place) continue;
     const bool is_its_slope = alone->rest.covariate == found.rest.covariate &&
                               is_straight_over(*now_, now_->added[i], found.rest);
-    if (!is_its_slope && predicts_clearly_worse(alone->held_out, found.held_out)) continue;
+    if (!is_its_slope && !says_as_much(*stage, *alone, found)) continue;
     removed_.insert(id);
     mark(round_, id, CandidateState::kRemoved, stage->error.value);
     now_ = std::move(stage);
