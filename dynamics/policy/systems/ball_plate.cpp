@@ -9,7 +9,6 @@
 namespace kinescope::policy {
 namespace {
 
-using Eigen::Matrix4d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using PartialVelocities = Eigen::Matrix<double, 3, 4>;
@@ -64,10 +63,9 @@ Mechanism ball_plate(const BallPlate& values) {
     const BallVelocity velocity = ball_velocity(p, dp);
     const Vector3d turn(dp[2] * cosine, dp[3], dp[2] * sine);  // of the plate, in its frame
     const Vector3d bias = velocity.rate * dp + turn.cross(Vector3d(velocity.jacobian * dp));
-    MotionTerms terms{.mass = Matrix4d(), .force = Vector4d(), .potential_j = 0.0};
+    MotionTerms terms = MotionTerms::zero(4);
     terms.mass = m * velocity.jacobian.transpose() * velocity.jacobian;
-    terms.mass.diagonal() +=
-        Vector4d(rolling, rolling, inertia * (1.0 + sine * sine), inertia);
+    terms.mass.diagonal() += Vector4d(rolling, rolling, inertia * (1.0 + sine * sine), inertia);
     const Vector4d plate(0, 0, -2.0 * inertia * sine * cosine * dp[2] * dp[3],
                          inertia * sine * cosine * dp[2] * dp[2]);
     const Vector4d actuators(-values.rolling_damping_ns_m * dp[0],

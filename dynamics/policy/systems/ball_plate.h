@@ -15,8 +15,8 @@ struct BallPlate {
   double ball_kg = 0.0327;
   double rolling_share = 0.4;  ///< inertia of the ball over mass and radius squared: solid
   double rolling_damping_ns_m = 0.01;
-  double plate_kgm2 = 3.75e-3;  ///< about its axes; twice that about its normal
-  double servo_hz = 8.0;        ///< of the position loop, critically damped
+  double plate_kgm2 = 3.75e-3;    ///< about its axes; twice that about its normal
+  double servo_hz = 8.0;          ///< of the position loop, critically damped
   double angle_limit_rad = 0.15;  ///< of the reference
   double step_s = 1.0 / 30.0;
 };

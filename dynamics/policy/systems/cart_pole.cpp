@@ -17,7 +17,7 @@ Mechanism cart_pole(const CartPole& values) {
     const double half = 0.5 * values.pole_kg * values.length_m;  // mass times centre of mass
     const double sine = std::sin(p[1]);
     const double cosine = std::cos(p[1]);
-    MotionTerms terms{.mass = Eigen::Matrix2d(), .force = Eigen::Vector2d(), .potential_j = 0.0};
+    MotionTerms terms = MotionTerms::zero(2);
     terms.mass << values.cart_kg + values.pole_kg, half * cosine, half * cosine,
         values.pole_kg * values.length_m * values.length_m / 3.0;
     terms.force << u[0] - values.friction_ns_m * dp[0] + half * sine * dp[1] * dp[1],

@@ -12,7 +12,7 @@ namespace kinescope::policy {
 struct CartPole {
   double cart_kg = 0.5;
   double pole_kg = 0.5;
-  double length_m = 0.5;      ///< of the pole
+  double length_m = 0.5;       ///< of the pole
   double friction_ns_m = 0.1;  ///< of the cart, viscous
   double force_limit_n = 10.0;
   double step_s = 0.05;

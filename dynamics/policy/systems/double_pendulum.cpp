@@ -23,15 +23,15 @@ Mechanism double_pendulum(MotorAt motor, const DoublePendulum& values) {
     const double shoulder_inertia =
         values.upper_kgm2 + values.lower_kgm2 + values.lower_kg * values.upper_m * values.upper_m;
     const double pull = kPlantGravity_m_s2 * lower * std::sin(p[0] + p[1]);
-    MotionTerms terms{.mass = Eigen::Matrix2d(), .force = Eigen::Vector2d(), .potential_j = 0.0};
+    MotionTerms terms = MotionTerms::zero(2);
     terms.mass << shoulder_inertia + 2.0 * cosine, values.lower_kgm2 + cosine,
         values.lower_kgm2 + cosine, values.lower_kgm2;
     terms.force << (elbow ? 0.0 : u[0]) + sine * dp[1] * (2.0 * dp[0] + dp[1]) -
                        kPlantGravity_m_s2 * upper * std::sin(p[0]) - pull -
                        values.damping_nms * dp[0],
         (elbow ? u[0] : 0.0) - sine * dp[0] * dp[0] - pull - values.damping_nms * dp[1];
-    terms.potential_j = -kPlantGravity_m_s2 *
-                        (upper * std::cos(p[0]) + lower * std::cos(p[0] + p[1]));
+    terms.potential_j =
+        -kPlantGravity_m_s2 * (upper * std::cos(p[0]) + lower * std::cos(p[0] + p[1]));
     return terms;
   };
   return out;

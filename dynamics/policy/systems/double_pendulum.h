@@ -16,8 +16,8 @@ enum class MotorAt { kShoulder, kElbow };
 struct DoublePendulum {
   double upper_kg = 0.52346;
   double lower_kg = 0.62557;
-  double upper_m = 0.2;          ///< from joint to joint
-  double upper_centre_m = 0.2;   ///< from the joint to the centre of mass
+  double upper_m = 0.2;         ///< from joint to joint
+  double upper_centre_m = 0.2;  ///< from the joint to the centre of mass
   double lower_centre_m = 0.25569;
   double upper_kgm2 = 0.031887;  ///< about the shoulder
   double lower_kgm2 = 0.050870;  ///< about the elbow

@@ -15,7 +15,7 @@ Mechanism furuta(const Furuta& values) {
   out.terms = [values](const Eigen::VectorXd& p, const Eigen::VectorXd& dp,
                        const Eigen::VectorXd& u) {
     const double arm = values.arm_kg * values.arm_m * values.arm_m / 3.0 +
-                       values.pole_kg * values.arm_m * values.arm_m;      // J0 hat
+                       values.pole_kg * values.arm_m * values.arm_m;           // J0 hat
     const double pole = values.pole_kg * values.pole_m * values.pole_m / 3.0;  // J2 hat
     const double half = 0.5 * values.pole_kg * values.pole_m;
     const double coupling = half * values.arm_m;
@@ -23,7 +23,7 @@ Mechanism furuta(const Furuta& values) {
     const double sine = std::sin(p[1]);
     const double cosine = std::cos(p[1]);
     const double twice = std::sin(2.0 * p[1]);
-    MotionTerms terms{.mass = Eigen::Matrix2d(), .force = Eigen::Vector2d(), .potential_j = 0.0};
+    MotionTerms terms = MotionTerms::zero(2);
     terms.mass << arm + pole * sine * sine, coupling * cosine, coupling * cosine, pole;
     terms.force << torque - values.arm_damping_nms * dp[0] - pole * twice * dp[0] * dp[1] +
                        coupling * sine * dp[1] * dp[1],

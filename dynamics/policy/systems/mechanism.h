@@ -24,6 +24,10 @@ struct MotionTerms {
   Eigen::MatrixXd mass;      ///< P x P, symmetric, positive definite
   Eigen::VectorXd force;     ///< P: all but M ddp
   double potential_j = 0.0;  ///< of gravity
+
+  [[nodiscard]] static MotionTerms zero(Eigen::Index positions) {
+    return {Eigen::MatrixXd::Zero(positions, positions), Eigen::VectorXd::Zero(positions), 0.0};
+  }
 };
 
 struct Mechanism {

@@ -4,32 +4,22 @@
 // within their limits and held over a step.
 #pragma once
 
-#include <vector>
-
-#include "dynamics/policy/system.h"
+#include "dynamics/policy/particles.h"
 #include "dynamics/policy/systems/mechanism.h"
-#include "dynamics/policy/systems/sensing.h"
 
 namespace kinescope::policy {
 
-struct SimulatedSensors {
-  Sensing sensing = Sensing::kFull;
-  Eigen::VectorXd sigma;  ///< of the measured state (2 P); with kPositions its first P count
-  SpeedFilters filters;
+/// What is drawn and measured in a simulated trial.
+struct SimulatedTrials {
+  StartDistribution start;
+  SensingOptions sensors;
+  double smoothing_cutoff_hz = 0.0;  ///< afterwards, where only positions are measured
 };
-
-struct StartDistribution {
-  std::vector<Eigen::VectorXd> means;  ///< 2 P each; one of them, each as probable
-  Eigen::VectorXd sigma;               ///< 2 P, about it
-};
-
-/// Throws bad_request for sizes that are not the layout's, deviations below zero, no mean.
-void check_start(const StartDistribution& start, const StateLayout& layout);
 
 class SimulatedSystem : public System {
  public:
-  /// Throws bad_request as check_layout() and check_start().
-  SimulatedSystem(Mechanism mechanism, StartDistribution start, SimulatedSensors sensors);
+  /// Throws bad_request for what contradicts itself or the layout.
+  SimulatedSystem(Mechanism mechanism, SimulatedTrials trials);
 
   [[nodiscard]] const StateLayout& layout() const override { return mechanism_.layout; }
   [[nodiscard]] Trial run(const Controller& controller, int steps, std::uint64_t seed,
@@ -37,14 +27,19 @@ class SimulatedSystem : public System {
 
  private:
   Mechanism mechanism_;
-  StartDistribution start_;
-  SimulatedSensors sensors_;
+  SimulatedTrials trials_;
 };
 
-/// An input within the limits of its layout. Throws undetermined where the controller gives one
-/// that is not finite.
+/// The controller's input (U) within the limits of its layout. Throws undetermined where it is not
+/// finite.
 [[nodiscard]] Eigen::VectorXd limited_input(const Controller& controller,
                                             const Eigen::VectorXd& seen, int step,
                                             const StateLayout& layout);
+
+/// What the model learns from: `seen`, or smoothed positions where only these are measured.
+[[nodiscard]] Eigen::MatrixXd smoothed_signal(const Eigen::MatrixXd& seen,
+                                              const Eigen::MatrixXd& measured_positions,
+                                              const StateLayout& layout, Sensing sensing,
+                                              double cutoff_hz);
 
 }  // namespace kinescope::policy
