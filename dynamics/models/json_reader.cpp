@@ -12,7 +12,7 @@ using Eigen::Index;
 using nlohmann::json;
 
 Error JsonReader::wrong(std::string_view what) const {
-  return bad_input(path_, what, "give a file of kinescope dynamics --save-model");
+  return bad_input(path_, what, remedy_);
 }
 
 const json& JsonReader::at(const json& object, const char* key) const {

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope policy` as a function.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "app/commands/commands.h"
+#include "dynamics/policy/sensing.h"
+#include "dynamics/policy/velocity_model.h"
+
+namespace kinescope {
+
+struct PolicyCommandOptions {
+  std::string system;          ///< a problem of the literature, or a YAML file
+  std::uint64_t seed = 1;
+  std::optional<int> trials;   ///< with a learned policy; none: the system's own number
+  int explorations = 1;        ///< trials with random inputs, first
+  int particles = 400;
+  int basis_functions = 200;
+  int search_steps = 4000;     ///< of each search, at most
+  policy::VelocityKernel kernel = policy::VelocityKernel::kSquaredExponential;
+  std::optional<policy::Sensing> sensing;  ///< of a problem of the literature; none: full state
+  int threads = 0;                         ///< 0: all of the machine
+  std::filesystem::path output;            ///< folder
+  bool force = false;                      ///< begin anew, and replace what others wrote
+  std::string command_line;                ///< for the page
+};
+
+[[nodiscard]] ExitCode policy_command(const PolicyCommandOptions& options, const Console& console);
+
+}  // namespace kinescope
