@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dynamics/policy/gp_passes.h"
+
+#include "dynamics/gp/simd.h"
+#include "dynamics/policy/lanes.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::policy {
+namespace {
+
+using Eigen::Index;
+
+// Columns of one group of eight particles, which stay in registers or the first cache.
+constexpr Index kMaxColumns = 64;
+constexpr std::size_t column_capacity(int columns) {
+  if (columns < 0) return static_cast<std::size_t>(kMaxColumns);
+  return columns == 0 ? 1 : static_cast<std::size_t>(columns);
+}
+template <int kColumns>
+using Columns = std::array<Lanes, column_capacity(kColumns)>;
+
+struct SamplePass {
+  Index samples;
+  Index columns;  // D
+  const double* scaled_samples;
+  double variance;
+  const double* weights;
+  Index factors;
+  Index linear_columns;  // G
+  const double* slopes0;
+  const double* slopes1;
+  double offset0;
+  double offset1;
+  const double* scaled;  // of the particles
+  Index stride;
+  const double* linear;
+  Index linear_stride;
+};
+
+template <int kColumns>
+[[gnu::always_inline]] inline void load_columns(const double* from, Index stride, Index count,
+                                                Columns<kColumns>& out) {
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    load(from + d * stride, out[static_cast<std::size_t>(d)]);
+  }
+}
+
+template <int kLinear>
+[[gnu::always_inline]] inline void factor_of(const Columns<kLinear>& x, const double* slopes,
+                                             Index count, double offset, Lanes& out) {
+  out = Lanes{} + offset;
+  for (Index f = 0; f < (kLinear < 0 ? count : kLinear); ++f) {
+    out += x[static_cast<std::size_t>(f)] * slopes[f];
+  }
+}
+
+template <int kColumns, int kLinear>
+[[gnu::always_inline]] inline void value_body(const SamplePass& p, Index particle, double* smooth,
+                                              Index smooth_stride, double* kernel,
+                                              Index kernel_stride, double* mean) {
+  Columns<kColumns> x;
+  Columns<kLinear> linear;
+  load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
+  load_columns<kLinear>(p.linear + particle, p.linear_stride, p.linear_columns, linear);
+  Lanes sums = {};
+  for (Index j = 0; j < p.samples; ++j) {
+    const double* y = p.scaled_samples + j * p.columns;
+    Lanes k = {};
+    for (Index d = 0; d < (kColumns < 0 ? p.columns : kColumns); ++d) {
+      const Lanes z = x[static_cast<std::size_t>(d)] - y[d];
+      k += z * z;
+    }
+    k *= -0.5;
+    exp_of(k);
+    k *= p.variance;
+    store(k, smooth + j * smooth_stride + particle);
+    if (kLinear != 0) {
+      Lanes a;
+      factor_of<kLinear>(linear, p.slopes0 + j * p.linear_columns, p.linear_columns, p.offset0, a);
+      if (p.factors == 2) {
+        Lanes b;
+        factor_of<kLinear>(linear, p.slopes1 + j * p.linear_columns, p.linear_columns, p.offset1,
+                           b);
+        a *= b;
+      }
+      k += a;
+    }
+    store(k, kernel + j * kernel_stride + particle);
+    sums += k * p.weights[j];
+  }
+  store(sums, mean + particle);
+}
+
+// Few columns are unrolled: of a cart and a pole, and of plants with two of each.
+#define KINESCOPE_BY_COLUMNS(body, ...)                                        \
+  const bool plain = p.factors == 0;                                           \
+  if (plain && p.columns == 5) return body<5, 0>(__VA_ARGS__);                 \
+  if (plain && p.columns == 6) return body<6, 0>(__VA_ARGS__);                 \
+  if (plain && p.columns == 7) return body<7, 0>(__VA_ARGS__);                 \
+  if (plain) return body<-1, 0>(__VA_ARGS__);                                  \
+  if (p.columns == 6 && p.linear_columns == 6) return body<6, 6>(__VA_ARGS__); \
+  return body<-1, -1>(__VA_ARGS__)
+
+KINESCOPE_WIDE void value_pass(const SamplePass& p, Index particle, double* smooth,
+                               Index smooth_stride, double* kernel, Index kernel_stride,
+                               double* mean) {
+  KINESCOPE_BY_COLUMNS(value_body, p, particle, smooth, smooth_stride, kernel, kernel_stride, mean);
+}
+
+struct Slopes {
+  const double* smooth;
+  Index smooth_stride;
+  const double* solved;
+  Index solved_stride;
+  const double* d_mean;
+  const double* d_variance;
+  double* d_scaled;
+  Index d_stride;
+  double* d_linear;
+  Index d_linear_stride;
+};
+
+template <int kColumns, int kLinear>
+[[gnu::always_inline]] inline void pullback_body(const SamplePass& p, const Slopes& s,
+                                                 Index particle) {
+  Columns<kColumns> x;
+  Columns<kLinear> linear;
+  Columns<kColumns> d_x;
+  Columns<kLinear> d_linear;
+  load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
+  load_columns<kLinear>(p.linear + particle, p.linear_stride, p.linear_columns, linear);
+  const Index columns = kColumns < 0 ? p.columns : kColumns;
+  const Index linear_columns = kLinear < 0 ? p.linear_columns : kLinear;
+  for (Index d = 0; d < columns; ++d) d_x[static_cast<std::size_t>(d)] = Lanes{};
+  for (Index f = 0; f < linear_columns; ++f) d_linear[static_cast<std::size_t>(f)] = Lanes{};
+  Lanes d_mean;
+  Lanes d_variance;
+  load(s.d_mean + particle, d_mean);
+  load(s.d_variance + particle, d_variance);
+  d_variance *= -2.0;
+  for (Index j = 0; j < p.samples; ++j) {
+    Lanes smooth;
+    Lanes solved;
+    load(s.smooth + j * s.smooth_stride + particle, smooth);
+    load(s.solved + j * s.solved_stride + particle, solved);
+    const Lanes d_k = d_mean * p.weights[j] + d_variance * solved;
+    const Lanes d_smooth = d_k * smooth;
+    const double* y = p.scaled_samples + j * p.columns;
+    for (Index d = 0; d < columns; ++d) {
+      d_x[static_cast<std::size_t>(d)] -= d_smooth * (x[static_cast<std::size_t>(d)] - y[d]);
+    }
+    if (kLinear != 0) {
+      const double* slopes0 = p.slopes0 + j * p.linear_columns;
+      const double* slopes1 = p.slopes1 + j * p.linear_columns;
+      Lanes d_a = d_k;
+      Lanes d_b = {};
+      if (p.factors == 2) {
+        Lanes a;
+        Lanes b;
+        factor_of<kLinear>(linear, slopes0, p.linear_columns, p.offset0, a);
+        factor_of<kLinear>(linear, slopes1, p.linear_columns, p.offset1, b);
+        d_a *= b;
+        d_b = d_k * a;
+        for (Index f = 0; f < linear_columns; ++f) {
+          d_linear[static_cast<std::size_t>(f)] += d_b * slopes1[f];
+        }
+      }
+      for (Index f = 0; f < linear_columns; ++f) {
+        d_linear[static_cast<std::size_t>(f)] += d_a * slopes0[f];
+      }
+    }
+  }
+  for (Index d = 0; d < columns; ++d) {
+    store(d_x[static_cast<std::size_t>(d)], s.d_scaled + d * s.d_stride + particle);
+  }
+  for (Index f = 0; f < linear_columns; ++f) {
+    store(d_linear[static_cast<std::size_t>(f)], s.d_linear + f * s.d_linear_stride + particle);
+  }
+}
+
+KINESCOPE_WIDE void pullback_pass(const SamplePass& p, const Slopes& s, Index particle) {
+  KINESCOPE_BY_COLUMNS(pullback_body, p, s, particle);
+}
+#undef KINESCOPE_BY_COLUMNS
+
+KINESCOPE_WIDE void add_squares(const double* values, Index rows, double* sums) {
+  for (Index i = 0; i < rows; ++i) sums[i] += values[i] * values[i];
+}
+
+SamplePass pass_of(const PreparedSamples& samples, const ConstBlock& scaled,
+                   const ConstBlock& linear) {
+  KINESCOPE_CHECK(scaled.rows() % kLaneCount == 0, "a multiple of eight particles");
+  return {samples.scaled.rows(),
+          samples.scaled.cols(),
+          samples.scaled.data(),
+          samples.variance,
+          samples.weights.data(),
+          samples.factors,
+          samples.factors > 0 ? samples.slopes[0].cols() : 0,
+          samples.slopes[0].data(),
+          samples.slopes[1].data(),
+          samples.offsets[0],
+          samples.offsets[1],
+          scaled.data(),
+          scaled.outerStride(),
+          linear.data(),
+          linear.outerStride()};
+}
+
+}  // namespace
+
+PreparedSamples::PreparedSamples(const KernelValues& kernel, const Eigen::MatrixXd& inputs,
+                                 const Eigen::MatrixXd& linear, const Eigen::VectorXd& mean_weights)
+    : variance(kernel.variance),
+      inverse_scales(kernel.length_scales.cwiseInverse().transpose()),
+      weights(mean_weights),
+      factors(static_cast<Index>(kernel.factors.size())) {
+  KINESCOPE_CHECK(factors <= 2 && inputs.cols() <= kMaxColumns && linear.cols() <= kMaxColumns,
+                  "at most two factors and 64 columns");
+  scaled = inputs * inverse_scales.asDiagonal();
+  for (std::size_t f = 0; f < kernel.factors.size(); ++f) {
+    offsets[f] = kernel.factors[f].offset;
+    slopes[f] = linear * kernel.factors[f].weights.asDiagonal();
+  }
+}
+
+void kernel_value(const PreparedSamples& samples, const ConstBlock& scaled,
+                  const ConstBlock& linear, Block smooth, Block kernel, Block mean) {
+  const SamplePass pass = pass_of(samples, scaled, linear);
+  for (Index i = 0; i < scaled.rows(); i += kLaneCount) {
+    value_pass(pass, i, smooth.data(), smooth.outerStride(), kernel.data(), kernel.outerStride(),
+               mean.data());
+  }
+}
+
+void kernel_pullback(const PreparedSamples& samples, const ConstBlock& scaled,
+                     const ConstBlock& linear, const ConstBlock& smooth, const ConstBlock& solved,
+                     const ConstBlock& d_mean, const ConstBlock& d_variance, Block d_scaled,
+                     Block d_linear) {
+  const SamplePass pass = pass_of(samples, scaled, linear);
+  const Slopes slopes{smooth.data(),         smooth.outerStride(),   solved.data(),
+                      solved.outerStride(),  d_mean.data(),          d_variance.data(),
+                      d_scaled.data(),       d_scaled.outerStride(), d_linear.data(),
+                      d_linear.outerStride()};
+  for (Index i = 0; i < scaled.rows(); i += kLaneCount) pullback_pass(pass, slopes, i);
+}
+
+void squared_rows(const ConstBlock& values, Block sums) {
+  sums.setZero();
+  for (Index j = 0; j < values.cols(); ++j) {
+    add_squares(values.col(j).data(), values.rows(), sums.data());
+  }
+}
+
+}  // namespace kinescope::policy

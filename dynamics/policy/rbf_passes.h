@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The policy of a block of particles and its pullback: one pass over basis functions and particles
+// each, internal. Rows are particles, a multiple of eight.
+#pragma once
+
+#include "dynamics/policy/rbf_policy.h"
+#include "dynamics/policy/state_features.h"
+
+namespace kinescope::policy {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The policy's numbers as the passes read them; once a step of the search.
+struct PreparedPolicy {
+  explicit PreparedPolicy(const RbfPolicy& policy);
+  RowMajor scaled_centres;  ///< B x F, over the length scales
+  RowMajor weights;         ///< B x U
+  Eigen::RowVectorXd inverse_scales;
+  Eigen::RowVectorXd limits;
+};
+
+/// Gradient by the policy's numbers, length scales by their logarithm.
+struct PolicyGradient {
+  RowMajor centres;
+  RowMajor weights;
+  Eigen::RowVectorXd log_scales;
+
+  explicit PolicyGradient(const RbfPolicy& policy);
+  void set_zero();
+  void add(const PolicyGradient& other);
+  [[nodiscard]] double norm() const;
+  void scale(double factor);
+};
+
+/// `scaled` = features over the length scales (rows x F). `basis` (rows x B) comes as dropout's
+/// factors and leaves as basis functions times those; inputs (rows x U) = squashed sums.
+void policy_value(const PreparedPolicy& policy, const ConstBlock& scaled, Block basis,
+                  Block inputs);
+/// From d_inputs, which is overwritten: d_scaled = pullback to the scaled features; adds to the
+/// gradient, there by the scaled centres (`finish_gradient` turns them into centres).
+void policy_pullback(const PreparedPolicy& policy, const ConstBlock& scaled,
+                     const ConstBlock& basis, const ConstBlock& inputs, Block d_inputs,
+                     Block d_scaled, PolicyGradient& gradient);
+void finish_gradient(const PreparedPolicy& policy, PolicyGradient& gradient);
+
+/// By parameters_of(policy).
+[[nodiscard]] Eigen::VectorXd search_gradient(const PolicyGradient& gradient,
+                                              const RbfPolicy& policy);
+
+}  // namespace kinescope::policy
