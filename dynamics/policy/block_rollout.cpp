@@ -49,13 +49,14 @@ BlockRollout::BlockRollout(const PreparedModel& model, const PolicyTask& task, I
     processes.emplace_back(rows, model.columns, p.samples());
     scratch_.emplace_back(rows, model.columns, model.linear, p.samples());
   }
-  tape_.assign(as_index(task.steps),
-               TimeTape{Eigen::MatrixXd(rows, model.features),
-                        Eigen::MatrixXd(rows, model.features), Eigen::MatrixXd(rows, basis_count),
-                        Eigen::MatrixXd(rows, model.layout.input_count()),
-                        Eigen::MatrixXd(rows, model.columns),
-                        Eigen::MatrixXd(rows, model.physics ? model.linear : 0),
-                        Eigen::MatrixXd(rows, model.layout.position_count()), processes});
+  tape_.assign(
+      as_index(task.steps),
+      TimeTape{Eigen::MatrixXd(rows, model.features), Eigen::MatrixXd(rows, model.features),
+               Eigen::MatrixXd(rows, even(basis_count)),
+               Eigen::MatrixXd(rows, model.layout.input_count()),
+               Eigen::MatrixXd(rows, model.columns),
+               Eigen::MatrixXd(rows, model.physics ? model.linear : 0),
+               Eigen::MatrixXd(rows, model.layout.position_count()), processes});
 }
 
 ConstBlock BlockRollout::linear_of(const TimeTape& tape) const {

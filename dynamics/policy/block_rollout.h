@@ -52,7 +52,7 @@ class BlockRollout {
   struct TimeTape {
     Eigen::MatrixXd seen_features;  // rows x F
     Eigen::MatrixXd scaled;         // rows x F, over the policy's length scales
-    Eigen::MatrixXd basis;          // rows x B
+    Eigen::MatrixXd basis;          // rows x even(B)
     Eigen::MatrixXd input;          // rows x U
     Eigen::MatrixXd model_input;    // rows x D
     Eigen::MatrixXd linear;         // rows x G, where physics has features

@@ -23,6 +23,7 @@ struct SamplePass {
   Index samples;
   Index columns;  // D
   const double* scaled_samples;
+  const double* half_squares;  // -1/2 |y|^2
   double variance;
   const double* weights;
   Index factors;
@@ -40,17 +41,58 @@ struct SamplePass {
 template <int kColumns>
 [[gnu::always_inline]] inline void load_columns(const double* from, Index stride, Index count,
                                                 Columns<kColumns>& out) {
+#pragma GCC unroll 8
   for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
     load(from + d * stride, out[static_cast<std::size_t>(d)]);
   }
 }
 
-template <int kLinear>
-[[gnu::always_inline]] inline void factor_of(const Columns<kLinear>& x, const double* slopes,
-                                             Index count, double offset, Lanes& out) {
-  out = Lanes{} + offset;
-  for (Index f = 0; f < (kLinear < 0 ? count : kLinear); ++f) {
-    out += x[static_cast<std::size_t>(f)] * slopes[f];
+// out += sum_d x_d row_d.
+template <int kColumns>
+[[gnu::always_inline]] inline void add_product(const Columns<kColumns>& x, const double* row,
+                                               Index count, Lanes& out) {
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    out += x[static_cast<std::size_t>(d)] * row[d];
+  }
+}
+
+// x_d += factor row_d.
+template <int kColumns>
+[[gnu::always_inline]] inline void add_row(const Lanes& factor, const double* row, Index count,
+                                           Columns<kColumns>& x) {
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    x[static_cast<std::size_t>(d)] += factor * row[d];
+  }
+}
+
+template <int kColumns>
+[[gnu::always_inline]] inline void set_zero(Index count, Columns<kColumns>& x) {
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    x[static_cast<std::size_t>(d)] = Lanes{};
+  }
+}
+
+template <int kColumns>
+[[gnu::always_inline]] inline void store_columns(const Columns<kColumns>& x, Index stride,
+                                                 Index count, double* to) {
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    store(x[static_cast<std::size_t>(d)], to + d * stride);
+  }
+}
+
+// -1/2 |x - y|^2 = x'y - 1/2 |x|^2 - 1/2 |y|^2, half the operations of differences. Rounding is
+// 1e-16 |x|^2, which matters to the kernel only where it is zero.
+template <int kColumns>
+[[gnu::always_inline]] inline void half_squares(const Columns<kColumns>& x, Index count,
+                                                Lanes& out) {
+  out = Lanes{};
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? count : kColumns); ++d) {
+    out -= 0.5 * x[static_cast<std::size_t>(d)] * x[static_cast<std::size_t>(d)];
   }
 }
 
@@ -62,25 +104,21 @@ template <int kColumns, int kLinear>
   Columns<kLinear> linear;
   load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
   load_columns<kLinear>(p.linear + particle, p.linear_stride, p.linear_columns, linear);
+  Lanes own;
+  half_squares<kColumns>(x, p.columns, own);
   Lanes sums = {};
   for (Index j = 0; j < p.samples; ++j) {
-    const double* y = p.scaled_samples + j * p.columns;
-    Lanes k = {};
-    for (Index d = 0; d < (kColumns < 0 ? p.columns : kColumns); ++d) {
-      const Lanes z = x[static_cast<std::size_t>(d)] - y[d];
-      k += z * z;
-    }
-    k *= -0.5;
+    Lanes k = own + p.half_squares[j];
+    add_product<kColumns>(x, p.scaled_samples + j * p.columns, p.columns, k);
     exp_of(k);
     k *= p.variance;
     store(k, smooth + j * smooth_stride + particle);
     if (kLinear != 0) {
-      Lanes a;
-      factor_of<kLinear>(linear, p.slopes0 + j * p.linear_columns, p.linear_columns, p.offset0, a);
+      Lanes a = Lanes{} + p.offset0;
+      add_product<kLinear>(linear, p.slopes0 + j * p.linear_columns, p.linear_columns, a);
       if (p.factors == 2) {
-        Lanes b;
-        factor_of<kLinear>(linear, p.slopes1 + j * p.linear_columns, p.linear_columns, p.offset1,
-                           b);
+        Lanes b = Lanes{} + p.offset1;
+        add_product<kLinear>(linear, p.slopes1 + j * p.linear_columns, p.linear_columns, b);
         a *= b;
       }
       k += a;
@@ -120,62 +158,53 @@ struct Slopes {
   Index d_linear_stride;
 };
 
+// d_x = sum_j d_k_j (y_j - x) = sum_j d_k_j y_j - x sum_j d_k_j, and by the product rule.
 template <int kColumns, int kLinear>
 [[gnu::always_inline]] inline void pullback_body(const SamplePass& p, const Slopes& s,
                                                  Index particle) {
-  Columns<kColumns> x;
   Columns<kLinear> linear;
   Columns<kColumns> d_x;
   Columns<kLinear> d_linear;
-  load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
   load_columns<kLinear>(p.linear + particle, p.linear_stride, p.linear_columns, linear);
-  const Index columns = kColumns < 0 ? p.columns : kColumns;
-  const Index linear_columns = kLinear < 0 ? p.linear_columns : kLinear;
-  for (Index d = 0; d < columns; ++d) d_x[static_cast<std::size_t>(d)] = Lanes{};
-  for (Index f = 0; f < linear_columns; ++f) d_linear[static_cast<std::size_t>(f)] = Lanes{};
+  set_zero<kColumns>(p.columns, d_x);
+  set_zero<kLinear>(p.linear_columns, d_linear);
   Lanes d_mean;
   Lanes d_variance;
   load(s.d_mean + particle, d_mean);
   load(s.d_variance + particle, d_variance);
   d_variance *= -2.0;
+  Lanes total = {};
   for (Index j = 0; j < p.samples; ++j) {
-    Lanes smooth;
-    Lanes solved;
-    load(s.smooth + j * s.smooth_stride + particle, smooth);
-    load(s.solved + j * s.solved_stride + particle, solved);
-    const Lanes d_k = d_mean * p.weights[j] + d_variance * solved;
-    const Lanes d_smooth = d_k * smooth;
-    const double* y = p.scaled_samples + j * p.columns;
-    for (Index d = 0; d < columns; ++d) {
-      d_x[static_cast<std::size_t>(d)] -= d_smooth * (x[static_cast<std::size_t>(d)] - y[d]);
-    }
-    if (kLinear != 0) {
-      const double* slopes0 = p.slopes0 + j * p.linear_columns;
+    Lanes d_smooth;
+    Lanes d_k;
+    load(s.smooth + j * s.smooth_stride + particle, d_smooth);
+    load(s.solved + j * s.solved_stride + particle, d_k);
+    d_k = d_mean * p.weights[j] + d_variance * d_k;
+    d_smooth *= d_k;
+    total += d_smooth;
+    add_row<kColumns>(d_smooth, p.scaled_samples + j * p.columns, p.columns, d_x);
+    if (kLinear == 0) continue;
+    const double* slopes0 = p.slopes0 + j * p.linear_columns;
+    if (p.factors == 2) {
       const double* slopes1 = p.slopes1 + j * p.linear_columns;
-      Lanes d_a = d_k;
-      Lanes d_b = {};
-      if (p.factors == 2) {
-        Lanes a;
-        Lanes b;
-        factor_of<kLinear>(linear, slopes0, p.linear_columns, p.offset0, a);
-        factor_of<kLinear>(linear, slopes1, p.linear_columns, p.offset1, b);
-        d_a *= b;
-        d_b = d_k * a;
-        for (Index f = 0; f < linear_columns; ++f) {
-          d_linear[static_cast<std::size_t>(f)] += d_b * slopes1[f];
-        }
-      }
-      for (Index f = 0; f < linear_columns; ++f) {
-        d_linear[static_cast<std::size_t>(f)] += d_a * slopes0[f];
-      }
+      Lanes a = Lanes{} + p.offset0;
+      Lanes b = Lanes{} + p.offset1;
+      add_product<kLinear>(linear, slopes0, p.linear_columns, a);
+      add_product<kLinear>(linear, slopes1, p.linear_columns, b);
+      a *= d_k;
+      d_k *= b;
+      add_row<kLinear>(a, slopes1, p.linear_columns, d_linear);
     }
+    add_row<kLinear>(d_k, slopes0, p.linear_columns, d_linear);
   }
-  for (Index d = 0; d < columns; ++d) {
-    store(d_x[static_cast<std::size_t>(d)], s.d_scaled + d * s.d_stride + particle);
+  Columns<kColumns> x;
+  load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
+#pragma GCC unroll 8
+  for (Index d = 0; d < (kColumns < 0 ? p.columns : kColumns); ++d) {
+    d_x[static_cast<std::size_t>(d)] -= total * x[static_cast<std::size_t>(d)];
   }
-  for (Index f = 0; f < linear_columns; ++f) {
-    store(d_linear[static_cast<std::size_t>(f)], s.d_linear + f * s.d_linear_stride + particle);
-  }
+  store_columns<kColumns>(d_x, s.d_stride, p.columns, s.d_scaled + particle);
+  store_columns<kLinear>(d_linear, s.d_linear_stride, p.linear_columns, s.d_linear + particle);
 }
 
 KINESCOPE_WIDE void pullback_pass(const SamplePass& p, const Slopes& s, Index particle) {
@@ -193,6 +222,7 @@ SamplePass pass_of(const PreparedSamples& samples, const ConstBlock& scaled,
   return {samples.scaled.rows(),
           samples.scaled.cols(),
           samples.scaled.data(),
+          samples.half_squares.data(),
           samples.variance,
           samples.weights.data(),
           samples.factors,
@@ -218,6 +248,7 @@ PreparedSamples::PreparedSamples(const KernelValues& kernel, const Eigen::Matrix
   KINESCOPE_CHECK(factors <= 2 && inputs.cols() <= kMaxColumns && linear.cols() <= kMaxColumns,
                   "at most two factors and 64 columns");
   scaled = inputs * inverse_scales.asDiagonal();
+  half_squares = -0.5 * scaled.rowwise().squaredNorm();
   for (std::size_t f = 0; f < kernel.factors.size(); ++f) {
     offsets[f] = kernel.factors[f].offset;
     slopes[f] = linear * kernel.factors[f].weights.asDiagonal();

@@ -21,6 +21,7 @@ struct PreparedSamples {
   double variance = 1.0;
   Eigen::RowVectorXd inverse_scales;  ///< D
   RowMajor scaled;                    ///< N x D, over the length scales
+  Eigen::VectorXd half_squares;       ///< N: -1/2 |scaled|^2
   Eigen::VectorXd weights;            ///< N, of the mean
   Eigen::Index factors = 0;           ///< 0, 1 or 2
   std::array<RowMajor, 2> slopes;     ///< N x G each: weights times what the factor is linear in

@@ -124,8 +124,9 @@ Eigen::VectorXd parameters_of(const RbfPolicy& policy) {
 }
 
 Eigen::VectorXd search_gradient(const PolicyGradient& gradient, const RbfPolicy& policy) {
-  return packed(gradient.centres, gradient.log_scales,
-                gradient.weights * policy.input_limit.asDiagonal());
+  const Index basis = gradient.basis_count;
+  return packed(gradient.centres.topRows(basis), gradient.log_scales,
+                gradient.weights.topRows(basis) * policy.input_limit.asDiagonal());
 }
 
 RbfPolicy with_parameters(RbfPolicy policy, const Eigen::VectorXd& parameters) {

@@ -34,7 +34,7 @@ TEST_P(RolloutGradient, IsThatOfCentralDifferences) {
   }
   task.start.means.resize(2, 4);
   task.start.means << 0.0, 0.0, 0.0, 0.0, 0.4, -0.5, 0.1, 0.3;
-  const RbfPolicy policy = random_policy(12);
+  const RbfPolicy policy = random_policy(13);
   const RolloutDraws draws{7, 3, GetParam().dropout};
   ParticleObjective objective(model, task, kParticles, policy.basis_count(), 1);
   PolicyGradient gradient(policy);
