@@ -98,8 +98,7 @@ template <int kColumns>
 
 template <int kColumns, int kLinear>
 [[gnu::always_inline]] inline void value_body(const SamplePass& p, Index particle, double* smooth,
-                                              Index smooth_stride, double* kernel,
-                                              Index kernel_stride, double* mean) {
+                                              double* kernel, double* mean) {
   Columns<kColumns> x;
   Columns<kLinear> linear;
   load_columns<kColumns>(p.scaled + particle, p.stride, p.columns, x);
@@ -112,7 +111,7 @@ template <int kColumns, int kLinear>
     add_product<kColumns>(x, p.scaled_samples + j * p.columns, p.columns, k);
     exp_of(k);
     k *= p.variance;
-    store(k, smooth + j * smooth_stride + particle);
+    store(k, smooth + j * kLaneCount);
     if (kLinear != 0) {
       Lanes a = Lanes{} + p.offset0;
       add_product<kLinear>(linear, p.slopes0 + j * p.linear_columns, p.linear_columns, a);
@@ -123,7 +122,7 @@ template <int kColumns, int kLinear>
       }
       k += a;
     }
-    store(k, kernel + j * kernel_stride + particle);
+    store(k, kernel + j * kLaneCount);
     sums += k * p.weights[j];
   }
   store(sums, mean + particle);
@@ -139,17 +138,14 @@ template <int kColumns, int kLinear>
   if (p.columns == 6 && p.linear_columns == 6) return body<6, 6>(__VA_ARGS__); \
   return body<-1, -1>(__VA_ARGS__)
 
-KINESCOPE_WIDE void value_pass(const SamplePass& p, Index particle, double* smooth,
-                               Index smooth_stride, double* kernel, Index kernel_stride,
+KINESCOPE_WIDE void value_pass(const SamplePass& p, Index particle, double* smooth, double* kernel,
                                double* mean) {
-  KINESCOPE_BY_COLUMNS(value_body, p, particle, smooth, smooth_stride, kernel, kernel_stride, mean);
+  KINESCOPE_BY_COLUMNS(value_body, p, particle, smooth, kernel, mean);
 }
 
 struct Slopes {
-  const double* smooth;
-  Index smooth_stride;
+  const double* smooth;  // of the group
   const double* solved;
-  Index solved_stride;
   const double* d_mean;
   const double* d_variance;
   double* d_scaled;
@@ -177,8 +173,8 @@ template <int kColumns, int kLinear>
   for (Index j = 0; j < p.samples; ++j) {
     Lanes d_smooth;
     Lanes d_k;
-    load(s.smooth + j * s.smooth_stride + particle, d_smooth);
-    load(s.solved + j * s.solved_stride + particle, d_k);
+    load(s.smooth + j * kLaneCount, d_smooth);
+    load(s.solved + j * kLaneCount, d_k);
     d_k = d_mean * p.weights[j] + d_variance * d_k;
     d_smooth *= d_k;
     total += d_smooth;
@@ -212,8 +208,14 @@ KINESCOPE_WIDE void pullback_pass(const SamplePass& p, const Slopes& s, Index pa
 }
 #undef KINESCOPE_BY_COLUMNS
 
-KINESCOPE_WIDE void add_squares(const double* values, Index rows, double* sums) {
-  for (Index i = 0; i < rows; ++i) sums[i] += values[i] * values[i];
+KINESCOPE_WIDE void sum_squares(const double* values, Index columns, double* sums) {
+  Lanes total = {};
+  for (Index j = 0; j < columns; ++j) {
+    Lanes x;
+    load(values + j * kLaneCount, x);
+    total += x * x;
+  }
+  store(total, sums);
 }
 
 SamplePass pass_of(const PreparedSamples& samples, const ConstBlock& scaled,
@@ -256,30 +258,29 @@ PreparedSamples::PreparedSamples(const KernelValues& kernel, const Eigen::Matrix
 }
 
 void kernel_value(const PreparedSamples& samples, const ConstBlock& scaled,
-                  const ConstBlock& linear, Block smooth, Block kernel, Block mean) {
+                  const ConstBlock& linear, LaneMatrix& smooth, LaneMatrix& kernel, Block mean) {
   const SamplePass pass = pass_of(samples, scaled, linear);
-  for (Index i = 0; i < scaled.rows(); i += kLaneCount) {
-    value_pass(pass, i, smooth.data(), smooth.outerStride(), kernel.data(), kernel.outerStride(),
-               mean.data());
+  for (Index g = 0; g < smooth.groups(); ++g) {
+    value_pass(pass, g * kLaneCount, smooth.group(g), kernel.group(g), mean.data());
   }
 }
 
 void kernel_pullback(const PreparedSamples& samples, const ConstBlock& scaled,
-                     const ConstBlock& linear, const ConstBlock& smooth, const ConstBlock& solved,
+                     const ConstBlock& linear, const LaneMatrix& smooth, const LaneMatrix& solved,
                      const ConstBlock& d_mean, const ConstBlock& d_variance, Block d_scaled,
                      Block d_linear) {
   const SamplePass pass = pass_of(samples, scaled, linear);
-  const Slopes slopes{smooth.data(),         smooth.outerStride(),   solved.data(),
-                      solved.outerStride(),  d_mean.data(),          d_variance.data(),
-                      d_scaled.data(),       d_scaled.outerStride(), d_linear.data(),
-                      d_linear.outerStride()};
-  for (Index i = 0; i < scaled.rows(); i += kLaneCount) pullback_pass(pass, slopes, i);
+  for (Index g = 0; g < smooth.groups(); ++g) {
+    const Slopes slopes{smooth.group(g),   solved.group(g),       d_mean.data(),
+                        d_variance.data(), d_scaled.data(),       d_scaled.outerStride(),
+                        d_linear.data(),   d_linear.outerStride()};
+    pullback_pass(pass, slopes, g * kLaneCount);
+  }
 }
 
-void squared_rows(const ConstBlock& values, Block sums) {
-  sums.setZero();
-  for (Index j = 0; j < values.cols(); ++j) {
-    add_squares(values.col(j).data(), values.rows(), sums.data());
+void squared_rows(const LaneMatrix& values, Block sums) {
+  for (Index g = 0; g < values.groups(); ++g) {
+    sum_squares(values.group(g), values.columns(), sums.data() + g * kLaneCount);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <array>
 
+#include "dynamics/policy/lane_matrix.h"
 #include "dynamics/policy/rbf_passes.h"
 #include "dynamics/policy/velocity_model.h"
 
@@ -31,16 +32,16 @@ struct PreparedSamples {
 /// `scaled`: particles x D, inputs over the length scales; `linear`: particles x G. `smooth`:
 /// particles x N, the exponential part alone; `kernel`: all of it; mean: particles.
 void kernel_value(const PreparedSamples& samples, const ConstBlock& scaled,
-                  const ConstBlock& linear, Block smooth, Block kernel, Block mean);
+                  const ConstBlock& linear, LaneMatrix& smooth, LaneMatrix& kernel, Block mean);
 
 /// d k(i, j) = d_mean_i weights_j - 2 d_variance_i solved(i, j), with solved = K* A^-1. d_scaled
 /// (particles x D) and d_linear (particles x G) are overwritten.
 void kernel_pullback(const PreparedSamples& samples, const ConstBlock& scaled,
-                     const ConstBlock& linear, const ConstBlock& smooth, const ConstBlock& solved,
+                     const ConstBlock& linear, const LaneMatrix& smooth, const LaneMatrix& solved,
                      const ConstBlock& d_mean, const ConstBlock& d_variance, Block d_scaled,
                      Block d_linear);
 
 /// Row sums of squares: particles.
-void squared_rows(const ConstBlock& values, Block sums);
+void squared_rows(const LaneMatrix& values, Block sums);
 
 }  // namespace kinescope::policy

@@ -14,15 +14,13 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kPanel = 8;
-constexpr std::size_t kLanesEach = kLaneCount;
 
 struct Tile {
-  const double* in;
-  Index in_stride;
+  const double* in;  // of the first group of particles
+  Index group_stride;
   const double* packed;
   Index rows;  // of the panel, the inner dimension
   double* out;
-  Index out_stride;
   Index columns;  // of the panel that exist
 };
 
@@ -31,27 +29,29 @@ struct Tile {
 template <std::size_t kGroups, std::size_t kColumns>
 [[gnu::always_inline]] inline void tile(const Tile& t, Index first) {
   Lanes acc[kGroups][kColumns] = {};
-  const double* in = t.in;
+  const double* in[kGroups];
+  for (std::size_t g = 0; g < kGroups; ++g) in[g] = t.in + static_cast<Index>(g) * t.group_stride;
   const double* factor = t.packed + first;
   for (Index k = 0; k < t.rows; ++k) {
     Lanes row[kGroups];
 #pragma GCC unroll 4
-    for (std::size_t g = 0; g < kGroups; ++g) load(in + g * kLanesEach, row[g]);
+    for (std::size_t g = 0; g < kGroups; ++g) load(in[g] + k * kLaneCount, row[g]);
 #pragma GCC unroll 8
     for (std::size_t c = 0; c < kColumns; ++c) {
 #pragma GCC unroll 4
       for (std::size_t g = 0; g < kGroups; ++g) acc[g][c] += row[g] * factor[c];
     }
-    in += t.in_stride;
     factor += kPanel;
   }
 #pragma GCC unroll 8
   for (std::size_t c = 0; c < kColumns; ++c) {
     const Index column = first + static_cast<Index>(c);
     if (column >= t.columns) break;
-    double* out = t.out + column * t.out_stride;
+    double* out = t.out + column * kLaneCount;
 #pragma GCC unroll 4
-    for (std::size_t g = 0; g < kGroups; ++g) store(acc[g][c], out + g * kLanesEach);
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      store(acc[g][c], out + static_cast<Index>(g) * t.group_stride);
+    }
   }
 }
 
@@ -97,21 +97,19 @@ TriangleProduct::TriangleProduct(const Eigen::MatrixXd& inverse_factor)
   }
 }
 
-void TriangleProduct::multiply(const Packed& packed, Index size, const gp::ConstBlock& in,
-                               gp::Block out) {
-  KINESCOPE_CHECK(in.rows() % kLaneCount == 0, "a multiple of eight particles");
+void TriangleProduct::multiply(const Packed& packed, const LaneMatrix& in, LaneMatrix& out) {
+  const Index size = in.columns();
   const Index groups_a_tile = has_wide_registers() ? 3 : 1;
-  for (Index first = 0; first < in.rows(); first += groups_a_tile * kLaneCount) {
-    const Index groups = std::min(groups_a_tile, (in.rows() - first) / kLaneCount);
+  for (Index first = 0; first < in.groups(); first += groups_a_tile) {
+    const Index groups = std::min(groups_a_tile, in.groups() - first);
     for (std::size_t p = 0; p < packed.panels.size(); ++p) {
       const Panel& panel = packed.panels[p];
       const Index column = static_cast<Index>(p) * kPanel;
-      const Tile t{in.data() + panel.first_row * in.outerStride() + first,
-                   in.outerStride(),
+      const Tile t{in.group(first) + panel.first_row * kLaneCount,
+                   size * kLaneCount,
                    packed.values.data() + panel.at,
                    panel.rows,
-                   out.data() + column * out.outerStride() + first,
-                   out.outerStride(),
+                   out.group(first) + column * kLaneCount,
                    std::min(kPanel, size - column)};
       if (groups_a_tile == 1) {
         narrow_tile(t);
@@ -122,12 +120,12 @@ void TriangleProduct::multiply(const Packed& packed, Index size, const gp::Const
   }
 }
 
-void TriangleProduct::times_transposed(const gp::ConstBlock& k, gp::Block out) const {
-  multiply(transposed_, size_, k, out);
+void TriangleProduct::times_transposed(const LaneMatrix& k, LaneMatrix& out) const {
+  multiply(transposed_, k, out);
 }
 
-void TriangleProduct::times(const gp::ConstBlock& v, gp::Block out) const {
-  multiply(plain_, size_, v, out);
+void TriangleProduct::times(const LaneMatrix& v, LaneMatrix& out) const {
+  multiply(plain_, v, out);
 }
 
 }  // namespace kinescope::policy

@@ -8,7 +8,7 @@
 
 #include <vector>
 
-#include "dynamics/gp/blas.h"
+#include "dynamics/policy/lane_matrix.h"
 
 namespace kinescope::policy {
 
@@ -20,9 +20,9 @@ class TriangleProduct {
 
   [[nodiscard]] Eigen::Index size() const { return size_; }
   /// out = k J'.
-  void times_transposed(const gp::ConstBlock& k, gp::Block out) const;
+  void times_transposed(const LaneMatrix& k, LaneMatrix& out) const;
   /// out = v J.
-  void times(const gp::ConstBlock& v, gp::Block out) const;
+  void times(const LaneMatrix& v, LaneMatrix& out) const;
 
  private:
   // Panels of eight columns, row by row, zeros beyond the size.
@@ -35,8 +35,7 @@ class TriangleProduct {
     std::vector<Panel> panels;
     std::vector<double> values;
   };
-  static void multiply(const Packed& packed, Eigen::Index size, const gp::ConstBlock& in,
-                       gp::Block out);
+  static void multiply(const Packed& packed, const LaneMatrix& in, LaneMatrix& out);
 
   Eigen::Index size_ = 0;
   Packed transposed_;

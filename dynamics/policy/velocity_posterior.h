@@ -14,8 +14,8 @@ namespace kinescope::policy {
 struct PosteriorTape {
   PosteriorTape(Eigen::Index particles, Eigen::Index columns, Eigen::Index samples);
   Eigen::MatrixXd scaled;     ///< particles x D
-  Eigen::MatrixXd smooth;     ///< particles x N
-  Eigen::MatrixXd solved;     ///< particles x N: W
+  LaneMatrix smooth;          ///< particles x N
+  LaneMatrix solved;          ///< particles x N: W
   Eigen::MatrixXd mean;       ///< particles x 1, of targets over target_scale
   Eigen::MatrixXd deviation;  ///< particles x 1
 };
@@ -24,8 +24,8 @@ struct PosteriorTape {
 struct PosteriorScratch {
   PosteriorScratch(Eigen::Index particles, Eigen::Index columns, Eigen::Index linear,
                    Eigen::Index samples);
-  Eigen::MatrixXd kernel;
-  Eigen::MatrixXd rotated;
+  LaneMatrix kernel;
+  LaneMatrix rotated;
   Eigen::MatrixXd sums;
   Eigen::MatrixXd d_variance;
   Eigen::MatrixXd d_scaled;

@@ -54,17 +54,16 @@ Eigen::MatrixXd factor(Eigen::Index size) {
 }
 
 void factor_products(benchmark::State& state) {
-  Rng rng(2);
   const TriangleProduct product(factor(state.range(0)));
-  const Eigen::MatrixXd rows = random_matrix(rng, kBlock, state.range(0), 1.0);
-  Eigen::MatrixXd v = rows;
-  Eigen::MatrixXd w = rows;
+  const LaneMatrix rows(kBlock, state.range(0));
+  LaneMatrix v = rows;
+  LaneMatrix w = rows;
   for (auto _ : state) {
     for (int k = 0; k < kBlocks; ++k) {
       product.times_transposed(rows, v);
       product.times(v, w);
     }
-    benchmark::DoNotOptimize(w.data());
+    benchmark::DoNotOptimize(w.group(0));
   }
 }
 BENCHMARK(factor_products)->Arg(120)->Arg(300)->Unit(benchmark::kMillisecond);
