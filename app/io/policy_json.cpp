@@ -163,8 +163,8 @@ policy::VelocityModel velocity_model_of(const json& object, const StateLayout& l
 
 json search_json(const policy::SearchState& search) {
   return {{"policy", rbf_policy_json(search.policy)},
-          {"first_moment", rbf_policy_json(search.first_moment)},
-          {"second_moment", rbf_policy_json(search.second_moment)},
+          {"first_moment", list_json(search.first_moment)},
+          {"second_moment", list_json(search.second_moment)},
           {"seed", search.seed},
           {"step", search.step},
           {"adam_step", search.adam_step},
@@ -186,8 +186,9 @@ policy::SearchState search_of(const json& object, const StateLayout& layout,
   const auto whole = [&](const char* key) { return read.integer(read.at(object, key), key); };
   policy::SearchState out;
   out.policy = rbf_policy_of(read.at(object, "policy"), layout, read);
-  out.first_moment = rbf_policy_of(read.at(object, "first_moment"), layout, read);
-  out.second_moment = rbf_policy_of(read.at(object, "second_moment"), layout, read);
+  const Index count = policy::parameters_of(out.policy).size();
+  out.first_moment = read.vector(object, "first_moment", count);
+  out.second_moment = read.vector(object, "second_moment", count);
   out.seed = seed_of(object, read);
   out.step = whole("step");
   out.adam_step = whole("adam_step");

@@ -40,8 +40,9 @@ void check_options(const ImproveOptions& options);
 /// All that a search needs to go on: a plain value that can be saved after any step.
 struct SearchState {
   RbfPolicy policy;
-  RbfPolicy first_moment;  ///< Adam's averages, shaped as the policy (length scales: logarithms)
-  RbfPolicy second_moment;
+  /// Adam's averages by parameters_of(policy).
+  Eigen::VectorXd first_moment;
+  Eigen::VectorXd second_moment;
   std::uint64_t seed = 1;
   int step = 0;       ///< gradient steps done
   int adam_step = 0;  ///< since the averages were zero
@@ -89,6 +90,11 @@ struct Improvement {
   double cost = 0.0;        ///< expected, of the particles without dropout
   double cost_sigma = 0.0;  ///< of one rollout
 };
+
+/// What Adam moves: centres row by row, logarithms of the length scales, weights over the inputs'
+/// limits row by row.
+[[nodiscard]] Eigen::VectorXd parameters_of(const RbfPolicy& policy);
+[[nodiscard]] RbfPolicy with_parameters(RbfPolicy policy, const Eigen::VectorXd& parameters);
 
 [[nodiscard]] SearchState begin_search(RbfPolicy policy, const ImproveOptions& options,
                                        std::uint64_t seed);

@@ -42,22 +42,47 @@ void check_sensing(const SensingOptions& options, const StateLayout& layout);
 /// the cut-off is 0.
 [[nodiscard]] double low_pass_memory(double cutoff_hz, double step_s);
 
-/// The filter on one run of the system. Memory of the filter: measured position of the step before,
-/// filtered position, filtered speed.
-class OnlineFilter {
+/// The filter on a block of particles, one row each, with its pullback. Memory: measured position
+/// of the step before, filtered position, filtered speed.
+class ParticleFilter {
  public:
-  OnlineFilter(const StateLayout& layout, const SensingOptions& options);
-  /// The seen state (2 P) from the measured one (2 P; speeds are not read where only positions are
-  /// measured). The first call starts the filter: speeds zero where they are not measured.
-  [[nodiscard]] Eigen::VectorXd step(const Eigen::VectorXd& measured);
+  ParticleFilter(const StateLayout& layout, const SensingOptions& options, Eigen::Index rows);
+  [[nodiscard]] bool noisy() const { return options_.noise_sigma.size() > 0; }
+
+  /// Forgets everything: the next step is the first.
+  void start();
+  /// `normals`: rows x 2 P, read where the measurement has noise. At the first step filters start
+  /// at what is measured; speeds that are not measured start at zero.
+  void step(const TrueStates& states, const Eigen::MatrixXd& normals, SeenStates& seen);
+
+  /// Before the pullback of the last step.
+  void start_pullback();
+  /// From the last step to the first: d_states += the pullback of d_seen (rows x 2 P each).
+  void pullback(const ConstBlock& d_seen, bool first_step, Block d_states);
 
  private:
   StateLayout layout_;
   SensingOptions options_;
+  double position_memory_ = 0.0;
+  double speed_memory_ = 0.0;
   bool started_ = false;
-  Eigen::VectorXd last_position_;
-  Eigen::VectorXd position_;
-  Eigen::VectorXd speed_;
+  Eigen::MatrixXd last_;  // rows x P each
+  Eigen::MatrixXd position_;
+  Eigen::MatrixXd speed_;
+};
+
+/// The same filter on one run of the real system, whose measurements have noise of their own.
+class OnlineFilter {
+ public:
+  OnlineFilter(const StateLayout& layout, SensingOptions options);
+  /// The seen state (2 P) from the measured one (2 P; speeds are not read where only positions are
+  /// measured).
+  [[nodiscard]] Eigen::VectorXd step(const Eigen::VectorXd& measured);
+
+ private:
+  ParticleFilter filter_;
+  TrueStates measured_;
+  SeenStates seen_;
 };
 
 }  // namespace kinescope::policy

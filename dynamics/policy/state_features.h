@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/gp/blas.h"
 #include "dynamics/policy/system.h"
 
 namespace kinescope::policy {
 
-using gp::Block;
-using gp::ConstBlock;
+/// Column-major parts of matrices, rows are particles or samples.
+using Block = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+using ConstBlock = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
 /// F: the number of features of a state.
 [[nodiscard]] Eigen::Index feature_count(const StateLayout& layout);
