@@ -188,7 +188,10 @@ PolicyProblem problem_named(std::string_view name, Sensing sensing) {
   out.name = known.mechanism.name;
   out.task.cost = known.cost;
   out.task.start = known.start;
-  out.task.sensing = sensors_of(known, sensing);
+  const SensingOptions sensors = sensors_of(known, sensing);
+  // As in the benchmark: particles of a measured state are seen as they are, the model's noise holds
+  // the sensors'; where only positions are measured, the particles have the sensors, too.
+  if (sensing == Sensing::kPositionsOnly) out.task.sensing = sensors;
   out.task.steps = static_cast<int>(std::lround(known.horizon_s / layout.step_s));
   out.learner.trials = known.trials;
   out.tolerance = known.tolerance;
@@ -198,7 +201,7 @@ PolicyProblem problem_named(std::string_view name, Sensing sensing) {
   out.skeleton = known.skeleton;
   out.system = std::make_shared<const SimulatedSystem>(
       known.mechanism, SimulatedTrials{.start = known.start,
-                                       .sensors = out.task.sensing,
+                                       .sensors = sensors,
                                        .smoothing_cutoff_hz = kSpeedCutoffShare / layout.step_s});
   return out;
 }
