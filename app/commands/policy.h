@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "app/commands/commands.h"
 #include "dynamics/policy/sensing.h"
@@ -15,13 +16,15 @@
 namespace kinescope {
 
 struct PolicyCommandOptions {
-  std::string system;          ///< a problem of the literature, or a YAML file
+  std::string system;  ///< a problem of the literature, or a YAML file
   std::uint64_t seed = 1;
-  std::optional<int> trials;   ///< with a learned policy; none: the system's own number
-  int explorations = 1;        ///< trials with random inputs, first
+  /// First and last of several, each in a folder of its own in `output`; none: `seed` alone.
+  std::optional<std::pair<int, int>> seeds;
+  std::optional<int> trials;  ///< with a learned policy; none: the system's own number
+  int explorations = 1;       ///< trials with random inputs, first
   int particles = 400;
   int basis_functions = 200;
-  int search_steps = 4000;     ///< of each search, at most
+  int search_steps = 4000;  ///< of each search, at most
   policy::VelocityKernel kernel = policy::VelocityKernel::kSquaredExponential;
   std::optional<policy::Sensing> sensing;  ///< of a problem of the literature; none: full state
   int threads = 0;                         ///< 0: all of the machine

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/policy_command_line.h"
 
+#include <cmath>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,6 +13,7 @@
 #include "app/commands/command_options.h"
 #include "app/io/nearest_name.h"
 #include "dynamics/policy/systems/library.h"
+#include "kinematics/core/csv.h"
 
 namespace kinescope {
 namespace {
@@ -36,8 +39,8 @@ constexpr CountOption kCounts[] = {
 };
 
 template <typename Value, typename Target>
-CLI::Option* add_word(CLI::App& command, const char* name, const std::map<std::string, Value>& words,
-                      Target& target, const char* help) {
+CLI::Option* add_word(CLI::App& command, const char* name,
+                      const std::map<std::string, Value>& words, Target& target, const char* help) {
   std::vector<std::string> known;
   for (const auto& [word, value] : words) known.push_back(word);
   const auto check = [words, known](const std::string& word) -> std::string {
@@ -58,10 +61,11 @@ void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
       {"semi_parametric", policy::VelocityKernel::kSemiParametric}};
   static const std::map<std::string, policy::Sensing> kSensing = {
       {"full", policy::Sensing::kFullState}, {"positions", policy::Sensing::kPositionsOnly}};
-  command.add_option_function<int>(
-             "--trials", [&policy](const int& count) { policy.trials = count; },
-             "Trials with a learned policy (default: 5, or what the file says); a folder with fewer "
-             "is gone on with")
+  command
+      .add_option_function<int>(
+          "--trials", [&policy](const int& count) { policy.trials = count; },
+          "Trials with a learned policy (default: 5, or what the file says); a folder with fewer "
+          "is gone on with")
       ->check(number_in(1, 1000))
       ->type_name("N")
       ->group(kHow);
@@ -82,6 +86,32 @@ void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
       ->type_name("WHAT");
 }
 
+// "3..7".
+std::optional<std::pair<int, int>> seeds_of(const std::string& text) {
+  const std::size_t dots = text.find("..");
+  if (dots == std::string::npos) return std::nullopt;
+  const std::optional<double> first = parse_number(text.substr(0, dots));
+  const std::optional<double> last = parse_number(text.substr(dots + 2));
+  const auto whole = [](const std::optional<double>& value) {
+    return value && *value >= 0.0 && *value <= 1e9 && *value == std::floor(*value);
+  };
+  if (!whole(first) || !whole(last) || *last < *first) return std::nullopt;
+  return std::pair(static_cast<int>(*first), static_cast<int>(*last));
+}
+
+CLI::Option* add_seeds(CLI::App& command, PolicyCommandOptions& policy) {
+  return command
+      .add_option_function<std::string>(
+          "--seeds", [&policy](const std::string& text) { policy.seeds = seeds_of(text); },
+          "Several searches, one after another: A..B; each in a folder seed_N of the output, with "
+          "a table of all that are there (also those that another machine wrote)")
+      ->check([](const std::string& text) {
+        return seeds_of(text) ? std::string()
+                              : fmt::format("'{}' is no range of seeds such as 1..50", text);
+      })
+      ->type_name("A..B");
+}
+
 }  // namespace
 
 void add_policy(CLI::App& app, CommandLine& line) {
@@ -97,10 +127,11 @@ void add_policy(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("SYSTEM");
   add_learning(command, policy);
-  command.add_option("--seed", policy.seed, "Of all random numbers")
-      ->check(number_in(0, 1e9))
-      ->capture_default_str()
-      ->type_name("N");
+  CLI::Option* seed = command.add_option("--seed", policy.seed, "Of all random numbers")
+                          ->check(number_in(0, 1e9))
+                          ->capture_default_str()
+                          ->type_name("N");
+  add_seeds(command, policy)->excludes(seed);
   command
       .add_option("--threads", policy.threads,
                   "Threads; 0: all of the machine. Never changes a result")
@@ -116,10 +147,11 @@ void add_policy(CLI::App& app, CommandLine& line) {
   add_force(command, policy.force,
             "Begin anew, and replace what others wrote in the output folder");
   add_output_options(command, line.output);
-  command.footer(fmt::format(
-      "Examples:\n  kinescope policy cartpole --seed 1 -o cartpole_1\n"
-      "  kinescope policy my_robot.yaml --trials 8\n\n{}",
-      kExitCodes));
+  command.footer(
+      fmt::format("Examples:\n  kinescope policy cartpole --seed 1 -o cartpole_1\n"
+                  "  kinescope policy my_robot.yaml --trials 8\n"
+      "  kinescope policy cartpole --seeds 1..50 -o cartpole_seeds\n\n{}",
+                  kExitCodes));
 }
 
 }  // namespace kinescope

@@ -58,7 +58,8 @@ void set_learner(PolicyProblem& problem, const PolicyCommandOptions& options) {
   learner.model.kernel = options.kernel;
   if (options.kernel != policy::VelocityKernel::kSemiParametric) return;
   if (!problem.physics) {
-    throw bad_request("--kernel", fmt::format("nothing is known of the physics of {}", problem.name),
+    throw bad_request("--kernel",
+                      fmt::format("nothing is known of the physics of {}", problem.name),
                       "take se or se_p2");
   }
   learner.model.physics = problem.physics;
@@ -132,8 +133,8 @@ PolicyRequest make_policy_request(const PolicyCommandOptions& options) {
       {"Particles", fmt::format("{}", options.particles)},
       {"Policy", fmt::format("{} basis functions, at most {} gradient steps a trial",
                              options.basis_functions, options.search_steps)},
-      {"Model", fmt::format("one Gaussian process a speed, kernel {}",
-                            policy::name_of(options.kernel))},
+      {"Model",
+       fmt::format("one Gaussian process a speed, kernel {}", policy::name_of(options.kernel))},
       {"Measured", out.problem.task.sensing.sensing == Sensing::kPositionsOnly
                        ? "positions; speeds are estimated"
                        : "positions and speeds"}};
@@ -141,8 +142,8 @@ PolicyRequest make_policy_request(const PolicyCommandOptions& options) {
 }
 
 std::vector<std::string> policy_products(int trials) {
-  std::vector<std::string> out{kState,        "policy.json",         "velocity_model.json",
-                               "policy.html", "policy_search.json"};
+  std::vector<std::string> out{kState, "policy.json", "velocity_model.json", "policy.html",
+                               "policy_search.json"};
   for (int k = 0; k < trials; ++k) out.push_back(trial_name(static_cast<std::size_t>(k)));
   return out;
 }
@@ -166,13 +167,14 @@ void PolicySearch::open(bool fresh) {
     return;
   }
   if (!fs::exists(file, error)) return;
-  PolicyStateFile saved =
-      read_policy_state(file, request_.problem.system->layout(), request_.problem.physics);
+  const nlohmann::json asked = read_policy_request(file);
   for (const auto& [key, value] : request_.fingerprint.items()) {
-    if (saved.request.is_object() && saved.request.value(key, nlohmann::json()) == value) continue;
+    if (asked.value(key, nlohmann::json()) == value) continue;
     throw bad_request(file.string(), fmt::format("is of a search with another {}", key),
                       "name another folder with --output, or begin anew with --force");
   }
+  PolicyStateFile saved =
+      read_policy_state(file, request_.problem.system->layout(), request_.problem.physics);
   bands_ = std::move(saved.bands);
   add_trials(saved.state);
   state_ = std::move(saved.state);
@@ -189,9 +191,9 @@ void PolicySearch::add_trials(const LearnerState& state) {
     if (k >= bands_.size()) {
       bands_.emplace_back();
       if (one.record && state.model) {
-        const policy::ParticleRollout particles = policy::roll_out(
-            *state.model, request_.problem.task, state.policies[k - explorations],
-            request_.problem.learner.promise_particles, state.seed, threads_);
+        const policy::ParticleRollout particles =
+            policy::roll_out(*state.model, request_.problem.task, state.policies[k - explorations],
+                             request_.problem.learner.promise_particles, state.seed, threads_);
         bands_.back() =
             policy::particle_band(particles, request_.problem.system->layout().position_count());
       }
@@ -213,16 +215,15 @@ void PolicySearch::write_products(const LearnerState& state) const {
   }
   if (!state.records.empty()) {
     const std::size_t best = best_policy(state);
-    folder_.write("policy.json",
-                  policy_file_text({.version = summary_.version,
-                                    .system = request_.problem.name,
-                                    .layout = layout,
-                                    .sensing = request_.problem.task.sensing,
-                                    .policy = state.policies[best],
-                                    .trial = request_.problem.learner.explorations +
-                                             static_cast<int>(best),
-                                    .promised = state.records[best].promised,
-                                    .paid = state.records[best].paid}));
+    folder_.write("policy.json", policy_file_text({.version = summary_.version,
+                                                   .system = request_.problem.name,
+                                                   .layout = layout,
+                                                   .sensing = request_.problem.task.sensing,
+                                                   .policy = state.policies[best],
+                                                   .trial = request_.problem.learner.explorations +
+                                                            static_cast<int>(best),
+                                                   .promised = state.records[best].promised,
+                                                   .paid = state.records[best].paid}));
   }
   folder_.write("policy_search.json", policy_search_json(summary_).dump(1) + "\n");
   folder_.write("policy.html", policy_html(summary_));
@@ -239,15 +240,14 @@ void PolicySearch::save(const LearnerState& state) {
 }
 
 void PolicySearch::run(const Console& console) {
-  const int trials =
-      request_.problem.learner.explorations + request_.problem.learner.trials;
+  const int trials = request_.problem.learner.explorations + request_.problem.learner.trials;
   policy::LearnerHooks hooks;
   hooks.progress = [&](const policy::LearnerProgress& progress) {
     show(console.progress, progress, trials);
   };
   hooks.save = [this](const LearnerState& state) { save(state); };
-  state_ = policy::learn(*request_.problem.system, request_.problem.task,
-                         request_.problem.learner, std::move(state_), hooks);
+  state_ = policy::learn(*request_.problem.system, request_.problem.task, request_.problem.learner,
+                         std::move(state_), hooks);
   add_trials(state_);
   write_products(state_);
 }

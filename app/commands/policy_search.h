@@ -27,7 +27,8 @@ struct PolicyRequest {
 
 class PolicySearch {
  public:
-  PolicySearch(PolicyRequest request, const PolicyCommandOptions& options, const OutputFolder& folder);
+  PolicySearch(PolicyRequest request, const PolicyCommandOptions& options,
+               const OutputFolder& folder);
 
   /// Goes on with what the folder holds; `fresh`: begins anew. Throws bad_request where it holds
   /// another search.

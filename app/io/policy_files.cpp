@@ -21,6 +21,7 @@ using policy::StateLayout;
 constexpr const char* kPolicySchema = "kinescope.policy";
 constexpr const char* kStateSchema = "kinescope.policy_state";
 constexpr int kSchemaVersion = 1;
+constexpr const char* kBeginAgain = "begin again with --force, or in another folder";
 
 json document_of(const std::filesystem::path& path, const char* schema, const JsonReader& read) {
   json document;
@@ -210,18 +211,23 @@ PolicyFile read_policy_file(const std::filesystem::path& path) {
 std::string policy_state_text(const PolicyStateFile& file) {
   json bands = json::array();
   for (const auto& band : file.bands) bands.push_back(band_json(band));
-  const json document{{"schema", kStateSchema},
-                      {"schema_version", kSchemaVersion},
-                      {"version", file.version},
-                      {"request", file.request},
-                      {"state", state_json(file.state)},
-                      {"bands", std::move(bands)}};
+  const json document{{"schema", kStateSchema},          {"schema_version", kSchemaVersion},
+                      {"version", file.version},         {"request", file.request},
+                      {"state", state_json(file.state)}, {"bands", std::move(bands)}};
   return document.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+json read_policy_request(const std::filesystem::path& path) {
+  const JsonReader read(path, kBeginAgain);
+  const json document = document_of(path, kStateSchema, read);
+  const json& request = read.at(document, "request");
+  if (!request.is_object()) throw read.wrong("'request' is no object");
+  return request;
 }
 
 PolicyStateFile read_policy_state(const std::filesystem::path& path, const StateLayout& layout,
                                   std::shared_ptr<const policy::PhysicsFeatures> physics) {
-  const JsonReader read(path, "begin again with --force, or in another folder");
+  const JsonReader read(path, kBeginAgain);
   const json document = document_of(path, kStateSchema, read);
   PolicyStateFile out;
   out.version = read.word(document, "version");

@@ -43,6 +43,8 @@ struct PolicyStateFile {
 };
 
 [[nodiscard]] std::string policy_state_text(const PolicyStateFile& file);
+/// What was asked for, alone. Throws bad_input.
+[[nodiscard]] nlohmann::json read_policy_request(const std::filesystem::path& path);
 /// `physics`: of the system, for a semi-parametric model. Throws bad_input.
 [[nodiscard]] PolicyStateFile read_policy_state(
     const std::filesystem::path& path, const policy::StateLayout& layout,
@@ -50,8 +52,8 @@ struct PolicyStateFile {
 
 /// velocity_model.json: what a policy was learned on. Schema: velocity_model.schema.json.
 [[nodiscard]] std::string velocity_model_text(const policy::VelocityModel& model,
-                                              const std::string& version,
-                                              const std::string& system, int trials);
+                                              const std::string& version, const std::string& system,
+                                              int trials);
 
 /// t, the seen state, the inputs (empty in the last row), where they differ the smoothed and the
 /// true state, and what the particles promised.

@@ -74,8 +74,8 @@ json layout_json(const StateLayout& layout) {
   }
   json inputs = json::array();
   for (Index u = 0; u < layout.input_count(); ++u) {
-    inputs.push_back({{"name", layout.inputs[static_cast<std::size_t>(u)]},
-                      {"limit", layout.input_limit[u]}});
+    inputs.push_back(
+        {{"name", layout.inputs[static_cast<std::size_t>(u)]}, {"limit", layout.input_limit[u]}});
   }
   return {{"positions", std::move(positions)},
           {"inputs", std::move(inputs)},
@@ -221,8 +221,8 @@ std::string word_of(SearchStatus status) {
 }
 
 SearchStatus search_status_of(const std::string& word, const JsonReader& read) {
-  const auto found = std::ranges::find_if(
-      kStatusWords, [&](const auto& entry) { return word == entry.second; });
+  const auto found =
+      std::ranges::find_if(kStatusWords, [&](const auto& entry) { return word == entry.second; });
   if (found == kStatusWords.end()) throw read.wrong(fmt::format("'{}' is no status", word));
   return found->first;
 }

@@ -19,8 +19,8 @@ using Eigen::Vector2d;
 
 constexpr int kPostures = 12;  // drawn one over the other
 constexpr double kWidth = 480.0;
-constexpr double kMargin = 0.08;     // of the drawing
-constexpr double kFrame_px = 80.0;   // of axis labels, about
+constexpr double kMargin = 0.08;    // of the drawing
+constexpr double kFrame_px = 80.0;  // of axis labels, about
 constexpr double kTallest = 480.0;
 
 std::vector<Vector2d> points_of(const Matrix2Xd& columns) {
@@ -72,8 +72,7 @@ std::string animate(std::string_view attribute, const std::string& values, doubl
 }
 
 // A polyline that goes through all postures and begins again.
-std::string moving_body(const Plot& plot, const std::vector<Matrix2Xd>& postures,
-                           double seconds) {
+std::string moving_body(const Plot& plot, const std::vector<Matrix2Xd>& postures, double seconds) {
   std::string lines;
   for (const Matrix2Xd& posture : postures) {
     lines += (lines.empty() ? "" : ";") + pixels(plot, posture);
@@ -124,7 +123,7 @@ std::string motion_picture(std::string_view name, const policy::Skeleton& skelet
   plot.add(moving_dot(plot, path, seconds));
   plot.legend("at the end", "ink");
   plot.legend("before", "faint");
-  plot.legend("way of the tip", series_class(0));
+  plot.legend("path of the tip", series_class(0));
   return plot.str();
 }
 

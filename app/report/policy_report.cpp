@@ -100,8 +100,9 @@ std::string trials_table(const PolicySummary& summary, const nlohmann::json& doc
 }
 
 std::string cost_section(const PolicySummary& summary, const nlohmann::json& document) {
-  Curve promised{.name = "promised, and two standard deviations", .points = {}, .lower = {}, .upper = {}};
-  Curve paid{.name = "paid", .points = {}, .lower = {}, .upper = {}, .dots = true};
+  Curve promised{
+      .name = "promised, and two standard deviations", .points = {}, .lower = {}, .upper = {}};
+  Curve paid{.name = "paid", .points = {}, .lower = {}, .upper = {}};
   for (std::size_t k = 0; k < summary.trials.size(); ++k) {
     const std::optional<policy::TrialRecord>& record = summary.trials[k].record;
     if (!record) continue;
@@ -209,9 +210,9 @@ std::string input_plot(const PolicySummary& summary, const PolicyTrialSummary& o
 
 std::string trial_words(const PolicySummary& summary, const PolicyTrialSummary& one) {
   if (!one.record) return "Random inputs, to learn from.";
-  std::string out = fmt::format("Promised {:.3g} (standard deviation {:.2g}), paid {:.3g}",
-                                one.record->promised, one.record->promised_sigma,
-                                cost_paid(*one.record));
+  std::string out =
+      fmt::format("Promised {:.3g} (standard deviation {:.2g}), paid {:.3g}", one.record->promised,
+                  one.record->promised_sigma, cost_paid(*one.record));
   out += as_promised(*one.record) ? ", as promised" : ", which is not what was promised";
   if (!has_tolerance(summary)) return out + ".";
   return out + (one.success ? "; within tolerance over the last second."
@@ -233,13 +234,13 @@ std::string trial_section(const PolicySummary& summary, std::size_t number) {
 
 std::string motion_section(const PolicySummary& summary) {
   const PolicyTrialSummary& last = summary.trials.back();
-  const std::string picture =
-      motion_picture("Motion in the last trial", summary.problem.skeleton, best_known(last.trial),
-                     layout_of(summary).step_s);
+  const std::string picture = motion_picture("Motion in the last trial", summary.problem.skeleton,
+                                             best_known(last.trial), layout_of(summary).step_s);
   if (picture.empty()) return {};
   return section_head("motion", "Motion in the last trial") +
-         figure(picture, "Postures at even times; on a screen one more goes through them in real "
-                         "time",
+         figure(picture,
+                "Postures at even times; on a screen one more goes through them in real "
+                "time",
                 "half") +
          "</section>\n";
 }
@@ -306,12 +307,13 @@ std::vector<std::string> policy_findings(const PolicySummary& summary) {
         summary.problem.name, policies));
   }
   const policy::TrialRecord& last = *summary.trials.back().record;
-  out.push_back(fmt::format(
-      "Last trial: promised {:.3g} with standard deviation {:.2g}, paid {:.3g}.", last.promised,
-      last.promised_sigma, cost_paid(last)));
-  out.push_back(fmt::format("{} of {} trials cost what was promised within two standard "
-                            "deviations.",
-                            kept, policies));
+  out.push_back(
+      fmt::format("Last trial: promised {:.3g} with standard deviation {:.2g}, paid {:.3g}.",
+                  last.promised, last.promised_sigma, cost_paid(last)));
+  out.push_back(
+      fmt::format("{} of {} trials cost what was promised within two standard "
+                  "deviations.",
+                  kept, policies));
   return out;
 }
 
@@ -351,8 +353,8 @@ std::string policy_html(const PolicySummary& summary) {
   }
   ids.emplace_back("reproduce", "How to reproduce");
   const std::vector<ContentsEntry> contents(ids.begin(), ids.end());
-  std::string out = page_begin("policy", summary.problem.name, "policy search", summary.version,
-                               contents);
+  std::string out =
+      page_begin("policy", summary.problem.name, "policy search", summary.version, contents);
   out += "<main>\n" + section_head("verdict", "Findings");
   for (const std::string& finding : policy_findings(summary)) out += paragraph(finding);
   out += "</section>\n" + motion + cost_section(summary, document);

@@ -19,7 +19,7 @@ namespace kinescope {
 
 struct PolicyTrialSummary {
   policy::Trial trial;
-  std::optional<policy::TrialRecord> record;     ///< none: explored at random
+  std::optional<policy::TrialRecord> record;      ///< none: explored at random
   std::optional<policy::ParticleBand> particles;  ///< that the model promised
   bool success = false;
 };

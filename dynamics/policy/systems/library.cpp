@@ -189,8 +189,8 @@ PolicyProblem problem_named(std::string_view name, Sensing sensing) {
   out.task.cost = known.cost;
   out.task.start = known.start;
   const SensingOptions sensors = sensors_of(known, sensing);
-  // As in the benchmark: particles of a measured state are seen as they are, the model's noise holds
-  // the sensors'; where only positions are measured, the particles have the sensors, too.
+  // As in the benchmark: particles of a measured state are seen as they are, the model's noise
+  // holds the sensors'; where only positions are measured, the particles have the sensors, too.
   if (sensing == Sensing::kPositionsOnly) out.task.sensing = sensors;
   out.task.steps = static_cast<int>(std::lround(known.horizon_s / layout.step_s));
   out.learner.trials = known.trials;

@@ -22,7 +22,7 @@ SimulatedTrials cart_trials(Sensing sensing, double sigma) {
   out.start = {Eigen::MatrixXd::Zero(1, 4), Eigen::VectorXd::Constant(4, 0.01)};
   out.sensors.sensing = sensing;
   out.sensors.noise_sigma = Eigen::VectorXd::Constant(4, sigma);
-  out.sensors.speed_cutoff_hz = 5.0;
+  if (sensing == Sensing::kPositionsOnly) out.sensors.speed_cutoff_hz = 5.0;
   out.smoothing_cutoff_hz = 5.0;
   return out;
 }
