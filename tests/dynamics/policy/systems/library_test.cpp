@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/QR>
 #include <gtest/gtest.h>
 
 #include "dynamics/policy/systems/cart_pole.h"
