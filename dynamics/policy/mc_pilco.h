@@ -43,12 +43,12 @@ struct TrialRecord {
 /// A plain value. Trials 0 .. explorations - 1 are explorations.
 struct LearnerState {
   std::uint64_t seed = 1;
-  std::vector<Trial> trials;
-  std::vector<TrialRecord> records;    ///< one a trial with a learned policy
-  std::vector<RbfPolicy> policies;     ///< one a record
-  std::optional<VelocityModel> model;  ///< learned from the first `model_trials` trials
+  std::vector<Trial> trials{};
+  std::vector<TrialRecord> records{};    ///< one a trial with a learned policy
+  std::vector<RbfPolicy> policies{};     ///< one a record
+  std::optional<VelocityModel> model{};  ///< learned from the first `model_trials` trials
   int model_trials = 0;
-  std::optional<SearchState> search;  ///< of a search that was stopped or is going on
+  std::optional<SearchState> search{};  ///< of a search that was stopped or is going on
 };
 
 enum class LearnerStage { kExploring, kModelling, kSearching, kTrial, kDone };
