@@ -119,17 +119,17 @@ ExperimentTable success_table(const std::map<int, TrialCount>& counts) {
                       "Seeds whose positions were within tolerance over the last second, with 95 % "
                       "interval",
                       {},
-                      {"trial", "seeds", "learned from (s)", "in this trial (%)", "from", "to",
-                       "by this trial (%)", "from ", "to ", "median cost"},
+                      {"trial", "seeds", "learned from (s)", "in this trial (%)", "in from (%)",
+                       "in to (%)", "by this trial (%)", "by from (%)", "by to (%)", "median cost"},
                       {}};
   for (const auto& [trial, count] : counts) {
     const ShareInterval in = share_interval(count.in_trial, count.seeds);
     const ShareInterval by = share_interval(count.by_trial, count.seeds);
     out.rows.push_back({{},
-                        {static_cast<double>(trial), static_cast<double>(count.seeds),
-                         count.data_s, 100.0 * count.in_trial / count.seeds, 100.0 * in.lower,
-                         100.0 * in.upper, 100.0 * count.by_trial / count.seeds,
-                         100.0 * by.lower, 100.0 * by.upper, median(count.paid)}});
+                        {static_cast<double>(trial), static_cast<double>(count.seeds), count.data_s,
+                         100.0 * count.in_trial / count.seeds, 100.0 * in.lower, 100.0 * in.upper,
+                         100.0 * count.by_trial / count.seeds, 100.0 * by.lower, 100.0 * by.upper,
+                         median(count.paid)}});
   }
   return out;
 }
@@ -142,10 +142,10 @@ ExperimentTable seeds_table(const std::map<int, std::vector<SeedTrial>>& seeds) 
                       {}};
   for (const auto& [seed, trials] : seeds) {
     for (const SeedTrial& one : trials) {
-      out.rows.push_back({{},
-                          {static_cast<double>(seed), static_cast<double>(one.trial), one.data_s,
-                           one.promised, one.paid,
-                           one.judged ? (one.success ? 1.0 : 0.0) : kNone}});
+      out.rows.push_back(
+          {{},
+           {static_cast<double>(seed), static_cast<double>(one.trial), one.data_s, one.promised,
+            one.paid, one.judged ? (one.success ? 1.0 : 0.0) : kNone}});
     }
   }
   return out;
@@ -168,8 +168,7 @@ std::string success_finding(const std::map<int, TrialCount>& counts) {
   for (const auto& [trial, count] : counts) {
     const ShareInterval interval = share_interval(count.by_trial, count.seeds);
     out += fmt::format("{} {}: {} of {} ({:.0f} to {:.0f} %)", out.back() == 'l' ? "" : ",", trial,
-                       count.by_trial, count.seeds, 100.0 * interval.lower,
-                       100.0 * interval.upper);
+                       count.by_trial, count.seeds, 100.0 * interval.lower, 100.0 * interval.upper);
   }
   return out + ".";
 }
@@ -204,8 +203,7 @@ ExperimentSummary policy_seeds_summary(const fs::path& folder, const json& reque
     if (key == "seed" || value.is_null()) continue;
     std::string name = key;
     std::ranges::replace(name, '_', ' ');
-    out.settings.emplace_back(name,
-                              value.is_string() ? value.get<std::string>() : value.dump());
+    out.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
   }
   out.findings = {success_finding(counts)};
   out.tables = {success_table(counts), seeds_table(seeds)};

@@ -27,6 +27,9 @@ const policy::Controller kStill = [](const Eigen::VectorXd&, int) {
   return Eigen::VectorXd(Eigen::VectorXd::Zero(1));
 };
 
+// Long enough for a shell to start on a busy machine.
+constexpr double kSoon_s = 1.0;
+
 struct Outcome {
   ExitCode code = ExitCode::kDone;
   std::string words;
@@ -95,9 +98,9 @@ TEST(ProgramSystem, AnglesGoOnAfterAWholeTurn) {
 
 TEST(ProgramSystem, SaysWhatTheProgramDid) {
   const std::string head = "echo angle,angle_speed; ";
-  expect(rollout_of(head + "echo 0,0; sleep 60", 0.2), ExitCode::kUndetermined,
-         "wrote no state 2 of 4 within 0.2 s");
-  expect(rollout_of("sleep 60", 0.2), ExitCode::kUndetermined, "wrote no columns within 0.2 s");
+  expect(rollout_of(head + "echo 0,0; sleep 60", kSoon_s), ExitCode::kUndetermined,
+         "wrote no state 2 of 4 within 1 s");
+  expect(rollout_of("sleep 60", kSoon_s), ExitCode::kUndetermined, "wrote no columns within 1 s");
   expect(rollout_of(head + "echo 0,0; echo no motor >&2; exit 3"), ExitCode::kUndetermined,
          "ended with exit code 3 before its state 2 of 4: no motor");
   expect(rollout_of(head + "echo 0,0; kill -SEGV $$"), ExitCode::kUndetermined,
@@ -113,7 +116,7 @@ TEST(ProgramSystem, SaysWhatTheProgramDid) {
   expect(rollout_of(good + "exit 2"), ExitCode::kUndetermined, "exit code 2 after its rollout");
   expect(rollout_of(good + "echo angle,angle_speed; echo 1,1"), ExitCode::kUndetermined,
          "before its smoothed state 2 of 4");
-  expect(rollout_of(good + "sleep 60", 0.2), ExitCode::kUndetermined, "no end of its output");
+  expect(rollout_of(good + "sleep 60", kSoon_s), ExitCode::kUndetermined, "no end of its output");
   const Outcome none = outcome_of(
       [] { LineProgram({"./no_such_program"}, truth::temporary_path("x").parent_path(), 1.0); });
   expect(none, ExitCode::kBadInput, "./no_such_program: cannot be started: No such file");
@@ -124,7 +127,7 @@ TEST(ProgramSystem, LeavesNoProgramBehind) {
   const fs::path pid_file = truth::temporary_path("pid");
   const auto before = std::chrono::steady_clock::now();
   const Outcome outcome =
-      rollout_of(fmt::format("sleep 61 & echo $! > '{}'; wait", pid_file.string()), 0.3);
+      rollout_of(fmt::format("sleep 61 & echo $! > '{}'; wait", pid_file.string()), kSoon_s);
   EXPECT_EQ(outcome.code, ExitCode::kUndetermined);
   EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
   const pid_t pid = std::stoi(read_text_file(pid_file));
