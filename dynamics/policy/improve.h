@@ -85,7 +85,7 @@ struct SearchHooks {
 };
 
 struct Improvement {
-  SearchState search;  ///< its policy is the result
+  SearchState search{};  ///< its policy is the result
   SearchStatus status = SearchStatus::kNotRun;
   double cost = 0.0;        ///< expected, of the particles without dropout
   double cost_sigma = 0.0;  ///< of one rollout

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/policy/mc_pilco.h"
 
+#include <algorithm>
+#include <limits>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -97,40 +100,79 @@ class Learner {
     state_.model = learn_model(system_.layout(), state_.trials, model,
                                state_.model ? &*state_.model : nullptr);
     state_.model_trials = trial_number();
+    state_.starts.clear();
     state_.search.reset();
     save();
   }
 
-  [[nodiscard]] RbfPolicy new_policy(int redraw) const {
+  [[nodiscard]] RbfPolicy new_policy(int number) const {
     const std::uint64_t seed =
-        seed_of(state_.seed, fmt::format("policy {}", redraw), state_.trials.size());
+        seed_of(state_.seed, fmt::format("policy {}", number), state_.trials.size());
     return draw_policy(system_.layout(), options_.policy, states_seen(state_.trials), seed);
   }
 
-  Improvement search() {
-    ImproveOptions improvement = options_.improve;
-    if (state_.records.empty()) improvement.max_steps = options_.first_max_steps;
-    if (!state_.search) {
-      const bool keep = options_.keep_policy && !state_.policies.empty();
-      state_.search = begin_search(keep ? state_.policies.back() : new_policy(0), improvement,
-                                   seed_of(state_.seed, "search", state_.trials.size()));
-    }
+  // A start of the search, the policy of the trial before first.
+  [[nodiscard]] SearchState new_start(std::size_t number) const {
+    const bool keep = options_.keep_policy && !state_.policies.empty() && number == 0;
+    return begin_search(
+        keep ? state_.policies.back() : new_policy(static_cast<int>(number)), options_.improve,
+        seed_of(state_.seed, fmt::format("search {}", number), state_.trials.size()));
+  }
+
+  // Goes on with state_.search up to a number of steps.
+  Improvement go_on(LearnerStage stage, int max_steps) {
+    ImproveOptions options = options_.improve;
+    options.max_steps = max_steps;
     SearchHooks hooks;
     hooks.stop = hooks_.stop;
     hooks.save_period = hooks_.save_period;
-    hooks.progress = [this](const SearchProgress& p) { report(LearnerStage::kSearching, p); };
-    hooks.save = [this](const SearchState& s) {
+    hooks.progress = [&](const SearchProgress& p) { report(stage, p); };
+    hooks.save = [&](const SearchState& s) {
       state_.search = s;
       save();
     };
-    Improvement out = improve(
-        *state_.model, task_, *state_.search, [this](int redraw) { return new_policy(redraw); },
-        improvement, hooks);
+    const auto redraw = [&](int number) {
+      return new_policy(static_cast<int>(state_.starts.size()) + options_.starts * number);
+    };
+    Improvement out =
+        improve(*state_.model, task_, std::move(value_of(state_.search)), redraw, options, hooks);
+    state_.search = out.search;
+    return out;
+  }
+
+  // False where it was stopped.
+  bool run_starts() {
+    const auto count = static_cast<std::size_t>(options_.starts);
+    while (state_.starts.size() < count) {
+      if (!state_.search) state_.search = new_start(state_.starts.size());
+      const Improvement found = go_on(LearnerStage::kStarting, options_.start_steps);
+      if (found.status == SearchStatus::kStopped) return false;
+      state_.starts.push_back(value_of(state_.search));
+      state_.search.reset();
+    }
+    if (!state_.search) state_.search = *std::ranges::min_element(state_.starts, {}, recent_cost);
+    return true;
+  }
+
+  // Mean over the last steps; a start that failed has none.
+  static double recent_cost(const SearchState& search) {
+    constexpr std::size_t kSteps = 20;
+    if (search.costs.empty()) return std::numeric_limits<double>::infinity();
+    const std::size_t count = std::min(kSteps, search.costs.size());
+    return std::accumulate(search.costs.end() - static_cast<std::ptrdiff_t>(count),
+                           search.costs.end(), 0.0) /
+           static_cast<double>(count);
+  }
+
+  Improvement search() {
+    if (!run_starts()) return {{}, SearchStatus::kStopped};
+    const bool first = state_.records.empty();
+    Improvement out = go_on(LearnerStage::kSearching,
+                            first ? options_.first_max_steps : options_.improve.max_steps);
     if (out.status == SearchStatus::kFailed) {
       throw undetermined("search", "the cost of the particles is not finite, whatever the policy",
                          "choose the squared-exponential kernel, or explore for longer");
     }
-    state_.search = out.search;
     return out;
   }
 
@@ -154,6 +196,7 @@ class Learner {
     state_.policies.push_back(policy);
     state_.records.push_back(std::move(record));
     state_.trials.push_back(std::move(trial));
+    state_.starts.clear();
     state_.search.reset();
     save();
   }
@@ -171,8 +214,9 @@ void check_learner(const System& system, const PolicyTask& task, const LearnerOp
   check_layout(system.layout());
   check_task(task, system.layout());
   check_options(options.improve);
-  for (const int count : {options.explorations, options.trials, options.first_max_steps,
-                          options.promise_particles, options.exploration_hold}) {
+  for (const int count :
+       {options.explorations, options.trials, options.first_max_steps, options.promise_particles,
+        options.exploration_hold, options.starts, options.start_steps}) {
     if (count < 1) {
       throw bad_request("learner", fmt::format("a number of {}", count),
                         "explorations, trials, steps, particles and hold are 1 or more");

@@ -22,8 +22,13 @@ struct LearnerOptions {
   int first_max_steps = 2000;  ///< of the search before the first trial; later: improve.max_steps
   int explorations = 1;        ///< rollouts with random inputs
   int trials = 5;              ///< with a learned policy
-  /// A search starts from the policy of the trial before; else from a newly drawn one.
+  /// The policy of the trial before is one of the starts of a search; else all are newly drawn.
   bool keep_policy = true;
+  /// Starts of a search: so many policies take `start_steps` steps each, and only the one whose
+  /// cost is then lowest goes on. One in ten single starts ends in a policy that leaves a pendulum
+  /// hanging.
+  int starts = 3;
+  int start_steps = 100;
   int promise_particles = 400;  ///< that the promised cost is measured with
   /// The random input holds each value, uniform within the limits, for so many steps.
   int exploration_hold = 1;
@@ -48,10 +53,11 @@ struct LearnerState {
   std::vector<RbfPolicy> policies{};     ///< one a record
   std::optional<VelocityModel> model{};  ///< learned from the first `model_trials` trials
   int model_trials = 0;
-  std::optional<SearchState> search{};  ///< of a search that was stopped or is going on
+  std::vector<SearchState> starts{};    ///< of the search for the next trial, those that are done
+  std::optional<SearchState> search{};  ///< what was stopped or is going on: a start, or the search
 };
 
-enum class LearnerStage { kExploring, kModelling, kSearching, kTrial, kDone };
+enum class LearnerStage { kExploring, kModelling, kStarting, kSearching, kTrial, kDone };
 struct LearnerProgress {
   LearnerStage stage = LearnerStage::kExploring;
   int trial = 0;  ///< number among all, explorations included

@@ -24,6 +24,8 @@ LearnerOptions small() {
   out.first_max_steps = 40;
   out.promise_particles = 48;
   out.trials = 2;
+  out.starts = 2;
+  out.start_steps = 10;
   return out;
 }
 
@@ -75,20 +77,21 @@ TEST(Learner, GoesOnFromWhatWasSavedToTheSameBits) {
 
 TEST(Learner, StopsWhenAskedAndGoesOn) {
   const CartPole plant;
-  std::stop_source stop;
-  LearnerHooks hooks;
-  hooks.stop = stop.get_token();
-  hooks.progress = [&](const LearnerProgress& p) {
-    if (p.stage == LearnerStage::kSearching && p.trial == 2 && p.search.step == 11) {
-      stop.request_stop();
-    }
-  };
-  const LearnerState stopped = learn(plant, short_task(), small(), {.seed = 5}, hooks);
-  ASSERT_EQ(stopped.trials.size(), 2U);
-  EXPECT_EQ(value_of(stopped.search).step, 11);
   const LearnerState whole = learn(plant, short_task(), small(), {.seed = 5});
-  const LearnerState rest = learn(plant, short_task(), small(), stopped);
-  EXPECT_TRUE(rest.policies.back() == whole.policies.back());
+  for (const LearnerStage stage : {LearnerStage::kStarting, LearnerStage::kSearching}) {
+    const int stop_at = stage == LearnerStage::kStarting ? 6 : 17;
+    std::stop_source stop;
+    LearnerHooks hooks;
+    hooks.stop = stop.get_token();
+    hooks.progress = [&](const LearnerProgress& p) {
+      if (p.trial == 2 && p.search.step == stop_at && p.stage == stage) stop.request_stop();
+    };
+    const LearnerState stopped = learn(plant, short_task(), small(), {.seed = 5}, hooks);
+    ASSERT_EQ(stopped.trials.size(), 2U);
+    EXPECT_EQ(value_of(stopped.search).step, stop_at);
+    const LearnerState rest = learn(plant, short_task(), small(), stopped);
+    EXPECT_TRUE(rest.policies.back() == whole.policies.back());
+  }
 }
 
 TEST(Improve, RefusesACostThatNeverChanges) {
