@@ -14,10 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 Writer writer_of(const PolicyCommandOptions& options, std::vector<std::string> products) {
-  Writer out{.command = "policy",
-             .products = std::move(products),
-             .inputs = {},
-             .force = options.force};
+  Writer out{
+      .command = "policy", .products = std::move(products), .inputs = {}, .force = options.force};
   std::error_code error;
   if (fs::exists(options.system, error)) out.inputs.emplace_back(options.system);
   return out;

@@ -24,9 +24,11 @@ struct PolicyCommandOptions {
   int explorations = 1;       ///< trials with random inputs, first
   int particles = 400;
   int basis_functions = 200;
+  int starts = 3;           ///< of each search; the best goes on
   int search_steps = 4000;  ///< of each search, at most
   policy::VelocityKernel kernel = policy::VelocityKernel::kSquaredExponential;
   std::optional<policy::Sensing> sensing;  ///< of a problem of the literature; none: full state
+  bool plain = false;                      ///< positions alone, but the model knows nothing of it
   int threads = 0;                         ///< 0: all of the machine
   std::filesystem::path output;            ///< folder
   bool force = false;                      ///< begin anew, and replace what others wrote

@@ -34,6 +34,8 @@ constexpr CountOption kCounts[] = {
      "Rollouts of the model that estimate the cost of a policy; more: smoother and slower"},
     {"--basis-functions", &PolicyCommandOptions::basis_functions, 1, 10000,
      "Of the policy; more: finer and slower"},
+    {"--starts", &PolicyCommandOptions::starts, 1, 100,
+     "Policies that each search begins with; the one that costs least soon goes on"},
     {"--search-steps", &PolicyCommandOptions::search_steps, 1, 1000000,
      "Gradient steps before each trial, at most; it stops where the cost no longer falls"},
 };
@@ -84,6 +86,12 @@ void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
            "Of a plant of the literature: full (default), or positions, from which speeds are "
            "estimated")
       ->type_name("WHAT");
+  command
+      .add_flag(
+          "--plain", policy.plain,
+          "With --sensing positions, for comparison: the model's particles do not see through "
+          "the sensors and their filters")
+      ->group(kHow);
 }
 
 // "3..7".
@@ -150,7 +158,7 @@ void add_policy(CLI::App& app, CommandLine& line) {
   command.footer(
       fmt::format("Examples:\n  kinescope policy cartpole --seed 1 -o cartpole_1\n"
                   "  kinescope policy my_robot.yaml --trials 8\n"
-      "  kinescope policy cartpole --seeds 1..50 -o cartpole_seeds\n\n{}",
+                  "  kinescope policy cartpole --seeds 1..50 -o cartpole_seeds\n\n{}",
                   kExitCodes));
 }
 

@@ -30,14 +30,20 @@ bool is_of_the_literature(const std::string& system) {
 
 PolicyProblem problem_of(const PolicyCommandOptions& options) {
   if (is_of_the_literature(options.system)) {
-    return policy::problem_named(options.system, options.sensing.value_or(Sensing::kFullState));
+    const Sensing sensing = options.sensing.value_or(Sensing::kFullState);
+    if (options.plain && sensing == Sensing::kFullState) {
+      throw bad_request("--plain", "changes nothing where speeds are measured",
+                        "give --sensing positions, too");
+    }
+    return policy::problem_named(options.system, sensing, options.plain);
   }
   if (fs::path(options.system).extension().empty() && !fs::exists(options.system)) {
     // A misspelt name rather than a file.
     return policy::problem_named(options.system, Sensing::kFullState);
   }
-  if (options.sensing) {
-    throw bad_request("--sensing", fmt::format("is said by {} itself", options.system),
+  if (options.sensing || options.plain) {
+    throw bad_request(options.sensing ? "--sensing" : "--plain",
+                      fmt::format("is said by {} itself", options.system),
                       "write its key `sensing` there");
   }
   return read_policy_problem(options.system);
@@ -51,6 +57,8 @@ void set_learner(PolicyProblem& problem, const PolicyCommandOptions& options) {
   learner.improve.particles = options.particles;
   learner.promise_particles = options.particles;
   learner.improve.max_steps = options.search_steps;
+  learner.starts = options.starts;
+  learner.start_steps = std::min(learner.start_steps, options.search_steps);
   learner.first_max_steps = std::min(learner.first_max_steps, options.search_steps);
   learner.improve.threads = options.threads;
   learner.model.threads = options.threads;
@@ -65,9 +73,13 @@ void set_learner(PolicyProblem& problem, const PolicyCommandOptions& options) {
   learner.model.physics = problem.physics;
 }
 
+std::string sensing_word(const PolicyProblem& problem, const PolicyCommandOptions& options) {
+  if (options.plain) return "positions, plain";
+  return problem.task.sensing.sensing == Sensing::kPositionsOnly ? "positions" : "full";
+}
+
 nlohmann::json fingerprint_of(const PolicyRequest& request, const PolicyCommandOptions& options) {
   const PolicyProblem& problem = request.problem;
-  const bool positions = problem.task.sensing.sensing == Sensing::kPositionsOnly;
   return {{"system", problem.name},
           {"file_sha256", request.inputs.empty() ? nlohmann::json()
                                                  : nlohmann::json(request.inputs.front().sha256)},
@@ -75,9 +87,10 @@ nlohmann::json fingerprint_of(const PolicyRequest& request, const PolicyCommandO
           {"explorations", options.explorations},
           {"particles", options.particles},
           {"basis_functions", options.basis_functions},
+          {"starts", options.starts},
           {"search_steps", options.search_steps},
           {"kernel", policy::name_of(options.kernel)},
-          {"sensing", positions ? "positions" : "full"}};
+          {"sensing", sensing_word(problem, options)}};
 }
 
 std::string stage_words(const policy::LearnerProgress& progress, int trials) {
@@ -87,6 +100,8 @@ std::string stage_words(const policy::LearnerProgress& progress, int trials) {
       return fmt::format("{}, random inputs", trial);
     case LearnerStage::kModelling:
       return fmt::format("{}, model", trial);
+    case LearnerStage::kStarting:
+      return fmt::format("{}, starts of the policy\tcost {:.3f}", trial, progress.search.cost);
     case LearnerStage::kSearching:
       // After the tab: what it has come to, which begins no new stage.
       return fmt::format("{}, policy\tcost {:.3f}", trial, progress.search.cost);
@@ -99,7 +114,8 @@ std::string stage_words(const policy::LearnerProgress& progress, int trials) {
 }
 
 void show(const Progress& progress, const policy::LearnerProgress& learner, int trials) {
-  const bool searching = learner.stage == LearnerStage::kSearching;
+  const bool searching =
+      learner.stage == LearnerStage::kSearching || learner.stage == LearnerStage::kStarting;
   report_progress(progress, stage_words(learner, trials), searching ? learner.search.step : 0,
                   searching ? learner.search.max_steps : 0);
 }
@@ -131,13 +147,11 @@ PolicyRequest make_policy_request(const PolicyCommandOptions& options) {
       {"Seed", fmt::format("{}", options.seed)},
       {"Trial", fmt::format("{} steps of {:g} s", out.problem.task.steps, layout.step_s)},
       {"Particles", fmt::format("{}", options.particles)},
-      {"Policy", fmt::format("{} basis functions, at most {} gradient steps a trial",
-                             options.basis_functions, options.search_steps)},
+      {"Policy", fmt::format("{} basis functions, {} starts, at most {} gradient steps a trial",
+                             options.basis_functions, options.starts, options.search_steps)},
       {"Model",
        fmt::format("one Gaussian process a speed, kernel {}", policy::name_of(options.kernel))},
-      {"Measured", out.problem.task.sensing.sensing == Sensing::kPositionsOnly
-                       ? "positions; speeds are estimated"
-                       : "positions and speeds"}};
+      {"Measured", sensing_word(out.problem, options)}};
   return out;
 }
 

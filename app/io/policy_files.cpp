@@ -104,7 +104,9 @@ json state_json(const policy::LearnerState& state) {
            {"policies", json::array()},
            {"model", state.model ? velocity_model_json(*state.model) : json()},
            {"model_trials", state.model_trials},
+           {"starts", json::array()},
            {"search", state.search ? search_json(*state.search) : json()}};
+  for (const policy::SearchState& start : state.starts) out["starts"].push_back(search_json(start));
   for (const policy::Trial& trial : state.trials) out["trials"].push_back(trial_json(trial));
   for (const policy::TrialRecord& record : state.records) {
     out["records"].push_back(record_json(record));
@@ -135,6 +137,9 @@ policy::LearnerState state_of(const json& object, const StateLayout& layout,
   out.model_trials = read.integer(read.at(object, "model_trials"), "model_trials");
   const json& model = read.at(object, "model");
   if (!model.is_null()) out.model = velocity_model_of(model, layout, std::move(physics), read);
+  for (const json& start : read.array(object, "starts")) {
+    out.starts.push_back(search_of(start, layout, read));
+  }
   const json& search = read.at(object, "search");
   if (!search.is_null()) out.search = search_of(search, layout, read);
   return out;

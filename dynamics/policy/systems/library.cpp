@@ -181,7 +181,7 @@ std::vector<std::string> problem_names() {
   return {"cartpole", "furuta", "ball_plate", "pendubot", "acrobot"};
 }
 
-PolicyProblem problem_named(std::string_view name, Sensing sensing) {
+PolicyProblem problem_named(std::string_view name, Sensing sensing, bool plain) {
   const Description known = describe(name, sensing);
   const StateLayout& layout = known.mechanism.layout;
   PolicyProblem out;
@@ -191,7 +191,7 @@ PolicyProblem problem_named(std::string_view name, Sensing sensing) {
   const SensingOptions sensors = sensors_of(known, sensing);
   // As in the benchmark: particles of a measured state are seen as they are, the model's noise
   // holds the sensors'; where only positions are measured, the particles have the sensors, too.
-  if (sensing == Sensing::kPositionsOnly) out.task.sensing = sensors;
+  if (sensing == Sensing::kPositionsOnly && !plain) out.task.sensing = sensors;
   out.task.steps = static_cast<int>(std::lround(known.horizon_s / layout.step_s));
   out.learner.trials = known.trials;
   out.tolerance = known.tolerance;
@@ -200,9 +200,10 @@ PolicyProblem problem_named(std::string_view name, Sensing sensing) {
   }
   out.skeleton = known.skeleton;
   out.system = std::make_shared<const SimulatedSystem>(
-      known.mechanism, SimulatedTrials{.start = known.start,
-                                       .sensors = sensors,
-                                       .smoothing_cutoff_hz = kSpeedCutoffShare / layout.step_s});
+      known.mechanism,
+      SimulatedTrials{.start = known.start,
+                      .sensors = sensors,
+                      .smoothing_cutoff_hz = plain ? 0.0 : kSpeedCutoffShare / layout.step_s});
   return out;
 }
 

@@ -44,7 +44,7 @@ Eigen::VectorXd limited_input(const Controller& controller, const Eigen::VectorX
 Eigen::MatrixXd smoothed_signal(const Eigen::MatrixXd& seen,
                                 const Eigen::MatrixXd& measured_positions,
                                 const StateLayout& layout, Sensing sensing, double cutoff_hz) {
-  if (sensing == Sensing::kFullState) return seen;
+  if (sensing == Sensing::kFullState || cutoff_hz <= 0.0) return seen;
   return smoothed_states(measured_positions, layout.step_s, cutoff_hz);
 }
 

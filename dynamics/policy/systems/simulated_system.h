@@ -13,7 +13,8 @@ namespace kinescope::policy {
 struct SimulatedTrials {
   StartDistribution start;
   SensingOptions sensors;
-  double smoothing_cutoff_hz = 0.0;  ///< afterwards, where only positions are measured
+  /// Afterwards, where only positions are measured; 0: none, the model learns from what was seen.
+  double smoothing_cutoff_hz = 0.0;
 };
 
 class SimulatedSystem : public System {

@@ -110,6 +110,22 @@ TEST_F(PolicyCommand, ThePolicyFileIsThePolicyOfTheTrial) {
   }
 }
 
+// The same first trial; then a model that learns from what was seen.
+TEST_F(PolicyCommand, PlainDoesNotKnowItsSensors) {
+  const Words positions{"--trials", "1", "--sensing", "positions"};
+  Words plain = positions;
+  plain.emplace_back("--plain");
+  ASSERT_EQ(run(small("cartpole", "pms", positions)).code, 0);
+  ASSERT_EQ(run(small("cartpole", "plain", plain)).code, 0);
+  const CsvTable known = read_csv(in("pms/trial_0.csv"));
+  const CsvTable unknown = read_csv(in("plain/trial_0.csv"));
+  EXPECT_TRUE(known.column("pole_speed_smoothed").has_value());
+  EXPECT_FALSE(unknown.column("pole_speed_smoothed").has_value());
+  const std::size_t speed = known.require_column("pole_speed");
+  EXPECT_EQ(known.rows[20][speed], unknown.rows[20][unknown.require_column("pole_speed")]);
+  EXPECT_NE(text_of("pms/velocity_model.json"), text_of("plain/velocity_model.json"));
+}
+
 TEST_F(PolicyCommand, ThreadsChangeNothing) {
   ASSERT_EQ(run(small("cartpole", "one", {"--trials", "1", "--threads", "1"})).code, 0);
   ASSERT_EQ(run(small("cartpole", "two", {"--trials", "1", "--threads", "3"})).code, 0);
@@ -214,6 +230,8 @@ TEST_F(PolicyCommand, RefusesWhatMakesNoSense) {
   expect_refusal(small("none.yaml", "out"), ExitCode::kBadInput, "none.yaml");
   expect_refusal(small("ball_plate", "out", {"--kernel", "semi_parametric"}), ExitCode::kBadRequest,
                  "nothing is known of the physics");
+  expect_refusal(small("cartpole", "out", {"--plain"}), ExitCode::kBadRequest,
+                 "--plain: changes nothing");
   EXPECT_EQ(run(small("cartpole", "out", {"--kernel", "rbf"})).code, 2);
   EXPECT_EQ(run(small("cartpole", "out", {"--particles", "0"})).code, 2);
   EXPECT_FALSE(fs::exists(in("out")));
