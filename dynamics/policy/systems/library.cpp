@@ -93,11 +93,12 @@ Vector2d slanted(double x, double y, double z) { return {x - 0.35 * y, z - 0.35 
 Description furuta_problem(Sensing) {
   const Furuta values;
   Description out{.mechanism = furuta(values)};
-  out.cost.terms = {{0, 0.0, 2.0, CostError::kDifference}, {1, pi, 3.0, CostError::kAbsolute}};
+  out.cost.terms = {{0, 0.0, 2.0, CostError::kDifference}, {1, pi, 2.0, CostError::kAbsolute}};
   out.start = at_rest(2, 0.01);
   out.noise = list({3e-3, 3e-3, 3e-2, 3e-2});
   out.position_noise = 3e-3;
   out.tolerance = list({30.0 * kDegree, 10.0 * kDegree});
+  out.trials = 6;
   out.physics = {"arm speed",
                  "pole speed",
                  "voltage",
