@@ -159,7 +159,7 @@ void LineProgram::write_line(std::string_view line) {
     const ssize_t count = ::send(input_, rest.data(), rest.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count > 0) {
       rest.remove_prefix(static_cast<std::size_t>(count));
-    } else if (errno != EINTR && errno != EAGAIN) {
+    } else if (count == 0 || (errno != EINTR && errno != EAGAIN)) {
       return;
     }
   }

@@ -43,7 +43,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 // One rollout of a program: what it says, and what is wrong with it.
 class Conversation {
  public:
-  Conversation(const ProgramCall& call, std::vector<std::string> words)
+  Conversation(const ProgramCall& call, const std::vector<std::string>& words)
       : name_(fmt::format("{}", fmt::join(call.words, " "))),
         timeout_s_(call.timeout_s),
         program_(words, call.folder, call.timeout_s) {}
@@ -172,7 +172,7 @@ policy::Trial ProgramSystem::run(const policy::Controller& controller, int steps
   std::vector<std::string> words = call_.words;
   words.insert(words.end(), {"--steps", fmt::format("{}", steps), "--trial",
                              fmt::format("{}", trial), "--seed", fmt::format("{}", seed)});
-  Conversation talk(call_, std::move(words));
+  Conversation talk(call_, words);
   talk.program().write_line(fmt::format("{}", fmt::join(layout_.inputs, ",")));
   const std::vector<Index> order = talk.order_of(talk.require_line("columns"), columns);
   policy::OnlineFilter filter(layout_, sensing_);

@@ -160,8 +160,13 @@ Improvement improve(const VelocityModel& model, const PolicyTask& task, SearchSt
                     const std::function<RbfPolicy(int redraw)>& redraw,
                     const ImproveOptions& options, const SearchHooks& hooks) {
   check_options(options);
+  check_model(model);
   check_task(task, model.layout);
   check_policy(begin.policy, model.layout);
+  const Index parameters = parameters_of(begin.policy).size();
+  if (begin.first_moment.size() != parameters || begin.second_moment.size() != parameters) {
+    throw bad_request("search", "its averages are not those of its policy", "begin it anew");
+  }
   Search search(model, task, std::move(begin), options);
   SearchState& state = search.state();
   Improvement out;

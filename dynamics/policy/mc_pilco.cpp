@@ -46,6 +46,38 @@ Eigen::MatrixXd states_seen(const std::vector<Trial>& trials) {
   return out;
 }
 
+void check_trial(const StateLayout& layout, const Trial& trial, int steps, std::size_t number) {
+  const bool fits = trial.seen.rows() == steps + 1 && trial.seen.cols() == layout.state_count() &&
+                    trial.inputs.rows() == steps && trial.inputs.cols() == layout.input_count();
+  if (fits && trial.seen.allFinite()) return;
+  throw bad_request(fmt::format("trial {}", number),
+                    fmt::format("{} x {} states that are all finite and {} x {} inputs were "
+                                "expected",
+                                steps + 1, layout.state_count(), steps, layout.input_count()),
+                    "let the system report all of its states at every step");
+}
+
+void check_state(const System& system, const LearnerState& state, const PolicyTask& task,
+                 const LearnerOptions& options) {
+  for (std::size_t k = 0; k < state.trials.size(); ++k) {
+    check_trial(system.layout(), state.trials[k], task.steps, k);
+  }
+  const std::size_t explorations =
+      std::min(state.trials.size(), static_cast<std::size_t>(options.explorations));
+  const bool fits = state.records.size() == state.trials.size() - explorations &&
+                    state.policies.size() == state.records.size() &&
+                    state.starts.size() <= static_cast<std::size_t>(options.starts) &&
+                    state.model_trials <= static_cast<int>(state.trials.size()) &&
+                    (!state.model || state.model->layout.positions == system.layout().positions);
+  if (fits) return;
+  throw bad_request("saved state",
+                    fmt::format("{} trials, {} records and a model of {} trials do not fit {} "
+                                "explorations of this system",
+                                state.trials.size(), state.records.size(), state.model_trials,
+                                options.explorations),
+                    "go on with the options that it was begun with, or begin anew");
+}
+
 // One run of learn().
 class Learner {
  public:
@@ -81,7 +113,9 @@ class Learner {
   }
 
   Trial run_trial(const Controller& controller) const {
-    return system_.run(controller, task_.steps, state_.seed, trial_number());
+    Trial out = system_.run(controller, task_.steps, state_.seed, trial_number());
+    check_trial(system_.layout(), out, task_.steps, state_.trials.size());
+    return out;
   }
 
   void explore() {
@@ -227,6 +261,7 @@ void check_learner(const System& system, const PolicyTask& task, const LearnerOp
 LearnerState learn(const System& system, const PolicyTask& task, const LearnerOptions& options,
                    LearnerState state, const LearnerHooks& hooks) {
   check_learner(system, task, options);
+  check_state(system, state, task, options);
   return Learner(system, task, options, std::move(state), hooks).run();
 }
 

@@ -76,6 +76,7 @@ struct LearnerHooks {
 void check_learner(const System& system, const PolicyTask& task, const LearnerOptions& options);
 
 /// Goes on from `state` (begin with LearnerState{.seed = ..}) for all trials, or until stopped.
+/// Throws bad_request for a state of another system or of other options.
 /// Throws what the system, the model or the search throw; what was saved before stays valid.
 [[nodiscard]] LearnerState learn(const System& system, const PolicyTask& task,
                                  const LearnerOptions& options, LearnerState state,

@@ -39,6 +39,7 @@ double ParticleRollout::cost_sigma() const {
 
 ParticleRollout roll_out(const VelocityModel& model, const PolicyTask& task,
                          const RbfPolicy& policy, int particles, std::uint64_t seed, int threads) {
+  check_model(model);
   check_task(task, model.layout);
   check_policy(policy, model.layout);
   if (particles < 1) {

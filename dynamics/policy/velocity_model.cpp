@@ -207,6 +207,36 @@ std::string_view name_of(VelocityKernel kernel) {
   KINESCOPE_CHECK(false, "a kernel that is not known");
 }
 
+void check_model(const VelocityModel& model) {
+  check_layout(model.layout);
+  const Index columns = feature_count(model.layout) + model.layout.input_count();
+  const Index linear = model.physics ? model.physics->count() : columns;
+  const auto factors =
+      static_cast<std::size_t>(model.kernel == VelocityKernel::kPolynomial2
+                                   ? 2
+                                   : (model.kernel == VelocityKernel::kSemiParametric ? 1 : 0));
+  bool fits = static_cast<Index>(model.processes.size()) == model.layout.position_count();
+  fits = fits && (model.kernel == VelocityKernel::kSemiParametric) == (model.physics != nullptr);
+  for (const VelocityProcess& p : model.processes) {
+    const KernelValues& k = p.kernel;
+    fits = fits && p.inputs.cols() == columns && p.inputs.rows() == p.targets.size() &&
+           p.targets.size() > 0 && k.length_scales.size() == columns && k.factors.size() == factors;
+    for (const LinearFactor& f : k.factors) {
+      fits = fits && f.weights.size() == linear && f.weights.allFinite() && f.offset >= 0.0;
+    }
+    fits = fits && p.inputs.allFinite() && p.targets.allFinite() && k.length_scales.allFinite() &&
+           (k.length_scales.array() > 0.0).all() && k.variance > 0.0 && k.noise_variance > 0.0 &&
+           p.target_scale > 0.0;
+  }
+  if (fits) return;
+  throw bad_request(
+      "model",
+      fmt::format("its {} processes do not fit {} positions and kernel {}, or hold a "
+                  "number that is not finite",
+                  model.processes.size(), model.layout.position_count(), name_of(model.kernel)),
+      "give a model of this system, or learn it again");
+}
+
 VelocityModel learn_model(const StateLayout& layout, const std::vector<Trial>& trials,
                           const ModelOptions& options, const VelocityModel* last) {
   check_model_options(options);

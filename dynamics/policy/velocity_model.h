@@ -80,6 +80,10 @@ struct VelocityModel {
   std::shared_ptr<const PhysicsFeatures> physics;
 };
 
+/// Throws bad_request where sizes contradict each other or a number is not finite or, where it must
+/// be, not above zero.
+void check_model(const VelocityModel& model);
+
 struct ModelOptions {
   VelocityKernel kernel = VelocityKernel::kSquaredExponential;
   std::shared_ptr<const PhysicsFeatures> physics;  ///< of kSemiParametric

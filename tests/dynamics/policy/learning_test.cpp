@@ -94,6 +94,41 @@ TEST(Learner, StopsWhenAskedAndGoesOn) {
   }
 }
 
+TEST(Learner, RefusesAStateOfAnotherRun) {
+  const CartPole plant;
+  LearnerOptions options = small();
+  options.trials = 1;
+  LearnerState state = learn(plant, short_task(), options, {.seed = 5});
+  const auto refused = [&](const LearnerState& s, const LearnerOptions& o, int steps) {
+    PolicyTask task = short_task();
+    task.steps = steps;
+    try {
+      static_cast<void>(learn(plant, task, o, s));
+    } catch (const Error& e) {
+      return e.code() == ExitCode::kBadRequest;
+    }
+    return false;
+  };
+  EXPECT_FALSE(refused(state, options, 20));
+  EXPECT_TRUE(refused(state, options, 21));
+  LearnerOptions two = options;
+  two.explorations = 2;
+  EXPECT_TRUE(refused(state, two, 20));
+  two = options;
+  two.starts = 0;
+  EXPECT_TRUE(refused(state, two, 20));
+  options.trials = 2;
+  LearnerState damaged = state;
+  damaged.trials[0].seen(3, 1) = std::nan("");
+  EXPECT_TRUE(refused(damaged, options, 20));
+  damaged = state;
+  damaged.model_trials = 2;
+  value_of(damaged.model).processes[0].inputs(0, 0) = std::nan("");
+  EXPECT_TRUE(refused(damaged, options, 20));
+  value_of(damaged.model).processes.pop_back();
+  EXPECT_TRUE(refused(damaged, options, 20));
+}
+
 TEST(Improve, RefusesACostThatNeverChanges) {
   const VelocityModel model = random_model(VelocityKernel::kSquaredExponential, 10);
   PolicyTask task = random_task(5);
