@@ -66,8 +66,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, dynamics, predict, simulate, export, contact, experiment, inspect or "
-        "camera; see kinescope --help";
+        "run, trace, correct, dynamics, predict, simulate, export, contact, experiment, policy, "
+        "inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -187,6 +187,11 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
       experiment.data = log_settings(line, experiment.log, experiment.data);
     return experiment_command(experiment, console);
   }
+  if (app.got_subcommand("policy")) {
+    PolicyCommandOptions& policy = line.policy;
+    if (policy.output.empty()) policy.output = log_name(policy.system) + "_policy";
+    return policy_command(policy, console);
+  }
   if (app.got_subcommand("inspect")) {
     if (std::filesystem::is_regular_file(line.inspect.recording.folder))
       line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
@@ -252,6 +257,7 @@ int run_program(int argc, const char* const* argv) {
   line.dynamics.command_line = line.run.command_line;
   line.contact.command_line = line.run.command_line;
   line.experiment.command_line = line.run.command_line;
+  line.policy.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

@@ -6,6 +6,7 @@
 
 #include "app/commands/command_options.h"
 #include "app/commands/experiment_command_line.h"
+#include "app/commands/policy_command_line.h"
 #include "app/commands/simulation_command_line.h"
 #include "app/commands/torque_command_line.h"
 #include "app/io/nearest_name.h"
@@ -299,6 +300,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_export(app, line);
   add_contact(app, line);
   add_experiment(app, line);
+  add_policy(app, line);
   add_inspect(app, line);
   add_camera(app, line);
 }

@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/policy.h"
 
 namespace kinescope {
 
@@ -28,6 +29,7 @@ struct CommandLine {
   ExportOptions exported;
   ContactCommandOptions contact;
   ExperimentOptions experiment;
+  PolicyCommandOptions policy;
   InspectOptions inspect;
   CameraOptions camera;
   TraceCommandOptions trace;

@@ -35,14 +35,16 @@ ProgressLine ProgressLine::for_standard_error() {
       }};
 }
 
-void ProgressLine::update(std::string_view stage, int done, int total) {
+void ProgressLine::update(std::string_view words, int done, int total) {
   const std::lock_guard lock(mutex_);
+  const std::string_view stage = words.substr(0, words.find('\t'));
   if (stage != stage_) {
     end_stage();
     stage_ = stage;
     begin_s_ = clock_();
     shown_s_ = begin_s_ - 2.0 * kSecondsBetweenRewrites;
   }
+  note_ = stage.size() < words.size() ? fmt::format(", {}", words.substr(stage.size() + 1)) : "";
   done_ = done;
   total_ = total;
   if (stage_.empty()) return;
@@ -63,8 +65,8 @@ void ProgressLine::end_stage() {
   const std::string count = total_ > 0  ? fmt::format(" {} of {},", done_, total_)
                             : done_ > 0 ? fmt::format(" {},", done_)
                                         : "";
-  out_ << fmt::format("{}{}:{} {:.1f} s\n", terminal_ ? kEraseLine : "", stage_, count,
-                      clock_() - begin_s_)
+  out_ << fmt::format("{}{}:{} {:.1f} s{}\n", terminal_ ? kEraseLine : "", stage_, count,
+                      clock_() - begin_s_, note_)
        << std::flush;
   stage_.clear();
 }
@@ -82,7 +84,7 @@ void ProgressLine::rewrite() {
   } else if (done_ > 0) {
     out_ << fmt::format(" {}", done_);
   }
-  out_ << std::flush;
+  out_ << note_ << std::flush;
 }
 
 }  // namespace kinescope

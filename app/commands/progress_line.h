@@ -24,8 +24,8 @@ class ProgressLine {
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   /// What kinematics/core/progress.h asks for; total 0: not known; no stage: the last one has
-  /// ended. Any thread.
-  void update(std::string_view stage, int done, int total);
+  /// ended. After a tab the words may say what the stage has come to. Any thread.
+  void update(std::string_view words, int done, int total);
   /// Ends the stage that is shown; what is printed next begins at the left edge.
   void finish();
 
@@ -38,6 +38,7 @@ class ProgressLine {
   Clock clock_;
   std::mutex mutex_;
   std::string stage_;  ///< empty: none is shown
+  std::string note_;
   int done_ = 0;
   int total_ = 0;
   double begin_s_ = 0.0;

@@ -62,6 +62,8 @@ class Plot {
 
   /// Pixels of a data point, for what the helper does not draw.
   [[nodiscard]] Eigen::Vector2d place(const Eigen::Vector2d& point) const;
+  /// SVG elements in these pixels.
+  void add(std::string_view elements) { marks_ += elements; }
   [[nodiscard]] std::string str() const;
 
  private:

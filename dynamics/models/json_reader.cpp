@@ -11,9 +11,7 @@ namespace kinescope {
 using Eigen::Index;
 using nlohmann::json;
 
-Error JsonReader::wrong(std::string_view what) const {
-  return bad_input(path_, what, "give a file of kinescope dynamics --save-model");
-}
+Error JsonReader::wrong(std::string_view what) const { return bad_input(path_, what, remedy_); }
 
 const json& JsonReader::at(const json& object, const char* key) const {
   if (!object.is_object() || !object.contains(key))

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,7 +23,9 @@ class JsonReader {
  public:
   using json = nlohmann::json;
 
-  explicit JsonReader(const std::filesystem::path& path) : path_(path.string()) {}
+  explicit JsonReader(const std::filesystem::path& path,
+                      std::string remedy = "give a file of kinescope dynamics --save-model")
+      : path_(path.string()), remedy_(std::move(remedy)) {}
 
   [[nodiscard]] Error wrong(std::string_view what) const;
   [[nodiscard]] const json& at(const json& object, const char* key) const;
@@ -48,6 +51,7 @@ class JsonReader {
 
  private:
   std::string path_;
+  std::string remedy_;
 };
 
 }  // namespace kinescope

@@ -39,6 +39,17 @@ TEST_F(ProgressTest, PlainLinesAtStageEnds) {
   EXPECT_EQ(text(), "");
 }
 
+TEST_F(ProgressTest, WhatAStageHasComeToBeginsNoOther) {
+  ProgressLine line(out, false, clock);
+  line.update("search\tcost 3.0", 1, 0);
+  line.update("search\tcost 2.0", 2, 0);
+  now_s += 1.0;
+  line.update("trial", 0, 0);
+  EXPECT_EQ(text(), "search: 2, 1.0 s, cost 2.0\n");
+  line.finish();
+  EXPECT_EQ(text(), "trial: 0.0 s\n");
+}
+
 TEST_F(ProgressTest, NoStageEndsTheLastOne) {
   ProgressLine line(out, true, clock);
   line.update("gip model", 0, 0);
