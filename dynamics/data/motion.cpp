@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/acceleration_share.h"
+#include "dynamics/data/predictive_cutoff.h"
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/error.h"
@@ -195,6 +196,10 @@ class MotionDeriver {
       throw undetermined(log_.sources.front(), "no joint moves clear of the noise",
                          "record a motion, or state a cut-off (cutoff_hz)");
     }
+    if (!out_.cutoff.chosen) return;
+    const std::vector<CutoffTrial> trials =
+        try_cutoffs(log_, step_s_, out_.source, out_.cutoff.cutoff_hz);
+    out_.cutoff.cutoff_hz = best_predicting_cutoff(trials, out_.cutoff.cutoff_hz);
   }
 
   static double sum_of_squares(const Eigen::VectorXd& errors) {
