@@ -13,7 +13,7 @@ namespace kinescope {
 namespace {
 
 constexpr int kBlocks = 10;
-constexpr double kSignificant = 1.833;  // Student's t of 9 degrees of freedom, 5 %, one-sided
+constexpr double kSignificant = 2.821;  // Student's t of 9 degrees of freedom, 1 %, one-sided
 constexpr double kStepsPerOctave = 2.0;
 constexpr int kStepsDown = 4;     // to a quarter
 constexpr double kHighest = 0.4;  // of the sampling rate
@@ -22,8 +22,11 @@ constexpr Eigen::Index kMostRows = 60000;    // filtered; of a longer log the mi
 constexpr Eigen::Index kMostTargets = 2000;  // torques that are predicted
 constexpr Eigen::Index kFewestTargets = 200;
 constexpr Eigen::Index kFewestRows = 32;
-constexpr double kMostEdge = 0.1;     // of a part, dropped at either end
-constexpr double kRidge = 1e-6;       // of a feature's power: against collinearity only
+constexpr double kMostEdge = 0.1;  // of a part, dropped at either end
+constexpr double kRidge = 1e-6;    // of a feature's power: against collinearity only
+// Gravity of a joint that hardly turns is no curve through its torque: its amplitude is taken as
+// three times the torque's rms, beside errors of a tenth of that.
+constexpr double kGravityRidge = 1e-3;
 constexpr double kUsualWidth = 0.01;  // rad/s or m/s: of the models' Coulomb friction
 constexpr double kStill = 1e-3;       // rad or m: spread of a joint that does not move
 
@@ -132,14 +135,20 @@ Eigen::VectorXd block_errors(const Motions& motion, const Eigen::VectorXd& logge
   const Eigen::MatrixXd rough = rough_torque_features(motion.q, motion.dq, joint, width);
   Eigen::MatrixXd features(rough.rows(), rough.cols() + joints);
   features << rough, motion.ddq;
+  const auto is_gravity = [&](Eigen::Index c) {
+    return c >= rough.cols() - 2 * joints && c < rough.cols();
+  };
   for (Eigen::Index c = 0; c < features.cols(); ++c) {
     const double norm = features.col(c).norm();
-    if (norm > 0.0) features.col(c) /= norm;
+    if (!is_gravity(c) && norm > 0.0) features.col(c) /= norm;
   }
   const Eigen::Index rows = features.rows();
   std::array<Eigen::MatrixXd, kBlocks> grams;
   std::array<Eigen::VectorXd, kBlocks> rights;
   Eigen::MatrixXd gram = kRidge * Eigen::MatrixXd::Identity(features.cols(), features.cols());
+  for (Eigen::Index c = 0; c < features.cols(); ++c) {
+    if (is_gravity(c)) gram(c, c) = kGravityRidge * static_cast<double>(rows);
+  }
   Eigen::VectorXd right = Eigen::VectorXd::Zero(features.cols());
   for (int b = 0; b < kBlocks; ++b) {
     const Eigen::Index from = block_begin(rows, b);

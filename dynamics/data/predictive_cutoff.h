@@ -32,7 +32,7 @@ struct CutoffTrial {
 [[nodiscard]] std::vector<CutoffTrial> try_cutoffs(const TorqueLog& log, double step_s,
                                                    MotionSource source, double cutoff_hz);
 
-/// The trial with the largest gain where that is significant (one-sided t test at 5 % over the
+/// The trial with the largest gain where that is significant (one-sided t test at 1 % over the
 /// blocks), else `cutoff_hz`: what the spectra say stands unless the torque contradicts.
 [[nodiscard]] double best_predicting_cutoff(const std::vector<CutoffTrial>& trials,
                                             double cutoff_hz);

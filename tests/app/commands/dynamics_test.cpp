@@ -387,6 +387,11 @@ TEST(OneJointCommand, MeasuredFrictionOfOneJointIsTraced) {
              "--quiet"});
     EXPECT_EQ(outcome.code, 0) << log << ": " << outcome.err;
     EXPECT_NE(outcome.out.find("Tracing: "), std::string::npos) << outcome.out;
+    // Friction that turns round within 0.01 rad/s at every joint left 12.3 and 19.6 %.
+    const auto document =
+        nlohmann::json::parse(read_text_file(folder.path() / "out/dynamics.json"));
+    EXPECT_LT(document.at("models")[0].at("nmse_percent")[0].get<double>(), 11.0) << log;
+    EXPECT_GT(document.at("data").at("cutoff_hz").get<double>(), 0.7) << log;
   }
 }
 

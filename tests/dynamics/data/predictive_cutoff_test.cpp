@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/data/rough_torque.h"
 #include "kinematics/core/rng.h"
 
 namespace kinescope {
@@ -58,6 +59,13 @@ TEST(PredictiveCutoff, StaysWhereNothingIsSignificantlyBetter) {
 TEST(PredictiveCutoff, TakesTheNearestOfThoseThatDoAsWell) {
   const std::vector<CutoffTrial> trials{{4.0, 0.95, 0.1}, {8.0, 1.0, 0.1}, {16.0, 0.99, 0.1}};
   EXPECT_EQ(best_predicting_cutoff(trials, 2.0), 4.0);
+}
+
+TEST(NarrowWidth, IsATenthOfAnUsualSpeedWhateverAFewPeaks) {
+  Eigen::VectorXd speed = Eigen::VectorXd::Constant(100, -0.003);
+  speed.head(5).setConstant(2.0);
+  EXPECT_NEAR(narrow_width(speed), 0.0003, 1e-9);
+  EXPECT_EQ(narrow_width(Eigen::VectorXd::Zero(100)), 0.0);
 }
 
 TEST(PredictiveCutoff, OfALogWithoutTorqueSaysNothing) {
