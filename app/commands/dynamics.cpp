@@ -341,8 +341,11 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   if (options.gravity_from_torques && !options.gravity_m_s2) {
     take_gravity_of(summary.data.samples, model, summary);
   }
-  models_options.identify.drives = slow_enough(models_options.identify.drives, summary.types,
-                                               moving_speeds(summary.data.samples));
+  // A robot that moves no joint is refused by the fit.
+  if (std::ssize(summary.types) == summary.data.samples.joints()) {
+    models_options.identify.drives = slow_enough(models_options.identify.drives, summary.types,
+                                                 moving_speeds(summary.data.samples));
+  }
   const TorqueScales scales = check_scale(options.logs, model, models_options.identify, summary);
   split_samples(options, model, summary);
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), models_options);

@@ -42,7 +42,9 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
     summary.test = read_torque_data(options.test_logs, wanted_joints(model.tree), data).samples;
     summary.split = "the unseen log " + file_list(options.test_logs);
   }
-  summary.new_motion = motion_words(span_of(summary.train), summary.test, make_rigid_model(model));
+  const RigidModel rigid = make_rigid_model(model);
+  if (std::ssize(rigid.bodies) != summary.test.joints()) return;  // refused by the fit
+  summary.new_motion = motion_words(span_of(summary.train), summary.test, rigid);
 }
 
 }  // namespace kinescope

@@ -116,6 +116,7 @@ void fill(const RigidModel& model, const DriveTerms& drives, const std::vector<T
 
 DriveTerms slow_enough(DriveTerms drives, const std::vector<JointType>& types,
                        const Eigen::MatrixXd& dq) {
+  KINESCOPE_CHECK(dq.cols() == std::ssize(types), "one type a joint");
   for (Eigen::Index j = 0; j < dq.cols() && dq.rows() > 0; ++j) {
     const double narrow = narrow_width(dq.col(j));
     if (!(narrow > 0.0)) continue;
