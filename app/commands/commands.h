@@ -76,6 +76,9 @@ struct DynamicsOptions {
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
   /// Where nobody declared it and the torques contradict the default, what they say is taken.
   bool gravity_from_torques = false;
+  /// Held out are single samples by lot, as in much of the literature; else whole trajectories or a
+  /// block, as what a model is worth on new motion asks for.
+  bool split_at_random = false;
   bool learning_curve = false;
   /// The robust regressions beside the models, and of a payload at rest; nothing: where all models
   /// are asked for, and of a payload.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
@@ -16,13 +17,16 @@
 #include "app/commands/torque_inputs.h"
 #include "app/commands/torque_plausibility.h"
 #include "app/commands/torque_robust_stage.h"
+#include "app/commands/torque_signs.h"
+#include "app/commands/torque_split.h"
 #include "app/commands/torque_stages.h"
 #include "app/commands/torque_trace_stage.h"
+#include "app/commands/traced_score.h"
 #include "app/io/nearest_name.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/trace_lines.h"
-#include "dynamics/data/splits.h"
 #include "dynamics/identify/gravity_from_torques.h"
+#include "dynamics/identify/torque_terms.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
@@ -30,9 +34,6 @@ namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Share of the samples that is held out where no log is named for it.
-constexpr double kHeldOut = 0.3;
 
 // What is fitted, and how.
 struct Wanted {
@@ -68,29 +69,26 @@ Wanted wanted_models(const DynamicsOptions& options) {
   return out;
 }
 
-void split_samples(const DynamicsOptions& options, const DynamicModel& model,
-                   TorqueSummary& summary) {
-  if (!options.test_logs.empty()) {
-    TorqueDataOptions data = options.data;
-    data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
-    summary.train = summary.data.samples;
-    summary.test = read_torque_data(options.test_logs, wanted_joints(model.tree), data).samples;
-    summary.split = "the unseen log " + file_list(options.test_logs);
-    return;
+// Zero of joints that hold still, whose speeds are noise.
+Eigen::MatrixXd moving_speeds(const TorqueSamples& samples) {
+  constexpr double kStill = 1e-3;  // rad or m
+  Eigen::MatrixXd out = samples.dq;
+  for (Eigen::Index j = 0; j < out.cols(); ++j) {
+    const Eigen::ArrayXd q = samples.q.col(j);
+    if (std::sqrt((q - q.mean()).square().mean()) < kStill) out.col(j).setZero();
   }
-  const Fold fold = split_last(summary.data.samples, kHeldOut);
-  summary.train = select_rows(summary.data.samples, fold.train);
-  summary.test = select_rows(summary.data.samples, fold.test);
-  const bool whole = summary.train.trajectory.size() > 0 &&
-                     (summary.test.trajectory.array() != summary.train.trajectory[0]).all();
-  summary.split = whole ? "unseen trajectories of the log" : "the log's last part, after a gap";
+  return out;
 }
 
-// The scale of the torque against the nominal masses, where there are any.
+// The scale of the torque against the nominal masses, where there are any, and its signs.
 TorqueScales check_scale(const std::vector<fs::path>& logs, const DynamicModel& model,
-                         TorqueSummary& summary) {
-  if (!has_masses(model) || summary.data.samples.torque_unit == "A") return {};
-  TorqueScales scales = torque_scales(make_rigid_model(model), summary.data.samples, logs);
+                         const IdentifyOptions& identify, TorqueSummary& summary) {
+  if (summary.data.samples.torque_unit == "A") return {};
+  TorqueScales scales;
+  if (has_masses(model)) {
+    scales = torque_scales(make_rigid_model(model), summary.data.samples, logs);
+  }
+  check_torque_signs(model, summary.data.samples, identify, logs, scales);
   throw_refusals(scales.findings);
   summary.data.findings.insert(summary.data.findings.end(), scales.findings.begin(),
                                scales.findings.end());
@@ -128,6 +126,22 @@ std::vector<DriveEstimate> drives_of(const TorqueSummary& summary) {
   return out;
 }
 
+// Friction takes energy. One that is clearly negative is a torque of the other sign, or late.
+void warn_of_driving_friction(TorqueSummary& summary) {
+  constexpr double kClear = 2.7;  // sigmas: 5 % for seven joints together, Student's t of 20 blocks
+  for (const DriveEstimate& drive : summary.drives) {
+    if (drive.term != "coulomb" || !(drive.value < -kClear * drive.sigma)) continue;
+    std::vector<int> factors(summary.joints.size(), 1);
+    const auto at = std::ranges::find(summary.joints, drive.joint) - summary.joints.begin();
+    factors[static_cast<std::size_t>(at)] = -1;
+    summary.warnings.push_back(fmt::format(
+        "friction of {} seems to drive it ({:.3g} +- {:.2g} {}): its torque has the other sign "
+        "(dynamics: {{torque_factor: [{}]}} in recording.yaml, or --torque-factor), or comes late",
+        drive.joint, drive.value, drive.sigma, summary.train.torque_unit,
+        fmt::join(factors, ", ")));
+  }
+}
+
 void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const DynamicModel& model,
                          const TorqueModelOptions& options, TorqueSummary& summary) {
   for (const TorqueModelKind kind : kinds) {
@@ -148,10 +162,11 @@ void add_learning_curves(const std::vector<TorqueModelKind>& kinds, const Dynami
   }
 }
 
-// Every model on the held-out samples; the best one's prediction is kept.
+// Every model on the held-out samples, the traced one last; the best one's prediction is kept.
 std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds,
                                        const DynamicModel& model, const TorqueModelOptions& options,
                                        const FittedTorqueModel& parametric,
+                                       const std::optional<TracedScore>& traced,
                                        const Progress& progress, TorqueSummary& summary) {
   std::vector<FittedTorqueModel> fitted(kinds.size());
   for (std::size_t k = 0; k < kinds.size(); ++k) {
@@ -169,7 +184,13 @@ std::vector<FittedTorqueModel> compare(const std::vector<TorqueModelKind>& kinds
     }
     summary.scores.push_back(std::move(score));
   }
+  if (traced) summary.scores.push_back(traced->score);
   summary.best = best_score(summary.scores);
+  if (summary.best == std::ssize(fitted)) {
+    summary.bands = traced->bands;
+    summary.prediction = traced->prediction;
+    return fitted;
+  }
   const FittedTorqueModel& best = fitted[static_cast<std::size_t>(summary.best)];
   summary.bands = best.bands;
   if (best.predict) {
@@ -217,12 +238,19 @@ void check_savable(const DynamicsOptions& options, const std::vector<TorqueModel
 
 // The best of those that can be saved.
 std::string save_best(const DynamicsOptions& options, const std::vector<FittedTorqueModel>& fitted,
-                      const std::optional<SavedTrace>& traced, const TorqueSummary& summary) {
+                      const std::optional<TracedLog>& traced, const TorqueSummary& summary) {
   std::vector<TorqueScore> scores = summary.scores;
+  const auto parametric = static_cast<std::size_t>(
+      std::ranges::find(scores, TorqueModelKind::kParametric, &TorqueScore::kind) - scores.begin());
   for (std::size_t k = 0; k < scores.size(); ++k) {
-    if (!fitted[k].saved && scores[k].failure.empty()) scores[k].failure = "cannot be saved";
+    // The traced model is saved beside the parametric one.
+    const bool saved = k < fitted.size() ? fitted[k].saved != nullptr
+                                         : traced && parametric < fitted.size() &&
+                                               fitted[parametric].saved != nullptr;
+    if (!saved && scores[k].failure.empty()) scores[k].failure = "cannot be saved";
   }
-  const auto best = static_cast<std::size_t>(best_score(scores));
+  auto best = static_cast<std::size_t>(best_score(scores));
+  if (best >= fitted.size()) best = parametric;
   if (!fitted[best].saved) {
     throw undetermined("--save-model",
                        "no model that can be saved was learned: " + scores[best].failure,
@@ -233,17 +261,16 @@ std::string save_best(const DynamicsOptions& options, const std::vector<FittedTo
   file.model = *fitted[best].saved;
   file.filter = {summary.data.filter, summary.data.cutoff.cutoff_hz};
   file.source = summary.data.source;
-  if (file.model.kind == TorqueModelKind::kParametric) file.traced = traced;
+  if (file.model.kind == TorqueModelKind::kParametric && traced) file.traced = traced->saved;
   write_file_atomically(options.save_model, torque_model_json(file));
   return fmt::format("{}{}", to_string(file.model.kind),
                      file.traced ? " with what tracing found" : "");
 }
 
-std::optional<SavedTrace> add_trace(const DynamicsOptions& options, const DynamicModel& model,
-                                    const TorqueLogReport& log, const OutputFolder& folder,
-                                    const Progress& progress, TorqueSummary& summary) {
-  const TracedLog traced =
-      trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
+std::optional<TracedLog> add_trace(const DynamicsOptions& options, const DynamicModel& model,
+                                   const TorqueLogReport& log, const OutputFolder& folder,
+                                   const Progress& progress, TorqueSummary& summary) {
+  TracedLog traced = trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
   summary.trace = traced.trace.trace;
   take_traced_drives(traced.trace, model, summary.drives);
   for (const TracedEffect& effect : summary.trace->accepted) {
@@ -256,7 +283,7 @@ std::optional<SavedTrace> add_trace(const DynamicsOptions& options, const Dynami
   }
   // Without effects it would be the identified model again, less exactly.
   if (traced.saved.corrected.effects.empty()) return std::nullopt;
-  return traced.saved;
+  return traced;
 }
 
 void print_scores(const TorqueSummary& summary) {
@@ -265,10 +292,10 @@ void print_scores(const TorqueSummary& summary) {
   fmt::print("\n");
   for (const TorqueScore& score : summary.scores) {
     if (!score.failure.empty()) {
-      fmt::print("{:<16} {}\n", to_string(score.kind), score.failure);
+      fmt::print("{:<16} {}\n", name_of(score), score.failure);
       continue;
     }
-    fmt::print("{:<16} {:>8} {:>8}", to_string(score.kind), score.training_samples,
+    fmt::print("{:<16} {:>8} {:>8}", name_of(score), score.training_samples,
                score.inducing_points > 0 ? fmt::format("{}", score.inducing_points) : "-");
     for (const double nmse : score.nmse_percent) {
       fmt::print(" {:>10}", std::isfinite(nmse) ? fmt::format("{:.3g}", nmse) : "-");
@@ -314,7 +341,12 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   if (options.gravity_from_torques && !options.gravity_m_s2) {
     take_gravity_of(summary.data.samples, model, summary);
   }
-  const TorqueScales scales = check_scale(options.logs, model, summary);
+  // A robot that moves no joint is refused by the fit.
+  if (std::ssize(summary.types) == summary.data.samples.joints()) {
+    models_options.identify.drives = slow_enough(models_options.identify.drives, summary.types,
+                                                 moving_speeds(summary.data.samples));
+  }
+  const TorqueScales scales = check_scale(options.logs, model, models_options.identify, summary);
   split_samples(options, model, summary);
   check_torque_memory(kinds, summary.train.size(), summary.train.joints(), models_options);
   clock.lap("read", summary.times);
@@ -333,17 +365,20 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   }
   summary.consistent = consistent_model(summary.identification);
   summary.drives = drives_of(summary);
+  warn_of_driving_friction(summary);
   clock.lap("identify", summary.times);
   // What the model lacks stands in the folder before the slow models begin.
-  std::optional<SavedTrace> traced;
+  std::optional<TracedLog> traced;
+  std::optional<TracedScore> traced_score;
   if (options.trace) {
     traced = add_trace(options, model, log, folder, progress, summary);
+    if (traced) traced_score = score_traced(model, *traced, summary, !options.test_logs.empty());
     clock.lap("trace", summary.times);
   } else {
     remove_torque_trace(options.trace_file, folder);
   }
   const std::vector<FittedTorqueModel> fitted =
-      compare(kinds, model, models_options, parametric, progress, summary);
+      compare(kinds, model, models_options, parametric, traced_score, progress, summary);
   clock.lap("models", summary.times);
   if (!options.save_model.empty())
     summary.saved_model = save_best(options, fitted, traced, summary);
@@ -375,6 +410,9 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
   if (console.json) {
     fmt::print("{}\n", torque_json(summary).dump(2));
     return ExitCode::kDone;
+  }
+  for (const std::string& warning : summary.warnings) {
+    fmt::print(stderr, "warning: {}\n", warning);
   }
   const TorqueVerdict verdict = torque_verdict(summary);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);

@@ -104,6 +104,16 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
           "points")
       ->delimiter(',')
       ->type_name("LIST");
+  command
+      .add_option_function<std::string>(
+          "--split",
+          [&dynamics](const std::string& text) { dynamics.split_at_random = text == "random"; },
+          "What is held out without --test: blocks (whole trajectories, or the log's last part), "
+          "or "
+          "random (samples by lot, which flatters: for published tables made so)")
+      ->check(CLI::IsMember({"blocks", "random"}))
+      ->excludes("--test")
+      ->type_name("HOW");
   add_gravity(command, dynamics.gravity_m_s2);
   command.add_flag("--gains", dynamics.models_options.identify.gains,
                    "Estimate a gain a joint: currents, or doubtful drive constants");

@@ -169,7 +169,7 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
   folder.write(options.trace_file, document.dump(1) + "\n");
   if (out.trace.verdict == TraceVerdict::kNothingToSay) {
     remove_corrected(folder);
-    return {std::move(out), {}};
+    return {std::move(out), {}, traced.samples, trace_options};
   }
   folder.write("robot_traced.urdf", write_urdf(out.corrected.model));
   std::vector<std::string> joints;
@@ -178,7 +178,7 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
                compensated_csv(
                    compensate(out.corrected, traced.samples, trace_options.model.filter), joints));
   SavedTrace saved = saved_trace(out, traced.samples, trace_options.model.filter);
-  return {std::move(out), std::move(saved)};
+  return {std::move(out), std::move(saved), traced.samples, trace_options};
 }
 
 }  // namespace kinescope

@@ -15,6 +15,8 @@ namespace kinescope {
 struct TracedLog {
   TorqueTrace trace;
   SavedTrace saved;
+  TorqueSamples samples;       ///< that were traced
+  TorqueTraceOptions options;  ///< how
 };
 
 /// One answer for each drive: where tracing sizes a term of a joint, its value (with what the URDF

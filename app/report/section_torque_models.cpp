@@ -35,7 +35,7 @@ std::string score_table(const TorqueFacts& facts, std::string_view id, std::stri
     const TorqueScore& score = facts.summary.scores[m];
     if (!score.failure.empty()) continue;
     table.begin_row();
-    table.text(to_string(score.kind));
+    table.text(name_of(score));
     table.number(fmt::format("/models/{}/samples", m), Quantity::kCount);
     if (inducing) table.number(fmt::format("/models/{}/inducing_points", m), Quantity::kCount);
     for (std::size_t j = 0; j < facts.summary.joints.size(); ++j) {
@@ -168,28 +168,30 @@ std::string torque_models_section(const TorqueFacts& facts) {
       "nMSE: mean squared error over the variance of the measured torque, on the held-out part; "
       "below it, on motion left out of the training, by which the model to rely on is chosen. "
       "Coverage: share of the held-out samples within the model's own 90 % and 95 % bands.");
-  out += score_table(facts, "nmse-table", "nMSE, %", "nmse_percent", Quantity::kPlain);
+  const std::string by_lot =
+      facts.summary.split_at_random ? " (samples held out by lot, which flatters)" : "";
+  out += score_table(facts, "nmse-table", "nMSE, %" + by_lot, "nmse_percent", Quantity::kPlain);
   out += score_table(facts, "left-out-table", "nMSE on motion left out of the training, %",
                      "left_out_nmse_percent", Quantity::kPlain);
-  out += score_table(facts, "rms-table",
-                     fmt::format("Rms error, {}",
-                                 common_unit(facts.summary.train.torque_unit, facts.summary.types)),
-                     "rms", Quantity::kPlain);
-  out += score_table(facts, "coverage90-table", "Coverage of the 90 % band, %", "coverage_90",
-                     Quantity::kPercent);
-  out += score_table(facts, "coverage95-table", "Coverage of the 95 % band, %", "coverage_95",
-                     Quantity::kPercent);
+  out += score_table(
+      facts, "rms-table",
+      fmt::format("Rms error, {}{}",
+                  common_unit(facts.summary.train.torque_unit, facts.summary.types), by_lot),
+      "rms", Quantity::kPlain);
+  out += score_table(facts, "coverage90-table", "Coverage of the 90 % band, %" + by_lot,
+                     "coverage_90", Quantity::kPercent);
+  out += score_table(facts, "coverage95-table", "Coverage of the 95 % band, %" + by_lot,
+                     "coverage_95", Quantity::kPercent);
   for (const TorqueScore& score : facts.summary.scores) {
     if (!score.failure.empty()) {
-      out += paragraph(fmt::format("{} was not fitted: {}", to_string(score.kind), score.failure),
-                       "note");
+      out += paragraph(fmt::format("{} was not fitted: {}", name_of(score), score.failure), "note");
     }
   }
   for (const std::string& note : model_notes(facts.summary)) out += paragraph(note, "note");
   for (const TorqueScore& score : facts.summary.scores) {
     const std::string limits = band_limits(score, facts.summary.joints);
     if (limits.empty()) continue;
-    out += paragraph(fmt::format("Bands of {}:{}", to_string(score.kind), limits), "note");
+    out += paragraph(fmt::format("Bands of {}:{}", name_of(score), limits), "note");
   }
   return out + learning_plot(facts.summary) + "</section>\n";
 }
@@ -197,9 +199,9 @@ std::string torque_models_section(const TorqueFacts& facts) {
 std::string torque_prediction_section(const TorqueFacts& facts) {
   std::string out = section_head("prediction", "Measured and predicted torque");
   if (facts.summary.test.size() == 0 || facts.summary.scores.empty()) return out + "</section>\n";
-  out += paragraph(fmt::format(
-      "Predicted by the {} model.",
-      to_string(facts.summary.scores[static_cast<std::size_t>(facts.summary.best)].kind)));
+  out += paragraph(
+      fmt::format("Predicted by the {} model.",
+                  name_of(facts.summary.scores[static_cast<std::size_t>(facts.summary.best)])));
   for (Eigen::Index j = 0; j < facts.summary.test.joints(); ++j) {
     out += prediction_plot(facts.summary, j);
   }

@@ -40,6 +40,8 @@ json data_json(const TorqueSummary& summary) {
           {"training", summary.train.size()},
           {"test", summary.test.size()},
           {"split", text(summary.split)},
+          {"split_at_random", summary.split_at_random},
+          {"new_motion", report::texts(summary.new_motion)},
           {"inputs", inputs_json(summary.inputs)},
           {"findings", findings_json(summary.data.findings)}};
 }
@@ -47,7 +49,7 @@ json data_json(const TorqueSummary& summary) {
 json scores_json(const std::vector<TorqueScore>& scores) {
   json out = json::array();
   for (const TorqueScore& score : scores) {
-    out.push_back({{"model", to_string(score.kind)},
+    out.push_back({{"model", name_of(score)},
                    {"samples", score.training_samples},
                    {"inducing_points", score.inducing_points},
                    {"nmse_percent", numbers(score.nmse_percent)},
@@ -216,7 +218,7 @@ json best_model(const TorqueSummary& summary) {
   if (summary.scores.empty()) return {};
   const TorqueScore& best = summary.scores[static_cast<std::size_t>(summary.best)];
   const bool holds = std::isfinite(mean_nmse_percent(best)) && worse_than_constant(best).empty();
-  return holds ? json(to_string(best.kind)) : json();
+  return holds ? json(name_of(best)) : json();
 }
 
 }  // namespace

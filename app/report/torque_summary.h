@@ -80,6 +80,10 @@ struct TorqueSummary {
   TorqueData data;    ///< of the log learned from; its samples are `train` and, without a log of
                       ///< its own, `test`
   std::string split;  ///< in words: what was held out
+  /// Held out by lot: neighbours of every test sample were learned from.
+  bool split_at_random = false;
+  /// Where the motion of `test` leaves that of `train`, a sentence each (motion_words.h).
+  std::vector<std::string> new_motion;
   TorqueSamples train;
   TorqueSamples test;
 
@@ -108,13 +112,13 @@ struct TorqueSummary {
 ///   robot, version, unit, joints [name, type], gravity_m_s2, gravity_declared,
 ///   traced_gravity_m_s2 (null: as declared)
 ///   data      rows_read, rows_used, log_rate_hz, rate_hz, filter, source, cutoff_hz, training,
-///             test, split, inputs [name, sha256], findings [fault, weight, channel, share, value,
-///             place, what, remedy]
+///             test, split, split_at_random, new_motion, inputs [name, sha256], findings [fault,
+///             weight, channel, share, value, place, what, remedy]
 ///   models    [model, samples, inducing_points, nmse_percent, left_out_nmse_percent, rms,
 ///             coverage_90, coverage_95, extrapolated, band_residuals, bands_by_trajectory,
 ///             plainer_joints, constant_joints, failure]
-///   best      name of the model with the smallest mean left_out_nmse_percent; null where there is
-///             none that predicts every joint better than a constant
+///   best      name of the model with the smallest mean left_out_nmse_percent; null where it
+///             predicts a joint of the test worse than a constant
 ///   learning  [model, points [samples, nmse_percent]]
 ///   parameters [name, value, sigma, sigma_white]; noise_sigma; correlation_samples
 ///   drives    [term, joint, value, sigma]
@@ -142,8 +146,9 @@ struct TorqueVerdict {
 };
 [[nodiscard]] TorqueVerdict torque_verdict(const TorqueSummary& summary);
 
-/// What the numbers of a table of models do not say, a sentence each: who is worse than a constant,
-/// who gave way to one or to the parametric model.
+/// What the numbers of a table of models do not say, a sentence each: that a split by lot flatters,
+/// which samples chose the model to rely on, where the test's motion is new, who is worse than a
+/// constant, who gave way to one or to the parametric model.
 [[nodiscard]] std::vector<std::string> model_notes(const TorqueSummary& summary);
 
 /// One self-contained page. Pure: the same summary gives the same bytes.

@@ -26,15 +26,15 @@ std::string percent(double value) {
   return value < 10.0 ? fmt::format("{:.2g} %", value) : fmt::format("{:.0f} %", value);
 }
 
-std::string name_of(TorqueModelKind kind) {
-  std::string name(to_string(kind));
+std::string words_of(const TorqueScore& score) {
+  std::string name(name_of(score));
   std::ranges::replace(name, '_', '-');
   return name;
 }
 
 const TorqueScore* score_of(const TorqueSummary& summary, TorqueModelKind kind) {
   for (const TorqueScore& score : summary.scores) {
-    if (score.kind == kind && score.failure.empty()) return &score;
+    if (score.kind == kind && !score.traced && score.failure.empty()) return &score;
   }
   return nullptr;
 }
@@ -185,6 +185,42 @@ std::string gravity_words(const TorqueSummary& summary) {
 
 }  // namespace
 
+namespace {
+
+// How the samples were divided, and what that says about the table.
+std::vector<std::string> split_notes(const TorqueSummary& summary) {
+  std::vector<std::string> out;
+  if (summary.split_at_random) {
+    out.emplace_back(
+        "Held out are samples by lot: each has neighbours that were learned from, so that these "
+        "figures flatter; they are for published tables that were made so.");
+  }
+  const auto chooses = [](const TorqueScore& score) {
+    return score.failure.empty() && score.left_out_nmse_percent.size() > 0;
+  };
+  if (std::ranges::count_if(summary.scores, chooses) > 1) {
+    out.push_back(fmt::format(
+        "The model to rely on was chosen on the {} training samples, each predicted by a fit "
+        "without its {}; no test sample had a part in it.",
+        summary.train.size(),
+        std::ranges::any_of(summary.scores, &TorqueScore::bands_by_trajectory) ? "trajectory"
+                                                                               : "block of time"));
+  }
+  const auto traced = std::ranges::find_if(summary.scores, [](const TorqueScore& score) {
+    return score.traced && score.failure.empty();
+  });
+  if (traced != summary.scores.end() && summary.rollout && summary.rollout->seen_by_trace) {
+    out.emplace_back(
+        "traced: which effects it has was chosen on the whole log, their sizes here on the "
+        "training samples; name another log with --test to judge the choice, too.");
+  }
+  for (const std::string& words : summary.new_motion)
+    out.push_back("New on the test: " + words + ".");
+  return out;
+}
+
+}  // namespace
+
 double mean_nmse_percent(const TorqueScore& score) {
   const auto varies = score.nmse_percent.array().isFinite();
   const auto count = varies.count();
@@ -193,13 +229,12 @@ double mean_nmse_percent(const TorqueScore& score) {
 }
 
 std::vector<std::string> model_notes(const TorqueSummary& summary) {
-  std::vector<std::string> out;
+  std::vector<std::string> out = split_notes(summary);
   for (const TorqueScore& score : summary.scores) {
-    const std::string name = name_of(score.kind);
+    const std::string name = words_of(score);
     if (const auto worse = worse_than_constant(score); !worse.empty()) {
-      out.push_back(
-          fmt::format("{} is worse than a constant at {}: of no use there, and never the best.",
-                      name, joint_names(summary, worse)));
+      out.push_back(fmt::format("{} is worse than a constant at {}: of no use there.", name,
+                                joint_names(summary, worse)));
     }
     if (!score.constant_joints.empty()) {
       out.push_back(
@@ -242,11 +277,11 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
   out.accurate = fmt::format(
       "On {} the {} model{} leaves {} of the torque's variance unexplained (mean over {}; worst "
       "{} with {}).",
-      summary.split, name_of(best.kind), choice_words(summary), percent(mean_nmse_percent(best)),
+      summary.split, words_of(best), choice_words(summary), percent(mean_nmse_percent(best)),
       joints_words(best), summary.joints[static_cast<std::size_t>(worst)],
       percent(best.nmse_percent[worst]));
   const TorqueScore* parametric = score_of(summary, TorqueModelKind::kParametric);
-  if (parametric != nullptr && best.kind != TorqueModelKind::kParametric) {
+  if (parametric != nullptr && parametric != &best) {
     out.accurate +=
         fmt::format(" The parametric model leaves {}.", percent(mean_nmse_percent(*parametric)));
   }

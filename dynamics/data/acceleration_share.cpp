@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/data/rough_torque.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/log/smoothing_spline.h"
 
@@ -58,14 +59,8 @@ double variance(const Eigen::VectorXd& x) { return (x.array() - x.mean()).square
 
 double share_of_joint(const Rough& rough, Eigen::Index joint) {
   const Eigen::Index n = rough.q.rows();
-  const Eigen::Index joints = rough.q.cols();
   const double slow = kSignSpeed * rough.dq.col(joint).cwiseAbs().maxCoeff() + 1e-12;
-  Eigen::MatrixXd rest(n, 3 + 2 * joints);
-  rest.col(0).setOnes();
-  rest.col(1) = rough.dq.col(joint);
-  rest.col(2) = (rough.dq.col(joint).array() / slow).tanh();
-  rest.middleCols(3, joints) = rough.q.array().sin();
-  rest.rightCols(joints) = rough.q.array().cos();
+  const Eigen::MatrixXd rest = rough_torque_features(rough.q, rough.dq, joint, slow);
   Eigen::MatrixXd both(n, 2);
   both << rough.ddq.col(joint), rough.torque.col(joint);
   const Eigen::MatrixXd fitted = least_squares(rest, both);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/acceleration_share.h"
+#include "dynamics/data/predictive_cutoff.h"
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/error.h"
@@ -170,6 +171,7 @@ class MotionDeriver {
         torque ? spectra_of(log_.torque, 1) : std::vector<Spectrum>();
     const Eigen::VectorXd shares = acceleration_shares(log_, step_s_);
     double best = std::numeric_limits<double>::infinity();
+    CutoffEvidence used;
     for (const Candidate& candidate : candidates) {
       const bool wanted =
           options_.source == MotionSource::kBest || options_.source == candidate.source;
@@ -190,11 +192,25 @@ class MotionDeriver {
       best = error;
       out_.cutoff = choice;
       out_.source = candidate.source;
+      used = evidence;
     }
     if (out_.cutoff.cutoff_hz <= 0.0) {
       throw undetermined(log_.sources.front(), "no joint moves clear of the noise",
                          "record a motion, or state a cut-off (cutoff_hz)");
     }
+    if (out_.cutoff.chosen) follow_the_torque(used);
+  }
+
+  /// Another cut-off where the torque asks for one.
+  void follow_the_torque(const CutoffEvidence& evidence) {
+    const double spectral_hz = out_.cutoff.cutoff_hz;
+    const double cutoff_hz =
+        best_predicting_cutoff(try_cutoffs(log_, step_s_, out_.source, spectral_hz), spectral_hz);
+    if (cutoff_hz == spectral_hz) return;
+    out_.cutoff.expected_error =
+        choose_cutoff(evidence, order_of(options_.filter), cutoff_hz).expected_error;
+    out_.cutoff.cutoff_hz = cutoff_hz;
+    out_.cutoff.at_edge = false;
   }
 
   static double sum_of_squares(const Eigen::VectorXd& errors) {

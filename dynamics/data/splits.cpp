@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "kinematics/core/error.h"
+#include "kinematics/core/rng.h"
 
 namespace kinescope {
 namespace {
@@ -248,6 +249,28 @@ Folds split_folds(const TorqueSamples& samples, const SplitOptions& options) {
         "record longer, or lower the guard");
   }
   return out;
+}
+
+Fold split_at_random(const TorqueSamples& samples, double share, std::uint64_t seed) {
+  const bool sound = share > 0.0 && share < 1.0;
+  if (!sound) throw bad_request("dynamics.test_share", fmt::format("{}", share), "between 0 and 1");
+  std::vector<Eigen::Index> rows(static_cast<std::size_t>(samples.size()));
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  Rng rng = Rng::from_name("split_at_random", seed);
+  for (std::size_t k = rows.size(); k > 1; --k) {
+    std::swap(rows[k - 1], rows[static_cast<std::size_t>(rng.index(static_cast<int>(k)))]);
+  }
+  const auto held =
+      static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(rows.size())));
+  Fold fold{{rows.begin() + std::min(held, std::ssize(rows)), rows.end()},
+            {rows.begin(), rows.begin() + std::min(held, std::ssize(rows))}};
+  if (fold.train.empty() || fold.test.empty()) {
+    throw undetermined("hold-out", fmt::format("{} samples are too few", samples.size()),
+                       "record longer");
+  }
+  std::ranges::sort(fold.train);
+  std::ranges::sort(fold.test);
+  return fold;
 }
 
 Fold split_last(const TorqueSamples& samples, double share, const SplitOptions& options) {

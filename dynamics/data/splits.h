@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which samples a model learns from and which it is judged on. Never single samples by lot:
-// neighbours in time are nearly equal, and a model is then judged on what it has seen. Whole
-// trajectories are held out, and trajectories that repeat one path stay together; where there is
-// one path only, contiguous blocks are held out, with a gap to what is learned from.
+// Which samples a model learns from and which it is judged on. Not single samples by lot, unless
+// published figures are to be compared with: neighbours in time are nearly equal, and a model is
+// then judged on what it has seen. Whole trajectories are held out, and trajectories that repeat
+// one path stay together; where there is one path only, contiguous blocks are held out, with a gap
+// to what is learned from.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "dynamics/data/log_findings.h"
@@ -38,6 +40,10 @@ struct Folds {
 /// block.
 [[nodiscard]] Fold split_last(const TorqueSamples& samples, double share = 0.3,
                               const SplitOptions& options = {});
+
+/// One fold whose test part is `share` of the samples by lot, as published tables often have it. It
+/// flatters: every test sample has neighbours that were learned from. Throws as split_last().
+[[nodiscard]] Fold split_at_random(const TorqueSamples& samples, double share, std::uint64_t seed);
 
 /// For each trajectory, the number of the first one that follows the same path (its own where none
 /// does): every posture of the shorter lies within 1 % of the joints' ranges of a posture of the

@@ -131,11 +131,12 @@ bool put_into(DynamicModel& model, const TorqueEffect& effect) {
 }
 
 CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel& traced,
-                             const Trace& trace) {
+                             const std::vector<AddedEffect>& added,
+                             std::vector<TorqueEffect> effects) {
   CorrectedTorqueModel out;
   out.model = model;
-  out.effects = effects_of(trace);
-  out.base = traced.fitted(trace.added);
+  out.effects = std::move(effects);
+  out.base = traced.fitted(added);
   out.travels = traced.context().travels;
   out.log = traced.context().log;
   if (traced.base().kind == TorqueBaseKind::kIdentified) {
@@ -177,6 +178,25 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
                 2.0 * options.contact_spans.window_s);
 }
 
+/// The low-pass smears a contact over its own memory.
+double contact_margin_s(const TorqueTraceOptions& options) {
+  const double cutoff_hz = options.model.filter.cutoff_hz;
+  return options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
+}
+
+/// The effects that were found with the values of another fit.
+std::vector<TorqueEffect> with_values(std::vector<TorqueEffect> effects,
+                                      const std::vector<AddedEffect>& added,
+                                      const std::vector<Eigen::VectorXd>& values) {
+  for (std::size_t k = 0; k < added.size(); ++k) {
+    const auto own = std::ranges::find_if(effects, [&](const TorqueEffect& effect) {
+      return effect.id == added[k].id && effect.scan == added[k].scan;
+    });
+    if (own != effects.end() && own->values.size() == values[k].size()) own->values = values[k];
+  }
+  return effects;
+}
+
 bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan>& b,
                 double tolerance_s) {
   return std::ranges::equal(a, b, [tolerance_s](const ContactSpan& x, const ContactSpan& y) {
@@ -195,10 +215,7 @@ double tracing_cutoff_hz(const CutoffChoice& chosen) {
 TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
                          const TorqueTraceOptions& options, const Progress& progress) {
   const TorqueTracedModel whole(model, samples, options.model);
-  const double cutoff_hz = whole.motion().filter().cutoff_hz;
-  // The low-pass smears a contact over its own memory.
-  const double margin_s =
-      options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
+  const double margin_s = contact_margin_s(options);
   TorqueTrace out;
   HeldOutError before;
   for (int pass = 0; pass < kMostPasses; ++pass) {
@@ -211,7 +228,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
     out.trace = trace_with(traced, options, progress);
     effects::widen_by_disagreement(traced, out.trace);
     out.base = traced.base();
-    out.corrected = correct(model, traced, out.trace);
+    out.corrected = correct(model, traced, out.trace.added, effects_of(out.trace));
     if (pass == 0) before = out.trace.held_out_before;
     if (!options.contacts || out.trace.verdict == TraceVerdict::kNothingToSay) break;
     std::vector<ContactSpan> spans = spans_left(out.corrected, whole, out.base.sigma, options);
@@ -220,6 +237,23 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   }
   if (!out.contacts.empty()) add_contacts(whole, before, out);
   return out;
+}
+
+CorrectedTorqueModel refit(const DynamicModel& model, const TorqueSamples& samples,
+                           const TorqueTraceOptions& options, const TorqueTrace& found,
+                           const std::vector<char>& wanted) {
+  TracedTorqueOptions same = options.model;
+  same.base = found.base.kind;
+  TorqueTracedModel traced(model, samples, same);
+  std::vector<char> kept =
+      outside_spans(traced.motion(), found.contacts, contact_margin_s(options));
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (wanted[k] == 0) kept[k] = 0;
+  }
+  traced.leave_out(kept);
+  const std::vector<AddedEffect>& added = found.trace.added;
+  return correct(model, traced, added,
+                 with_values(effects_of(found.trace), added, traced.fit(added).values));
 }
 
 }  // namespace kinescope

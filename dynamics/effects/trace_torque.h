@@ -65,6 +65,13 @@ struct TorqueTrace {
                                        const TorqueTraceOptions& options = {},
                                        const Progress& progress = {});
 
+/// The same effects on top of the same kind of base, fitted to the samples for which `wanted` is
+/// not 0, contact spans left out: to judge on the others what was found. Which effects they are was
+/// chosen on all that `found` is of. Throws as TorqueTracedModel does.
+[[nodiscard]] CorrectedTorqueModel refit(const DynamicModel& model, const TorqueSamples& samples,
+                                         const TorqueTraceOptions& options,
+                                         const TorqueTrace& found, const std::vector<char>& wanted);
+
 /// Torque of the rigid bodies and of every effect at every sample, as the sensors would show it.
 [[nodiscard]] Eigen::MatrixXd predict_torque(const CorrectedTorqueModel& corrected,
                                              const TorqueSamples& samples,

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/data/rough_torque.h"
 #include "dynamics/rigid/base_parameters.h"
 #include "dynamics/rigid/regressor.h"
 #include "kinematics/core/error.h"
@@ -112,6 +113,20 @@ void fill(const RigidModel& model, const DriveTerms& drives, const std::vector<T
 }
 
 }  // namespace
+
+DriveTerms slow_enough(DriveTerms drives, const std::vector<JointType>& types,
+                       const Eigen::MatrixXd& dq) {
+  KINESCOPE_CHECK(dq.cols() == std::ssize(types), "one type a joint");
+  for (Eigen::Index j = 0; j < dq.cols() && dq.rows() > 0; ++j) {
+    const double narrow = narrow_width(dq.col(j));
+    if (!(narrow > 0.0)) continue;
+    double& width = types[static_cast<std::size_t>(j)] == JointType::kPrismatic
+                        ? drives.coulomb_width_m_s
+                        : drives.coulomb_width_rad_s;
+    width = std::min(width, narrow);
+  }
+  return drives;
+}
 
 std::vector<TorqueTerm> torque_terms(const RigidModel& model, const DriveTerms& drives) {
   check_drives(model, drives);

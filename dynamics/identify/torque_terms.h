@@ -26,6 +26,12 @@ struct DriveTerms {
   std::vector<Eigen::VectorXd> coupled_drives;
 };
 
+/// The same with widths of Coulomb friction that a joint of the slowest kind leaves: at most a
+/// tenth of the speed that it exceeds a tenth of the time. `types`: one a joint; `dq`: samples x
+/// joints. Joints that hold still do not count.
+[[nodiscard]] DriveTerms slow_enough(DriveTerms drives, const std::vector<JointType>& types,
+                                     const Eigen::MatrixXd& dq);
+
 enum class TermKind {
   kInertial,
   kMotorInertia,

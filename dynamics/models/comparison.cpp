@@ -11,6 +11,8 @@
 namespace kinescope {
 namespace {
 
+constexpr double kOfConstant = 100.0;  // nMSE, %
+
 /// Share of the errors within `width(joint)` sigmas.
 template <typename Width>
 Eigen::VectorXd coverage(const Eigen::MatrixXd& error, const Eigen::MatrixXd& sigma, Width width) {
@@ -47,26 +49,32 @@ Eigen::VectorXd share_beyond(const Eigen::MatrixXd& model_sigma, const BandFacto
 
 }  // namespace
 
-TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamples& test) {
-  const TorquePrediction claim = fitted.claim ? fitted.claim(test.q, test.dq, test.ddq)
-                                              : fitted.predict(test.q, test.dq, test.ddq);
-  const TorquePrediction prediction = fitted.claim ? with_sigma_parts(claim, fitted.parts) : claim;
+TorqueScore score_prediction(const TorquePrediction& prediction, const BandFactors& bands,
+                             const TorqueSamples& test) {
   const Eigen::MatrixXd error = test.torque - prediction.mean;
   TorqueScore score;
-  score.kind = fitted.kind;
-  score.training_samples = fitted.samples;
   score.test_samples = static_cast<int>(test.size());
   score.nmse_percent = normalised_error_percent(test.torque, prediction.mean);
   score.rms = error.colwise().squaredNorm().transpose() / static_cast<double>(test.size());
   score.rms = score.rms.cwiseSqrt();
   score.coverage_90 =
-      coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_90(j); });
+      coverage(error, prediction.sigma, [&](Eigen::Index j) { return bands.width_90(j); });
   score.coverage_95 =
-      coverage(error, prediction.sigma, [&](Eigen::Index j) { return fitted.bands.width_95(j); });
+      coverage(error, prediction.sigma, [&](Eigen::Index j) { return bands.width_95(j); });
+  score.band_residuals =
+      bands.residuals.size() > 0 ? bands.residuals : Eigen::VectorXi::Zero(error.cols());
+  score.bands_by_trajectory = bands.by_trajectory;
+  return score;
+}
+
+TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamples& test) {
+  const TorquePrediction claim = fitted.claim ? fitted.claim(test.q, test.dq, test.ddq)
+                                              : fitted.predict(test.q, test.dq, test.ddq);
+  TorqueScore score = score_prediction(fitted.claim ? with_sigma_parts(claim, fitted.parts) : claim,
+                                       fitted.bands, test);
+  score.kind = fitted.kind;
+  score.training_samples = fitted.samples;
   score.extrapolated = share_beyond(claim.model_sigma, fitted.bands);
-  score.band_residuals = fitted.bands.residuals.size() > 0 ? fitted.bands.residuals
-                                                           : Eigen::VectorXi::Zero(error.cols());
-  score.bands_by_trajectory = fitted.bands.by_trajectory;
   score.plainer_joints = fitted.plainer_joints;
   score.constant_joints = fitted.constant_joints;
   score.inducing_points = fitted.inducing_points;
@@ -74,13 +82,16 @@ TorqueScore score_torque_model(const FittedTorqueModel& fitted, const TorqueSamp
   return score;
 }
 
+std::string_view name_of(const TorqueScore& score) {
+  return score.traced ? "traced" : to_string(score.kind);
+}
+
 std::vector<int> worse_than_constant(const TorqueScore& score) {
-  constexpr double kConstant = 100.0;
   std::vector<int> out;
   for (Eigen::Index j = 0; j < score.nmse_percent.size(); ++j) {
     const auto joint = static_cast<int>(j);
     if (std::ranges::count(score.constant_joints, joint) > 0) continue;
-    if (score.nmse_percent[j] > kConstant) out.push_back(joint);
+    if (score.nmse_percent[j] > kOfConstant) out.push_back(joint);
   }
   return out;
 }
@@ -91,8 +102,9 @@ int best_score(const std::vector<TorqueScore>& scores) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < scores.size(); ++k) {
     if (!scores[k].failure.empty()) continue;
-    const bool holds = worse_than_constant(scores[k]).empty();
-    const double error = mean_of_finite(scores[k].left_out_nmse_percent);
+    const Eigen::VectorXd& left_out = scores[k].left_out_nmse_percent;
+    const bool holds = !(left_out.array() > kOfConstant).any();
+    const double error = mean_of_finite(left_out);
     if (best >= 0 && (best_holds != holds ? best_holds : !(error < least))) continue;
     best = static_cast<int>(k);
     best_holds = holds;

@@ -10,6 +10,7 @@ namespace kinescope {
 /// How a model did; one entry a joint.
 struct TorqueScore {
   TorqueModelKind kind = TorqueModelKind::kParametric;
+  bool traced = false;  ///< not of a kind: rigid bodies with the effects that tracing found
   int training_samples = 0;
   int test_samples = 0;
   Eigen::VectorXd nmse_percent;  ///< mean squared error over the variance of the measured torque
@@ -32,15 +33,22 @@ struct TorqueScore {
   std::string failure;  ///< why there is no score; empty where there is one
 };
 
+/// to_string(kind), or "traced".
+[[nodiscard]] std::string_view name_of(const TorqueScore& score);
+
 [[nodiscard]] TorqueScore score_torque_model(const FittedTorqueModel& fitted,
                                              const TorqueSamples& test);
+
+/// The part of a score that a prediction of the test and its bands give.
+[[nodiscard]] TorqueScore score_prediction(const TorquePrediction& prediction,
+                                           const BandFactors& bands, const TorqueSamples& test);
 
 /// Joints of the test that the model predicts worse than a constant would (nMSE above 100 %); those
 /// at which it is one do not count.
 [[nodiscard]] std::vector<int> worse_than_constant(const TorqueScore& score);
 
-/// The score to rely on: the least mean error on motion left out of the training, never on the
-/// test, which only strikes out models that do worse than a constant there. The first, where
+/// The score to rely on: the least mean error on motion left out of the training; those that do
+/// worse than a constant at a joint there come last. The test has no part in it. The first, where
 /// nothing was left out; 0 where no model was fitted.
 [[nodiscard]] int best_score(const std::vector<TorqueScore>& scores);
 

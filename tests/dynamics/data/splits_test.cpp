@@ -137,5 +137,20 @@ TEST(Splits, RefuseWhatLeavesNothing) {
             std::string::npos);
 }
 
+TEST(Splits, ByLotHasEverySampleOnceAndIsTheSameForASeed) {
+  const TorqueSamples samples = make_samples({300, 200}, {1, 2});
+  const Fold fold = split_at_random(samples, 0.3, 7);
+  EXPECT_EQ(fold.test.size(), 150U);
+  std::set<Eigen::Index> all(fold.train.begin(), fold.train.end());
+  all.insert(fold.test.begin(), fold.test.end());
+  EXPECT_EQ(all.size(), 500U);
+  EXPECT_EQ(fold.test, split_at_random(samples, 0.3, 7).test);
+  EXPECT_NE(fold.test, split_at_random(samples, 0.3, 8).test);
+  const auto in_first =
+      std::ranges::count_if(fold.test, [](Eigen::Index row) { return row < 300; });
+  EXPECT_NEAR(static_cast<double>(in_first), 90.0, 25.0);  // 4.5 sigma of the lot
+  EXPECT_THROW((void)split_at_random(samples, 1.5, 1), Error);
+}
+
 }  // namespace
 }  // namespace kinescope

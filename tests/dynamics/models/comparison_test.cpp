@@ -34,17 +34,27 @@ TEST(BestScore, IsChosenByWhatTheTestHasNoPartIn) {
   EXPECT_EQ(best_score({}), 0);
 }
 
-TEST(BestScore, IsNeverWorseThanAConstant) {
-  std::vector<TorqueScore> scores{score_of(TorqueModelKind::kParametric, 3.0, 3.0),
+TEST(BestScore, TheTestNamesAModelThatIsWorseThanAConstantAndChoosesNone) {
+  std::vector<TorqueScore> scores{score_of(TorqueModelKind::kParametric, 3.0, 60.0),
                                   score_of(TorqueModelKind::kRbf, 0.5, 1.0)};
   scores[1].nmse_percent[0] = 18183.0;
   EXPECT_EQ(worse_than_constant(scores[1]), std::vector<int>{0});
-  EXPECT_EQ(best_score(scores), 0);
+  EXPECT_EQ(best_score(scores), 1);
+  scores[1].left_out_nmse_percent[0] = 101.0;
+  EXPECT_EQ(best_score(scores), 0) << "worse than a constant on motion left out of the training";
+  scores[1].left_out_nmse_percent[0] = 1.0;
   scores[1].constant_joints = {0};  // it gave way there
   EXPECT_TRUE(worse_than_constant(scores[1]).empty());
   EXPECT_EQ(best_score(scores), 1);
   scores[1].nmse_percent[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(worse_than_constant(scores[1]).empty());
+}
+
+TEST(ScoreName, TheTracedModelIsOfNoKind) {
+  TorqueScore score = score_of(TorqueModelKind::kParametric, 1.0, 1.0);
+  EXPECT_EQ(name_of(score), "parametric");
+  score.traced = true;
+  EXPECT_EQ(name_of(score), "traced");
 }
 
 // A torque that no motion explains, at one of two joints.
