@@ -108,8 +108,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       .add_option_function<std::string>(
           "--split",
           [&dynamics](const std::string& text) { dynamics.split_at_random = text == "random"; },
-          "What is held out without --test: blocks (whole trajectories, or the log's last part), "
-          "or "
+          "What is held out without --test: blocks (whole trajectories, or the log's last part) or "
           "random (samples by lot, which flatters: for published tables made so)")
       ->check(CLI::IsMember({"blocks", "random"}))
       ->excludes("--test")
