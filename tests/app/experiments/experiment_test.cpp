@@ -76,6 +76,7 @@ TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"barrett", "--samples", "150"},
         std::vector<std::string>{"contact", "--runs", "1", "--seconds", "5", "--samples", "8000"},
+        std::vector<std::string>{"control", "--runs", "1", "--seconds", "15", "--joints", "2"},
         std::vector<std::string>{"panda", "--runs", "1", "--joints", "2,3", "--models",
                                  "rbf,parametric", "--starts", "1", "--search-samples", "60"}}) {
     std::vector<std::string> command{"experiment"};
