@@ -34,8 +34,8 @@ std::string ratio_words(const ControlSummary& summary, const ControlRun& before,
   Eigen::Index most = 0;
   ratio.minCoeff(&least);
   ratio.maxCoeff(&most);
-  return fmt::format("errors are {:.3g} ({}) to {:.3g} ({}) times smaller than with {}",
-                     ratio[least], summary.joints[static_cast<std::size_t>(least)], ratio[most],
+  return fmt::format("reduced {:.3g} ({}) to {:.3g} ({}) times against {}", ratio[least],
+                     summary.joints[static_cast<std::size_t>(least)], ratio[most],
                      summary.joints[static_cast<std::size_t>(most)], before.name);
 }
 
