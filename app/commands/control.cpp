@@ -101,7 +101,11 @@ std::string law_words(ControlLaw law) {
   }
 }
 
-/// The commands of one after another into the summary.
+std::string of_nominal(ControlLaw law) {
+  return law_words(law) + (law == ControlLaw::kPd ? "" : ", nominal masses");
+}
+
+/// Controllers one after another, into the summary.
 class Session {
  public:
   Session(const ControlOptions& options, const ControlBench& bench, const OutputFolder& folder,
@@ -119,7 +123,7 @@ class Session {
     if (options_.rounds > 0) before.round = 0;
     judge(before);
     if (options_.servo.law != ControlLaw::kPdGravity) {
-      judge({law_words(options_.servo.law) + ", nominal masses", "nominal", options_.servo.law});
+      judge({of_nominal(options_.servo.law), "nominal", options_.servo.law});
     }
     if (options_.model) {
       best_ = learned_of(*options_.model, options_, bench_);
@@ -168,6 +172,7 @@ class Session {
     dynamics.models = {options_.learn};
     dynamics.models_options = quick_options();
     dynamics.robust = false;
+    dynamics.trace = options_.learn == to_string(TorqueModelKind::kParametric);
     dynamics.gravity_m_s2 = options_.gravity_m_s2;
     dynamics.owner = "control";
     dynamics.force = options_.force;
@@ -186,8 +191,8 @@ class Session {
     before.loaded = true;
     judge(before);
     Contender learned = best_ ? with(*best_, "", "") : Contender{"", "", options_.servo.law};
-    const std::string name =
-        law_words(options_.servo.law) + ", " + (best_ ? best_->kind : "nominal masses");
+    const ControlLaw law = options_.servo.law;
+    const std::string name = best_ ? law_words(law) + ", " + best_->kind : of_nominal(law);
     learned.loaded = true;
     learned.name = name + ", load unknown";
     learned.file = "loaded_unknown";
@@ -240,6 +245,10 @@ void check_request(const ControlOptions& options) {
   if (options.payload_kg && !(*options.payload_kg > 0.0)) {
     throw bad_request("--payload", fmt::format("a mass of {} kg", *options.payload_kg),
                       "give one above 0");
+  }
+  if (options.servo.law == ControlLaw::kPd && (options.model || options.rounds > 0)) {
+    throw bad_request("--law", "pd has no place for what was learned",
+                      "name pd_gravity, feed_forward or computed_torque");
   }
   if (options.training && options.rounds == 0) {
     throw bad_request("--training", "nothing is learned without rounds", "add --rounds 1");

@@ -143,17 +143,19 @@ void add_learning(CLI::App& command, ControlOptions& control) {
   add_file(command, "--model", control.model,
            "What was learned: a file of kinescope dynamics --save-model, or dynamics.json of its "
            "folder for the masses and effects of its trace");
-  command
-      .add_option("--rounds", control.rounds,
-                  "Run, log, learn, compensate, run again: so often, from nothing learned")
-      ->check(number_in(0, 100))
-      ->type_name("N");
+  CLI::Option* rounds =
+      command
+          .add_option("--rounds", control.rounds,
+                      "Run, log, learn, compensate, run again: so often, from nothing learned")
+          ->check(number_in(0, 100))
+          ->type_name("N");
   command
       .add_option("--learn", control.learn,
                   "What rounds learn: parametric (with tracing), gip, semi_parametric, rbf "
                   "(default: parametric)")
-      ->check(CLI::IsMember({"parametric", "gip", "semi_parametric", "rbf"}))
-      ->type_name("KIND");
+      ->check(one_of({"parametric", "gip", "semi_parametric", "rbf"}))
+      ->type_name("KIND")
+      ->needs(rounds);
   add_file(command, "--training", control.training,
            "Trajectory that rounds learn on (default: sinusoids of their own, within the range and "
            "speed of --trajectory, other ones each round)");
@@ -185,7 +187,7 @@ void add_control(CLI::App& app, CommandLine& line) {
           },
           "Of the controller that compensates: pd, pd_gravity, feed_forward or computed_torque "
           "(default: feed_forward)")
-      ->check(CLI::IsMember(law_names()))
+      ->check(one_of(law_names()))
       ->type_name("LAW");
   add_payload(command, control);
   add_servo_of_control(command, control.servo);

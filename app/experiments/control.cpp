@@ -187,8 +187,11 @@ std::vector<ExperimentSection> sections_of(const WamControlResult& wam,
 ExperimentSummary control_experiment(const ExperimentChoice& choice, const Progress& progress) {
   WamControlOptions options{.seed = choice.seed};
   if (choice.joints) {
-    if (choice.joints->size() > 1) {
-      throw bad_request("--joints", "several arms", "give one number: 2 to 7");
+    // Below the elbow no joint turns a load about two horizontal axes, and its mass does not show.
+    constexpr int kFewest = 4;
+    if (choice.joints->size() != 1 || choice.joints->front() < kFewest) {
+      throw bad_request("--joints", "the WAM takes one number, and its load shows from joint 4 on",
+                        "give 4 to 7");
     }
     options.joints = choice.joints->front();
   }

@@ -3,10 +3,9 @@
 // Takes   the masses that a controller believes in, what was learned of its robot, what it carries.
 // Gives   Compensation: the torque that a motion asks for.
 // Units   SI; vectors have one entry a moving joint; N m or N.
-// Method  nominal + weight (learned - nominal) + payload. The weight is that of the linear estimate
-// of
-//         least mean square error from both: e^2 / (e^2 + s^2), with s the model's doubt about the
-//         function (its band without the noise) and e what the nominal torque lacks of the learned
+// Method  nominal + weight (learned - nominal) + payload. The weight e^2 / (e^2 + s^2) makes the
+//         linear estimate of least mean square error from both: s is the model's doubt about the
+//         function (its band without the noise), e what the nominal torque lacks of the learned
 //         one where the model was learned, rms. Where the model knows nothing the weight is 0.
 // Not here: feedback (controller.h), how models are learned (dynamics/models, dynamics/effects).
 #pragma once

@@ -20,7 +20,7 @@ struct JointMotion {
 };
 
 /// True torques of the actuators; what sensors add (gain, cross-talk, delay) is no matter of a
-/// command. Calls allocate nothing.
+/// command.
 class OnlineTorque {
  public:
   explicit OnlineTorque(Plant plant);

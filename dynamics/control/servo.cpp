@@ -80,11 +80,10 @@ Run follow(const Plant& plant, const TorqueSamples& reference, Controller contro
     const Eigen::VectorXd reading = quantised(state.q, options.encoder_step);
     run.q.row(k) = reading.transpose();
     run.dq.row(k) = state.dq.transpose();
-    if (options.velocity_cutoff_hz > 0.0) {
-      if (!velocity) {
-        velocity.emplace(reading, state.dq, options.rate_hz, options.velocity_cutoff_hz);
-      }
+    if (velocity) {
       run.dq.row(k) = velocity->update(reading).transpose();
+    } else if (options.velocity_cutoff_hz > 0.0) {
+      velocity.emplace(reading, state.dq, options.rate_hz, options.velocity_cutoff_hz);
     }
     // What the controller knows of is this late; before the beginning it knew the beginning.
     const Eigen::Index seen = std::max<Eigen::Index>(0, k - late);

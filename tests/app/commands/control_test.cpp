@@ -2,8 +2,8 @@
 //
 // `kinescope control`: what was learned of a simulated robot makes it follow better, with and
 // without a load, in rounds; refusals.
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -149,6 +149,14 @@ TEST_F(Control, RoundsLearnAndALoadIsIdentified) {
   EXPECT_EQ(run_named(by_trace, "before.csv").at("error"),
             run_named(by_file, "before.csv").at("error"));
 
+  // A model of another robot is refused.
+  std::string other = read_text_file(folder_.path() / "robot.urdf");
+  const std::string name = "name=\"" + model_.tree.name + "\"";
+  ASSERT_NE(other.find(name), std::string::npos);
+  folder_.write("other.urdf", other.replace(other.find(name), name.size(), "name=\"other\""));
+  expect_refused({"--nominal", path("other.urdf"), "--model", path("out/round1/torque.json")},
+                 static_cast<int>(ExitCode::kBadInput), "the model is of robot");
+
   // The same bytes again; what others wrote stays.
   const std::string first = read_text_file(folder_.path() / "out/round1.csv");
   ASSERT_EQ(run(command).code, 0);
@@ -169,7 +177,6 @@ TEST_F(Control, EveryLawRuns) {
 }
 
 TEST_F(Control, RefusesWhatDoesNotFit) {
-  folder_.write("far.csv", path_csv(joints_, 3.0, 0.0, 3.0));
   std::string other = read_text_file(folder_.path() / "robot.urdf");
   const std::string name = "\"" + joints_[1] + "\"";
   for (std::size_t at = 0; (at = other.find(name, at)) != std::string::npos;) {
@@ -178,7 +185,6 @@ TEST_F(Control, RefusesWhatDoesNotFit) {
   folder_.write("other.urdf", other).write("model.json", "{\"schema\": 1}");
   const int input = static_cast<int>(ExitCode::kBadInput);
   const int request = static_cast<int>(ExitCode::kBadRequest);
-  expect_refused({"--trajectory", path("far.csv")}, request, "--trajectory");  // given twice
   expect_refused({"--nominal", path("other.urdf")}, input, "other joints");
   expect_refused({"--model", path("model.json")}, input, "model.json");
   expect_refused({"--model", path("none.json")}, input, "none.json");
@@ -190,6 +196,8 @@ TEST_F(Control, RefusesWhatDoesNotFit) {
   expect_refused({"--velocity-cutoff", "200"}, request, "below half the rate");
   expect_refused({"--payload", "-1"}, request, "above 0");
   expect_refused({"--training", path("training.csv")}, request, "--rounds");
+  expect_refused({"--learn", "gip"}, request, "--rounds");
+  expect_refused({"--law", "pd", "--rounds", "1"}, request, "no place for what was learned");
   folder_.write("path.csv", path_csv(joints_, 3.0, 0.0, 3.0));
   expect_refused({}, input, "limits");
 }
