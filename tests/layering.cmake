@@ -25,7 +25,7 @@ set(rooms
     "dynamics/models: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
     "dynamics/effects: kinematics/* calib/trace dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
     "dynamics/contact: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify"
-    "dynamics/experiments: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/models dynamics/contact"
+    "dynamics/experiments: kinematics/* calib/trace dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/models dynamics/effects dynamics/contact dynamics/simulation dynamics/control"
     "dynamics/simulation: kinematics/* calib/trace dynamics/data dynamics/rigid dynamics/effects"
     "dynamics/control: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/models dynamics/effects dynamics/contact dynamics/simulation"
     "dynamics/policy: kinematics/* dynamics/data dynamics/rigid dynamics/gp dynamics/identify dynamics/effects dynamics/contact dynamics/simulation dynamics/control"

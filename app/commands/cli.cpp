@@ -66,7 +66,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, dynamics, predict, simulate, export, contact, experiment, policy, "
+        "run, trace, correct, dynamics, predict, simulate, control, export, contact, experiment, "
+        "policy, "
         "inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
@@ -172,6 +173,12 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     return predict_command(line.predict, console);
   }
   if (app.got_subcommand("simulate")) return simulate_command(line.simulate, console);
+  if (app.got_subcommand("control")) {
+    if (line.control.output.empty()) {
+      line.control.output = log_name(line.control.trajectory) + "_control";
+    }
+    return control_command(line.control, console);
+  }
   if (app.got_subcommand("export")) return export_command(line.exported, console);
   if (app.got_subcommand("contact")) {
     if (line.contact.output.empty()) {
@@ -258,6 +265,7 @@ int run_program(int argc, const char* const* argv) {
   line.contact.command_line = line.run.command_line;
   line.experiment.command_line = line.run.command_line;
   line.policy.command_line = line.run.command_line;
+  line.control.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

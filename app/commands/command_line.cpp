@@ -297,6 +297,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_dynamics(app, line);
   add_predict(app, line);
   add_simulate(app, line);
+  add_control(app, line);
   add_export(app, line);
   add_contact(app, line);
   add_experiment(app, line);

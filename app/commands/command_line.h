@@ -26,6 +26,7 @@ struct CommandLine {
   DynamicsOptions dynamics;
   PredictOptions predict;
   SimulateOptions simulate;
+  ControlOptions control;
   ExportOptions exported;
   ContactCommandOptions contact;
   ExperimentOptions experiment;

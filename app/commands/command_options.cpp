@@ -1,13 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/command_options.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "app/io/nearest_name.h"
 #include "kinematics/core/csv.h"
 
 namespace kinescope {
+namespace {
+
+std::string refuse_other(const std::string& word, const std::vector<std::string>& known) {
+  if (std::ranges::find(known, word) != known.end()) return {};
+  return fmt::format("'{}' is not known; {}", word, did_you_mean(word, known));
+}
+
+}  // namespace
+
+CLI::Validator one_of(const std::vector<std::string>& known) {
+  CLI::Validator out([known](const std::string& word) { return refuse_other(word, known); }, "");
+  out.name(fmt::format("{}", fmt::join(known, " ")));
+  return out;
+}
 
 CLI::Validator number_in(double least, double most) {
   return {[least, most](const std::string& text) -> std::string {

@@ -3,6 +3,9 @@
 // What several commands say on the command line. Shows CLI11, as command_line.h does.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "app/commands/command_line.h"
 
 namespace kinescope {
@@ -19,6 +22,9 @@ inline constexpr const char* kExitCodes =
 
 /// A finite number in a range. CLI::Range lets NaN through.
 [[nodiscard]] CLI::Validator number_in(double least, double most);
+
+/// One of these words, which stand in the validator's name: for completion.
+[[nodiscard]] CLI::Validator one_of(const std::vector<std::string>& known);
 
 /// --force of a command that writes a file, and of one that writes into a folder.
 inline constexpr const char* kReplaceFile = "Replace the file that is there";

@@ -15,9 +15,9 @@
 #include "calib/vision/board.h"
 #include "calib/vision/detect.h"
 #include "dynamics/contact/contact.h"
+#include "dynamics/control/servo.h"
 #include "dynamics/data/torque_data.h"
 #include "dynamics/models/torque_model.h"
-#include "dynamics/simulation/servo.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/progress.h"
 
@@ -121,6 +121,28 @@ struct SimulateOptions {
 };
 
 [[nodiscard]] ExitCode simulate_command(const SimulateOptions& options, const Console& console);
+
+struct ControlOptions {
+  std::filesystem::path robot;                   ///< URDF with masses: what is simulated
+  std::filesystem::path trajectory;              ///< joint positions over time
+  std::optional<std::filesystem::path> effects;  ///< of the simulated robot, as SimulateOptions
+  std::optional<std::filesystem::path> nominal;  ///< URDF that the controller knows; none: robot
+  /// A file of dynamics --save-model, or the dynamics.json or trace.json of dynamics.
+  std::optional<std::filesystem::path> model;
+  int rounds = 0;                                 ///< of running, learning and running again
+  std::string learn = "parametric";               ///< the kind of model that rounds learn
+  std::optional<std::filesystem::path> training;  ///< that rounds move along; none: sinusoids
+  std::optional<double> payload_kg;
+  Eigen::Vector3d payload_centre_m = Eigen::Vector3d::Zero();  ///< in the last link's frame
+  ServoOptions servo{.bandwidth_hz = 3.0, .velocity_cutoff_hz = 40.0};
+  std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: 9.81 down z
+  std::uint64_t seed = 1;
+  std::filesystem::path output;  ///< folder
+  bool force = false;            ///< as DynamicsOptions
+  std::string command_line;      ///< for the page
+};
+
+[[nodiscard]] ExitCode control_command(const ControlOptions& options, const Console& console);
 
 struct ExportOptions {
   std::filesystem::path source;                 ///< folder of run or dynamics, or a URDF

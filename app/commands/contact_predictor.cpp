@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/contact_model.h"
+#include "app/commands/model_of_robot.h"
 #include "app/commands/output_folder.h"
 #include "app/commands/torque_inputs.h"
 #include "app/io/nearest_name.h"
@@ -31,50 +32,6 @@ std::vector<std::string> usable_names() {
   std::vector<std::string> out;
   for (const TorqueModelKind kind : kUsable) out.emplace_back(to_string(kind));
   return out;
-}
-
-std::vector<std::string> joint_names(const RigidModel& rigid) {
-  std::vector<std::string> out;
-  for (const RigidBody& body : rigid.bodies) out.push_back(body.joint);
-  return out;
-}
-
-/// Links and joints as another URDF places them; files of robots are rounded to six digits.
-bool same_geometry(const RigidBody& a, const RigidBody& b) {
-  constexpr double kRounding = 1e-5;  // m, and of directions
-  return (a.p_parent_joint - b.p_parent_joint).norm() <= kRounding &&
-         (a.R_parent_joint - b.R_parent_joint).norm() <= kRounding &&
-         (a.axis - b.axis).norm() <= kRounding;
-}
-
-void check_robot(const fs::path& path, const SavedTorqueModel& model, const DynamicModel& robot,
-                 const fs::path& urdf) {
-  const RigidModel own = make_rigid_model(robot);
-  const std::vector<std::string> model_joints = joint_names(model.rigid);
-  const std::vector<std::string> joints = joint_names(own);
-  if (model_joints != joints) {
-    throw bad_input(
-        path.string(),
-        fmt::format("the model has the joints {}, {} has {}", fmt::join(model_joints, ", "),
-                    urdf.filename().string(), fmt::join(joints, ", ")),
-        "give the URDF that the model was learned with");
-  }
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (model.rigid.bodies[j].type == own.bodies[j].type &&
-        model.rigid.bodies[j].parent == own.bodies[j].parent &&
-        same_geometry(model.rigid.bodies[j], own.bodies[j])) {
-      continue;
-    }
-    throw bad_input(path.string(),
-                    fmt::format("joint '{}' is another one, or elsewhere, in {}", joints[j],
-                                urdf.filename().string()),
-                    "give the URDF that the model was learned with");
-  }
-  if (model.robot == robot.tree.name) return;
-  throw bad_input(path.string(),
-                  fmt::format("the model is of robot '{}', {} of '{}'", model.robot,
-                              urdf.filename().string(), robot.tree.name),
-                  "give the URDF that the model was learned with");
 }
 
 TorqueModelKind usable_kind(const std::string& name) {
@@ -300,7 +257,7 @@ ContactModelChoice choose_contact_model(const ContactCommandOptions& options,
   }
   out.file = read_torque_model(path);
   out.kind = out.file->model.kind;
-  check_robot(path, out.file->model, robot, options.robot);
+  require_model_of(path, out.file->model, robot, options.robot);
   require_own_cutoff(*out.file, options.data.motion.cutoff_hz, path);
   return out;
 }

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/experiment_command_line.h"
 
-#include <algorithm>
-
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/commands/command_options.h"
 #include "app/commands/torque_command_line.h"
 #include "app/experiments/experiments.h"
-#include "app/io/nearest_name.h"
 
 namespace kinescope {
 namespace {
@@ -25,18 +21,6 @@ std::vector<std::string> experiment_names() {
 std::vector<std::string> learner_names() {
   std::vector<std::string> out;
   for (const std::string_view name : experiments::learner_names()) out.emplace_back(name);
-  return out;
-}
-
-std::string refuse_other(const std::string& word, const std::vector<std::string>& known) {
-  if (std::ranges::find(known, word) != known.end()) return {};
-  return fmt::format("'{}' is not known; {}", word, did_you_mean(word, known));
-}
-
-// The words stand in the validator's name: for completion.
-CLI::Validator one_of(const std::vector<std::string>& known) {
-  CLI::Validator out([known](const std::string& word) { return refuse_other(word, known); }, "");
-  out.name(fmt::format("{}", fmt::join(known, " ")));
   return out;
 }
 

@@ -9,6 +9,7 @@
 namespace kinescope {
 
 void add_simulate(CLI::App& app, CommandLine& line);
+void add_control(CLI::App& app, CommandLine& line);
 void add_export(CLI::App& app, CommandLine& line);
 
 }  // namespace kinescope

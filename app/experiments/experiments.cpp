@@ -31,6 +31,11 @@ const std::vector<Experiment>& all_experiments() {
        {"--runs", "--samples", "--seconds", "--noise"},
        {"detection", "detectors", "runs", "contacts", "false_alarms"},
        contact_experiment},
+      {"control",
+       "Learned compensation in the servo loop of a WAM, and of its joint 4 alone",
+       {"--runs", "--seconds", "--joints"},
+       {"wam", "feedback", "weight", "payload", "joint4"},
+       control_experiment},
   };
   return experiments;
 }

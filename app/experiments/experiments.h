@@ -36,5 +36,7 @@ struct Experiment {
                                                    const Progress& progress);
 [[nodiscard]] ExperimentSummary contact_experiment(const ExperimentChoice& choice,
                                                    const Progress& progress);
+[[nodiscard]] ExperimentSummary control_experiment(const ExperimentChoice& choice,
+                                                   const Progress& progress);
 
 }  // namespace kinescope

@@ -6,22 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/simulation/drive_torque.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
-namespace {
-
-double wave_torque(const JointDrive::Wave& wave, double q) {
-  return wave.sine * effects::wave_sine(q, wave.number) +
-         wave.cosine * effects::wave_cosine(q, wave.number);
-}
-
-/// The part of a drift that is not its offset is relative to its mean over the log.
-double about_mean(const JointDrive::Drift& drift, double t_s) {
-  return drift.settling.at(t_s) - drift.settling.mean();
-}
-
-}  // namespace
 
 PlantState PlantState::at(const Plant& plant, Eigen::VectorXd q, Eigen::VectorXd dq, double t_s) {
   KINESCOPE_CHECK(q.size() == plant.size() && dq.size() == q.size(),
@@ -71,35 +59,6 @@ void Simulation::set_state(PlantState state) {
   friction_ = Eigen::VectorXd::Zero(rows_.rows());
 }
 
-/// What the drive adds beside inertia, viscous and dry friction.
-double Simulation::smooth_torque(std::size_t joint, double q, double dq, double t_s) const {
-  const JointDrive& drive = plant_.drives[joint];
-  double out = drive.offset + drive.stiffness * q + drive.asymmetric * std::abs(dq);
-  for (const auto& power : drive.powers) {
-    out += power.at_high_speed * effects::speed_power(dq, power.high_speed, power.power);
-  }
-  for (const auto& wave : drive.ripples) out += wave_torque(wave, q);
-  for (const auto& drift : drive.drifts) {
-    out += drift.offset * drift.settling.at(t_s) + drift.viscous * about_mean(drift, t_s) * dq;
-  }
-  return out;
-}
-
-/// What the direction of the speed is multiplied by.
-double Simulation::dry_amplitude(std::size_t joint, double q, double dq, double t_s) const {
-  const JointDrive& drive = plant_.drives[joint];
-  double out = drive.coulomb;
-  for (const auto& stribeck : drive.stribecks) {
-    out += stribeck.excess_at_rest * effects::stribeck_decay(dq, stribeck.speed);
-  }
-  for (const auto& wave : drive.position_friction) out += wave_torque(wave, q);
-  for (const auto& drift : drive.drifts) out += drift.coulomb * about_mean(drift, t_s);
-  if (drive.share_of_load != 0.0) {
-    out += drive.share_of_load * std::abs(load_[static_cast<Eigen::Index>(joint)]);
-  }
-  return out;
-}
-
 /// Mass matrix, torque of everything smooth, amplitudes of friction, at q_mid_ and dq_mid_.
 void Simulation::evaluate(double t_s) {
   mass_ = momentum_.evaluate(q_mid_, dq_mid_).mass + plant_.coupled_inertia;
@@ -107,8 +66,9 @@ void Simulation::evaluate(double t_s) {
   if (has_load_) load_newton_euler_.torque(q_mid_, dq_mid_, state_.ddq, load_);
   for (Eigen::Index j = 0; j < bias_.size(); ++j) {
     const auto joint = static_cast<std::size_t>(j);
-    bias_[j] += smooth_torque(joint, q_mid_[j], dq_mid_[j], t_s);
-    double amplitude = dry_amplitude(joint, q_mid_[j], dq_mid_[j], t_s);
+    const JointDrive& drive = plant_.drives[joint];
+    bias_[j] += smooth_torque(drive, q_mid_[j], dq_mid_[j], t_s);
+    double amplitude = dry_amplitude(drive, q_mid_[j], dq_mid_[j], t_s, load_[j]);
     DryElement& element = elements_[joint];
     if (amplitude < 0.0) {
       // A law that drives is no friction: explicit, and no hold at rest.

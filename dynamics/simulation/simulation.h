@@ -50,8 +50,6 @@ class Simulation {
   [[nodiscard]] Eigen::VectorXd acceleration(const Eigen::VectorXd& torque);
 
  private:
-  [[nodiscard]] double smooth_torque(std::size_t joint, double q, double dq, double t_s) const;
-  [[nodiscard]] double dry_amplitude(std::size_t joint, double q, double dq, double t_s) const;
   void evaluate(double t_s);
   void make_right_side(const Eigen::VectorXd& torque, double step_s);
   void make_elements();

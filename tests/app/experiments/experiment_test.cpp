@@ -76,6 +76,7 @@ TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"barrett", "--samples", "150"},
         std::vector<std::string>{"contact", "--runs", "1", "--seconds", "5", "--samples", "8000"},
+        std::vector<std::string>{"control", "--runs", "1", "--seconds", "12", "--joints", "4"},
         std::vector<std::string>{"panda", "--runs", "1", "--joints", "2,3", "--models",
                                  "rbf,parametric", "--starts", "1", "--search-samples", "60"}}) {
     std::vector<std::string> command{"experiment"};
@@ -123,6 +124,7 @@ TEST(Experiment, Refusals) {
   expect_refusal({"experiment", "scara", "--models", "gipp"}, code, "did you mean 'gip'?");
   expect_refusal({"experiment", "efficiency", "--tilt", "2"}, code,
                  "--tilt: is no option of the experiment efficiency");
+  expect_refusal({"experiment", "control", "--joints", "3"}, code, "give 4 to 7");
   expect_refusal({"experiment", "scara", "--seconds", "20"}, code,
                  "--seconds: is no option of the experiment scara");
   expect_refusal({"experiment", "scara", "--tilt", "1,2", "--shift", "0.01"}, code,

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/control/servo.h"
 #include "dynamics/experiments/reference_arms.h"
-#include "dynamics/simulation/servo.h"
 
 namespace kinescope {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dynamics/simulation/servo.h"
+#include "dynamics/control/servo.h"
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ TEST(Servo, FrictionCostsASlowLoopMore) {
 }
 
 TEST(Servo, FeedForwardSparesTheLoopItsError) {
-  EXPECT_GT(log_of({.feed_forward = false}).tracking_error.maxCoeff(),
+  EXPECT_GT(log_of({.law = ControlLaw::kPd}).tracking_error.maxCoeff(),
             3.0 * log_of({}).tracking_error.maxCoeff());
 }
 

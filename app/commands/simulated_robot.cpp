@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/commands/simulated_robot.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/commands/output_folder.h"
+#include "app/io/torque_effects_file.h"
+#include "dynamics/data/log_checks.h"
+#include "dynamics/simulation/plant.h"
+#include "dynamics/simulation/robot_effects.h"
+#include "kinematics/core/error.h"
+#include "kinematics/log/joint_log.h"
+#include "kinematics/log/smoothing_spline.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The channel of every joint: its name, q_NAME or NAME_position; where none is named so, and there
+/// are as many as joints, their order.
+std::vector<int> channels_of(const JointLog& log, const TorqueRobot& robot) {
+  std::vector<int> out;
+  std::string missing;
+  for (const std::string& joint : robot.joints) {
+    std::optional<int> found;
+    for (const std::string& name : {joint, "q_" + joint, joint + "_position"}) {
+      if (!found) found = log.channel(name);
+    }
+    if (found) {
+      out.push_back(*found);
+    } else if (missing.empty()) {
+      missing = joint;
+    }
+  }
+  if (missing.empty()) return out;
+  if (out.empty() && log.channels.size() == robot.joints.size()) {
+    for (std::size_t j = 0; j < robot.joints.size(); ++j) out.push_back(static_cast<int>(j));
+    return out;
+  }
+  throw bad_input(log.source, fmt::format("has no column for joint '{}'", missing),
+                  fmt::format("name the columns t, {}", fmt::join(robot.joints, ", ")));
+}
+
+/// Values that are too large to be rad or m.
+void require_plausible_units(const JointLog& log, const Eigen::MatrixXd& values,
+                             const std::vector<int>& channels, const TorqueRobot& robot) {
+  TorqueLog checked;
+  checked.sources = {log.source};
+  checked.q = values;
+  checked.source.assign(static_cast<std::size_t>(values.rows()), 0);
+  checked.lines.assign(static_cast<std::size_t>(values.rows()), 0);
+  for (std::size_t j = 0; j < channels.size(); ++j) {
+    checked.joints.push_back({robot.joints[j], robot.types[j] == JointType::kPrismatic});
+    checked.q_columns.push_back(log.channels[static_cast<std::size_t>(channels[j])]);
+  }
+  for (const LogFinding& finding : check_ranges(checked))
+    throw bad_input(log.source, finding.what, "write the trajectory in rad and m");
+}
+
+/// Of a trace, effects that the URDF already holds are not added again.
+std::vector<ListedEffect> not_yet_in(const fs::path& robot, const fs::path& trace,
+                                     std::vector<ListedEffect> effects) {
+  const bool traced_urdf = same_place(robot, trace.parent_path() / "robot_traced.urdf");
+  std::erase_if(effects, [&](const ListedEffect& effect) { return traced_urdf && effect.in_urdf; });
+  return effects;
+}
+
+}  // namespace
+
+TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& robot,
+                               double rate_hz) {
+  const JointLog log = read_joint_log(trajectory);
+  for (const std::string& warning : log.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  constexpr std::size_t kFewest = 8;  // of the spline
+  if (log.size() < kFewest) {
+    throw bad_input(log.source, fmt::format("holds {} rows", log.size()),
+                    fmt::format("give at least {}", kFewest));
+  }
+  const std::vector<int> channels = channels_of(log, robot);
+  Eigen::MatrixXd values(std::ssize(log.times_s), std::ssize(channels));
+  for (std::size_t j = 0; j < channels.size(); ++j) {
+    values.col(static_cast<Eigen::Index>(j)) = log.values.col(channels[j]);
+  }
+  require_plausible_units(log, values, channels, robot);
+  const Eigen::VectorXd t_s =
+      Eigen::Map<const Eigen::VectorXd>(log.times_s.data(), std::ssize(log.times_s));
+  const double span_s = t_s[t_s.size() - 1] - t_s[0];
+  // Smooth enough to be followed, near enough to pass through the rows: a quarter of their rate.
+  constexpr double kOfRate = 0.25;
+  const double cutoff_hz = kOfRate * static_cast<double>(t_s.size() - 1) / span_s;
+  const SmoothingSpline spline(t_s, values, cutoff_hz);
+  TorqueSamples out;
+  const auto rows = static_cast<Eigen::Index>(std::floor(span_s * rate_hz)) + 1;
+  if (rows < 2) {
+    throw bad_input(log.source, fmt::format("lasts {:.3g} s, less than a period", span_s),
+                    "give a longer trajectory, or a higher --rate");
+  }
+  out.t_s = t_s[0] + Eigen::ArrayXd::LinSpaced(rows, 0.0, static_cast<double>(rows - 1)) / rate_hz;
+  // Rounding must not leave the spline.
+  out.t_s = out.t_s.cwiseMin(t_s[t_s.size() - 1]);
+  out.q = spline.evaluate(out.t_s);
+  out.dq = spline.evaluate(out.t_s, 1);
+  out.ddq = spline.evaluate(out.t_s, 2);
+  out.torque = Eigen::MatrixXd::Zero(rows, out.q.cols());
+  out.trajectory = Eigen::VectorXi::Zero(rows);
+  return out;
+}
+
+CorrectedTorqueModel simulated_robot(const fs::path& urdf, const DynamicModel& robot,
+                                     const std::optional<fs::path>& effects,
+                                     const TorqueSamples& motion) {
+  if (!effects) return with_effects(robot);
+  const ListedEffects listed = read_listed_effects(*effects);
+  const RobotEffects known = effects_of_robot(robot, motion);
+  std::vector<JointTravel> travels = known.travels;
+  const std::vector<JointId> joints = moving_joints(robot.tree);
+  for (std::size_t j = 0; j < travels.size(); ++j) {
+    const auto speed = listed.high_speeds.find(robot.tree.joints[joints[j].index()].name);
+    if (speed != listed.high_speeds.end()) travels[j].high_speed = speed->second;
+  }
+  return with_effects(robot, resolved(not_yet_in(urdf, *effects, listed.effects), known.candidates),
+                      travels, listed.log.value_or(known.log));
+}
+
+void require_masses(const fs::path& urdf, const DynamicModel& robot) {
+  if (has_masses(robot)) return;
+  throw bad_input(urdf.string(), "no link has a mass",
+                  "give a robot with masses: robot_dynamics.urdf of kinescope dynamics");
+}
+
+std::string torque_log_csv(const TorqueSamples& samples, const std::vector<std::string>& joints) {
+  std::string out = "t";
+  for (const char* what : {"q", "dq", "tau"}) {
+    for (const std::string& joint : joints) out += fmt::format(",{}_{}", what, joint);
+  }
+  out += "\n";
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    out += fmt::format("{:.9g}", samples.t_s[i]);
+    for (const Eigen::MatrixXd* values : {&samples.q, &samples.dq, &samples.torque}) {
+      for (Eigen::Index j = 0; j < values->cols(); ++j) {
+        out += fmt::format(",{:.10g}", (*values)(i, j));
+      }
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+}  // namespace kinescope
