@@ -10,14 +10,7 @@
 
 namespace kinescope::policy {
 
-enum class Use : std::uint8_t {
-  kStart = 1,
-  kStartMode,
-  kTransition,
-  kMeasurement,
-  kDropout,
-  kPolicy
-};
+enum class Use : std::uint8_t { kStart = 1, kStartMode, kTransition, kMeasurement, kDropout };
 
 struct DrawPlace {
   std::uint64_t seed = 1;
