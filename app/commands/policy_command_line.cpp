@@ -66,7 +66,8 @@ void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
   command
       .add_option_function<int>(
           "--trials", [&policy](const int& count) { policy.trials = count; },
-          "Trials with a learned policy (default: 5, or what the file says); a folder with fewer "
+          "Trials with a learned policy (default: as many as the system asks for); a folder with "
+          "fewer "
           "is gone on with")
       ->check(number_in(1, 1000))
       ->type_name("N")

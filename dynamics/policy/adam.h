@@ -14,7 +14,7 @@ void adam_step(const Eigen::VectorXd& gradient, SearchState& search);
 void limit_gradient(double limit, Eigen::VectorXd& gradient, SearchState& search);
 
 /// Enters a cost into the averages of its change; where there was no progress for long, halves the
-/// step size, lowers the dropout and starts the averages anew (T-RO 2022, algorithm 1). True: no
+/// step size, lowers the dropout and starts the averages anew (Amadio et al., T-RO 2022). True: no
 /// progress at the smallest step size.
 [[nodiscard]] bool note_cost(double cost, const ImproveOptions& options, SearchState& search);
 

@@ -92,7 +92,7 @@ void BlockRollout::act(const PreparedPolicy& policy, const RolloutDraws& draws, 
   policy_value(policy, tape.scaled, tape.basis, tape.input);
 }
 
-// The true state of the next time, by the model (T-RO 2022, eqs. 12 and 13).
+// The true state of the next time, speeds by the model and positions by integration.
 void BlockRollout::advance(const RolloutDraws& draws, Index first, int time, bool with_tape) {
   TimeTape& tape = tape_[as_index(time)];
   const Eigen::MatrixXd& x = states_[as_index(time)].values;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The saturating cost of a state: 1 - exp(-sum_t (e_t / length_scale_t)^2) in [0, 1) (Amadio et
-// al., T-RO 2022, eq. 36), summed over time by the learner.
+// al., T-RO 2022), summed over time by the learner.
 #pragma once
 
 #include <vector>

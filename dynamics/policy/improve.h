@@ -4,7 +4,7 @@
 // Gives   the policy of the smallest expected cost over the model's particles.
 // Method  Adam (Kingma and Ba 2015) on the Monte-Carlo gradient with dropout on the basis
 //         functions; step size and dropout are lowered where the cost no longer falls (Amadio et
-//         al., T-RO 2022, section V.C, algorithm 1).
+//         al., T-RO 2022).
 #pragma once
 
 #include <functional>

@@ -25,8 +25,8 @@ struct LearnerOptions {
   /// The policy of the trial before is one of the starts of a search; else all are newly drawn.
   bool keep_policy = true;
   /// Starts of a search: so many policies take `start_steps` steps each, and only the one whose
-  /// cost is then lowest goes on. One in ten single starts ends in a policy that leaves a pendulum
-  /// hanging.
+  /// cost is then lowest goes on. Of 34 single starts on a cart and pole two ended in a policy that
+  /// leaves the pole hanging.
   int starts = 3;
   int start_steps = 100;
   int promise_particles = 400;  ///< that the promised cost is measured with

@@ -15,14 +15,10 @@ using Eigen::Index;
 // Blocks whose kernel rows stay in the second cache (1 MB for 48 rows of 300 samples with their
 // tape); of the sizes the one that computes the fewest particles nobody asked for.
 Index rows_of_block(int particles) {
-  Index best = 0;
-  Index least = 0;
-  for (const Index rows : {48, 40, 32, 24, 16, 8}) {
-    const Index computed = (particles + rows - 1) / rows * rows;
-    if (best == 0 || computed < least) {
-      best = rows;
-      least = computed;
-    }
+  const auto computed = [&](Index rows) { return (particles + rows - 1) / rows * rows; };
+  Index best = 48;
+  for (const Index rows : {40, 32, 24, 16, 8}) {
+    if (computed(rows) < computed(best)) best = rows;
   }
   return best;
 }

@@ -3,7 +3,7 @@
 // Takes   VelocityModel, RbfPolicy, SaturatingCost, where particles start, what the policy sees.
 // Gives   the expected cost of a policy over a horizon, its gradient, and the particles themselves.
 // Method  Monte-Carlo rollout by the reparametrisation x' = mean + std * draw and a reverse sweep
-//         over its tape (Amadio et al., T-RO 2022, section V), in blocks of particles that workers
+//         over its tape (Amadio et al., T-RO 2022), in blocks of particles that workers
 //         share; draws are counter-based, so that results have the same bits on any number of
 //         threads.
 #pragma once

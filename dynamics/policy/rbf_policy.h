@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The policy: a weighted sum of Gaussian basis functions of the seen state, squashed below the
-// inputs' limits (Amadio et al., T-RO 2022, section V; Deisenroth, Fox and Rasmussen 2015).
+// inputs' limits (Amadio et al., T-RO 2022; Deisenroth, Fox and Rasmussen 2015).
 #pragma once
 
 #include <cstdint>

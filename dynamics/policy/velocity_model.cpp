@@ -104,7 +104,7 @@ class KernelSearch {
 
  private:
   [[nodiscard]] gp::Kernel make() const {
-    const gp::Kernel smooth = gp::rbf(gp::first_columns(static_cast<int>(columns_)));
+    gp::Kernel smooth = gp::rbf(gp::first_columns(static_cast<int>(columns_)));
     if (kind_ == VelocityKernel::kSquaredExponential) return smooth;
     if (kind_ == VelocityKernel::kPolynomial2) {
       return smooth +
@@ -113,7 +113,7 @@ class KernelSearch {
     gp::FeatureMap map{{}, static_cast<int>(columns_), {}};
     for (Index f = 0; f < linear_; ++f) map.names.push_back(fmt::format("physics {}", f));
     map.map = [physics = physics_](const gp::Inputs& inputs, gp::Features features) {
-      physics->evaluate(inputs, features);
+      physics->evaluate(inputs, std::move(features));
     };
     return smooth + gp::linear(std::move(map), gp::Offset::kNone);
   }

@@ -2,8 +2,8 @@
 //
 // Takes   trials of a system.
 // Gives   VelocityModel: one Gaussian process for each speed's increment over a step; positions
-//         follow by integration, p' = p + step dp + step / 2 * increment (Amadio et al., T-RO 2022,
-//         section IV.B).
+//         follow by integration, p' = p + step dp + step / 2 * increment (Amadio et al., T-RO
+//         2022).
 // Units   SI; inputs of the processes are state_features() and the inputs u.
 // Method  exact regression on a subset of the samples (greedy by posterior variance),
 //         hyperparameters by the marginal likelihood (dynamics/gp).

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One gradient step of policy search: 400 particles x 60 steps, 200 basis functions, two processes
-// of N samples and six columns, dropout and all random numbers included, on one thread. Beside it the two
-// products with the Cholesky factor that it cannot do without, alone, and as triangular solves of
-// BLAS.
+// of N samples and six columns, dropout and all random numbers included, on one thread. Beside it
+// the two products with the Cholesky factor that it cannot do without, alone, and as triangular
+// solves of BLAS.
 #include <benchmark/benchmark.h>
 
 #include "dynamics/gp/blas.h"

@@ -12,8 +12,7 @@ namespace {
 constexpr double kGravity = 9.81;
 constexpr int kSubsteps = 10;
 
-// Equations of Deisenroth (2010, appendix C.2): state x, angle, x', angle' with a rod of uniform
-// mass.
+// Lagrange's equations of a cart and a rod of uniform mass; state x, angle, x', angle'.
 Eigen::Vector4d derivative(const CartPoleNumbers& n, const Eigen::Vector4d& x, double force) {
   const double s = std::sin(x[1]);
   const double c = std::cos(x[1]);

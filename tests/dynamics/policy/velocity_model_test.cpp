@@ -40,6 +40,22 @@ ModelOptions quick(VelocityKernel kernel) {
   return out;
 }
 
+// Without friction and force: what the integration of ten steps of 5 ms loses.
+TEST(CartPole, KeepsItsEnergy) {
+  const CartPoleNumbers n{.friction = 0.0, .noise = 0.0, .start_sigma = 1.0};
+  const CartPole plant(n);
+  const Trial trial =
+      plant.run([](const Eigen::VectorXd&, int) { return Eigen::VectorXd::Zero(1); }, 60, 3, 0);
+  const auto energy = [&](Index k) {
+    const Eigen::Vector4d x = trial.truth.row(k);
+    const double swing = 0.5 * n.length_m * x[3];
+    return 0.5 * (n.cart_kg + n.pole_kg) * x[2] * x[2] + n.pole_kg * x[2] * swing * std::cos(x[1]) +
+           2.0 / 3.0 * n.pole_kg * swing * swing -
+           0.5 * n.pole_kg * 9.81 * n.length_m * std::cos(x[1]);
+  };
+  for (Index k = 1; k <= 60; ++k) EXPECT_NEAR(energy(k), energy(0), 1e-5);
+}
+
 // What a model of a kernel of dynamics/gp with the same numbers says of the samples.
 double log_likelihood(const VelocityProcess& process, const PhysicsFeatures* physics) {
   Eigen::MatrixXd a = kernel_matrix(process.kernel, process.inputs, process.inputs, physics);
