@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "dynamics/gp/workers.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::policy {
 namespace {
@@ -61,15 +62,17 @@ struct ParticleObjective::State {
         task(policy_task),
         particles(count),
         rows(rows_of_block(count)),
-        blocks((count + rows - 1) / rows),
         workers(threads),
-        costs(count, policy_task.steps + 1) {}
+        costs(count, policy_task.steps + 1) {
+    KINESCOPE_CHECK(rows > 0, "blocks of particles");
+    blocks = (particles + rows - 1) / rows;
+  }
 
   PreparedModel model;
   PolicyTask task;
   Index particles;
   Index rows;
-  Index blocks;
+  Index blocks = 0;
   gp::Workers workers;
   Pool pool;
   Eigen::MatrixXd costs;
