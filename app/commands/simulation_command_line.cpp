@@ -2,6 +2,8 @@
 #include "app/commands/simulation_command_line.h"
 
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -22,7 +24,7 @@ CLI::Option* add_file(CLI::App& command, const char* name, Path& path, const cha
 
 /// One number a joint.
 CLI::Option* add_list(CLI::App& command, const char* name, Eigen::VectorXd& values,
-                      const char* help) {
+                      const std::string& help) {
   return command
       .add_option_function<std::vector<double>>(
           name,
@@ -70,14 +72,22 @@ std::vector<CLI::Option*> add_numbers(CLI::App& command, ServoOptions& servo,
   return out;
 }
 
-void add_servo(CLI::App& command, ServoOptions& servo, CLI::Option* in_servo) {
-  std::vector<CLI::Option*> options = add_numbers(command, servo, kServoNumbers);
-  options.push_back(
+// What every servo has: `numbers`, gains and limits.
+std::vector<CLI::Option*> add_servo_options(CLI::App& command, ServoOptions& servo,
+                                            std::span<const NumberOption> numbers,
+                                            std::string_view no_limit) {
+  std::vector<CLI::Option*> out = add_numbers(command, servo, numbers);
+  out.push_back(
       add_list(command, "--kp", servo.kp, "Gains on the position, N m/rad or N/m, one a joint"));
-  options.push_back(
-      add_list(command, "--kd", servo.kd, "Gains on the velocity, N m s/rad or N s/m"));
-  options.push_back(add_list(command, "--torque-limit", servo.torque_limit,
-                             "Largest torque of every joint, N m or N (default: none)"));
+  out.push_back(add_list(command, "--kd", servo.kd, "Gains on the velocity, N m s/rad or N s/m"));
+  out.push_back(
+      add_list(command, "--torque-limit", servo.torque_limit,
+               fmt::format("Largest torque of every joint, N m or N (default: {})", no_limit)));
+  return out;
+}
+
+void add_servo(CLI::App& command, ServoOptions& servo, CLI::Option* in_servo) {
+  std::vector<CLI::Option*> options = add_servo_options(command, servo, kServoNumbers, "none");
   options.push_back(command.add_flag_callback(
       "--no-feed-forward", [&servo] { servo.law = ControlLaw::kPd; },
       "Without the torque of the robot's masses along the trajectory"));
@@ -106,13 +116,8 @@ std::vector<std::string> law_names() {
 
 void add_servo_of_control(CLI::App& command, ServoOptions& servo) {
   constexpr const char* kGroup = "The servo";
-  std::vector<CLI::Option*> options = add_numbers(command, servo, kControlNumbers);
-  options.push_back(
-      add_list(command, "--kp", servo.kp, "Gains on the position, N m/rad or N/m, one a joint"));
-  options.push_back(
-      add_list(command, "--kd", servo.kd, "Gains on the velocity, N m s/rad or N s/m"));
-  options.push_back(add_list(command, "--torque-limit", servo.torque_limit,
-                             "Largest torque of every joint, N m or N (default: the URDF's)"));
+  std::vector<CLI::Option*> options =
+      add_servo_options(command, servo, kControlNumbers, "the URDF's");
   options.push_back(add_list(command, "--torque-rate-limit", servo.torque_rate_limit,
                              "Largest change of the torque, N m/s or N/s (default: none)"));
   for (CLI::Option* option : options) option->group(kGroup);

@@ -10,6 +10,7 @@
 #include "app/report/html.h"
 #include "app/report/page.h"
 #include "app/report/plot.h"
+#include "app/report/reproduction.h"
 #include "app/report/sections.h"
 #include "app/report/torque_unit.h"
 
@@ -221,16 +222,6 @@ std::string calibration_section(const ContactSummary& summary, const nlohmann::j
   return out + "</section>\n";
 }
 
-std::string reproduce(const ContactSummary& summary) {
-  std::string out = section_head("reproduce", "How to reproduce");
-  out += "<pre id=\"command\">" + escaped(summary.command) + "</pre>\n<ul>";
-  for (const InputFile& input : summary.inputs) {
-    out += "<li>" + escaped(input.name) + " <code class=\"hash\">" + escaped(input.sha256) +
-           "</code></li>";
-  }
-  return out + "</ul></section>\n";
-}
-
 }  // namespace
 
 std::string contact_report_html(const ContactSummary& summary) {
@@ -240,7 +231,8 @@ std::string contact_report_html(const ContactSummary& summary) {
          "<main>\n" + section_head("verdict", "Verdict") + paragraph(contact_verdict(summary)) +
          contact_table(summary, document) + "</section>\n" + timeline(summary) +
          comparison(summary, document) + calibration_section(summary, document) +
-         reproduce(summary) + "</main>\n</body>\n</html>\n";
+         reproduction_section({.command = summary.command, .inputs = summary.inputs}) +
+         "</main>\n</body>\n</html>\n";
 }
 
 }  // namespace kinescope

@@ -7,6 +7,7 @@
 #include "app/report/experiment_plots.h"
 #include "app/report/html.h"
 #include "app/report/page.h"
+#include "app/report/reproduction.h"
 #include "app/report/sections.h"
 
 namespace kinescope {
@@ -93,16 +94,9 @@ std::string torque_section(const ControlSummary& summary, const nlohmann::json& 
 }
 
 std::string reproduce(const ControlSummary& summary) {
-  std::string out = section_head("reproduce", "How to reproduce");
-  out += "<pre id=\"command\">" + escaped(summary.command) + "</pre>\n<ul>";
-  for (const InputFile& input : summary.inputs) {
-    out += "<li>" + escaped(input.name) + " <code class=\"hash\">" + escaped(input.sha256) +
-           "</code></li>";
-  }
-  for (const ControlRun& run : summary.runs) {
-    out += fmt::format("<li><code>{}</code>: {}</li>", escaped(run.log), escaped(run.name));
-  }
-  return out + "</ul></section>\n";
+  Reproduction of{.command = summary.command, .inputs = summary.inputs};
+  for (const ControlRun& run : summary.runs) of.products.emplace_back(run.log, run.name);
+  return reproduction_section(of);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "app/report/html.h"
 #include "app/report/page.h"
+#include "app/report/reproduction.h"
 #include "app/report/result_values.h"
 #include "app/report/sections.h"
 #include "kinematics/core/error.h"
@@ -68,20 +69,10 @@ std::string section_html(const ExperimentSummary& summary, const ExperimentSecti
 }
 
 std::string reproduce(const ExperimentSummary& summary) {
-  std::string out = section_head("reproduce", "How to reproduce");
-  out += "<pre id=\"command\">" + escaped(summary.command) + "</pre>\n<dl class=\"verdict\">";
-  for (const auto& [name, value] : summary.settings) {
-    out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value));
-  }
-  out += "</dl>\n<ul>";
-  for (const InputFile& input : summary.inputs) {
-    out += "<li>" + escaped(input.name) + " <code class=\"hash\">" + escaped(input.sha256) +
-           "</code></li>";
-  }
-  for (const ExperimentTable& table : summary.tables) {
-    out += fmt::format("<li><code>{}.csv</code>: {}</li>", table.id, escaped(table.caption));
-  }
-  return out + "</ul></section>\n";
+  Reproduction of{summary.command, summary.settings, summary.inputs};
+  for (const ExperimentTable& table : summary.tables)
+    of.products.emplace_back(table.id + ".csv", table.caption);
+  return reproduction_section(of);
 }
 
 std::string csv_word(const std::string& word) {

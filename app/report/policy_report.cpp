@@ -10,6 +10,7 @@
 #include "app/report/html.h"
 #include "app/report/page.h"
 #include "app/report/policy_sections.h"
+#include "app/report/reproduction.h"
 #include "app/report/result_values.h"
 #include "app/report/sections.h"
 
@@ -99,20 +100,6 @@ std::string cost_section(const PolicySummary& summary, const nlohmann::json& doc
                   "half");
   }
   return out + trials_table(summary, document) + "</section>\n";
-}
-
-std::string reproduce_section(const PolicySummary& summary) {
-  std::string out = section_head("reproduce", "How to reproduce");
-  out += "<pre id=\"command\">" + escaped(summary.command) + "</pre>\n<dl class=\"verdict\">";
-  for (const auto& [name, value] : summary.settings) {
-    out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value));
-  }
-  out += "</dl>\n<ul>";
-  for (const InputFile& input : summary.inputs) {
-    out += "<li>" + escaped(input.name) + " <code class=\"hash\">" + escaped(input.sha256) +
-           "</code></li>";
-  }
-  return out + "</ul></section>\n";
 }
 
 std::vector<double> data_seconds(const PolicySummary& summary) {
@@ -215,7 +202,8 @@ std::string policy_html(const PolicySummary& summary) {
   for (const std::string& finding : policy_findings(summary)) out += paragraph(finding);
   out += "</section>\n" + motion + cost_section(summary, document);
   for (std::size_t k = 0; k < summary.trials.size(); ++k) out += policy_trial_section(summary, k);
-  return out + reproduce_section(summary) + "</main>\n</body>\n</html>\n";
+  return out + reproduction_section({summary.command, summary.settings, summary.inputs}) +
+         "</main>\n</body>\n</html>\n";
 }
 
 }  // namespace kinescope
