@@ -59,7 +59,7 @@ struct Compensation::State {
   std::unique_ptr<TorquePredictor> predictor;
   Eigen::VectorXd nominal_error;
   Eigen::VectorXd torque, load, weight;
-  JointMotion still;
+  MotionPoint still;
 
   explicit State(const KnownRobot& robot) : nominal(robot.nominal) {
     check(robot);
@@ -95,7 +95,7 @@ struct Compensation::State {
   }
 
   /// `of_traced`: torque of the effects' model at this motion; null: there is none.
-  const Eigen::VectorXd& total(const JointMotion& motion, const Eigen::VectorXd* of_traced) {
+  const Eigen::VectorXd& total(const MotionPoint& motion, const Eigen::VectorXd* of_traced) {
     nominal.torque(motion.q, motion.dq, motion.ddq, torque);
     const Eigen::VectorXd* learned = of_traced;
     if (predictor) {
@@ -116,7 +116,7 @@ Compensation::~Compensation() = default;
 Compensation::Compensation(Compensation&&) noexcept = default;
 Compensation& Compensation::operator=(Compensation&&) noexcept = default;
 
-const Eigen::VectorXd& Compensation::at(const JointMotion& motion) {
+const Eigen::VectorXd& Compensation::at(const MotionPoint& motion) {
   return state_->total(motion, state_->traced ? &state_->traced->at(motion) : nullptr);
 }
 

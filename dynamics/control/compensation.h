@@ -43,7 +43,7 @@ class Compensation {
   Compensation(Compensation&&) noexcept;
   Compensation& operator=(Compensation&&) noexcept;
 
-  const Eigen::VectorXd& at(const JointMotion& motion);
+  const Eigen::VectorXd& at(const MotionPoint& motion);
   /// What holds the robot there; memories stay as they are.
   const Eigen::VectorXd& at_rest(const Eigen::VectorXd& q, double t_s);
   /// Of the learned part at the last call, 0 to 1, one a joint; 0 where nothing was learned.

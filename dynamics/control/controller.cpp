@@ -56,7 +56,7 @@ Controller::Controller(const KnownRobot& robot, const ControllerOptions& options
       feedback_(none_),
       torque_(none_) {}
 
-const Eigen::VectorXd& Controller::model_torque(const JointMotion& reference) {
+const Eigen::VectorXd& Controller::model_torque(const MotionPoint& reference) {
   switch (options_.law) {
     case ControlLaw::kPdGravity:
       return compensation_.at_rest(measured_.q, reference.t_s);
@@ -100,7 +100,7 @@ void Controller::feed_back() {
   derivative_ = options_.gains.kd.cwiseProduct(derivative_);
 }
 
-const Eigen::VectorXd& Controller::command(const JointMotion& reference, const Measured& measured) {
+const Eigen::VectorXd& Controller::command(const MotionPoint& reference, const Measured& measured) {
   take(measured);
   torque_ = model_torque(reference);
   feed_back();

@@ -66,7 +66,7 @@ class Controller {
   /// The command of one period. `reference` is finite; a joint's reading that is not is replaced by
   /// its last one, before the first by the reference. What is still not finite is never sent
   /// (torque_limiter.h).
-  const Eigen::VectorXd& command(const JointMotion& reference, const Measured& measured);
+  const Eigen::VectorXd& command(const MotionPoint& reference, const Measured& measured);
 
   /// Of the last command, before the limits; N m or N.
   [[nodiscard]] const Eigen::VectorXd& feedback() const { return feedback_; }
@@ -75,7 +75,7 @@ class Controller {
 
  private:
   void take(const Measured& measured);
-  const Eigen::VectorXd& model_torque(const JointMotion& reference);
+  const Eigen::VectorXd& model_torque(const MotionPoint& reference);
   void feed_back();
 
   ControllerOptions options_;
@@ -83,7 +83,7 @@ class Controller {
   Compensation compensation_;
   TorqueLimiter limiter_;
   Measured measured_;  ///< the last usable one
-  JointMotion asked_;  ///< of computed torque
+  MotionPoint asked_;  ///< of computed torque
   Eigen::VectorXd none_, proportional_, derivative_, feedback_, torque_;
 };
 

@@ -13,7 +13,7 @@ OnlineTorque::OnlineTorque(Plant plant)
   for (const JointDrive& drive : plant_.drives) presliding_.emplace_back(drive.presliding.size());
 }
 
-void OnlineTorque::move_presliding(const JointMotion& motion) {
+void OnlineTorque::move_presliding(const MotionPoint& motion) {
   for (std::size_t j = 0; j < plant_.drives.size(); ++j) {
     const auto i = static_cast<Eigen::Index>(j);
     for (std::size_t k = 0; k < presliding_[j].size(); ++k) {
@@ -27,7 +27,7 @@ void OnlineTorque::move_presliding(const JointMotion& motion) {
   begun_ = true;
 }
 
-void OnlineTorque::add_coupled(const JointMotion& motion) {
+void OnlineTorque::add_coupled(const MotionPoint& motion) {
   torque_.noalias() += plant_.viscous * motion.dq;
   torque_.noalias() += plant_.coupled_inertia * motion.ddq;
   for (const CoupledDrive& drive : plant_.coupled) {
@@ -36,7 +36,7 @@ void OnlineTorque::add_coupled(const JointMotion& motion) {
   }
 }
 
-const Eigen::VectorXd& OnlineTorque::at(const JointMotion& motion) {
+const Eigen::VectorXd& OnlineTorque::at(const MotionPoint& motion) {
   move_presliding(motion);
   bodies_.torque(motion.q, motion.dq, motion.ddq, torque_);
   load_bodies_.torque(motion.q, motion.dq, motion.ddq, load_);

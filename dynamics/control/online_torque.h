@@ -14,7 +14,7 @@
 namespace kinescope {
 
 /// The motion that a torque is asked for; one entry a joint.
-struct JointMotion {
+struct MotionPoint {
   double t_s = 0.0;
   Eigen::VectorXd q, dq, ddq;
 };
@@ -27,14 +27,14 @@ class OnlineTorque {
 
   /// M ddq + C dq + g + drives. Pre-sliding (Dahl) moves on to this posture; at the first one it is
   /// as after a long way in the direction of the speed.
-  const Eigen::VectorXd& at(const JointMotion& motion);
+  const Eigen::VectorXd& at(const MotionPoint& motion);
   /// What holds the robot there: no friction.
   const Eigen::VectorXd& at_rest(const Eigen::VectorXd& q, double t_s);
   [[nodiscard]] Eigen::Index size() const { return plant_.size(); }
 
  private:
-  void move_presliding(const JointMotion& motion);
-  void add_coupled(const JointMotion& motion);
+  void move_presliding(const MotionPoint& motion);
+  void add_coupled(const MotionPoint& motion);
 
   Plant plant_;
   rigid::NewtonEuler bodies_, load_bodies_;

@@ -62,7 +62,7 @@ struct Run {
       : q(reference.q), dq(q), ddq(q), applied(q), feedback(q), command(q), weight(q) {}
 };
 
-JointMotion row_of(const TorqueSamples& reference, Eigen::Index k) {
+MotionPoint row_of(const TorqueSamples& reference, Eigen::Index k) {
   return {reference.t_s[k], reference.q.row(k), reference.dq.row(k), reference.ddq.row(k)};
 }
 
@@ -70,7 +70,7 @@ Run follow(const Plant& plant, const TorqueSamples& reference, Controller contro
            const ServoOptions& options) {
   const auto late = static_cast<Eigen::Index>(std::lround(options.delay_s * options.rate_hz));
   const double step_s = 1.0 / (options.rate_hz * options.steps);
-  const JointMotion first = row_of(reference, 0);
+  const MotionPoint first = row_of(reference, 0);
   Simulation simulation(plant, PlantState::at(plant, first.q, first.dq, first.t_s));
   std::optional<VelocityEstimator> velocity;
   Run run(reference);

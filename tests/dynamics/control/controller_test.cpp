@@ -142,7 +142,7 @@ TEST(Controller, ReadingsThatAreNoNumbersNeverReachTheMotors) {
     Loop loop(law);
     Controller controller({.nominal = loop.plant_.rigid}, loop.options_);
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(7);
-    const JointMotion still{0.0, Loop::posture(), zero, zero};
+    const MotionPoint still{0.0, Loop::posture(), zero, zero};
     Measured measured{Loop::posture(), zero, Loop::posture(), zero};
     const Eigen::VectorXd before = controller.command(still, measured);
     measured.q[2] = kNone;
@@ -179,7 +179,7 @@ TEST(Compensation, KeepsToTheNominalMassesWhereTheModelDoesNotKnow) {
     known += 10.0 / static_cast<double>(log.size()) * compensation.weight();
   }
   EXPECT_GT(known.minCoeff(), 0.9);
-  const JointMotion far{0.0, 3.0 * log.q.row(0).transpose(), 5.0 * log.dq.row(0).transpose(),
+  const MotionPoint far{0.0, 3.0 * log.q.row(0).transpose(), 5.0 * log.dq.row(0).transpose(),
                         40.0 * log.ddq.row(0).transpose()};
   const Eigen::VectorXd torque = compensation.at(far);
   const Eigen::VectorXd weight = compensation.weight();

@@ -40,8 +40,8 @@ Eigen::VectorXd middle() {
   return (Eigen::VectorXd(kJoints) << 0.1, 0.4, -0.3, -1.6, 0.2, 1.7, 0.5).finished();
 }
 
-JointMotion reference(double t_s) {
-  JointMotion out{t_s, middle(), Eigen::VectorXd(kJoints), Eigen::VectorXd(kJoints)};
+MotionPoint reference(double t_s) {
+  MotionPoint out{t_s, middle(), Eigen::VectorXd(kJoints), Eigen::VectorXd(kJoints)};
   for (int j = 0; j < kJoints; ++j) {
     const double w = 2.0 + 0.7 * j;
     out.q[j] += 0.3 * (1.0 - std::cos(w * t_s));
@@ -66,7 +66,7 @@ Eigen::VectorXd our_end(ControlLaw law) {
   const Plant plant = make_plant(with_effects(arm()));
   Simulation simulation(plant, PlantState::at(plant, middle(), Eigen::VectorXd::Zero(kJoints)));
   for (int k = 0; k < kSteps; ++k) {
-    const JointMotion now = reference(k * kStep_s);
+    const MotionPoint now = reference(k * kStep_s);
     const PlantState& state = simulation.state();
     (void)simulation.step(control.command(now, {state.q, state.dq, now.q, now.dq}), kStep_s);
   }
@@ -84,7 +84,7 @@ Eigen::VectorXd mujoco_end(ControlLaw law) {
   Eigen::Map<Eigen::VectorXd> torque(data->qfrc_applied, kJoints);
   q = middle();
   for (int k = 0; k < kSteps; ++k) {
-    const JointMotion now = reference(k * kStep_s);
+    const MotionPoint now = reference(k * kStep_s);
     torque = control.command(now, {q, dq, now.q, now.dq});
     mj_step(model.get(), data.get());
   }
