@@ -116,6 +116,16 @@ TEST(Explain, WhatIsLeftOutUpToAnEndIsExplained) {
             (std::vector<std::string>{"camera_bump camera", "encoder_scale q5", "helical q2"}));
 }
 
+// Parallel axes that stand nearly upright: what gravity does to the last depends on small tilts,
+// and one mass under an unknown gravity leaves some of it. It was told as a sag, a coupling and a
+// scale.
+TEST(Explain, ASagUnderTheGravityThatItTellsIsOneEffect) {
+  const Answered answered = run_case(9526);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(only_effect(answered), "compliance q4");
+}
+
 // Each of the three is hidden by the two others, and lasts as long as they do.
 TEST(Explain, LargeEffectsThatHideEachOtherAreFoundTogether) {
   const Answered answered = run_case(328);
