@@ -67,8 +67,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     message = "name a command";
     remedy =
         "run, trace, correct, dynamics, predict, simulate, control, export, contact, experiment, "
-        "policy, "
-        "inspect or camera; see kinescope --help";
+        "policy, inspect or camera; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =

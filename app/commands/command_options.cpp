@@ -39,6 +39,14 @@ void add_force(CLI::App& command, bool& force, const char* help) {
   command.add_flag("--force", force, help);
 }
 
+void add_threads(CLI::App& command, int& threads) {
+  command
+      .add_option("--threads", threads, "Threads; 0: all of the machine. Never changes a result")
+      ->check(number_in(0, 256))
+      ->capture_default_str()
+      ->type_name("N");
+}
+
 void add_output_options(CLI::App& command, OutputOptions& output) {
   command.add_flag("--json", output.json, "Print the result as JSON");
   command.add_flag("--quiet", output.quiet, "No progress on standard error (warnings stay)");

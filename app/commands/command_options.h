@@ -35,6 +35,9 @@ void add_force(CLI::App& command, bool& force, const char* help);
 /// --gravity X,Y,Z in the base frame.
 void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2);
 
+/// --threads of a command whose result does not depend on it.
+void add_threads(CLI::App& command, int& threads);
+
 /// --json and --quiet.
 void add_output_options(CLI::App& command, OutputOptions& output);
 

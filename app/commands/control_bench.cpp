@@ -18,7 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kTraining_s = 40.0;
-constexpr Eigen::Index kShownPoints = 600;  // of a curve
+
+// Samples that a curve is drawn through.
+auto shown_rows(const TorqueSamples& samples) {
+  constexpr Eigen::Index kShownPoints = 600;
+  return Eigen::seq(Eigen::Index{0}, samples.size() - 1, 1 + (samples.size() - 1) / kShownPoints);
+}
 
 TorqueRobot robot_with_masses(const fs::path& file, const ControlOptions& options) {
   TorqueRobot out = read_torque_robot(file, options.gravity_m_s2);
@@ -149,10 +154,7 @@ void ControlBench::check_limits() const {
   }
 }
 
-Eigen::VectorXd ControlBench::shown_times() const {
-  const Eigen::Index step = 1 + (reference_.size() - 1) / kShownPoints;
-  return reference_.t_s(Eigen::seq(0, reference_.size() - 1, step));
-}
+Eigen::VectorXd ControlBench::shown_times() const { return reference_.t_s(shown_rows(reference_)); }
 
 TorqueSamples ControlBench::training(int round) const {
   if (!options_.training) return sinusoids_like(reference_, nominal_.model, options_, round);
@@ -181,9 +183,7 @@ ControlRun ControlBench::judge(const Contender& contender, const OutputFolder& f
   out.feedback = log.feedback.cwiseQuotient(log.torque);
   out.weight = log.weight;
   out.limited = log.limited;
-  const Eigen::Index step = 1 + (reference_.size() - 1) / kShownPoints;
-  out.errors =
-      (log.samples.q - reference_.q)(Eigen::seq(0, reference_.size() - 1, step), Eigen::all);
+  out.errors = (log.samples.q - reference_.q)(shown_rows(reference_), Eigen::all);
   folder.write(out.log, torque_log_csv(log.samples, robot_.joints));
   return out;
 }

@@ -112,12 +112,7 @@ void add_experiment(CLI::App& app, CommandLine& line) {
       ->check(number_in(0, 1e9))
       ->capture_default_str()
       ->type_name("N");
-  command
-      .add_option("--threads", experiment.choice.threads,
-                  "Threads; 0: all of the machine. Never changes a result")
-      ->check(number_in(0, 256))
-      ->capture_default_str()
-      ->type_name("N");
+  add_threads(command, experiment.choice.threads);
   command
       .add_option_function<std::string>(
           "--log", [&experiment](const std::string& text) { experiment.log = text; },

@@ -141,12 +141,7 @@ void add_policy(CLI::App& app, CommandLine& line) {
                           ->capture_default_str()
                           ->type_name("N");
   add_seeds(command, policy)->excludes(seed);
-  command
-      .add_option("--threads", policy.threads,
-                  "Threads; 0: all of the machine. Never changes a result")
-      ->check(number_in(0, 256))
-      ->capture_default_str()
-      ->type_name("N");
+  add_threads(command, policy.threads);
   command
       .add_option_function<std::string>(
           "-o,--output", [&policy](const std::string& text) { policy.output = text; },

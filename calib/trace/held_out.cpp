@@ -95,8 +95,14 @@ double paired_t(const Partition& partition, const Eigen::VectorXd& worse,
   return mean / std::sqrt(variance / n);
 }
 
+bool predicts_clearly_worse(const Partition& partition, const Eigen::VectorXd& one,
+                            const Eigen::VectorXd& other) {
+  constexpr double kClearlyWorse = 3.0;  // Student's t of the stretches' differences
+  return paired_t(partition, one, other) > kClearlyWorse;
+}
+
 bool predicts_clearly_worse(const Trace& one, const Trace& other) {
-  return paired_t(other.partition, one.held_out_whitened, other.held_out_whitened) > kClearlyWorse;
+  return predicts_clearly_worse(other.partition, one.held_out_whitened, other.held_out_whitened);
 }
 
 double paired_p_value(const Partition& partition, const Eigen::VectorXd& worse,

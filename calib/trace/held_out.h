@@ -30,8 +30,9 @@ struct HeldOutInstants {
 /// Of that t by chance, one side.
 [[nodiscard]] double paired_p_value(const Partition& partition, const Eigen::VectorXd& worse,
                                     const Eigen::VectorXd& better);
-/// From this t on one of two needs no refit to be called worse.
-inline constexpr double kClearlyWorse = 3.0;
+/// The first of two, by whitened squared errors of every instant: no refit need say so.
+[[nodiscard]] bool predicts_clearly_worse(const Partition& partition, const Eigen::VectorXd& one,
+                                          const Eigen::VectorXd& other);
 /// The first of two traces of the same measurements, by what their effects leave.
 [[nodiscard]] bool predicts_clearly_worse(const Trace& one, const Trace& other);
 

@@ -108,7 +108,7 @@ bool Tracer::can_look(const Stage& stage) {
 
 bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
                                     const Eigen::VectorXd& other) const {
-  return paired_t(now_->system.partition(), one, other) > kClearlyWorse;
+  return trace::predicts_clearly_worse(now_->system.partition(), one, other);
 }
 
 void Tracer::forward() {
@@ -344,9 +344,7 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
   int refits = 0;
   for (const Contender& contender : contenders) {
     if (refits >= options_.refits) break;
-    const bool clearly_worse = best && paired_t(now_->system.partition(), contender.held_out,
-                                                contenders.front().held_out) > kClearlyWorse;
-    if (clearly_worse) break;
+    if (best && predicts_clearly_worse(contender.held_out, contenders.front().held_out)) break;
     ++refits;
     std::vector<AddedEffect> effects = now_->added;
     effects.push_back({contender.id, contender.member.scan});
