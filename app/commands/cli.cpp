@@ -12,6 +12,7 @@
 #include "app/commands/run_folder.h"
 #include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
+#include "dynamics/gp/blas.h"
 
 namespace kinescope {
 namespace {
@@ -256,6 +257,8 @@ bool names_no_command(const CLI::App& app, int argc, const char* const* argv) {
 }  // namespace
 
 int run_program(int argc, const char* const* argv) {
+  // Of the sparse factors of the bundle, too.
+  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
   CLI::App app;
   CommandLine line;
   line.run.command_line = join_arguments(argc, argv);

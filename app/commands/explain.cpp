@@ -284,12 +284,19 @@ class Explainer {
     return is_better(one, other, evidence_.observed.measurements);
   }
 
+  [[nodiscard]] PoseTracks undone(const Calibration& calibration) const {
+    const TagObservations& tags = evidence_.observed.tags;
+    if (tags.observations.empty()) return with_effects_undone(calibration, evidence_.tracks);
+    const MarkerSet& markers = recording().markers;
+    return pose_tracks_from_tags(with_effects_undone(calibration, markers, tags),
+                                 calibration.camera, markers);
+  }
+
   // The structure was searched for on tracks that the effects were in: once more without them.
   [[nodiscard]] Explanation asked_again(Explanation now) const {
     if (!now.fitted || !now.structure || now.fitted->effects.empty()) return now;
     if (is_structure_clear(now) && !is_bent(*now.fitted)) return now;
-    std::optional<Structure> again =
-        proposed_structure(with_effects_undone(now.fitted->calibration, evidence_.tracks));
+    std::optional<Structure> again = proposed_structure(undone(now.fitted->calibration));
     if (!again) return now;
     if (shape_of(*again) == shape_of(*now.structure)) {
       now.structure = std::move(again);

@@ -79,8 +79,10 @@ std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& 
   if (sighting.target >= 0) {
     target = Eigen::Vector3d(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
-  const CorrectedSighting corrected =
-      sum_corrections(spec, sighting, corrections_of(spec, sighting), state.corrections.data());
+  const std::vector<int> which = corrections_of(spec, sighting);
+  std::vector<double> values;
+  for (const int c : which) values.push_back(state.corrections[static_cast<std::size_t>(c)]);
+  const CorrectedSighting corrected = sum_corrections(spec, sighting, which, values);
   return corrected_error(spec, sighting, corrected, from_block(state.camera_base.data()),
                          chain_of(spec, state, readings, sighting),
                          rates_of(spec, state, readings, sighting),

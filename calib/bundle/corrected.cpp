@@ -75,6 +75,11 @@ Vector6d moved_before(const Vector6d& at, const Vector6d& by) {
 // exp(at + by) = exp(at) exp(out): the right one.
 Vector6d moved_behind(const Vector6d& at, const Vector6d& by) { return moved_before(-at, by); }
 
+bool acts_in(const Correction& correction, int frame) {
+  if (correction.twists.rows() > 0) return !correction.twists.row(frame).isZero(0.0);
+  return share_at(correction, frame) != 0.0;
+}
+
 // Rows of the image between a corner and the middle row.
 double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t corner) {
   return sighting.corners_px[corner].y() - 0.5 * spec.camera.height;
@@ -113,19 +118,20 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
       case CorrectedPart::kCamera:
         break;
     }
-    if (bears) out.push_back(static_cast<int>(c));
+    if (bears && acts_in(correction, sighting.frame)) out.push_back(static_cast<int>(c));
   }
   return out;
 }
 
 CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
-                                  const std::vector<int>& which, const double* values) {
+                                  const std::vector<int>& which,
+                                  const std::vector<double>& values) {
   CorrectedSighting out;
   out.joints.assign(path_of(spec, sighting).size(), Vector6d::Zero());
-  for (const int c : which) {
-    const Correction& correction = spec.corrections[static_cast<std::size_t>(c)];
-    const Vector6d twist = values[c] * twist_at(correction, sighting.frame);
-    const double amount = values[c] * share_at(correction, sighting.frame);
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const Correction& correction = spec.corrections[static_cast<std::size_t>(which[k])];
+    const Vector6d twist = values[k] * twist_at(correction, sighting.frame);
+    const double amount = values[k] * share_at(correction, sighting.frame);
     switch (correction.part) {
       case CorrectedPart::kJoint:
         out.joints[place_on_path(spec, sighting, correction.index)] += twist;

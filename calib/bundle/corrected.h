@@ -9,7 +9,7 @@
 
 namespace kinescope::bundle {
 
-/// Corrections that bear on a sighting: indices into Spec::corrections, increasing.
+/// Corrections that bear on a sighting, in its frame: indices into Spec::corrections, increasing.
 [[nodiscard]] std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting);
 
 struct CorrectedSighting {
@@ -21,10 +21,10 @@ struct CorrectedSighting {
   double line_delay_s = 0.0;
 };
 
-/// `values`: one a correction of the spec.
+/// `values`: one each of `which`.
 [[nodiscard]] CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
                                                 const std::vector<int>& which,
-                                                const double* values);
+                                                const std::vector<double>& values);
 
 /// Chain and error of a sighting with its corrections.
 struct CorrectedError {

@@ -46,6 +46,7 @@ struct Correction {
   double reference = 1.0;
   /// What nobody asks for and yet has to be known beside an effect: where in its gap a joint began.
   bool is_nuisance = false;
+  bool is_local = false;  ///< bears on a few neighbouring frames
   /// Standard deviation of a Gaussian prior about zero, in the unit of the value and beside rows
   /// that are whitened; 0: none.
   double prior_sigma = 0.0;

@@ -38,7 +38,8 @@ class SightingCost final : public ceres::CostFunction {
     if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
     if (sighting.target >= 0) sizes.push_back(3);
     corrections_ = corrections_of(spec, sighting);
-    if (!corrections_.empty()) sizes.push_back(static_cast<int>(spec.corrections.size()));
+    first_correction_ = sizes.size();
+    sizes.resize(sizes.size() + corrections_.size(), 1);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -55,8 +56,8 @@ class SightingCost final : public ceres::CostFunction {
         corners ? camera_from(spec_->camera, parameters[mount + 2]) : spec_->camera;
     Eigen::Vector3d target = Eigen::Vector3d::Zero();
     if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[mount + 2]);
-    const double* values = corrections_.empty() ? nullptr : parameters[correction_block()];
-    const CorrectedSighting corrected = sum_corrections(*spec_, *sighting_, corrections_, values);
+    const CorrectedSighting corrected =
+        sum_corrections(*spec_, *sighting_, corrections_, values_of_corrections(parameters));
     const auto at =
         corrected_error(*spec_, *sighting_, corrected, from_block(parameters[0]), std::move(joints),
                         std::move(rates), from_block(parameters[mount]), camera,
@@ -87,7 +88,12 @@ class SightingCost final : public ceres::CostFunction {
                : parameters[2 + 2 * k][0] * readings_->rate(sighting_->frame, id);
   }
 
-  [[nodiscard]] std::size_t correction_block() const { return parameter_block_sizes().size() - 1; }
+  [[nodiscard]] std::vector<double> values_of_corrections(double const* const* parameters) const {
+    std::vector<double> out;
+    for (std::size_t k = 0; k < corrections_.size(); ++k)
+      out.push_back(parameters[first_correction_ + k][0]);
+    return out;
+  }
 
   void fill_pose(double* out, const SightingError& error, const Matrix6d& d,
                  const double* pose) const {
@@ -129,14 +135,12 @@ class SightingCost final : public ceres::CostFunction {
       Eigen::Map<RowMajor>(jacobians[mount + 2], rows, 3) =
           Eigen::Matrix3d::Identity() / sighting_->sigma;
     }
-    if (!corrections_.empty() && jacobians[correction_block()] != nullptr) {
-      Eigen::Map<RowMajor> out(jacobians[correction_block()], rows,
-                               static_cast<Eigen::Index>(spec_->corrections.size()));
-      out.setZero();
-      for (const int c : corrections_) {
-        out.col(c) =
-            d_correction(*spec_, *sighting_, spec_->corrections[static_cast<std::size_t>(c)], at);
-      }
+    for (std::size_t k = 0; k < corrections_.size(); ++k) {
+      double* out = jacobians[first_correction_ + k];
+      if (out == nullptr) continue;
+      const auto c = static_cast<std::size_t>(corrections_[k]);
+      Eigen::Map<Eigen::VectorXd>(out, rows) =
+          d_correction(*spec_, *sighting_, spec_->corrections[c], at);
     }
   }
 
@@ -144,7 +148,8 @@ class SightingCost final : public ceres::CostFunction {
   const Sighting* sighting_;
   const Readings* readings_;
   const std::vector<int>* path_;
-  std::vector<int> corrections_;  // that bear on this sighting
+  std::vector<int> corrections_;      // that bear on this sighting
+  std::size_t first_correction_ = 0;  // of the blocks
 };
 
 // Parts of a joint frame that should stay near the nominal one: rows on the right perturbation.
@@ -186,35 +191,19 @@ Matrix6d whitening_of(const NominalSigmas& sigmas) {
   return weights.asDiagonal();
 }
 
-// Values of corrections over their priors' sigmas.
-class CorrectionPrior final : public ceres::CostFunction {
+// A value over its prior's sigma.
+class CorrectionPrior final : public ceres::SizedCostFunction<1, 1> {
  public:
-  explicit CorrectionPrior(const std::vector<Correction>& corrections) {
-    for (std::size_t c = 0; c < corrections.size(); ++c) {
-      if (corrections[c].prior_sigma > 0.0) rows_.emplace_back(c, 1.0 / corrections[c].prior_sigma);
-    }
-    width_ = corrections.size();
-    set_num_residuals(static_cast<int>(rows_.size()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(width_));
-  }
+  explicit CorrectionPrior(double sigma) : weight_(1.0 / sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const auto& [column, weight] = rows_[i];
-      residuals[i] = weight * parameters[0][column];
-    }
-    if (jacobians != nullptr && jacobians[0] != nullptr) {
-      std::fill_n(jacobians[0], rows_.size() * width_, 0.0);
-      for (std::size_t i = 0; i < rows_.size(); ++i) {
-        jacobians[0][i * width_ + rows_[i].first] = rows_[i].second;
-      }
-    }
+    residuals[0] = weight_ * parameters[0][0];
+    if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = weight_;
     return true;
   }
 
  private:
-  std::vector<std::pair<std::size_t, double>> rows_;  // of the corrections, over sigma
-  std::size_t width_ = 0;
+  double weight_;
 };
 
 // A measured distance between two targets.
@@ -260,9 +249,7 @@ ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas, const Joint& n
                         motion_of(nominal).transpose() * whitening_of(sigmas));
 }
 
-ceres::CostFunction* make_correction_prior(const std::vector<Correction>& corrections) {
-  return new CorrectionPrior(corrections);
-}
+ceres::CostFunction* make_correction_prior(double sigma) { return new CorrectionPrior(sigma); }
 
 ceres::CostFunction* make_distance_cost(const TargetPair& pair) {
   return new DistanceCost(pair.distance_m, pair.sigma_m);

@@ -190,10 +190,11 @@ Columns sort_columns(const LinearBundle& linear, std::size_t corrections, bool t
   Columns out;
   Eigen::Index clock = -1;
   Eigen::Index next = 0;
+  std::size_t known = 0;
   for (const FreeBlock& block : linear.blocks) {
     for (std::size_t i = 0; i < block.names.size(); ++i, ++next) {
       if (block.block == "effects") {
-        (i < corrections ? out.change : out.probes).push_back(next);
+        (known++ < corrections ? out.change : out.probes).push_back(next);
       } else if (block.block == "clock") {
         clock = next;
       } else {

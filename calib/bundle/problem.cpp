@@ -188,6 +188,8 @@ BuiltProblem::BuiltProblem(const Spec& spec, State& state, const std::vector<int
   problem_options.evaluation_callback = callback_.get();
   problem_options.enable_fast_removal = false;
   problem_ = std::make_unique<ceres::Problem>(problem_options);
+  // Those that nothing shows are unknowns, too.
+  for (double& correction : state.corrections) problem_->AddParameterBlock(&correction, 1);
   for (const int index : sightings) add_sighting(spec, state, index, options);
   add_priors(spec, state);
   set_manifolds(spec, state, options);
@@ -210,7 +212,8 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   if (sighting.target >= 0) {
     blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
-  if (!corrections_of(spec, sighting).empty()) blocks.push_back(state.corrections.data());
+  for (const int c : corrections_of(spec, sighting))
+    blocks.push_back(&state.corrections[static_cast<std::size_t>(c)]);
   ceres::LossFunction* loss =
       options.robust_width ? new ceres::CauchyLoss(*options.robust_width) : nullptr;
   ids_.push_back(
@@ -225,11 +228,11 @@ void BuiltProblem::add_priors(const Spec& spec, State& state) {
     // A measurement, not a prior: it counts among the data.
     ids_.push_back(problem_->AddResidualBlock(make_distance_cost(pair), nullptr, from, to));
   }
-  const bool weighed = std::ranges::any_of(spec.corrections,
-                                           [](const Correction& c) { return c.prior_sigma > 0.0; });
-  if (weighed && problem_->HasParameterBlock(state.corrections.data())) {
-    prior_ids_.push_back(problem_->AddResidualBlock(make_correction_prior(spec.corrections),
-                                                    nullptr, state.corrections.data()));
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    const double sigma = spec.corrections[c].prior_sigma;
+    if (!(sigma > 0.0)) continue;
+    prior_ids_.push_back(
+        problem_->AddResidualBlock(make_correction_prior(sigma), nullptr, &state.corrections[c]));
   }
   if (!spec.prior) return;
   for (std::size_t j = 0; j < state.joint_frames.size(); ++j) {
@@ -328,13 +331,11 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
                  {nullptr, name, {name + " x", name + " y", name + " z"}, {"m", "m", "m"}, {}, -1},
                  frozen);
   }
-  FreeBlock corrections{nullptr, "effects", {}, {}, {}, -1};
-  for (const Correction& correction : spec.corrections) {
-    corrections.names.push_back(correction.name);
-    corrections.units.push_back(correction.unit);
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    const Correction& correction = spec.corrections[c];
+    free_numbers(&state.corrections[c], {true},
+                 {nullptr, "effects", {correction.name}, {correction.unit}, {}, -1}, frozen);
   }
-  free_numbers(state.corrections.data(), std::vector<bool>(spec.corrections.size(), true),
-               corrections, frozen);
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     // The zero of a joint that no channel drives is free: its value in the first frame stays.
     bool zero_held = frozen;

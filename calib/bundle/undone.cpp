@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "calib/bundle/links_in_camera.h"
@@ -29,12 +30,34 @@ Matrix6d turned(const Matrix6d& covariance, const Eigen::Matrix3d& R_now_before)
   return R * covariance * R.transpose();
 }
 
+using Residuals = std::map<std::pair<int, TagId>, const SightingResidual*>;
+
+Residuals residuals_of(const Calibration& calibration) {
+  Residuals out;
+  for (const SightingResidual& residual : calibration.residuals)
+    out[{residual.frame, residual.id}] = &residual;
+  return out;
+}
+
+// Where the camera would see the corners, with what is left of each; nothing where one lies behind
+// it.
+std::optional<std::vector<Eigen::Vector2d>> seen(const CameraModel& camera,
+                                                 const Pose& T_camera_marker,
+                                                 const std::vector<Eigen::Vector3d>& corners_m,
+                                                 const std::vector<Eigen::Vector2d>& left_px) {
+  std::vector<Eigen::Vector2d> out;
+  for (std::size_t i = 0; i < corners_m.size(); ++i) {
+    const std::optional<Eigen::Vector2d> at = project(camera, T_camera_marker * corners_m[i]);
+    if (!at) return std::nullopt;
+    out.push_back(*at + left_px[i]);
+  }
+  return out;
+}
+
 }  // namespace
 
 PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks) {
-  std::map<std::pair<int, TagId>, const SightingResidual*> residuals;
-  for (const SightingResidual& residual : calibration.residuals)
-    residuals[{residual.frame, residual.id}] = &residual;
+  const Residuals residuals = residuals_of(calibration);
   const auto links = bundle::links_in_camera(calibration);
   for (PoseTrack& track : tracks.tracks) {
     const Marker* marker = calibration.tree.marker(track.id);
@@ -57,6 +80,31 @@ PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks
     track.samples = std::move(undone);
   }
   return tracks;
+}
+
+TagObservations with_effects_undone(const Calibration& calibration, const MarkerSet& markers,
+                                    TagObservations tags) {
+  const Residuals residuals = residuals_of(calibration);
+  const auto links = bundle::links_in_camera(calibration);
+  std::vector<TagObservation> undone;
+  for (TagObservation& tag : tags.observations) {
+    const Marker* marker = calibration.tree.marker(tag.id);
+    if (marker == nullptr) {
+      undone.push_back(std::move(tag));
+      continue;
+    }
+    const auto residual = residuals.find({tag.frame, tag.id});
+    const auto frame = static_cast<std::size_t>(tag.frame);
+    if (residual == residuals.end() || !residual->second->used || links[frame].empty()) continue;
+    const Pose T_camera_marker = links[frame][marker->link.index()] * marker->T_link_marker;
+    auto corners_px = seen(calibration.camera, T_camera_marker, markers.corners_m(tag.id),
+                           residual->second->corners_px);
+    if (!corners_px) continue;
+    tag.corners_px = std::move(*corners_px);
+    undone.push_back(std::move(tag));
+  }
+  tags.observations = std::move(undone);
+  return tags;
 }
 
 }  // namespace kinescope

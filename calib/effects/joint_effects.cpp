@@ -73,19 +73,21 @@ CameraEffect early_reading(const EffectWorld& world, const Suspect& s) {
   return out;
 }
 
-// Where a reading rests on a step, only the camera says where in the step the joint is.
+// Between the edges of its steps, only the camera says where the joint is.
 std::vector<Correction> places_in_steps(const EffectWorld& world, const Suspect& s,
                                         const UnsteadyReading& reading) {
   std::vector<Correction> out;
-  for (const Hold& hold : reading.holds) {
+  for (const Doubt& doubt : reading.doubts) {
     Eigen::VectorXd share(s.value.size());
     for (Eigen::Index i = 0; i < share.size(); ++i)
-      share[i] = hold.share(world.frames.read_s(i, s.joint));
+      share[i] = doubt.share(world.frames.read_s(i, s.joint));
     if (share.isZero(0.0)) continue;
-    out.push_back(turn(s, fmt::format("place in its step from {:.3f} s", hold.first_s), s.unit,
-                       std::move(share)));
+    out.push_back(turn(
+        s, fmt::format("place in its step from {:.3f} s to {:.3f} s", doubt.first_s, doubt.last_s),
+        s.unit, std::move(share)));
     out.back().is_nuisance = true;
-    out.back().prior_sigma = reading.error;
+    out.back().is_local = true;
+    out.back().prior_sigma = doubt.sigma;
   }
   return out;
 }
@@ -113,7 +115,7 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
   out.corrections = [s, parameter, share](double) {
     return std::vector{turn(s, parameter, s.unit, share)};
   };
-  if (!world.known && !reading.holds.empty()) {
+  if (!world.known && !reading.doubts.empty()) {
     out.nuisances = [places = places_in_steps(world, s, reading)](double) { return places; };
   }
   return out;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/effects/suspect.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::effects {
@@ -303,6 +304,32 @@ std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& libra
   return out;
 }
 
+// Doubts that move what is seen by less than its noise are none.
+void keep_visible_doubts(const EffectBundle& bundle, std::map<int, UnsteadyReading>& readings) {
+  EffectWorld world;
+  world.tree = bundle.tree();
+  world.frames = bundle.motion_at_frames(0.0);
+  std::vector<int> joints;
+  std::vector<Correction> turns;
+  for (const auto& [joint, reading] : readings) {
+    if (reading.doubts.empty()) continue;
+    const Suspect s = suspect(world, joint);
+    joints.push_back(joint);
+    turns.push_back(turn(s, "turn", s.unit, {}));
+  }
+  if (joints.empty()) return;
+  const BundleFit fit = bundle.fit({}, turns);
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const Eigen::VectorXd slope = fit.probes.col(static_cast<Eigen::Index>(j));
+    Eigen::VectorXd information = Eigen::VectorXd::Zero(world.frames.value.rows());
+    for (std::size_t i = 0; i < fit.frames.size(); ++i) {
+      const Eigen::Index first = fit.first_row[i];
+      information[fit.frames[i]] = slope.segment(first, fit.first_row[i + 1] - first).squaredNorm();
+    }
+    readings.at(joints[j]).keep_visible(world.frames.read_s.col(joints[j]), information);
+  }
+}
+
 }  // namespace
 
 TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
@@ -312,6 +339,7 @@ TracedBundle::TracedBundle(const EffectBundle& bundle, const CalibrationTraceOpt
   unsteady_ =
       unsteady_readings(postures ? bundle_->motion_at_frames(0.0) : bundle_->motion_of_log(0.0),
                         bundle_->driven_joints(), postures);
+  if (!postures) keep_visible_doubts(*bundle_, unsteady_);
 }
 
 BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,

@@ -17,26 +17,33 @@
 
 namespace kinescope {
 
-/// A time over which the reading stays on one step: the value may be anywhere within it.
-struct Hold {
+/// A time over which the motion may stand apart from the truth.
+struct Doubt {
   double first_s = 0.0;
   double last_s = 0.0;
-  /// Within this time of an edge, where the value is known, the motion is bound to it; 0 at an end
-  /// of the log.
-  double after_first_s = 0.0;
-  double before_last_s = 0.0;
+  /// After the beginning and before the end: over that time it grows and goes. 0 at an end of the
+  /// log.
+  double rise_s = 0.0;
+  double fall_s = 0.0;
+  double sigma = 0.0;  ///< in the unit of the reading
 
-  /// How much of the error in the middle of the hold there is at a time, 0 to 1.
+  /// How much of it there is at a time, 0 to 1.
   [[nodiscard]] double share(double t_s) const;
 };
 
 struct UnsteadyReading {
   std::vector<double> times_s;  ///< of the samples
   bool in_steps = false;
-  double size = 0.0;        ///< distance of the steps, or standard deviation of the noise
-  double error = 0.0;       ///< rms by which a reading is off
-  Eigen::VectorXd motion;   ///< samples, in the unit of the reading
-  std::vector<Hold> holds;  ///< longer than the motion's own changes take
+  double size = 0.0;       ///< distance of the steps, or standard deviation of the noise
+  double error = 0.0;      ///< rms by which a reading is off
+  Eigen::VectorXd motion;  ///< samples, in the unit of the reading
+  /// Of readings in steps: as closely as the motion changes, and of each step on which the reading
+  /// rests for longer than that as a whole.
+  std::vector<Doubt> doubts;
+
+  /// Drops doubts that are less than what somebody sees of the value: `information` of it, one over
+  /// its variance, at times in any order.
+  void keep_visible(const Eigen::VectorXd& seen_s, const Eigen::VectorXd& information);
 };
 
 /// Distance of the steps that `values` come in. Nothing for values that lie on no grid, or on one

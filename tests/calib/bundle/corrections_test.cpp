@@ -99,14 +99,7 @@ class Derivatives : public ::testing::Test {
   }
 
   [[nodiscard]] Eigen::VectorXd analytic(std::size_t c) const {
-    const Readings readings(spec_, state_);
-    const CorrectedSighting corrected = sum_corrections(
-        spec_, *sighting_, corrections_of(spec_, *sighting_), state_.corrections.data());
-    const auto at =
-        corrected_error(spec_, *sighting_, corrected, from_block(state_.camera_base.data()),
-                        chain_of(spec_, state_, readings, *sighting_),
-                        rates_of(spec_, state_, readings, *sighting_),
-                        from_block(state_.mounts[4].data()), camera_of(spec_, state_), nullptr);
+    const auto at = corrected_error_of(spec_, state_, Readings(spec_, state_), *sighting_);
     return d_correction(spec_, *sighting_, spec_.corrections[c], at.value());
   }
 
@@ -171,6 +164,21 @@ TEST_F(Derivatives, CorrectionsBearOnWhatTheyMove) {
     EXPECT_TRUE(bears(sighting, 2));
     EXPECT_EQ(bears(sighting, 3), at >= 3U);
     EXPECT_EQ(bears(sighting, 4), sighting.marker == 4);
+  }
+}
+
+TEST_F(Derivatives, CorrectionsBearWhereTheyHaveAShare) {
+  const std::vector<int> with = corrections_of(spec_, *sighting_);
+  for (const int c : with) {
+    Correction& correction = spec_.corrections[static_cast<std::size_t>(c)];
+    if (correction.twists.rows() > 0) correction.twists.row(kFrame).setZero();
+    if (correction.share.size() > 0) correction.share[kFrame] = 0.0;
+  }
+  const std::vector<int> without = corrections_of(spec_, *sighting_);
+  EXPECT_LT(without.size(), with.size());
+  for (const int c : without) {
+    const Correction& correction = spec_.corrections[static_cast<std::size_t>(c)];
+    EXPECT_EQ(correction.twists.rows() + correction.share.size(), 0) << correction.name;
   }
 }
 

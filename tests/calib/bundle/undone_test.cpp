@@ -97,6 +97,49 @@ TEST(Undone, WhatACameraLeavesOpenStaysAlongItsLineOfSight) {
   EXPECT_LT((in_camera - Eigen::Matrix3d(camera_variances.asDiagonal())).norm(), 1e-15);
 }
 
+// Seen by a camera whose centre is not the declared one, as the declared one would have seen it.
+TEST(Undone, CornersAreThoseOfTheDeclaredCamera) {
+  truth::WorldOptions options;
+  options.sigma_px = 0.0;
+  const truth::World world = truth::make_world(options);
+  Calibration calibration;
+  calibration.kind = MeasurementKind::kCorners;
+  calibration.tree = world.tree;
+  calibration.T_camera_base = world.T_camera_base;
+  calibration.camera = world.camera;
+  calibration.joint_values = world.joint_values;
+  calibration.times_s = world.measurements.times_s;
+  const Eigen::Vector2d left(0.3, -0.2);  // px, of the model with the effect
+  const Eigen::Vector2d shift(40.0, 0.0);
+  TagObservations seen;
+  seen.times_s = world.measurements.times_s;
+  for (const TagObservation& corners : world.measurements.corners) {
+    TagObservation tag;
+    tag.frame = corners.frame;
+    tag.id = corners.id;
+    for (const Eigen::Vector2d& corner : corners.corners_px)
+      tag.corners_px.push_back(corner + shift + left);
+    seen.observations.push_back(tag);
+    SightingResidual residual;
+    residual.frame = corners.frame;
+    residual.id = corners.id;
+    residual.used = corners.frame != 3;
+    residual.corners_px.assign(corners.corners_px.size(), left);
+    calibration.residuals.push_back(residual);
+  }
+  const TagObservations undone = with_effects_undone(calibration, world.markers, seen);
+  std::size_t next = 0;
+  for (const TagObservation& corners : world.measurements.corners) {
+    if (corners.frame == 3) continue;
+    ASSERT_LT(next, undone.observations.size());
+    const TagObservation& tag = undone.observations[next++];
+    ASSERT_EQ(tag.frame, corners.frame);
+    for (std::size_t i = 0; i < corners.corners_px.size(); ++i)
+      EXPECT_LT((tag.corners_px[i] - corners.corners_px[i] - left).norm(), 1e-9);
+  }
+  EXPECT_EQ(next, undone.observations.size()) << "a sighting that was left out says nothing";
+}
+
 TEST(Undone, MarkersThatAreNotOnTheRobotStayAsTheyAre) {
   PoseTracks tracks;
   tracks.times_s = {0.0};
@@ -104,6 +147,9 @@ TEST(Undone, MarkersThatAreNotOnTheRobotStayAsTheyAre) {
   const PoseTracks undone = with_effects_undone(Calibration{}, tracks);
   ASSERT_EQ(undone.tracks.size(), 1U);
   EXPECT_EQ(undone.tracks[0].samples.size(), 1U);
+  TagObservations tags;
+  tags.observations = {{0, TagId{99}, {}}};
+  EXPECT_EQ(with_effects_undone(Calibration{}, MarkerSet{}, tags).observations.size(), 1U);
 }
 
 }  // namespace

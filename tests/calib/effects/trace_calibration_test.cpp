@@ -106,6 +106,22 @@ TEST(TraceCalibration, WhereAJointRestsInAStepOfItsReadingIsNoJump) {
   EXPECT_LT(trace.held_out_after.value, 1.3 * clean_trace().trace.held_out_after.value);
 }
 
+// Steps of 3 deg: between two edges the camera alone says where the joint is, and what it says is
+// neither a slip nor a jump nor structure of another kind.
+TEST(TraceCalibration, CoarseStepsHideNoOtherEffectAndLookLikeNone) {
+  constexpr double kCoarse = 0.05;  // rad
+  EffectWorldOptions options =
+      filmed({{"quantisation", "q2", kCoarse, 0.0}, strong("tag_size", "tag_12")}, 300);
+  options.rest_s = 2.0;
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  ASSERT_EQ(trace.accepted.size(), 2U) << answer(trace);
+  EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+  for (const EffectId& id : {EffectId{"quantisation", "q2"}, EffectId{"tag_size", "tag_12"}}) {
+    EXPECT_NE(std::ranges::find(trace.accepted, id, &TracedEffect::id), trace.accepted.end())
+        << answer(trace);
+  }
+}
+
 // What a step does from one frame to the next is no noise of the camera's.
 TEST(TraceCalibration, SightingsWeighNoLessBesideReadingsInSteps) {
   const World clean = make_effect_world(filmed());

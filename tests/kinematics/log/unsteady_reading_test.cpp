@@ -117,14 +117,58 @@ TEST(UnsteadyReading, WhileItRestsOnAStepTheValueIsSomewhereInIt) {
   }
   const auto found = unsteady_reading(read.times_s, read.reading);
   ASSERT_TRUE(found);
-  ASSERT_FALSE(found->holds.empty());
-  const Hold& first = found->holds.front();
-  EXPECT_EQ(first.first_s, read.times_s.front());
-  EXPECT_NEAR(first.last_s, read.times_s[kRests], 0.1);
-  EXPECT_EQ(first.share(read.times_s.front()), 1.0);
-  EXPECT_EQ(first.share(read.times_s[kRests / 2]), 1.0);
-  EXPECT_LT(first.share(first.last_s - 1e-6), 1e-3);
-  EXPECT_EQ(first.share(first.last_s + 1.0), 0.0);
+  ASSERT_FALSE(found->doubts.empty());
+  const double anywhere = kStep / std::sqrt(12.0);
+  const Doubt& rest = found->doubts.front();
+  EXPECT_EQ(rest.first_s, read.times_s.front());
+  EXPECT_NEAR(rest.last_s, read.times_s[kRests], 0.1);
+  EXPECT_EQ(rest.share(read.times_s.front()), 1.0);
+  EXPECT_EQ(rest.share(read.times_s[kRests / 2]), 1.0);
+  EXPECT_LT(rest.share(rest.last_s - 1e-6), 1e-3);
+  EXPECT_EQ(rest.share(rest.last_s + 1.0), 0.0);
+  for (const Doubt& doubt : found->doubts) {
+    EXPECT_LE(doubt.sigma, anywhere + kExact);
+    if (doubt.last_s < read.times_s[kRests]) {
+      EXPECT_NEAR(doubt.sigma, anywhere, kExact);
+    }
+  }
+  EXPECT_LT(found->doubts[2 * found->doubts.size() / 3].sigma, 0.5 * anywhere);
+}
+
+// Over steps from a fortieth of the range to a sixth of it: by what the motion is off, over what is
+// said of it there. Of few edges it is said with room to spare.
+TEST(UnsteadyReading, WhatItIsOffByIsWhatItDoubts) {
+  for (const double step : {0.2, 0.1, 0.05, 0.025}) {
+    const Read read = in_steps(step);
+    const auto found = unsteady_reading(read.times_s, read.reading);
+    ASSERT_TRUE(found) << step;
+    double squares = 0.0;
+    for (Eigen::Index i = 0; i < read.truth.size(); ++i) {
+      double variance = 0.0;
+      for (const Doubt& doubt : found->doubts)
+        variance +=
+            std::pow(doubt.sigma * doubt.share(read.times_s[static_cast<std::size_t>(i)]), 2);
+      squares += std::pow(found->motion[i] - read.truth[i], 2) / variance;
+    }
+    const double ratio = std::sqrt(squares / static_cast<double>(read.truth.size()));
+    EXPECT_GT(ratio, 0.1) << step;
+    EXPECT_LT(ratio, 2.0) << step;
+  }
+}
+
+TEST(UnsteadyReading, DoubtsThatNobodySeesAreNone) {
+  const Read read = in_steps(kStep);
+  auto found = unsteady_reading(read.times_s, read.reading);
+  ASSERT_TRUE(found);
+  const std::vector<Doubt> all = found->doubts;
+  const Eigen::Vector2d seen_s(read.times_s[900], read.times_s[300]);
+  const double clearly = 1e6 / (kStep * kStep);
+  found->keep_visible(seen_s, Eigen::Vector2d(0.0, clearly));
+  ASSERT_FALSE(found->doubts.empty());
+  for (const Doubt& doubt : found->doubts) EXPECT_GT(doubt.share(seen_s[1]), 0.0);
+  found->doubts = all;
+  found->keep_visible(seen_s, Eigen::Vector2d(1e-6 * clearly, 0.0));
+  EXPECT_TRUE(found->doubts.empty()) << "less than what one look shows";
 }
 
 TEST(UnsteadyReading, PosturesShowStepsInWhateverOrder) {
