@@ -48,19 +48,23 @@ SmoothingSpline spline_through(const std::vector<Node>& nodes, double cutoff_hz)
   return {columns.t_s, columns.value, columns.weight, cutoff_hz};
 }
 
-// Mean square, over their variances, by which every tenth node misses the spline through the rest.
-// Of every other one, what is left is too sparse to follow a motion of few steps: cut-offs of 1.2
-// to 3.4 Hz where tenths say 2.0 to 2.1 (`undeclared`, 9405, 9595, 9693).
-double missed_squares(const std::vector<Node>& nodes, double cutoff_hz) {
-  constexpr std::size_t kApart = 10;
+// Samples that are left out to choose a cut-off: neighbours are off alike, so every other one. What
+// is left of edges would be too sparse to follow a motion of few steps then: cut-offs of 1.2 to
+// 3.4 Hz where tenths say 2.0 to 2.1 (`undeclared`, 9405, 9595, 9693).
+constexpr std::size_t kSamplesApart = 2;
+constexpr std::size_t kEdgesApart = 10;
+
+// Mean square, over their variances, by which every `apart`-th node misses the spline through the
+// rest.
+double missed_squares(const std::vector<Node>& nodes, std::size_t apart, double cutoff_hz) {
   double out = 0.0;
   double count = 0.0;
-  for (std::size_t first = 0; first < kApart; ++first) {
+  for (std::size_t first = 0; first < apart; ++first) {
     std::vector<Node> kept;
     std::vector<Node> left_out;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const bool at_end = i == 0 || i + 1 == nodes.size();
-      (i % kApart == first && !at_end ? left_out : kept).push_back(nodes[i]);
+      (i % apart == first && !at_end ? left_out : kept).push_back(nodes[i]);
     }
     if (left_out.empty()) continue;
     const Columns there = columns_of(left_out);
@@ -81,7 +85,7 @@ struct Cutoff {
 };
 
 // The cut-off under which nodes that are left out are predicted best.
-Cutoff best_cutoff(std::vector<Node> nodes) {
+Cutoff best_cutoff(std::vector<Node> nodes, std::size_t apart) {
   constexpr std::size_t kMostNodes = 4000;  // that is enough to know it by
   constexpr int kCutoffs = 12;
   constexpr double kSlowest = 0.5;  // Hz, of a motion
@@ -95,7 +99,7 @@ Cutoff best_cutoff(std::vector<Node> nodes) {
   for (int k = 0; k < kCutoffs; ++k) {
     // Up to the rate of the nodes: the spline passes through them.
     const double hz = kSlowest * std::pow(std::max(1.0, rate_hz / kSlowest), k / (kCutoffs - 1.0));
-    if (const double squares = missed_squares(nodes, hz); squares < best.missed_squares)
+    if (const double squares = missed_squares(nodes, apart, hz); squares < best.missed_squares)
       best = {hz, squares};
   }
   return best;
@@ -264,7 +268,7 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   const double sigma = kRoundedSigma * step.value_or(1.0);
   std::vector<Node> nodes =
       rests_on_steps ? edges(times_s, values) : samples(times_s, values, 1.0 / (sigma * sigma));
-  const Cutoff cutoff = best_cutoff(nodes);
+  const Cutoff cutoff = best_cutoff(nodes, rests_on_steps ? kEdgesApart : kSamplesApart);
   if (rests_on_steps) nodes = with_rests(std::move(nodes), times_s, values, *step);
   const Eigen::Map<const Eigen::VectorXd> at(times_s.data(), values.size());
   out.motion = spline_through(nodes, cutoff.hz).evaluate(at);
