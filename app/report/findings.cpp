@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/report/answer.h"
 #include "app/report/facts.h"
@@ -56,11 +57,28 @@ void add_structure_doubts(const RunSummary& run, std::vector<Finding>& findings)
   }
 }
 
+// Joints that the log tells in steps only, where that was traced.
+std::vector<std::string> read_in_steps(const RunSummary& run) {
+  std::vector<std::string> out;
+  if (!run.trace) return out;
+  for (const TracedEffect& effect : run.trace->accepted)
+    if (effect.id.effect == "quantisation") out.push_back(effect.id.place);
+  return out;
+}
+
 void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
   const double ratio = held_out_ratio(run.calibration);
   if (ratio == 0.0) {
     findings.push_back({kNoCheck, "The error on unseen data is not known: nothing was held out.",
                         "Record more postures, so that some can be held out."});
+  } else if (const auto joints = read_in_steps(run); ratio > kRatioLimit && !joints.empty()) {
+    const std::string names = fmt::format("{}", fmt::join(joints, ", "));
+    findings.push_back(
+        {kModelError + std::min(ratio, 10.0),
+         fmt::format("In frames not seen the error is {:.2f} times that of the fit: between the "
+                     "steps of its reading the log does not say where {} is.",
+                     ratio, names),
+         fmt::format("Log {} with more digits, or with an encoder of more counts.", names)});
   } else if (ratio > kRatioLimit) {
     findings.push_back(
         {kModelError + std::min(ratio, 10.0),

@@ -116,6 +116,13 @@ TEST(Verdict, SaysWhenUnseenDataAreWorse) {
   RunSummary run = synthetic_run();
   run.calibration.held_out_rms = 1.4 * run.calibration.training_rms;
   EXPECT_TRUE(has(make_verdict(run).limits, "1.40 times"));
+  EXPECT_TRUE(has(make_verdict(run).limits, "model and postures"));
+  run.trace.emplace();
+  run.trace->accepted.emplace_back();
+  run.trace->accepted.back().id = {"quantisation", "q2"};
+  EXPECT_TRUE(has(make_verdict(run).limits, "1.40 times"));
+  EXPECT_TRUE(has(make_verdict(run).limits, "the log does not say where q2 is"));
+  EXPECT_FALSE(has(make_verdict(run).limits, "model and postures"));
   run.calibration.folds = 0;
   EXPECT_TRUE(has(make_verdict(run).limits, "nothing was held out"));
 }
