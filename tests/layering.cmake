@@ -110,12 +110,7 @@ function(check_third_party file room target)
   endforeach()
 endfunction()
 
-file(GLOB_RECURSE files RELATIVE ${ROOT} ${ROOT}/app/*.h ${ROOT}/app/*.cpp ${ROOT}/calib/*.h
-     ${ROOT}/calib/*.cpp ${ROOT}/dynamics/*.h ${ROOT}/dynamics/*.cpp ${ROOT}/kinematics/*.h
-     ${ROOT}/kinematics/*.cpp)
-if(NOT files)
-  message(FATAL_ERROR "no source below ${ROOT}")
-endif()
+include(${CMAKE_CURRENT_LIST_DIR}/source_files.cmake)
 foreach(file IN LISTS files)
   room_of(${file} room)
   allowed_rooms(${room} allowed known)

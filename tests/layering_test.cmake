@@ -2,18 +2,13 @@
 #
 # Proves that layering.cmake can fail: cmake -DSCRIPT=layering.cmake -DFOLDER=<scratch> -P layering_test.cmake
 cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/rule_outcome.cmake)
 
 function(expect result file content)
   file(REMOVE_RECURSE ${FOLDER})
   file(WRITE ${FOLDER}/kinematics/core/good.h "#include <vector>\n#include \"kinematics/core/pose.h\"\n")
   file(WRITE ${FOLDER}/${file} "${content}\n")
-  execute_process(COMMAND ${CMAKE_COMMAND} -DROOT=${FOLDER} -P ${SCRIPT} RESULT_VARIABLE code
-                  OUTPUT_QUIET ERROR_VARIABLE message)
-  if(result STREQUAL "accepted" AND NOT code EQUAL 0)
-    message(FATAL_ERROR "${file} with ${content} is refused: ${message}")
-  elseif(result STREQUAL "refused" AND code EQUAL 0)
-    message(FATAL_ERROR "${file} with ${content} is accepted")
-  endif()
+  expect_outcome(${result} "${file} with ${content}")
 endfunction()
 
 expect(accepted calib/bundle/a.cpp "#include \"kinematics/model/kinematic_tree.h\"")

@@ -4,12 +4,7 @@
 # No compiler sees both, the linker keeps the members of either, and the program ends in a crash.
 cmake_minimum_required(VERSION 3.25)
 
-file(GLOB_RECURSE files RELATIVE ${ROOT} ${ROOT}/app/*.h ${ROOT}/app/*.cpp ${ROOT}/calib/*.h
-     ${ROOT}/calib/*.cpp ${ROOT}/dynamics/*.h ${ROOT}/dynamics/*.cpp ${ROOT}/kinematics/*.h
-     ${ROOT}/kinematics/*.cpp)
-if(NOT files)
-  message(FATAL_ERROR "no source below ${ROOT}")
-endif()
+include(${CMAKE_CURRENT_LIST_DIR}/source_files.cmake)
 
 set(faults "")
 foreach(file IN LISTS files)

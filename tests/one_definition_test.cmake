@@ -3,18 +3,13 @@
 # Proves that one_definition.cmake can fail:
 # cmake -DSCRIPT=one_definition.cmake -DFOLDER=<scratch> -P one_definition_test.cmake
 cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/rule_outcome.cmake)
 
 function(expect result second)
   file(REMOVE_RECURSE ${FOLDER})
   file(WRITE ${FOLDER}/calib/bundle/a.h "namespace kinescope {\nstruct Motion {\n};\n}  // namespace kinescope\n")
   file(WRITE ${FOLDER}/dynamics/control/b.h "${second}")
-  execute_process(COMMAND ${CMAKE_COMMAND} -DROOT=${FOLDER} -P ${SCRIPT} RESULT_VARIABLE code
-                  OUTPUT_QUIET ERROR_VARIABLE message)
-  if(result STREQUAL "accepted" AND NOT code EQUAL 0)
-    message(FATAL_ERROR "refused: ${second}\n${message}")
-  elseif(result STREQUAL "refused" AND code EQUAL 0)
-    message(FATAL_ERROR "accepted: ${second}")
-  endif()
+  expect_outcome(${result} "${second}")
 endfunction()
 
 expect(accepted "namespace kinescope {\nstruct Motion;\n}  // namespace kinescope\n")

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "calib/bundle/links_in_camera.h"
 
@@ -30,14 +31,34 @@ Matrix6d turned(const Matrix6d& covariance, const Eigen::Matrix3d& R_now_before)
   return R * covariance * R.transpose();
 }
 
-using Residuals = std::map<std::pair<int, TagId>, const SightingResidual*>;
+/// A sighting that the calibration used: where the robot without effects has the marker, and what
+/// the sighting leaves of the model with them.
+struct UsedSighting {
+  Pose T_camera_marker;
+  const SightingResidual* residual = nullptr;
+};
 
-Residuals residuals_of(const Calibration& calibration) {
-  Residuals out;
-  for (const SightingResidual& residual : calibration.residuals)
-    out[{residual.frame, residual.id}] = &residual;
-  return out;
-}
+class UsedSightings {
+ public:
+  /// `calibration` must outlive it.
+  explicit UsedSightings(const Calibration& calibration)
+      : links_(bundle::links_in_camera(calibration)) {
+    for (const SightingResidual& residual : calibration.residuals)
+      residuals_[{residual.frame, residual.id}] = &residual;
+  }
+
+  [[nodiscard]] std::optional<UsedSighting> find(int frame, const Marker& marker) const {
+    const auto residual = residuals_.find({frame, marker.id});
+    if (residual == residuals_.end() || !residual->second->used) return std::nullopt;
+    const std::vector<Pose>& links = links_[static_cast<std::size_t>(frame)];
+    if (links.empty()) return std::nullopt;
+    return UsedSighting{links[marker.link.index()] * marker.T_link_marker, residual->second};
+  }
+
+ private:
+  std::map<std::pair<int, TagId>, const SightingResidual*> residuals_;
+  std::vector<std::vector<Pose>> links_;  // by frame
+};
 
 // Where the camera would see the corners, with what is left of each; nothing where one lies behind
 // it.
@@ -57,18 +78,16 @@ std::optional<std::vector<Eigen::Vector2d>> seen(const CameraModel& camera,
 }  // namespace
 
 PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks) {
-  const Residuals residuals = residuals_of(calibration);
-  const auto links = bundle::links_in_camera(calibration);
+  const UsedSightings used(calibration);
   for (PoseTrack& track : tracks.tracks) {
     const Marker* marker = calibration.tree.marker(track.id);
     if (marker == nullptr) continue;
     std::vector<PoseSample> undone;
     for (PoseSample& sample : track.samples) {
-      const auto residual = residuals.find({sample.frame, track.id});
-      const auto frame = static_cast<std::size_t>(sample.frame);
-      if (residual == residuals.end() || !residual->second->used || links[frame].empty()) continue;
-      const Pose undone_pose = displaced(links[frame][marker->link.index()] * marker->T_link_marker,
-                                         residual->second->displacement, calibration.kind);
+      const auto sighting = used.find(sample.frame, *marker);
+      if (!sighting) continue;
+      const Pose undone_pose =
+          displaced(sighting->T_camera_marker, sighting->residual->displacement, calibration.kind);
       if (calibration.kind == MeasurementKind::kCorners) {
         sample.covariance = turned(sample.covariance, undone_pose.matrix3().transpose() *
                                                           sample.T_camera_marker.matrix3());
@@ -84,8 +103,7 @@ PoseTracks with_effects_undone(const Calibration& calibration, PoseTracks tracks
 
 TagObservations with_effects_undone(const Calibration& calibration, const MarkerSet& markers,
                                     TagObservations tags) {
-  const Residuals residuals = residuals_of(calibration);
-  const auto links = bundle::links_in_camera(calibration);
+  const UsedSightings used(calibration);
   std::vector<TagObservation> undone;
   for (TagObservation& tag : tags.observations) {
     const Marker* marker = calibration.tree.marker(tag.id);
@@ -93,12 +111,10 @@ TagObservations with_effects_undone(const Calibration& calibration, const Marker
       undone.push_back(std::move(tag));
       continue;
     }
-    const auto residual = residuals.find({tag.frame, tag.id});
-    const auto frame = static_cast<std::size_t>(tag.frame);
-    if (residual == residuals.end() || !residual->second->used || links[frame].empty()) continue;
-    const Pose T_camera_marker = links[frame][marker->link.index()] * marker->T_link_marker;
-    auto corners_px = seen(calibration.camera, T_camera_marker, markers.corners_m(tag.id),
-                           residual->second->corners_px);
+    const auto sighting = used.find(tag.frame, *marker);
+    if (!sighting) continue;
+    auto corners_px = seen(calibration.camera, sighting->T_camera_marker, markers.corners_m(tag.id),
+                           sighting->residual->corners_px);
     if (!corners_px) continue;
     tag.corners_px = std::move(*corners_px);
     undone.push_back(std::move(tag));

@@ -38,9 +38,10 @@ bool names(const Trace& trace, const EffectId& id) {
   return std::ranges::find(trace.accepted, id, &TracedEffect::id) != trace.accepted.end();
 }
 
-CalibrationTrace traced(const EffectBundle& bundle, const CalibrationTraceOptions& options,
-                        const TraceOptions& trace_options, const Progress& progress) {
-  const effects::TracedBundle model(bundle, options);
+// `model`: of this bundle with these options.
+CalibrationTrace traced(const effects::TracedBundle& model, const EffectBundle& bundle,
+                        const CalibrationTraceOptions& options, const TraceOptions& trace_options,
+                        const Progress& progress) {
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
   effects::add_couplings_by_design(bundle, options, out.trace);
@@ -56,7 +57,8 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
                                      const CalibrationTraceOptions& options,
                                      const Progress& progress) {
   TraceOptions trace_options = options.trace;
-  trace_options.start = effects::TracedBundle(bundle, options).possible(options.trace.start);
+  const effects::TracedBundle model(bundle, options);
+  trace_options.start = model.possible(options.trace.start);
   if (bundle.kind() == MeasurementKind::kCorners) {
     // An effect that moves corners by less is not told from the detector's own errors.
     trace_options.floor = std::max(trace_options.floor, bundle.corner_bias_px());
@@ -64,7 +66,7 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   if (options.calibrate.estimate_time_offset && !bundle.postures()) {
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
   }
-  CalibrationTrace out = traced(bundle, options, trace_options, progress);
+  CalibrationTrace out = traced(model, bundle, options, trace_options, progress);
   if (options.gravity_base) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects, or leaves nothing that no effect explains.
@@ -81,7 +83,8 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   upright.gravity_base =
       effects::gravity_by_sag(effects::TracedBundle(bundle, options), trace_options.start, *sag);
   trace_options.start.push_back({*sag, 0.0});
-  CalibrationTrace again = traced(bundle, upright, trace_options, progress);
+  CalibrationTrace again =
+      traced(effects::TracedBundle(bundle, upright), bundle, upright, trace_options, progress);
   const bool says_all =
       out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
   // What predicts clearly better may need more.
