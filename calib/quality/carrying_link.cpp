@@ -12,7 +12,7 @@
 namespace kinescope {
 namespace {
 
-double angle_between(const Pose& a, const Pose& b) {
+double turn_between(const Pose& a, const Pose& b) {
   return a.rotation.angularDistance(b.rotation);
 }
 
@@ -41,7 +41,7 @@ Eigen::Quaterniond usual_rotation(const std::vector<Pose>& poses) {
   for (std::size_t i = 0; i < poses.size(); i += step) {
     std::vector<double> angles;
     for (std::size_t j = 0; j < poses.size(); j += step)
-      angles.push_back(angle_between(poses[i], poses[j]));
+      angles.push_back(turn_between(poses[i], poses[j]));
     const double usual = median_of(std::move(angles));
     if (usual >= least) continue;
     least = usual;

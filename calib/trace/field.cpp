@@ -17,9 +17,9 @@ namespace {
 constexpr int kMostNodes = 240;  // of a component
 constexpr int kRowsANode = 16;   // fewer nodes where few rows judge them
 // Smoothness, in spacings of the grid: what is finer the grid does not show.
-constexpr std::array<double, 4> kLengths{1.0, 2.0, 4.0, 8.0};
-constexpr double kVarianceStep = 0.5;  // decades
-constexpr int kNoiseSteps = 6;
+constexpr std::array<double, 4> kFieldLengths{1.0, 2.0, 4.0, 8.0};
+constexpr double kFieldVarianceStep = 0.5;  // decades
+constexpr int kFieldNoiseSteps = 6;
 constexpr double kMostWidening = 100.0;
 // Of the directions of the field the data show those by more than this part of their prior, and at
 // most so many are kept.
@@ -32,7 +32,7 @@ FieldGrid grid_of(const Linearisation& linear, const RestField& field) {
 }
 
 // What the rows say about the nodes' values, the model's own parameters taken out.
-struct Evidence {
+struct FieldEvidence {
   OwnSpace own;
   Eigen::MatrixXd QE;        // own basis x nodes' values: their products
   Eigen::VectorXd residual;  // rows, after the model's own step
@@ -46,9 +46,9 @@ struct Evidence {
   }
 };
 
-Evidence gather(const NormalSystem& system, const FieldGrid& grid) {
+FieldEvidence gather(const NormalSystem& system, const FieldGrid& grid) {
   const Linearisation& linear = system.linear();
-  Evidence out{OwnSpace(system), {}, {}, {}, {}, 0.0};
+  FieldEvidence out{OwnSpace(system), {}, {}, {}, {}, 0.0};
   out.QE = (grid.columns.transpose() * out.own.basis()).transpose();
   out.residual = out.freed(linear.residual);
   const Eigen::SparseMatrix<double> EE = grid.columns.transpose() * grid.columns;
@@ -79,7 +79,7 @@ Eigen::MatrixXd by_stretch(const NormalSystem& system, const FieldGrid& grid,
 
 // The same freed of what the model's own parameters can do.
 Eigen::MatrixXd projected_by_stretch(const NormalSystem& system, const FieldGrid& grid,
-                                     const Evidence& evidence) {
+                                     const FieldEvidence& evidence) {
   const Linearisation& linear = system.linear();
   const Partition& partition = system.partition();
   const Eigen::MatrixXd& basis = evidence.own.basis();
@@ -94,7 +94,7 @@ Eigen::MatrixXd projected_by_stretch(const NormalSystem& system, const FieldGrid
          evidence.QE.transpose() * evidence.own.solve(own);
 }
 
-Smoothness diagonalise(const FieldGrid& grid, const Evidence& evidence, double length) {
+Smoothness diagonalise(const FieldGrid& grid, const FieldEvidence& evidence, double length) {
   const Eigen::Index n = grid.nodes.rows();
   const Eigen::MatrixXd factor = CholeskyFactor(grid.correlation(length)).lower();
   Eigen::MatrixXd L = Eigen::MatrixXd::Zero(2 * n, 2 * n);
@@ -111,18 +111,18 @@ Smoothness diagonalise(const FieldGrid& grid, const Evidence& evidence, double l
 
 // Of a whitened row, when the field that it makes likeliest is taken away: the noise and the field
 // in turn.
-double noise_without_field(const std::vector<Smoothness>& all, const Evidence& evidence) {
+double noise_without_field(const std::vector<Smoothness>& all, const FieldEvidence& evidence) {
   const double whole = evidence.residual.squaredNorm();
   double noise = whole / evidence.freedom;
-  for (int i = 0; i < kNoiseSteps; ++i) {
-    noise = noise_beside(likeliest_smoothness(all, noise, kVarianceStep), noise, whole,
+  for (int i = 0; i < kFieldNoiseSteps; ++i) {
+    noise = noise_beside(likeliest_smoothness(all, noise, kFieldVarianceStep), noise, whole,
                          evidence.freedom);
   }
   return noise;
 }
 
 // By how much what stretches say about single nodes scatters more than white noise lets it.
-double widening(const NormalSystem& system, const FieldGrid& grid, const Evidence& evidence,
+double widening(const NormalSystem& system, const FieldGrid& grid, const FieldEvidence& evidence,
                 const Eigen::VectorXd& nodes, double noise) {
   const Eigen::VectorXd residual = evidence.residual - evidence.freed(grid.columns * nodes);
   const Eigen::VectorXd scatter = by_stretch(system, grid, residual).rowwise().squaredNorm();
@@ -164,18 +164,18 @@ double shift_of(const Linearisation& linear, const FieldGrid& grid, double gain)
 
 // The field as columns of the model: the directions that the data show, the prior's information on
 // each beside whitened rows.
-FoundRest fit_field(const NormalSystem& system, const FieldGrid& grid, const Evidence& evidence,
-                    const RestField& field) {
+FoundRest fit_field(const NormalSystem& system, const FieldGrid& grid,
+                    const FieldEvidence& evidence, const RestField& field) {
   std::vector<Smoothness> all;
-  for (const double length : kLengths) {
+  for (const double length : kFieldLengths) {
     if (length * grid.spacing > grid.extent) break;
     all.push_back(diagonalise(grid, evidence, length * grid.spacing));
   }
   const double white = noise_without_field(all, evidence);
-  const SmoothnessChoice first = likeliest_smoothness(all, white, kVarianceStep);
+  const SmoothnessChoice first = likeliest_smoothness(all, white, kFieldVarianceStep);
   const Eigen::VectorXd nodes = first.smoothness->directions * mean_of(first, white);
   const double noise = white * widening(system, grid, evidence, nodes, white);
-  const SmoothnessChoice choice = likeliest_smoothness(all, noise, kVarianceStep);
+  const SmoothnessChoice choice = likeliest_smoothness(all, noise, kFieldVarianceStep);
   const Smoothness& s = *choice.smoothness;
   // Eigenvalues grow.
   Eigen::Index kept = 0;
@@ -195,12 +195,13 @@ FoundRest fit_field(const NormalSystem& system, const FieldGrid& grid, const Evi
 }
 
 // See field_p_value().
-double p_value_of(const NormalSystem& system, const FieldGrid& grid, const Evidence& evidence) {
+double p_value_of(const NormalSystem& system, const FieldGrid& grid,
+                  const FieldEvidence& evidence) {
   const Eigen::Index n = grid.nodes.rows();
   const Eigen::MatrixXd scores = projected_by_stretch(system, grid, evidence);
   double best = 1.0;
   double tests = 0.0;
-  for (const double length : kLengths) {
+  for (const double length : kFieldLengths) {
     if (length * grid.spacing > grid.extent) break;
     const Eigen::MatrixXd K = grid.correlation(length * grid.spacing);
     Eigen::MatrixXd agreement = scores.topRows(n).transpose() * K * scores.topRows(n) +
@@ -239,7 +240,7 @@ std::optional<FoundRest> find_field(const NormalSystem& system,
   for (const RestField& field : fields) {
     const FieldGrid grid = grid_of(system.linear(), field);
     if (grid.nodes.rows() == 0) continue;
-    const Evidence evidence = gather(system, grid);
+    const FieldEvidence evidence = gather(system, grid);
     const double p_value =
         std::min(1.0, p_value_of(system, grid, evidence) * static_cast<double>(fields.size()));
     if (p_value > level) continue;

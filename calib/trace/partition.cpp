@@ -11,7 +11,7 @@ namespace kinescope::trace {
 namespace {
 
 constexpr double kCorrelationTimes = 6.0;  // in a stretch
-constexpr double kFewStretches = 24.0;
+constexpr double kAimedStretches = 24.0;
 constexpr double kManyStretches = 64.0;
 
 std::vector<int> stretch_of_instants(const Linearisation& linear, double& widening) {
@@ -29,7 +29,7 @@ std::vector<int> stretch_of_instants(const Linearisation& linear, double& wideni
     return out;
   }
   const double length = std::clamp(kCorrelationTimes * linear.correlation_time_s,
-                                   duration / kManyStretches, duration / kFewStretches);
+                                   duration / kManyStretches, duration / kAimedStretches);
   // Half a step is the integral time of white noise.
   const double step = duration / static_cast<double>(n - 1);
   widening = stretch_widening(length, linear.correlation_time_s - 0.5 * step);

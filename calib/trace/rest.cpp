@@ -18,8 +18,8 @@ constexpr std::size_t kStretchesAKnot = 5;  // fewer knots where few stretches j
 constexpr Eigen::Index kCurveKnots =
     24;  // of the Gaussian process: many, its prior keeps it smooth
 // The variance of the process is looked for from a thousandth to 1e9 times its natural scale.
-constexpr std::array<double, 5> kLengths{1.0, 0.5, 0.25, 0.125,
-                                         0.0625};  // of the covariate's range
+constexpr std::array<double, 5> kCurveLengths{1.0, 0.5, 0.25, 0.125,
+                                              0.0625};  // of the covariate's range
 constexpr int kVariances = 25;
 // Of the residual's sum of squares: less changes the error by less than half a per cent.
 constexpr double kLeastShare = 0.01;
@@ -87,7 +87,7 @@ Eigen::MatrixXd correlation(const std::vector<double>& knots, double length) {
 }
 
 // What the rows say about the knots' values, the model's own parameters taken out.
-struct Evidence {
+struct CurveEvidence {
   Eigen::MatrixXd S;
   Eigen::VectorXd score;
   double noise = 1.0;  // variance of a whitened row, widened for correlation in time
@@ -102,7 +102,7 @@ struct Posterior {
 };
 
 // Rasmussen and Williams 2006, eq. 2.30, in the space of the knots' values.
-Posterior posterior(const Evidence& evidence, const Eigen::MatrixXd& K) {
+Posterior posterior(const CurveEvidence& evidence, const Eigen::MatrixXd& K) {
   const Eigen::Index n = K.rows();
   const CholeskyFactor factor(K);
   Posterior out;
@@ -123,12 +123,12 @@ Posterior posterior(const Evidence& evidence, const Eigen::MatrixXd& K) {
   return out;
 }
 
-Posterior best_posterior(const Evidence& evidence, const std::vector<double>& knots) {
+Posterior best_posterior(const CurveEvidence& evidence, const std::vector<double>& knots) {
   const double range = knots.back() - knots.front();
   const double natural =
       evidence.noise * static_cast<double>(knots.size()) / std::max(1e-300, evidence.S.trace());
   Posterior best;
-  for (const double length : kLengths) {
+  for (const double length : kCurveLengths) {
     const Eigen::MatrixXd K = correlation(knots, length * std::max(range, 1e-300));
     for (int v = 0; v < kVariances; ++v) {
       const double variance = natural * std::pow(10.0, -3.0 + 0.5 * v);
@@ -139,11 +139,11 @@ Posterior best_posterior(const Evidence& evidence, const std::vector<double>& kn
   return best;
 }
 
-Evidence gather(const NormalSystem& system, const std::vector<EffectColumn>& columns,
-                const Score& score) {
+CurveEvidence gather(const NormalSystem& system, const std::vector<EffectColumn>& columns,
+                     const Score& score) {
   const EffectSums sums = system.sums(columns);
   const Eigen::MatrixXd B = system.inverse() * sums.JE;
-  Evidence out;
+  CurveEvidence out;
   out.S = sums.EE - sums.JE.transpose() * B;
   out.score = sums.Er - B.transpose() * system.total().g;
   const double white = (system.total().rr - score.gain) / system.freedom();

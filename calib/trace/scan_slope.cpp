@@ -12,7 +12,7 @@ namespace {
 // Half of a central difference's step, of the value.
 constexpr double kStep = 1e-4;
 // A slope that is less than this share of itself, freed of the model's parameters, does not show.
-constexpr double kHidden = 1e-10;
+constexpr double kUnseenShare = 1e-10;
 
 }  // namespace
 
@@ -37,7 +37,7 @@ std::optional<ScanStep> scan_step(const NormalSystem& system, const Eigen::Vecto
   const Eigen::VectorXd beside = linear.jacobian.transpose() * slope;
   const Eigen::VectorXd taken_up = system.inverse() * beside;
   const double information = slope.squaredNorm() - beside.dot(taken_up);
-  if (!(information > kHidden * slope.squaredNorm())) return {};
+  if (!(information > kUnseenShare * slope.squaredNorm())) return {};
   const double score = slope.dot(linear.residual) - taken_up.dot(system.total().g);
   return ScanStep{score / information,
                   std::sqrt(system.total().rr / system.freedom() / information)};

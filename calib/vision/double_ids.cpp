@@ -16,9 +16,8 @@
 namespace kinescope {
 namespace {
 
-constexpr double kLink_s = 0.5;       // longer gaps are bridged at the same place only
-constexpr double kNearby_s = 0.25;    // a marker is still there between sightings this close to it
-constexpr double kLinkOfEdge = 0.75;  // a link may be off by this share of the marker's edge ..
+constexpr double kLink_s = 0.5;         // longer gaps are bridged at the same place only
+constexpr double kLinkOfEdge = 0.75;    // a link may be off by this share of the marker's edge ..
 constexpr double kLinkOfMotion = 0.75;  // .. or of its way since it was seen
 constexpr double kNewOfEdge = 1.5;      // of the edge, where no velocity is known yet
 constexpr std::size_t kTracklet = 3;    // sightings; shorter ones are looked at together
@@ -28,9 +27,9 @@ constexpr double kFew = 0.2;            // a side with this share of the other's
 constexpr double kWeaker = 1.5;         // .. and that much less contrast is no marker
 
 using Sighting = const TagObservation*;
-using Corners = std::vector<Eigen::Vector2d>;
+using CornerPoints = std::vector<Eigen::Vector2d>;
 
-Eigen::Vector2d centre(const Corners& corners) {
+Eigen::Vector2d centre(const CornerPoints& corners) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& corner : corners) sum += corner;
   return sum / static_cast<double>(corners.size());
@@ -40,7 +39,7 @@ Eigen::Vector2d centre(const Corners& corners) {
 struct Node {
   std::vector<Sighting> seen;  // by frame
   bool moves = false;
-  Corners place;  // of a node at rest
+  CornerPoints place;  // of a node at rest
 };
 
 class Doubles {

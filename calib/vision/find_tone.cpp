@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "calib/vision/marker_edges.h"
 #include "calib/vision/pattern_shift.h"
 #include "kinematics/core/median.h"
 
@@ -16,12 +17,11 @@ namespace kinescope {
 namespace {
 
 constexpr double kLeastCell = 4.5;  // px; smaller cells blur into one another
-constexpr double kSharp = 0.2;      // px of blur a px of cell, at most
 // Ink spreads over what is bright, against a tone curve; this much of it may be missing.
 constexpr double kInkSigma_m = 2e-5;
 constexpr double kLikelyScatter = 0.03;  // px per px of blur, from marker to marker ..
 constexpr double kLikelyMarkers = 2.0;   // .. believed as if seen on so many
-constexpr double kClear = 3.0;           // standard deviations
+constexpr double kClearBloom = 3.0;      // standard deviations
 constexpr double kLeastShift = 0.02;     // px; less is not worth a correction
 constexpr double kAlike = 0.5;           // by which share border and inner edges may disagree
 constexpr double kMostGamma = 3.0;       // of any camera
@@ -50,7 +50,7 @@ std::vector<Shift> measure(std::span<const ToneView> views, const TagLayout& lay
     const RefinedCorners refined = refine_border(view.image, view.corners_px, layout, tone);
     if (refined.status != RefineStatus::kDone) continue;
     const double edge = mean_edge(refined.corners_px);
-    if (refined.blur_px > kSharp * edge / layout.cells) continue;
+    if (refined.blur_px > corner_fit::kSharp * edge / layout.cells) continue;
     const auto found = pattern_bloom(view.image, refined.corners_px, layout, tone, refined.blur_px);
     if (!found) continue;
     const double ink = view.size_m > 0.0 ? edge / view.size_m / refined.blur_px : 0.0;
@@ -144,7 +144,7 @@ bool shows_tone(const Corners& corners_px, const TagLayout& layout) {
 
 std::optional<FoundTone> find_tone(std::span<const ToneView> views, const TagLayout& layout) {
   const std::optional<Pooled> grey = pool(measure(views, layout, ToneCurve()));
-  if (!grey || grey->bloom < kClear * grey->sigma_with_ink ||
+  if (!grey || grey->bloom < kClearBloom * grey->sigma_with_ink ||
       grey->bloom * grey->blur_px < kLeastShift ||
       std::abs(grey->growth - grey->bloom) > kAlike * grey->bloom) {
     return std::nullopt;

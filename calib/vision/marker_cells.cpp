@@ -7,11 +7,12 @@
 
 #include <Eigen/Geometry>
 
+#include "calib/vision/marker_edges.h"
+
 namespace kinescope {
 namespace {
 
-constexpr double kMinContrast = 12.0;  // grey levels between dark and bright cells
-constexpr double kClear = 0.15;        // of the contrast, away from half way: dark or bright
+constexpr double kClearCell = 0.15;    // of the contrast, away from half way: dark or bright
 constexpr double kMostUnclear = 0.25;  // of the cells
 
 }  // namespace
@@ -32,7 +33,7 @@ double light_at(const ImageView& image, const Eigen::Vector2d& px, const ToneCur
   return between([&](std::uint8_t pixel) { return tone.light(pixel); });
 }
 
-bool MarkerCells::is_readable() const { return contrast > kMinContrast; }
+bool MarkerCells::is_readable() const { return contrast > corner_fit::kMinContrast; }
 
 MarkerCells read_cells(const ImageView& image, const Eigen::Matrix3d& H, int cells,
                        const ToneCurve& tone, double middle_of_cell) {
@@ -65,7 +66,7 @@ bool is_same_code(const MarkerCells& a, const MarkerCells& b) {
   for (Eigen::Index k = 0; k < a.level.size(); ++k) {
     const double in_a = place(a, k);
     const double in_b = place(b, k);
-    if (std::min(std::abs(in_a), std::abs(in_b)) < kClear) {
+    if (std::min(std::abs(in_a), std::abs(in_b)) < kClearCell) {
       ++unclear;
     } else if ((in_a < 0.0) != (in_b < 0.0)) {
       return false;

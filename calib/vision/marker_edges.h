@@ -13,6 +13,13 @@
 
 namespace kinescope::corner_fit {
 
+/// Grey levels between dark and bright cells, at least.
+inline constexpr double kMinContrast = 12.0;
+/// Px of blur a px of cell, at most: beyond it steps cannot be told from one another.
+inline constexpr double kSharp = 0.2;
+/// Px, of a corner that is fitted as well as can be; measured: tests/experiments/corners.cpp.
+inline constexpr double kFloorSigma = 0.002;
+
 /// The square that corners are the image of, in their order.
 inline const std::array<Eigen::Vector2d, 4> kSquare = {
     Eigen::Vector2d{-1.0, 1.0}, {1.0, 1.0}, {1.0, -1.0}, {-1.0, -1.0}};

@@ -24,17 +24,15 @@ constexpr double kShareOfCell = 0.03;
 constexpr double kNoisePixels = 2.0;  // px
 constexpr double kNoiseOfCell = 0.6;
 constexpr double kBending = 4e-4;
-constexpr double kClear = 5.0;  // standard deviations of the corners
+constexpr double kClearShift = 5.0;  // standard deviations of the corners
 // Of corners without a fit: few whole markers are left without one, so that little is lost.
 constexpr double kClearOfStart = 3.0;
-// Where the blur is more than this share of a cell, steps cannot be told from one another.
-constexpr double kSharp = 0.2;
 // What is read of a cell is this many blurs from the next one, where more than a point is left.
 constexpr double kClearOfBlur = 2.2;
 constexpr double kLeastOfCell = 0.05;
 
 // A step between two cells, placed in the square [-1, 1]^2.
-struct Step {
+struct CellEdge {
   Eigen::Vector2d at;
   double shift = 0.0;    // across
   double to_dark = 0.0;  // 1 where the cell behind is the dark one, -1 where the one before is
@@ -56,17 +54,17 @@ class Code {
   [[nodiscard]] bool is_readable() const { return cells_.is_readable(); }
 
   // Steps across direction 0 (x) or 1 (y).
-  [[nodiscard]] std::vector<Step> steps(int direction) const {
-    std::vector<Step> out;
+  [[nodiscard]] std::vector<CellEdge> steps(int direction) const {
+    std::vector<CellEdge> out;
     for (int i = 0; i + 1 < count_; ++i) {
       for (int j = 0; j < count_; ++j) {
         const double before = direction == 0 ? cells_.level(i, j) : cells_.level(j, i);
         const double after = direction == 0 ? cells_.level(i + 1, j) : cells_.level(j, i + 1);
         if (std::abs(after - before) < 0.5 * cells_.contrast) continue;
         const double across = middle(i) + 0.5 * width_;
-        Step step{{across, middle(j)},
-                  shift(direction, across, middle(j), before, after),
-                  after < before ? 1.0 : -1.0};
+        CellEdge step{{across, middle(j)},
+                      shift(direction, across, middle(j), before, after),
+                      after < before ? 1.0 : -1.0};
         if (direction == 1) std::swap(step.at.x(), step.at.y());
         out.push_back(step);
       }
@@ -116,7 +114,7 @@ using Numbers = Eigen::Matrix<double, N, 1>;
 // What a step's shift is made of: the four numbers of a bilinear warp, and with a fifth one how far
 // bright cells grow over dark ones.
 template <int N>
-Numbers<N> parts(const Step& step) {
+Numbers<N> parts(const CellEdge& step) {
   if constexpr (N == 4) {
     return bilinear(step.at);
   } else {
@@ -126,7 +124,7 @@ Numbers<N> parts(const Step& step) {
 
 // Robust (Tukey's biweight): cells that are covered themselves tell nothing.
 template <int N>
-std::optional<Numbers<N>> fit(const std::vector<Step>& steps) {
+std::optional<Numbers<N>> fit(const std::vector<CellEdge>& steps) {
   constexpr int kReweightings = 5;
   constexpr double kTukey = 4.685;
   constexpr double kLeastScale = 1e-4;
@@ -138,7 +136,7 @@ std::optional<Numbers<N>> fit(const std::vector<Step>& steps) {
   for (int round = 0; round <= kReweightings; ++round) {
     Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
     Numbers<N> g = Numbers<N>::Zero();
-    for (const Step& step : steps) {
+    for (const CellEdge& step : steps) {
       const Numbers<N> row = parts<N>(step);
       const double off = round == 0 ? 0.0 : (step.shift - row.dot(out)) / (kTukey * scale);
       const double weight = std::pow(std::max(0.0, 1.0 - off * off), 2);
@@ -226,7 +224,7 @@ bool is_partly_hidden(const ImageView& image, const RefinedCorners& border, cons
   if (border.status == RefineStatus::kDone) {
     if (border.blur_px > kSharp * shortest / layout.cells) return false;
     elsewhere += border.noise / border.contrast * (kNoisePixels + kNoiseOfCell * cell) +
-                 kClear * border.sigma_px;
+                 kClearShift * border.sigma_px;
   } else {
     elsewhere += kClearOfStart * start_sigma_px;
   }

@@ -38,16 +38,14 @@ constexpr Patience kUntilExact{4, 2e-3};  // the next step would be far smaller
 constexpr Patience kUntilNear{2, 0.1};    // as a start for the cells
 constexpr int kMaxRounds = 24;
 constexpr int kFullSteps = 6;          // rounds before steps are halved
-constexpr double kMinContrast = 12.0;  // grey levels
 constexpr double kMaxResidual = 0.12;  // noise over contrast
-constexpr double kFloorSigma = 0.002;  // px, measured: tests/experiments/corners.cpp
 constexpr double kMaxMove = 5.0;       // px in one round
 constexpr int kMinPixels = 40;
 
-class Fit {
+class BorderFit {
  public:
-  Fit(const ImageView& image, const Corners& start, const TagLayout& tag, const ToneCurve& tone,
-      Patience patience)
+  BorderFit(const ImageView& image, const Corners& start, const TagLayout& tag,
+            const ToneCurve& tone, Patience patience)
       : image_(image),
         tag_(tag),
         tone_(tone),
@@ -287,13 +285,13 @@ class Fit {
 
 RefinedCorners refine_border(const ImageView& image, const Corners& start, const TagLayout& layout,
                              const ToneCurve& tone) {
-  return Fit(image, start, layout, tone, kUntilExact).run();
+  return BorderFit(image, start, layout, tone, kUntilExact).run();
 }
 
 RefinedCorners refine_corners(const ImageView& image, const Corners& start, const TagLayout& layout,
                               const ToneCurve& tone, const CameraModel* lens) {
   if (lens != nullptr) {
-    const RefinedCorners near = Fit(image, start, layout, tone, kUntilNear).run();
+    const RefinedCorners near = BorderFit(image, start, layout, tone, kUntilNear).run();
     const RefinedCorners found = refine_by_cells(image, near, layout, tone, *lens);
     if (found.by_cells) return found;
   }

@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kMinEdge = 5.0;        // px; below, no family's cells can be told apart
 constexpr double kMinEdgeRatio = 0.15;  // shortest to longest edge: seen at more than 80 degrees
-constexpr double kNearby_s = 0.25;      // sightings this close in time say where a marker is
 constexpr double kJumpOfEdge = 0.75;    // a jump is further than this share of the marker's edge ..
 constexpr double kJumpOfMotion = 0.75;  // .. and of its motion between the neighbours ..
 constexpr double kJumpLeast = 5.0;      // .. and than this many px

@@ -15,6 +15,9 @@
 
 namespace kinescope {
 
+/// Sightings this close in time, s, say where a marker is.
+inline constexpr double kNearby_s = 0.25;
+
 /// Moves what is not believed from `observations.observations` to `observations.rejected` and sorts
 /// both. Returns warnings for the user, one line each.
 [[nodiscard]] std::vector<std::string> sort_out_sightings(TagObservations& observations,

@@ -9,7 +9,7 @@ namespace kinescope {
 namespace {
 
 constexpr double kWhite = 255.0;
-constexpr double kPerUnit = 64.0;
+constexpr double kEntriesPerShare = 64.0;
 constexpr double kBeyond = 0.25;
 constexpr double kDarkest = 0.2;        // of the dark cells' light
 constexpr double kLeastContrast = 1.0;  // grey levels
@@ -22,7 +22,7 @@ ToneTable::ToneTable(double dark, double bright, double gamma) {
   const double low = std::pow(black, gamma);
   const double high = std::pow(white, gamma);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
-    const double share = static_cast<double>(i) / kPerUnit - kBeyond;
+    const double share = static_cast<double>(i) / kEntriesPerShare - kBeyond;
     const double light = std::max(kDarkest * low, low + (high - low) * share);
     const double grey = std::pow(light, 1.0 / gamma);
     // By gamma, at the same levels.
@@ -35,13 +35,13 @@ ToneTable::ToneTable(double dark, double bright, double gamma) {
 }
 
 ToneTable::Value ToneTable::at(double share) const {
-  const double place = (share + kBeyond) * kPerUnit;
+  const double place = (share + kBeyond) * kEntriesPerShare;
   const auto i =
       static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(entries_.size()) - 2.0));
   const double part = place - static_cast<double>(i);
   const Entry& a = entries_[i];
   const Entry& b = entries_[i + 1];
-  return {a.value + part * (b.value - a.value), (b.value - a.value) * kPerUnit,
+  return {a.value + part * (b.value - a.value), (b.value - a.value) * kEntriesPerShare,
           a.per_gamma + part * (b.per_gamma - a.per_gamma)};
 }
 

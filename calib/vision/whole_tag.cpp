@@ -41,14 +41,14 @@ constexpr double kReach = 2.5;          // blurs from a step, of pixels that are
 constexpr double kMinOuterWidth = 1.1;  // px around the border that are used at least ..
 constexpr double kOuterReach = 2.0;     // .. and at most these blurs less than a cell
 constexpr double kTaper = 0.7;          // px over which a weight fades out there
-constexpr std::size_t kMinPixels = 112;
+constexpr std::size_t kFewestPixels = 112;
 constexpr std::size_t kEnough = 250;  // pixels to come near with
 constexpr std::size_t kCoarse = 4;    // one in so many pixels
 constexpr int kBlock = 8;             // px, of the usual video codecs
 
 // What is known beforehand, standard deviations.
-constexpr double kBlurMean = 0.64;  // px^2
-constexpr double kBlurSigma = 1.0;  // px^2
+constexpr double kBlurMean = 0.64;   // px^2
+constexpr double kBlurBelief = 1.0;  // px^2
 constexpr double kGammaSigma = 0.8;
 constexpr double kKnownGammaSigma = 0.1;
 constexpr double kSpreadSigma = 0.03;  // px: ink, where the tone curve is not
@@ -57,16 +57,14 @@ constexpr double kBowlSigma = 0.1;     // of the contrast
 
 constexpr double kLeastBlur = 0.0625;  // px^2, below the pixel's own 1/12
 constexpr double kLeastGamma = 0.4;
-constexpr double kMostGamma = 4.0;
+constexpr double kMostFittedGamma = 4.0;
 constexpr double kMostPeak = 2.0;  // px^4
 constexpr double kRobust = 3.0;    // noise units beyond which a pixel's weight falls
 constexpr double kMinNoise = 0.3;  // grey levels, rounding
-constexpr double kMinContrast = 12.0;
-constexpr int kMostRounds = 5;
+constexpr int kMostApproaches = 5;
 constexpr double kMostMove = 0.5;   // cells; beyond, it is another code
 constexpr double kMostNoise = 1.6;  // of the border's: compressed pictures stay below 1.4, a shadow
                                     // across the marker or a cover is beyond 3
-constexpr double kFloorSigma = 0.002;  // px, measured: tests/experiments/corners.cpp
 // A step below all of these changes the slopes too little to compute them anew.
 constexpr double kSmallMove = 0.05;  // px
 constexpr double kSmallBlur = 0.06;  // px^2
@@ -75,7 +73,7 @@ constexpr double kSmallPeak = 0.3;
 
 using Row = Eigen::Matrix<float, kSize, 1>;
 using System = Eigen::Matrix<double, kSize, kSize>;
-using Step = Eigen::Matrix<double, kSize, 1>;
+using ParameterStep = Eigen::Matrix<double, kSize, 1>;
 
 struct Pixel {
   double x = 0.0;
@@ -120,10 +118,10 @@ Eigen::AlignedBox2d box_of(const Corners& corners) {
   return out;
 }
 
-class Fit {
+class WholeTagFit {
  public:
-  Fit(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,
-      const ToneCurve& tone, const CameraModel& lens)
+  WholeTagFit(const ImageView& image, const RefinedCorners& border, const TagLayout& layout,
+              const ToneCurve& tone, const CameraModel& lens)
       : image_(image),
         border_(border),
         layout_(layout),
@@ -137,7 +135,7 @@ class Fit {
     if (!begin() || !collect()) return std::nullopt;
     // Most of the way with a part of the pixels.
     if (!approach(coarse_)) return std::nullopt;
-    const std::optional<Step> step = approach(pixels_.size());
+    const std::optional<ParameterStep> step = approach(pixels_.size());
     if (!step) return std::nullopt;
     const Row last = step->cast<float>();
     for (std::size_t i = 0; i < used_; ++i)
@@ -222,7 +220,7 @@ class Fit {
                            block_row + x / kBlock - x0 / kBlock, (x + 2 * y) % 4 == 0});
       }
     }
-    if (pixels_.size() <= kMinPixels || unclear >= pixels_.size()) return false;
+    if (pixels_.size() <= kFewestPixels || unclear >= pixels_.size()) return false;
     if (pixels_.size() < kCoarse * kEnough) {
       coarse_ = pixels_.size();
       return true;
@@ -295,11 +293,11 @@ class Fit {
   }
 
   // Steps with the first `count` pixels until they are small, and the last of them.
-  std::optional<Step> approach(std::size_t count) {
+  std::optional<ParameterStep> approach(std::size_t count) {
     used_ = count;
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostApproaches; ++round) {
       compare();
-      std::optional<Step> step = solve();
+      std::optional<ParameterStep> step = solve();
       if (!step) return std::nullopt;
       take(*step);
       if (is_small(*step)) return step;
@@ -330,7 +328,7 @@ class Fit {
       const double pull = x * p.x + y * p.y;
       const double off = 1.0 - t.value;
       const double both = t.value + off * ratio;
-      Step s;
+      ParameterStep s;
       s << x, x * p.x, x * p.y, y, y * p.x, y * p.y, pull * p.x, pull * p.y, w * share.blur,
           contrast * t.per_gamma, w * share.spread, w * share.peak, off, off * p.x, off * p.y,
           t.value, t.value * p.x, t.value * p.y, both * p.x * p.x, both * p.x * p.y,
@@ -339,7 +337,7 @@ class Fit {
     }
   }
 
-  std::optional<Step> solve() {
+  std::optional<ParameterStep> solve() {
     std::vector<double> size;
     size.reserve(coarse_);
     for (std::size_t i = 0; i < coarse_; ++i) size.push_back(std::abs(residuals_[i]));
@@ -347,14 +345,14 @@ class Fit {
     if (!weigh()) return std::nullopt;
     Row pull = Row::Zero();
     for (const Row& block : pulls_) pull += block;
-    Step g = pull.cast<double>();
+    ParameterStep g = pull.cast<double>();
     seen_ = System::Zero();
     add_products(slopes_.data(), weights_.data(), used_, seen_);
-    const Step believed = variance_ * beliefs();
+    const ParameterStep believed = variance_ * beliefs();
     solver_.compute(seen_ + System(believed.asDiagonal()));
     if (solver_.info() != Eigen::Success) return std::nullopt;
     g += believed.cwiseProduct(likely() - values());
-    Step step = solver_.solve(g);
+    ParameterStep step = solver_.solve(g);
     const double longest = step.segment<8>(kHomography).cwiseAbs().maxCoeff();
     if (!(longest < kMostMove * side_ / layout_.cells)) return std::nullopt;
     return step;
@@ -381,8 +379,8 @@ class Fit {
   }
 
   // The unknowns about which something is known beforehand, the others being zero.
-  [[nodiscard]] Step values() const {
-    Step out = Step::Zero();
+  [[nodiscard]] ParameterStep values() const {
+    ParameterStep out = ParameterStep::Zero();
     out.segment<3>(kBlur) << blur_(0, 0), blur_(0, 1), blur_(1, 1);
     out(kGamma) = gamma_;
     out(kSpread) = spread_;
@@ -391,28 +389,28 @@ class Fit {
     return out;
   }
 
-  [[nodiscard]] Step likely() const {
-    Step out = Step::Zero();
+  [[nodiscard]] ParameterStep likely() const {
+    ParameterStep out = ParameterStep::Zero();
     out(kBlur) = out(kBlur + 2) = kBlurMean;
     out(kGamma) = likely_gamma_;
     return out;
   }
 
   // 1 / sigma^2.
-  [[nodiscard]] Step beliefs() const {
-    Step sigma = Step::Zero();
-    sigma.segment<3>(kBlur).setConstant(kBlurSigma);
+  [[nodiscard]] ParameterStep beliefs() const {
+    ParameterStep sigma = ParameterStep::Zero();
+    sigma.segment<3>(kBlur).setConstant(kBlurBelief);
     sigma(kGamma) = gamma_sigma_;
     sigma(kSpread) = kSpreadSigma;
     sigma(kPeak) = kPeakSigma;
     sigma.segment<3>(kBowl).setConstant(kBowlSigma * (bright_(0) - dark_(0)));
-    Step out = Step::Zero();
+    ParameterStep out = ParameterStep::Zero();
     for (int i = 0; i < kUnknowns; ++i) out(i) = sigma(i) > 0.0 ? 1.0 / (sigma(i) * sigma(i)) : 0.0;
     out(kUnknowns) = 1.0;
     return out;
   }
 
-  void take(const Step& d) {
+  void take(const ParameterStep& d) {
     const double s = 2.0 / side_;
     Eigen::Matrix3d G;  // the square as it is seen to the one that fits
     G << 1.0 + s * d(1), s * d(2), s * d(0), s * d(4), 1.0 + s * d(5), s * d(3), -s * d(6),
@@ -423,7 +421,7 @@ class Fit {
     blur_(1, 1) += d(kBlur + 2);
     blur_(1, 0) = blur_(0, 1);
     keep_blur();
-    gamma_ = std::clamp(gamma_ + d(kGamma), kLeastGamma, kMostGamma);
+    gamma_ = std::clamp(gamma_ + d(kGamma), kLeastGamma, kMostFittedGamma);
     spread_ += d(kSpread);
     peak_ = std::clamp(peak_ + d(kPeak), -kMostPeak, kMostPeak);
     dark_ += d.segment<3>(kDark);
@@ -432,7 +430,7 @@ class Fit {
     bowl_ += d.segment<3>(kBowl);
   }
 
-  static bool is_small(const Step& d) {
+  static bool is_small(const ParameterStep& d) {
     return d.segment<8>(kHomography).cwiseAbs().maxCoeff() < kSmallMove &&
            d.segment<3>(kBlur).cwiseAbs().maxCoeff() < kSmallBlur &&
            std::abs(d(kGamma)) < kSmallGamma && std::abs(d(kPeak)) < kSmallPeak;
@@ -536,7 +534,7 @@ RefinedCorners refine_by_cells(const ImageView& image, const RefinedCorners& bor
                                const TagLayout& layout, const ToneCurve& tone,
                                const CameraModel& lens) {
   if (border.status != RefineStatus::kDone) return border;
-  return Fit(image, border, layout, tone, lens).run().value_or(border);
+  return WholeTagFit(image, border, layout, tone, lens).run().value_or(border);
 }
 
 }  // namespace kinescope

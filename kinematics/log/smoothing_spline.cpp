@@ -18,7 +18,7 @@ constexpr int kDegree = 5;
 constexpr int kBasis = kDegree + 1;      // functions that are not zero at a point
 constexpr double kKnotsPerPeriod = 6.0;  // of the cut-off: the basis follows it to 1e-4
 constexpr double kLargestWeight = 10.0;  // of a sample before a gap, in mean weights
-constexpr Eigen::Index kFewest = 8;
+constexpr Eigen::Index kFewestPoints = 8;
 
 using Functions = std::array<double, kBasis>;
 
@@ -102,7 +102,7 @@ SmoothingSpline::SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::Matrix
 SmoothingSpline::SmoothingSpline(const Eigen::VectorXd& t_s, const Eigen::MatrixXd& values,
                                  const Eigen::VectorXd& weights, double cutoff_hz) {
   const Eigen::Index n = t_s.size();
-  KINESCOPE_CHECK(n >= kFewest && values.rows() == n && weights.size() == n,
+  KINESCOPE_CHECK(n >= kFewestPoints && values.rows() == n && weights.size() == n,
                   "a spline wants 8 samples or more");
   KINESCOPE_CHECK(cutoff_hz > 0.0, "the cut-off must be positive");
   const double duration_s = t_s(n - 1) - t_s(0);

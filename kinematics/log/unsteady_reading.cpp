@@ -13,7 +13,7 @@ namespace {
 
 // Of a grid rounded to its steps, and of any value within one.
 const double kRoundedSigma = 1.0 / std::sqrt(12.0);
-constexpr Eigen::Index kFewest = 32;
+constexpr Eigen::Index kFewestChanges = 32;
 // Of the range: a grid or noise that is finer is no matter beside what a camera sees.
 constexpr double kFinest = 1e-4;
 
@@ -257,7 +257,7 @@ std::optional<UnsteadyReading> reading_in_steps(Eigen::VectorXd values) {
 std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times_s,
                                                 const Eigen::VectorXd& values) {
   const Eigen::Index changes = changes_of(values);
-  if (changes < kFewest) return std::nullopt;
+  if (changes < kFewestChanges) return std::nullopt;
   const std::optional<double> step = step_of(values);
   const double range = values.maxCoeff() - values.minCoeff();
   if (!step && noise_at_most(values) < kFinest * range) return std::nullopt;

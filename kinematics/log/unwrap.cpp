@@ -11,9 +11,9 @@
 namespace kinescope {
 namespace {
 
-constexpr std::size_t kFewest = 10;      // samples; fewer show no velocity before and after
-constexpr double kManyTimes = 5.0;       // a jump is larger than the usual step by this
-constexpr double kUsual = 0.9;           // quantile of the steps, and of their roughness
+constexpr std::size_t kFewestForVelocity = 10;  // samples; fewer show no velocity before and after
+constexpr double kManyTimes = 5.0;           // a jump is larger than the usual step by this
+constexpr double kUsual = 0.9;               // quantile of the steps, and of their roughness
 constexpr double kOfRoughness = 5.0;     // how far a jump may be from the velocity's prediction ..
 constexpr double kLeastOfPeriod = 0.01;  // .. or this share of the period ..
 constexpr double kMostOfPeriod = 0.1;    // .. and never more than this one
@@ -168,7 +168,7 @@ std::optional<double> period_of_jumps(const Channel& channel) {
 }  // namespace
 
 std::optional<Unwrapped> unwrap(const std::vector<double>& times_s, const Eigen::VectorXd& values) {
-  if (times_s.size() < kFewest) return std::nullopt;
+  if (times_s.size() < kFewestForVelocity) return std::nullopt;
   const Channel channel{.times_s = times_s,
                         .values = values,
                         .range = values.maxCoeff() - values.minCoeff(),

@@ -10,7 +10,6 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // What a joint has to lose without a channel (-2 ln likelihood) to share it: drives of two joints
 // are rare.
 constexpr double kRare = 25.0;
@@ -80,7 +79,7 @@ void deal_main_channels(GrownTree& tree, std::size_t channels) {
 
 struct Replacement {
   const Attachment* attachment = nullptr;  // null: none
-  double loss = kInfinity;
+  double loss = std::numeric_limits<double>::infinity();
 };
 
 // The link's next best explanation that does without the channel.

@@ -20,7 +20,7 @@ constexpr double kHopeless = 60.0;
 // one), and more than this part of the motion: is_acceptable() asks for far less of either.
 constexpr double kHopelessVariance = 50.0;
 constexpr double kHopelessShare = 0.01;
-constexpr std::size_t kFewestSamples = 5;
+constexpr std::size_t kFewestTogether = 5;
 
 // Fits with the weight along the joint that its inexactness asks for.
 ChainFit fit_weighted(const Motion& motion, const Readings& readings, const ChainModel& start,
@@ -101,7 +101,7 @@ std::vector<Attachment> find_attachments(const Body& body, int parent, const Lin
                                          const AttachmentOptions& options) {
   const RelativeMotion relative = relative_motion(body, path, readings);
   const auto seen = static_cast<std::size_t>(seen_with_log(body, readings));
-  if (relative.motion.size() < kFewestSamples || 3 * relative.motion.size() < seen) return {};
+  if (relative.motion.size() < kFewestTogether || 3 * relative.motion.size() < seen) return {};
   const std::vector<Candidate> candidates =
       screen_motion(relative.motion, readings.value, usable,
                     {.coordinate_free = options.coordinate_free, .max_channels = 4});

@@ -7,6 +7,7 @@
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/structure/linear_motion.h"
+#include "kinematics/structure/residual_scale.h"
 #include "kinematics/structure/rest.h"
 #include "kinematics/structure/tangent.h"
 #include "kinematics/structure/wide_turn.h"
@@ -18,14 +19,11 @@ constexpr int kSamples = 64;
 // With fewer samples than this there is nothing to be saved.
 constexpr std::size_t kFewest = 32;
 // What is left across the joint is hopeless above this variance over the declared one, and
-constexpr double kHopelessVariance = 100.0;
+constexpr double kHopelessAtFirst = 100.0;
 // above this part of the motion's variance.
-constexpr double kHopelessShare = 0.04;
+constexpr double kHopelessShareAtFirst = 0.04;
 // Channels that get a robust regression, best first.
 constexpr std::size_t kMostChannels = 4;
-// Medians of chi-square with 5 and 6 degrees of freedom.
-constexpr double kMedian5 = 4.3515;
-constexpr double kMedian6 = 5.3481;
 
 // Rows of a motion that are linear in the channel that drives it: logarithms about the mean pose
 // or, where the turn is too wide for one, from each sample to the next.
@@ -137,7 +135,7 @@ bool may_hang(const Motion& motion, const Readings& readings, const std::vector<
   const Eigen::MatrixXd centred = rows.y.colwise() - Vector6d(rows.y.rowwise().mean());
   const double spread = median(centred.colwise().squaredNorm().transpose()) / kMedian6;
   const double limit = std::min(variance_of_cost(give_up_above),
-                                std::max(kHopelessVariance, kHopelessShare * spread));
+                                std::max(kHopelessAtFirst, kHopelessShareAtFirst * spread));
   if (spread < limit || left_by_principal(rows.y) < limit) return true;
   return std::ranges::any_of(best_channels(rows, usable), [&](Eigen::Index c) {
     return left_by_channel(rows.y, rows.q.col(c)) < limit;

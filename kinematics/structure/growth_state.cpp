@@ -12,13 +12,12 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Added to the cost of a free body that is seen to rest.
 constexpr double kNeverFree = 1e6;
 // Cost per sighting above that of the best known attachment from which none is refined.
 constexpr double kGiveUpMargin = 3.0;
 
-std::vector<char> moving_channels(const Readings& readings) {
+std::vector<char> channels_that_move(const Readings& readings) {
   std::vector<char> usable;
   usable.reserve(static_cast<std::size_t>(readings.channels()));
   for (int c = 0; c < readings.channels(); ++c) usable.push_back(readings.moves(c) ? 1 : 0);
@@ -41,11 +40,11 @@ GrowthState start_growth(const Series& series, const Readings& readings,
   GrowthState state{.series = series,
                     .readings = readings,
                     .options = options,
-                    .usable = moving_channels(readings),
+                    .usable = channels_that_move(readings),
                     .likely_cost = likely_cost,
                     .moves_freely = std::vector<char>(series.bodies.size(), 0),
                     .tree = {}};
-  state.likely_cost.resize(series.bodies.size(), kInfinity);
+  state.likely_cost.resize(series.bodies.size(), std::numeric_limits<double>::infinity());
   for (const Body& body : series.bodies) {
     const FreeCost free = free_cost(body, readings);
     GrownBody& grown = state.tree.bodies.emplace_back();
@@ -63,8 +62,9 @@ GrowthState continued_growth(GrownTree tree, const Series& series, const Reading
   return {.series = series,
           .readings = readings,
           .options = options,
-          .usable = moving_channels(readings),
-          .likely_cost = std::vector<double>(series.bodies.size(), kInfinity),
+          .usable = channels_that_move(readings),
+          .likely_cost =
+              std::vector<double>(series.bodies.size(), std::numeric_limits<double>::infinity()),
           .moves_freely = std::vector<char>(series.bodies.size(), 0),
           .tree = std::move(tree)};
 }
@@ -120,9 +120,11 @@ void list_all_alternatives(GrowthState& state) {
 bool look_again_at_free_bodies(GrowthState& state) {
   bool any = false;
   for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
-    if (state.tree.bodies[b].link >= 0 || state.likely_cost[b] == kInfinity) continue;
+    if (state.tree.bodies[b].link >= 0 ||
+        state.likely_cost[b] == std::numeric_limits<double>::infinity())
+      continue;
     any = true;
-    state.likely_cost[b] = kInfinity;
+    state.likely_cost[b] = std::numeric_limits<double>::infinity();
     state.tree.bodies[b].alternatives.clear();
     for (std::size_t l = 0; l < state.tree.links.size(); ++l) {
       list_alternatives(state, b, static_cast<int>(l));

@@ -13,7 +13,7 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr std::size_t kFewestSamples = 12;
+constexpr std::size_t kFewestOfAPair = 12;
 
 struct PairMotion {
   Motion motion;
@@ -134,7 +134,7 @@ double regression_cost(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
 double pair_cost(const BodyPair& pair, const Readings& readings) {
   const Covered c = covered_part(pair, readings);
   const auto n = static_cast<int>(c.y.cols());
-  if (n < static_cast<int>(kFewestSamples)) return pair.free_cost;
+  if (n < static_cast<int>(kFewestOfAPair)) return pair.free_cost;
   const Matrix6d G = c.y * c.y.transpose();
   const Eigen::MatrixXd B = c.y * c.q;
   Eigen::Index best = -1;
@@ -174,7 +174,7 @@ std::vector<BodyPair> body_pairs(const Series& series, int most_instants) {
   for (int second = 0; second < bodies; ++second) {
     for (int first = -1; first < second; ++first) {
       const PairMotion relative = pair_motion(series, first, second, stride);
-      if (relative.motion.size() < kFewestSamples) continue;
+      if (relative.motion.size() < kFewestOfAPair) continue;
       const LinearMotion linear = linear_motion(relative.motion);
       const double own = free[static_cast<std::size_t>(second)];
       const double other = first < 0 ? own : free[static_cast<std::size_t>(first)];

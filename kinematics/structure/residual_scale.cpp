@@ -10,12 +10,6 @@
 namespace kinescope::structure_search {
 namespace {
 
-// Medians of chi-square with 5 and 6 degrees of freedom.
-constexpr double kMedian5 = 4.3515;
-constexpr double kMedian6 = 5.3481;
-// Samples beyond this many squared robust sigmas do not enter the second, efficient estimate.
-constexpr double kTrim = 25.0;
-
 // Mean of the values over `dof` within the trim; starts from the median.
 double trimmed_variance(const std::vector<double>& squared, double dof, double median_unit) {
   double variance = median_of(squared) / median_unit;

@@ -27,6 +27,12 @@ struct ResidualScale {
   double cost = 0.0;
 };
 
+/// Medians of chi-square with 5 and 6 degrees of freedom.
+inline constexpr double kMedian5 = 4.3515;
+inline constexpr double kMedian6 = 5.3481;
+/// Samples beyond this many squared robust sigmas do not enter a second, efficient estimate.
+inline constexpr double kTrim = 25.0;
+
 /// A sample costs at most this much: outliers (flips) are as likely as a 1 in 10^6 residual.
 inline constexpr double kOutlierCost = 30.0;
 

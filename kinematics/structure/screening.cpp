@@ -22,11 +22,6 @@ namespace {
 constexpr double kTurnEvidence = 3.5;
 // Cost beyond which, with one more a sample, a direction is not looked at any further.
 constexpr double kFar = 100.0;
-// Medians of chi-square with 5 and 6 degrees of freedom.
-constexpr double kMedian5 = 4.3515;
-constexpr double kMedian6 = 5.3481;
-// A sample this many times further than the median from the best line is left out.
-constexpr double kTrim = 25.0;
 
 // What one direction of y explains: sums of squares along it after regression, and across it.
 struct Direction {

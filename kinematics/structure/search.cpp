@@ -22,7 +22,7 @@ constexpr int kMostGrowths = 4;
 // Instants of the series on which an offset is looked for first.
 constexpr int kRoughInstants = 80;
 // How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
-constexpr double kClearly = 25.0;
+constexpr double kClearlyLikelierOffset = 25.0;
 // Variances over the declared ones up to which a tree explains all there is.
 constexpr double kNoiseOnly = 1.5;
 
@@ -232,7 +232,7 @@ FoundTree search_tree(const Series& full, const Series& thin, const JointLog& lo
                            [](const FoundTree& f) { return std::abs(f.offset.value_s); });
   std::size_t best = 0;
   for (std::size_t k = 1; k < found.size(); ++k) {
-    if (score_of(found[k]) < score_of(found[best]) - kClearly) best = k;
+    if (score_of(found[k]) < score_of(found[best]) - kClearlyLikelierOffset) best = k;
   }
   if (unseen == UnseenLinks::kNone || !is_unfinished(found[best]))
     return search.finished(std::move(found[best]), step_s, quick);

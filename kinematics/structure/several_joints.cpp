@@ -16,10 +16,10 @@ constexpr std::size_t kMostJoints = 8;
 // Up to this many joints all orders are tried.
 constexpr std::size_t kExhaustive = 4;
 // Samples used while orders are compared.
-constexpr std::size_t kMostSamples = 120;
+constexpr std::size_t kMostFitted = 120;
 // -2 ln likelihood by which another order has to be better than one nearer to the log's (odds of 1
 // to 100).
-constexpr double kClearly = 9.2;
+constexpr double kClearlyLikelierOrder = 9.2;
 // Standard deviations of a regression coefficient below which a channel does not matter.
 constexpr double kSignificant = 6.0;
 // Most that one sample may cost here: few postures may be all that shows a joint.
@@ -192,13 +192,14 @@ std::vector<std::vector<std::size_t>> all_orders(std::vector<std::size_t> order)
 Ordered best_order(const Problem& p) {
   Ordered best;
   for (std::size_t k = 0; k < p.channels.size(); ++k) best.order.push_back(k);
-  best.fit = fit_outwards(p, start_model(p, best.order), kMostSamples);
+  best.fit = fit_outwards(p, start_model(p, best.order), kMostFitted);
   const bool exhaustive = best.order.size() <= kExhaustive;
   for (int round = 0; round < (exhaustive ? 1 : 8); ++round) {
     Ordered next = best;
     for (auto& order : exhaustive ? all_orders(best.order) : insertions(best.order)) {
-      ChainFit fit = fit_outwards(p, start_model(p, order), kMostSamples);
-      if (fit.cost < next.fit.cost - kClearly) next = {std::move(order), std::move(fit)};
+      ChainFit fit = fit_outwards(p, start_model(p, order), kMostFitted);
+      if (fit.cost < next.fit.cost - kClearlyLikelierOrder)
+        next = {std::move(order), std::move(fit)};
     }
     if (next.order == best.order) break;
     best = std::move(next);
@@ -233,7 +234,7 @@ ChainFit best_coupling(const Problem& p, const Ordered& now) {
         } else {
           joint.terms.push_back({p.channels[kb], 0.0});
         }
-        ChainFit fit = fit_outwards(p, std::move(model), kMostSamples);
+        ChainFit fit = fit_outwards(p, std::move(model), kMostFitted);
         if (fit.cost < best.cost) best = std::move(fit);
       }
     }

@@ -16,7 +16,6 @@
 namespace kinescope::structure_search {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Larger log-odds mean nothing: the models are not that right.
 constexpr double kMostLogOdds = 1000.0;
 // Channels that agree this well hold the same numbers, perhaps in another unit.
@@ -60,7 +59,7 @@ bool same_answer(const Attachment& a, const Attachment& b) {
 }
 
 struct Alternative {
-  double loss = kInfinity;  // -2 ln odds against the answer
+  double loss = std::numeric_limits<double>::infinity();  // -2 ln odds against the answer
   std::string words;
   int first_channel = -1;  // the two channels that could be exchanged
   int second_channel = -1;
@@ -252,7 +251,7 @@ double usual_scale(const GrownTree& tree, const Readings& readings) {
 
 // The smallest motion (rad or m, RMS) that the best marker would show.
 double visible_motion(const Series& series) {
-  double least = kInfinity;
+  double least = std::numeric_limits<double>::infinity();
   for (const Body& body : series.bodies) {
     double sum = 0.0;
     for (const Sighting& s : body.at)
@@ -367,10 +366,10 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   Verdict verdict;
   verdict.status = StructureStatus::kDetermined;
   const std::vector<Alternative> all = Judge(tree, series, readings, log).alternatives();
-  verdict.link_log_odds.assign(tree.links.size(), kInfinity);
+  verdict.link_log_odds.assign(tree.links.size(), std::numeric_limits<double>::infinity());
   verdict.link_runner_up.assign(tree.links.size(), "");
   double odds = 0.0;
-  double least = kInfinity;
+  double least = std::numeric_limits<double>::infinity();
   for (const Alternative& a : all) {
     odds += std::exp(-0.5 * a.loss);
     if (a.loss < least) {

@@ -7,16 +7,14 @@
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/mjcf.h"
 #include "kinematics/urdf/urdf_inertia.h"
+#include "kinematics/urdf/xml_numbers.h"
 
 namespace kinescope {
 namespace {
 
 using tinyxml2::XMLElement;
+using urdf_document::add;
 using urdf_document::number_text;
-
-XMLElement& add(XMLElement& parent, const char* name) {
-  return *parent.InsertNewChildElement(name);
-}
 
 void set(XMLElement& element, const char* name, const std::string& value) {
   element.SetAttribute(name, value.c_str());

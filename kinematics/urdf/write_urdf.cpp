@@ -15,11 +15,13 @@
 #include "kinematics/urdf/urdf.h"
 #include "kinematics/urdf/urdf_document.h"
 #include "kinematics/urdf/urdf_inertia.h"
+#include "kinematics/urdf/xml_numbers.h"
 
 namespace kinescope {
 namespace {
 
 using tinyxml2::XMLElement;
+using urdf_document::add;
 using urdf_document::kAnyEffort;
 using urdf_document::kAnyVelocity;
 using urdf_document::number_text;
@@ -123,10 +125,6 @@ Names make_names(const KinematicTree& tree) {
     names.joints.push_back(claim(sanitised(joint.name, "joint"), joints));
   }
   return names;
-}
-
-XMLElement& add(XMLElement& parent, const char* name) {
-  return *parent.InsertNewChildElement(name);
 }
 
 void add_origin(XMLElement& parent, const Pose& pose) {

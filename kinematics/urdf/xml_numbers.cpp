@@ -11,6 +11,10 @@
 
 namespace kinescope::urdf_document {
 
+tinyxml2::XMLElement& add(tinyxml2::XMLElement& parent, const char* name) {
+  return *parent.InsertNewChildElement(name);
+}
+
 std::string xml_place(const tinyxml2::XMLElement& element, std::string_view source) {
   return fmt::format("{}:{}", source, element.GetLineNum());
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Numbers in attributes of XML elements, with complaints that name file and line.
+// Elements of an XML document, and numbers in their attributes with complaints that name file and
+// line.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +14,9 @@ class XMLElement;
 }
 
 namespace kinescope::urdf_document {
+
+/// A new last child.
+tinyxml2::XMLElement& add(tinyxml2::XMLElement& parent, const char* name);
 
 /// Who is speaking, for complaints.
 struct XmlOwner {
