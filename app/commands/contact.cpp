@@ -100,13 +100,13 @@ LogBalance balance_of(const TorqueModelFile& file, const std::vector<PredictedFr
   return on_one_clock(predicted.motions, samples, log, guard_s);
 }
 
-struct Detection {
+struct DetectedContacts {
   ContactCalibration calibration;
   std::vector<ContactEvent> events;
 };
 
-Detection detect(const Balances& balances, const ContactOptions& options) {
-  Detection out;
+DetectedContacts detect(const Balances& balances, const ContactOptions& options) {
+  DetectedContacts out;
   const std::vector<BalanceSample>& samples = balances.looked_at.samples;
   out.calibration = balances.learned
                         ? calibrate_contacts(balances.learned->samples, samples, options)
@@ -152,7 +152,7 @@ Logs read_logs(const ContactCommandOptions& options, const DynamicModel& model) 
   return out;
 }
 
-void report_detection(const Balances& balances, Detection found, ContactSummary& summary) {
+void report_detection(const Balances& balances, DetectedContacts found, ContactSummary& summary) {
   const LogBalance& looked_at = balances.looked_at;
   summary.clock = looked_at.clock;
   summary.learn_clock = balances.learned ? balances.learned->clock : looked_at.clock;
@@ -195,7 +195,7 @@ MomentumComparison compare_with_momentum(const ContactCommandOptions& options,
     const ContactModel expected =
         make_contact_model(options, model, logs.looked_at, logs.to_learn_from());
     const Balances balances = momentum_balances(expected, logs, options, contact.guard_s);
-    Detection found = detect(balances, contact);
+    DetectedContacts found = detect(balances, contact);
     out.events = std::move(found.events);
     apply_gains(expected.gains, out.events);
     out.excluded = std::move(found.calibration.excluded);

@@ -41,14 +41,14 @@ Eigen::MatrixXd velocities(const TorqueLog& log) {
 }
 
 // Filtered, with what the model's masses predict; nothing of a log that is too short to filter.
-struct Predicted {
+struct RigidPrediction {
   TorqueSamples samples;
   Eigen::MatrixXd torque;  // samples x joints
 };
 
-std::optional<Predicted> predicted_by(const RigidModel& rigid, const TorqueLogReport& log,
-                                      const TorqueDataOptions& options) {
-  Predicted out;
+std::optional<RigidPrediction> predicted_by(const RigidModel& rigid, const TorqueLogReport& log,
+                                            const TorqueDataOptions& options) {
+  RigidPrediction out;
   try {
     out.samples = filtered_data(log, options.motion).samples;
   } catch (const Error& error) {

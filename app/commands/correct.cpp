@@ -12,6 +12,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/log_range.h"
 #include "app/commands/output_folder.h"
+#include "app/commands/progress_line.h"
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
 #include "kinematics/core/file.h"
@@ -115,8 +116,6 @@ KinematicTree tree_of_run(const std::filesystem::path& run_folder,
   }
   return tree;
 }
-
-void print_warning(const std::string& warning) { fmt::print(stderr, "warning: {}\n", warning); }
 
 void to_si(JointLog& log, const std::map<std::string, double>& factors) {
   for (const auto& [name, factor] : factors) {

@@ -69,8 +69,9 @@ std::string names_of(const std::vector<int>& channels, const JointLog& log) {
 
 void refuse_flange_poses(const JointLog& log, const PoseTracks& tracks,
                          const CalibrateOptions& options) {
-  constexpr double kClocksS = 1.0;  // by which they may be apart
-  const auto flange = flange_columns(tracks, log, options.estimate_time_offset ? kClocksS : 0.0);
+  constexpr double kLargestOffsetS = 1.0;  // by which they may be apart
+  const auto flange =
+      flange_columns(tracks, log, options.estimate_time_offset ? kLargestOffsetS : 0.0);
   if (!flange) return;
   throw undetermined(
       log.source,
@@ -86,7 +87,7 @@ void refuse_flange_poses(const JointLog& log, const PoseTracks& tracks,
       "done here");
 }
 
-std::string file_named(const Recording& recording, std::string_view entry) {
+std::string csv_of(const Recording& recording, std::string_view entry) {
   return (recording.folder / fmt::format("{}.csv", entry)).string();
 }
 
@@ -108,7 +109,7 @@ void refuse_other_convention(const Recording& recording, const PoseTracks& track
     if (structure && is_robot(*structure)) fitting.emplace_back(convention.words);
   }
   if (fitting.empty()) return;
-  throw undetermined(file_named(recording, "poses"),
+  throw undetermined(csv_of(recording, "poses"),
                      fmt::format("the bodies do not move as a robot's links do, but {} they do",
                                  fmt::join(fitting, ", or ")),
                      "qx, qy, qz, qw and x, y, z are the pose of the body in the tracker's frame: "

@@ -29,7 +29,7 @@ using nlohmann::json;
 constexpr std::string_view kList = ".kinescope_products";
 constexpr std::string_view kListHead =
     "# Written here by kinescope, which may replace and remove them: command, file\n";
-constexpr std::string_view kRun = "run";
+constexpr std::string_view kRunCommand = "run";
 
 // Name of a file: the command that wrote it.
 using Owners = std::map<std::string, std::string, std::less<>>;
@@ -47,7 +47,7 @@ void add_products_of_run(const fs::path& run_json, Owners& owners) {
   const std::vector<std::string> known = run_products(true);
   for (const json& name : document.value("products", json::array())) {
     if (name.is_string() && std::ranges::find(known, name.get<std::string>()) != known.end()) {
-      owners[name.get<std::string>()] = kRun;
+      owners[name.get<std::string>()] = kRunCommand;
     }
   }
 }

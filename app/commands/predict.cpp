@@ -9,6 +9,7 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
+#include "app/commands/progress_line.h"
 #include "app/commands/torque_inputs.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
@@ -19,7 +20,7 @@
 namespace kinescope {
 namespace {
 
-struct Predicted {
+struct JudgedPrediction {
   TorqueSamples samples;
   TorquePrediction torque;
   BandFactors bands;
@@ -55,7 +56,7 @@ std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings) {
 }
 
 // Unit and sign of the log's torques against those that the model was learned from.
-void check_scale(const std::vector<std::filesystem::path>& logs, Predicted& predicted) {
+void check_scale(const std::vector<std::filesystem::path>& logs, JudgedPrediction& predicted) {
   std::vector<LogFinding> findings =
       compare_torque_scale(predicted.samples, predicted.torque.mean).findings;
   put_into_place(logs, findings);
@@ -63,12 +64,12 @@ void check_scale(const std::vector<std::filesystem::path>& logs, Predicted& pred
   for (std::string& line : warnings_of(findings)) predicted.warnings.push_back(std::move(line));
 }
 
-Predicted predict(const PredictOptions& options, const TorqueModelFile& file) {
+JudgedPrediction predict(const PredictOptions& options, const TorqueModelFile& file) {
   TorqueDataOptions data = options.data;
   const TorqueFilter& filter = file.traced ? file.traced->filter : file.filter;
   data.motion.filter = filter.kind;
   data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
-  Predicted out;
+  JudgedPrediction out;
   TorqueData read = read_torque_data(options.logs, wanted(file.model.rigid), data);
   out.warnings = warnings_of(read.findings);
   out.samples = std::move(read.samples);
@@ -90,7 +91,7 @@ Predicted predict(const PredictOptions& options, const TorqueModelFile& file) {
 }
 
 // t, trajectory, then of every joint: measured, mean, half the 90 % band, residual.
-std::string table(const Predicted& predicted, const RigidModel& rigid) {
+std::string table(const JudgedPrediction& predicted, const RigidModel& rigid) {
   std::string out = "t,trajectory";
   for (const RigidBody& body : rigid.bodies) {
     out += fmt::format(",torque_{0},mean_{0},band90_{0},residual_{0}", body.joint);
@@ -116,7 +117,7 @@ struct JointResult {
   double within_90 = 0.0;
 };
 
-std::vector<JointResult> results(const Predicted& predicted) {
+std::vector<JointResult> results(const JudgedPrediction& predicted) {
   const Eigen::MatrixXd error = predicted.samples.torque - predicted.torque.mean;
   const Eigen::VectorXd nmse =
       normalised_error_percent(predicted.samples.torque, predicted.torque.mean);
@@ -154,14 +155,13 @@ ExitCode predict_command(const PredictOptions& options, const Console& console) 
   inputs.push_back(options.model);
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueModelFile file = read_torque_model(options.model);
-  Predicted predicted = predict(options, file);
+  JudgedPrediction predicted = predict(options, file);
   const RigidModel& rigid = file.model.rigid;
   const std::vector<JointResult> joints = results(predicted);
   if (std::string words = worse_words(joints, rigid); !words.empty()) {
     predicted.warnings.push_back(std::move(words));
   }
-  for (const std::string& warning : predicted.warnings)
-    fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : predicted.warnings) print_warning(warning);
   write_file_atomically(options.output, table(predicted, rigid));
   const std::vector<std::string> words = motion_words(file.model.learned, predicted.samples, rigid);
   if (console.json) {

@@ -12,6 +12,7 @@
 #include "app/commands/limits.h"
 #include "app/commands/log_doubts.h"
 #include "app/commands/pipeline.h"
+#include "app/commands/progress_line.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
@@ -32,7 +33,6 @@ namespace kinescope {
 namespace {
 
 constexpr std::string_view kReport = "report.html";
-constexpr std::string_view kRun = "run.json";
 // Of a run without an answer, beside the products of an earlier one that has one.
 constexpr std::string_view kFailedReport = "failed_report.html";
 
@@ -64,9 +64,6 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.nominal = recording.nominal;
   run.free_asked = options.free.has_value();
 }
-
-// What is odd about the input, beside the result: the report has it, too.
-void print_warning(const std::string& warning) { fmt::print(stderr, "warning: {}\n", warning); }
 
 double mean_step(const std::vector<double>& times_s) {
   return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
@@ -295,9 +292,9 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!run.torque.empty()) clock.lap("torque", run.times);
   folder.write(kReport, report_html(run, urdf));
   clock.lap("report", run.times);
-  folder.add_products({std::string(kRun)});
+  folder.add_products({std::string(kRunFile)});
   folder.remove_stale_products();
-  folder.write(kRun, run_json(run, folder.products()).dump(2) + "\n");
+  folder.write(kRunFile, run_json(run, folder.products()).dump(2) + "\n");
 
   print_result(run, folder, kReport, console);
   require(answer, "the report shows the details");

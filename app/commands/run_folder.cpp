@@ -19,7 +19,6 @@ using nlohmann::json;
 
 constexpr std::string_view kObservations = "observations.csv";
 constexpr std::string_view kObservationsKey = "observations.json";
-constexpr std::string_view kRunFile = "run.json";
 
 // run.json; nothing where there is none of a run.
 std::optional<json> run_document(const fs::path& folder) {

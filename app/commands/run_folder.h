@@ -18,6 +18,8 @@
 
 namespace kinescope {
 
+inline constexpr std::string_view kRunFile = "run.json";
+
 class RunFolder : public OutputFolder {
  public:
   /// Throws bad_request where the folder is not this run's to write into: one with the recording's

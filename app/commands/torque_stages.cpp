@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr int kGpSamples = 600;
 constexpr double kGravity = 9.81;  // m/s^2
 
-std::optional<fs::path> file_named(const Recording& recording, std::string_view name) {
+std::optional<fs::path> listed_file(const Recording& recording, std::string_view name) {
   for (const fs::path& file : recording.files) {
     if (file.filename() == name) return file;
   }
@@ -79,7 +79,7 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
   TorqueStages out;
   try {
     TorqueDataOptions data;
-    if (const auto settings = file_named(recording, "recording.yaml")) {
+    if (const auto settings = listed_file(recording, "recording.yaml")) {
       data = read_dynamics_settings(*settings);
     }
     data.mapping.torque.clear();

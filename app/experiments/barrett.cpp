@@ -12,10 +12,9 @@
 #include "app/experiments/experiments.h"
 #include "app/report/experiment_plots.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
 
-using namespace experiments;
 using report::Curve;
 using Figure = ExperimentSection::Figure;
 
@@ -212,8 +211,12 @@ std::vector<ExperimentSection> sections_of(const BarrettResult& result) {
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary barrett_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   BarrettOptions options{.seed = choice.seed};
   options.samples = choice.samples.value_or(options.samples);
   const BarrettResult result = run_barrett(options, choice.threads, progress);

@@ -16,10 +16,9 @@
 #include "app/report/experiment_plots.h"
 #include "dynamics/experiments/contact_measures.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
 
-using namespace experiments;
 using report::Curve;
 using Figure = ExperimentSection::Figure;
 
@@ -291,8 +290,12 @@ std::string alarms_finding(const ContactDetection& contacts) {
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary contact_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   ContactDetectionOptions options{.noise = choice.noise, .seed = choice.seed};
   options.runs = choice.runs.value_or(options.runs);
   options.seconds = choice.seconds.value_or(options.seconds);

@@ -14,10 +14,9 @@
 #include "dynamics/experiments/wam_control.h"
 #include "kinematics/core/error.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
 
-using namespace experiments;
 using report::Curve;
 using Figure = ExperimentSection::Figure;
 
@@ -183,13 +182,17 @@ std::vector<ExperimentSection> sections_of(const WamControlResult& wam,
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary control_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   WamControlOptions options{.seed = choice.seed};
   if (choice.joints) {
     // Below the elbow no joint turns a load about two horizontal axes, and its mass does not show.
-    constexpr int kFewest = 4;
-    if (choice.joints->size() != 1 || choice.joints->front() < kFewest) {
+    constexpr int kFewestJoints = 4;
+    if (choice.joints->size() != 1 || choice.joints->front() < kFewestJoints) {
       throw bad_request("--joints", "the WAM takes one number, and its load shows from joint 4 on",
                         "give 4 to 7");
     }

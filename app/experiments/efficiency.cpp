@@ -13,10 +13,8 @@
 #include "dynamics/experiments/quartiles.h"
 #include "dynamics/experiments/scara.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
-
-using namespace experiments;
 
 constexpr int kFewest = 125;
 
@@ -85,8 +83,12 @@ Worlds worlds_of(const ExperimentChoice& choice) {
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary efficiency_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   const Worlds worlds = worlds_of(choice);
   const std::vector<int> sizes = sizes_up_to(worlds.most);
   const LearnOptions learn = learn_options(choice);

@@ -14,10 +14,8 @@
 #include "app/experiments/experiments.h"
 #include "app/experiments/own_log.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
-
-using namespace experiments;
 
 // Errors of joints that an arm does not have are not known: every trial has as many columns.
 std::vector<Trial> padded(std::vector<Trial> trials, Eigen::Index joints) {
@@ -37,8 +35,12 @@ std::vector<std::string> names_of(int joints) {
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary panda_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   const std::vector<int> joints = choice.joints.value_or(std::vector{3, 4, 5, 6, 7});
   const int most = std::ranges::max(joints);
   const LearnOptions learn = learn_options(choice);

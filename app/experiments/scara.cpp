@@ -14,10 +14,8 @@
 #include "app/experiments/own_log.h"
 #include "kinematics/core/error.h"
 
-namespace kinescope {
+namespace kinescope::experiments {
 namespace {
-
-using namespace experiments;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
@@ -107,8 +105,12 @@ ExperimentSummary on_own_log(const ExperimentChoice& choice, const Progress& pro
 }
 
 }  // namespace
+}  // namespace kinescope::experiments
+
+namespace kinescope {
 
 ExperimentSummary scara_experiment(const ExperimentChoice& choice, const Progress& progress) {
+  using namespace experiments;
   if (choice.log) return on_own_log(choice, progress);
   ScaraOptions world{.seed = choice.seed};
   world.samples = world.test_samples = choice.samples.value_or(world.samples);

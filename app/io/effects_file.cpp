@@ -13,10 +13,10 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kRemedy = "give the calibration.json of a finished run";
+constexpr const char* kCalibrationRemedy = "give the calibration.json of a finished run";
 
 Error wrong(const std::filesystem::path& path, const std::string& what) {
-  return bad_input(path.string(), what, kRemedy);
+  return bad_input(path.string(), what, kCalibrationRemedy);
 }
 
 double finite(const json& value, const std::filesystem::path& path, const std::string& key) {

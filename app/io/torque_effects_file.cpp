@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kRemedy =
+constexpr const char* kEffectsRemedy =
     "give a trace.json of kinescope dynamics, or a YAML list of effects";
 
 void add_parameter(TorqueEffect& effect, const std::string& name, double value) {
@@ -47,7 +47,7 @@ class TraceReader {
 
  private:
   [[nodiscard]] Error wrong(const std::string& what) const {
-    return bad_input(path_, what, kRemedy);
+    return bad_input(path_, what, kEffectsRemedy);
   }
   [[nodiscard]] const json& member(const json& entry, const char* key) const {
     if (!entry.is_object() || !entry.contains(key)) {
@@ -177,7 +177,7 @@ ListedEffects read_listed_effects(const std::filesystem::path& path) {
   try {
     document = json::parse(read_text_file(path));
   } catch (const json::exception&) {
-    throw bad_input(path.string(), "is no JSON", kRemedy);
+    throw bad_input(path.string(), "is no JSON", kEffectsRemedy);
   }
   return TraceReader(path).read(document);
 }

@@ -59,7 +59,7 @@ std::string remarks(const OptionEntry& option) {
   return out.empty() ? "" : fmt::format("\n[{}]", plain(out));
 }
 
-void add_option(const OptionEntry& option, std::string& out) {
+void append_option(const OptionEntry& option, std::string& out) {
   std::string names;
   for (const std::string& name : option.names) names += (names.empty() ? "" : ", ") + bold(name);
   out += fmt::format(".TP\n{}{}\n{}{}\n", names, argument_words(option),
@@ -93,15 +93,15 @@ void add_commands(const CommandPage& program, std::string& out) {
   }
 }
 
-void add_options(const CommandPage& page, std::string& out) {
+void append_options(const CommandPage& page, std::string& out) {
   if (!page.positionals.empty()) {
     out += ".SH ARGUMENTS\n";
-    for (const OptionEntry& positional : page.positionals) add_option(positional, out);
+    for (const OptionEntry& positional : page.positionals) append_option(positional, out);
   }
   out += ".SH OPTIONS\n";
   for (const OptionGroup& group : page.groups) {
     if (group.title != "Options") out += fmt::format(".SS {}\n", plain(group.title));
-    for (const OptionEntry& option : group.options) add_option(option, out);
+    for (const OptionEntry& option : group.options) append_option(option, out);
   }
 }
 
@@ -149,7 +149,7 @@ std::string man_page(const CommandPage& program, const CommandPage& page,
   out += fmt::format(".SH NAME\n{} \\- {}\n", plain(name), plain(page.description));
   add_synopsis(program, page, out);
   if (&program == &page) add_commands(program, out);
-  add_options(page, out);
+  append_options(page, out);
   for (const PageSection& section : page.footer) add_section(section, out);
   add_see_also(program, page, out);
   return out;

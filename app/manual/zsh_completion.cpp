@@ -31,7 +31,7 @@ std::string argument_action(const OptionEntry& option) {
   return option.argument == "FOLDER" ? "_files -/" : " ";
 }
 
-void add_option(const OptionEntry& option, std::string& out) {
+void append_completion(const OptionEntry& option, std::string& out) {
   const std::string help = fmt::format("[{}]", escaped(option.help));
   const std::string others =
       option.repeated ? "*" : fmt::format("({})", fmt::join(option.names, " "));
@@ -45,15 +45,15 @@ void add_option(const OptionEntry& option, std::string& out) {
   }
 }
 
-void add_options(const CommandPage& page, std::string& out) {
+void append_completions(const CommandPage& page, std::string& out) {
   for (const OptionGroup& group : page.groups) {
-    for (const OptionEntry& option : group.options) add_option(option, out);
+    for (const OptionEntry& option : group.options) append_completion(option, out);
   }
 }
 
 void add_command(const CommandPage& command, std::string& out) {
   out += fmt::format("    {})\n      _arguments", command.name);
-  add_options(command, out);
+  append_completions(command, out);
   for (const OptionEntry& positional : command.positionals) {
     const std::string spec = fmt::format("{}:{}:{}", positional.several ? "*" : "",
                                          positional.names.front(), argument_action(positional));
@@ -70,7 +70,7 @@ std::string zsh_completion(const CommandPage& program) {
       "# zsh completion of {0}(1), from its table of options\n\n"
       "local context state state_descr line\ntypeset -A opt_args\n_arguments -C",
       program.name);
-  add_options(program, out);
+  append_completions(program, out);
   out += " \\\n        '1:command:->command' '*::argument:->argument' && return\n";
   out += "case $state in\n  command)\n    local -a commands=(\n";
   for (const CommandPage& command : program.commands) {

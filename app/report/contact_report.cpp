@@ -14,12 +14,10 @@
 #include "app/report/sections.h"
 #include "app/report/torque_unit.h"
 
-namespace kinescope {
+namespace kinescope::report {
 namespace {
 
-using namespace report;
-
-constexpr Eigen::Index kMostPoints = 1200;  // of one curve
+constexpr Eigen::Index kMostContactPoints = 1200;  // of one curve
 std::vector<ContentsEntry> contents(const ContactSummary& summary) {
   std::vector<ContentsEntry> out{{"verdict", "Verdict"}, {"timeline", "Contact time line"}};
   if (summary.momentum) out.push_back({"comparison", "Beside the momentum balance"});
@@ -133,7 +131,8 @@ std::vector<Eigen::Vector2d> broken(const std::vector<Eigen::Vector2d>& points,
 // External torque of one joint over time; contacts as bands.
 std::string joint_plot(const ContactSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.t_s.size();
-  const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
+  const Eigen::Index step =
+      std::max<Eigen::Index>(1, (samples + kMostContactPoints - 1) / kMostContactPoints);
   std::vector<Eigen::Vector2d> points;
   double low = 0.0;
   double high = 0.0;
@@ -223,8 +222,12 @@ std::string calibration_section(const ContactSummary& summary, const nlohmann::j
 }
 
 }  // namespace
+}  // namespace kinescope::report
+
+namespace kinescope {
 
 std::string contact_report_html(const ContactSummary& summary) {
+  using namespace report;
   const nlohmann::json document = contact_json(summary);
   return page_begin("contact report", summary.robot, summary.log, summary.version,
                     contents(summary)) +

@@ -10,10 +10,8 @@
 #include "app/report/reproduction.h"
 #include "app/report/sections.h"
 
-namespace kinescope {
+namespace kinescope::report {
 namespace {
-
-using namespace report;
 
 std::string axis_of(const ControlSummary& summary, std::size_t joint, std::string_view what) {
   return fmt::format("{} of {}, {}", what, summary.joints[joint],
@@ -100,8 +98,12 @@ std::string reproduce(const ControlSummary& summary) {
 }
 
 }  // namespace
+}  // namespace kinescope::report
+
+namespace kinescope {
 
 std::string control_html(const ControlSummary& summary) {
+  using namespace report;
   const nlohmann::json document = control_json(summary);
   const std::vector<ContentsEntry> contents = {{"verdict", "Findings"},
                                                {"errors", "Tracking errors"},

@@ -13,12 +13,10 @@
 #include "app/report/sections.h"
 #include "kinematics/core/error.h"
 
-namespace kinescope {
+namespace kinescope::report {
 namespace {
 
-using namespace report;
-
-constexpr int kSchemaVersion = 1;
+constexpr int kExperimentSchema = 1;
 
 nlohmann::json table_json(const ExperimentTable& table) {
   nlohmann::json out{{"id", table.id},
@@ -83,15 +81,19 @@ std::string csv_word(const std::string& word) {
 }
 
 }  // namespace
+}  // namespace kinescope::report
+
+namespace kinescope {
 
 nlohmann::json experiment_json(const ExperimentSummary& summary) {
+  using namespace report;
   nlohmann::json settings = nlohmann::json::array();
   for (const auto& [name, value] : summary.settings) {
     settings.push_back({{"name", text(name)}, {"value", text(value)}});
   }
   nlohmann::json tables = nlohmann::json::array();
   for (const ExperimentTable& table : summary.tables) tables.push_back(table_json(table));
-  return {{"schema", "kinescope.experiment"}, {"schema_version", kSchemaVersion},
+  return {{"schema", "kinescope.experiment"}, {"schema_version", kExperimentSchema},
           {"version", summary.version},       {"experiment", summary.name},
           {"command", text(summary.command)}, {"inputs", inputs_json(summary.inputs)},
           {"settings", std::move(settings)},  {"findings", texts(summary.findings)},
@@ -99,6 +101,7 @@ nlohmann::json experiment_json(const ExperimentSummary& summary) {
 }
 
 std::string experiment_html(const ExperimentSummary& summary) {
+  using namespace report;
   const nlohmann::json document = experiment_json(summary);
   std::vector<ContentsEntry> contents{{"verdict", "Findings"}};
   for (const ExperimentSection& section : summary.sections) {
@@ -117,6 +120,7 @@ std::string experiment_html(const ExperimentSummary& summary) {
 }
 
 std::string experiment_csv(const ExperimentTable& table) {
+  using namespace report;
   std::string out;
   const auto add = [&](const std::string& cell, bool first) { out += (first ? "" : ",") + cell; };
   for (std::size_t c = 0; c < table.labels.size(); ++c) add(csv_word(table.labels[c]), c == 0);

@@ -61,6 +61,10 @@ double held_out_ratio(const Calibration& calibration) {
   return std::isfinite(ratio) ? ratio : 0.0;
 }
 
+Quantity joint_quantity(JointType type) {
+  return type == JointType::kPrismatic ? Quantity::kLength : Quantity::kAngle;
+}
+
 std::string status_words(StructureStatus status) { return spaced(kinescope::to_string(status)); }
 
 std::string status_words(CalibrationStatus status) { return spaced(kinescope::to_string(status)); }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/report/analysis.h"
+#include "app/report/numbers.h"
 #include "app/report/report.h"
 #include "app/report/run_summary.h"
 
@@ -44,6 +45,9 @@ inline constexpr double kDependenceLimit = 0.15;
 [[nodiscard]] double correlation(const Calibration& calibration, std::size_t a, std::size_t b);
 /// Held-out over training error; 0 where there is no held-out error.
 [[nodiscard]] double held_out_ratio(const Calibration& calibration);
+
+/// What a value of such a joint is.
+[[nodiscard]] Quantity joint_quantity(JointType type);
 
 /// The words of a state, as the result document and the page show it.
 [[nodiscard]] std::string status_words(StructureStatus status);

@@ -18,7 +18,7 @@ using Eigen::Matrix2Xd;
 using Eigen::Vector2d;
 
 constexpr int kPostures = 12;  // drawn one over the other
-constexpr double kWidth = 480.0;
+constexpr double kPictureWidth = 480.0;
 constexpr double kMargin = 0.08;    // of the drawing
 constexpr double kFrame_px = 80.0;  // of axis labels, about
 constexpr double kTallest = 480.0;
@@ -48,11 +48,11 @@ Plot frame_of(std::string_view name, Extent extent) {
   extent.upper += pad;
   const Vector2d size = extent.upper - extent.lower;
   const double height =
-      std::min(kTallest, (kWidth - kFrame_px) * size.y() / size.x() + 0.6 * kFrame_px);
+      std::min(kTallest, (kPictureWidth - kFrame_px) * size.y() / size.x() + 0.6 * kFrame_px);
   return {name,
           {.label = "m", .lower = extent.lower.x(), .upper = extent.upper.x()},
           {.label = "m", .lower = extent.lower.y(), .upper = extent.upper.y()},
-          {.width = kWidth, .height = height}};
+          {.width = kPictureWidth, .height = height}};
 }
 
 std::string pixels(const Plot& plot, const Matrix2Xd& points) {

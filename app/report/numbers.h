@@ -3,11 +3,14 @@
 // The one place where a number becomes text: SI in, the report's units out (mm, degrees, ms, px).
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 
 namespace kinescope::report {
+
+inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 
 /// What a number is, and with that how the report shows it.
 enum class Quantity {

@@ -14,13 +14,12 @@
 #include "app/report/result_values.h"
 #include "app/report/sections.h"
 
-namespace kinescope {
+namespace kinescope::report {
 namespace {
 
-using namespace report;
 using Eigen::Index;
 
-constexpr int kSchemaVersion = 1;
+constexpr int kPolicySchema = 1;
 
 nlohmann::json trial_json(const PolicySummary& summary, const PolicyTrialSummary& one, int index,
                           double seconds) {
@@ -113,6 +112,9 @@ std::vector<double> data_seconds(const PolicySummary& summary) {
 }
 
 }  // namespace
+}  // namespace kinescope::report
+
+namespace kinescope {
 
 double cost_paid(const policy::TrialRecord& record) {
   return record.paid_truth.value_or(record.paid);
@@ -127,6 +129,7 @@ std::optional<std::size_t> first_success(const PolicySummary& summary) {
 }
 
 std::vector<std::string> policy_findings(const PolicySummary& summary) {
+  using namespace report;
   std::vector<std::string> out;
   const std::vector<double> seconds = data_seconds(summary);
   int policies = 0;
@@ -161,6 +164,7 @@ std::vector<std::string> policy_findings(const PolicySummary& summary) {
 }
 
 nlohmann::json policy_search_json(const PolicySummary& summary) {
+  using namespace report;
   const std::vector<double> seconds = data_seconds(summary);
   nlohmann::json settings = nlohmann::json::array();
   for (const auto& [name, value] : summary.settings) {
@@ -172,7 +176,7 @@ nlohmann::json policy_search_json(const PolicySummary& summary) {
   }
   const std::optional<std::size_t> first = first_success(summary);
   return {{"schema", "kinescope.policy_search"},
-          {"schema_version", kSchemaVersion},
+          {"schema_version", kPolicySchema},
           {"version", summary.version},
           {"system", text(summary.problem.name)},
           {"command", text(summary.command)},
@@ -186,6 +190,7 @@ nlohmann::json policy_search_json(const PolicySummary& summary) {
 }
 
 std::string policy_html(const PolicySummary& summary) {
+  using namespace report;
   const nlohmann::json document = policy_search_json(summary);
   std::vector<std::pair<std::string, std::string>> ids{{"verdict", "Findings"}};
   const std::string motion = summary.trials.empty() ? "" : policy_motion_section(summary);

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
 #include "app/report/html.h"
 #include "app/report/motion_picture.h"
+#include "app/report/numbers.h"
 #include "app/report/sections.h"
 
 namespace kinescope::report {
@@ -17,8 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector2d;
 using policy::StateLayout;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 const Eigen::MatrixXd& best_known(const policy::Trial& trial) {
   return trial.truth.size() > 0 ? trial.truth : trial.smoothed;
@@ -31,7 +29,7 @@ struct Signal {
 };
 
 Signal position_signal(const StateLayout& layout, std::size_t p) {
-  return layout.is_angle[p] ? Signal{layout.positions[p] + ", deg", kDegrees}
+  return layout.is_angle[p] ? Signal{layout.positions[p] + ", deg", kDegreesPerRadian}
                             : Signal{layout.positions[p], 1.0};
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kTimelineWidth = 940.0;
 constexpr double kTimelineRow = 18.0;
-constexpr double kBarHalf = 0.32;
+constexpr double kTimelineBarHalf = 0.32;
 
 /// Frames in which a marker was seen, and those in which its sighting was left out.
 struct Sightings {
@@ -60,7 +60,7 @@ void draw_runs(Plot& plot, const std::set<int>& frames, const std::vector<double
     int last = first;
     for (++it; it != frames.end() && *it == last + 1; ++it) last = *it;
     if (first < 0 || last >= count) continue;
-    plot.bar(start(first), end(last), row - kBarHalf, row + kBarHalf, css_class);
+    plot.bar(start(first), end(last), row - kTimelineBarHalf, row + kTimelineBarHalf, css_class);
   }
 }
 

@@ -17,7 +17,7 @@ namespace kinescope::report {
 namespace {
 
 constexpr double kMatrixSize = 560.0;
-constexpr std::size_t kMostParameters = 160;  ///< of the correlation matrix; above, it is left out
+constexpr std::size_t kMostCorrelated = 160;  ///< of the correlation matrix; above, it is left out
 constexpr int kShades = 5;                    ///< of each sign
 
 std::string ladder(const std::vector<double>& values) {
@@ -72,7 +72,7 @@ std::string block_marks(const std::vector<Parameter>& parameters, double left, d
 /// One path a shade: dark for strong, blue for negative, orange for positive.
 std::string correlation_matrix(const Calibration& calibration) {
   const std::size_t count = calibration.parameters.size();
-  if (count < 2 || count > kMostParameters ||
+  if (count < 2 || count > kMostCorrelated ||
       calibration.covariance.rows() != static_cast<Eigen::Index>(count)) {
     return "";
   }

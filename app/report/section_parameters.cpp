@@ -13,10 +13,6 @@
 namespace kinescope::report {
 namespace {
 
-Quantity joint_quantity(JointType type) {
-  return type == JointType::kPrismatic ? Quantity::kLength : Quantity::kAngle;
-}
-
 /// What stands for a missing uncertainty: a block with no parameter in the fit was held.
 std::string_view absent_word(const Facts& facts, std::string_view block) {
   for (const Parameter& parameter : facts.run.calibration.parameters) {

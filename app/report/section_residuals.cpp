@@ -21,10 +21,6 @@ namespace {
 constexpr std::size_t kMostDots = 2500;  ///< of one plot; more are thinned evenly
 constexpr int kCurveBins = 24;
 
-Quantity joint_quantity(JointType type) {
-  return type == JointType::kPrismatic ? Quantity::kLength : Quantity::kAngle;
-}
-
 bool has_corners(const Facts& facts) { return !facts.analysis.corners.empty(); }
 
 /// Every n-th, so that at most kMostDots remain.

@@ -12,10 +12,6 @@
 namespace kinescope::report {
 namespace {
 
-Quantity joint_quantity(JointType type) {
-  return type == JointType::kPrismatic ? Quantity::kLength : Quantity::kAngle;
-}
-
 std::string evidence_table(const Facts& facts, const Structure& structure) {
   Table table("structure-table",
               "Joints and the evidence for each (scale and travel: first estimates; the final ones "

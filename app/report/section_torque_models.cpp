@@ -13,7 +13,7 @@
 namespace kinescope::report {
 namespace {
 
-constexpr Eigen::Index kMostPoints = 600;  // of one curve
+constexpr Eigen::Index kMostTorquePoints = 600;  // of one curve
 
 std::vector<std::string> joint_header(const TorqueSummary& summary, std::string_view first) {
   std::vector<std::string> names{std::string(first)};
@@ -115,7 +115,8 @@ std::string band_limits(const TorqueScore& score, const std::vector<std::string>
 
 std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
   const Eigen::Index samples = summary.test.size();
-  const Eigen::Index step = std::max<Eigen::Index>(1, (samples + kMostPoints - 1) / kMostPoints);
+  const Eigen::Index step =
+      std::max<Eigen::Index>(1, (samples + kMostTorquePoints - 1) / kMostTorquePoints);
   const double band = summary.bands.width_95(joint);
   std::vector<double> time;
   std::vector<double> lower;

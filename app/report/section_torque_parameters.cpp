@@ -13,8 +13,8 @@
 namespace kinescope::report {
 namespace {
 
-constexpr int kBins = 24;
-constexpr std::size_t kMostParameters = 120;
+constexpr int kVelocityBins = 24;
+constexpr std::size_t kMostListed = 120;
 
 // Of the parametric model, which the plots show; what tracing found beside it has its own.
 double drive_value(const TorqueSummary& summary, std::string_view term, const std::string& joint) {
@@ -35,12 +35,12 @@ std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
   const double coulomb = drive_value(summary, "coulomb", name);
   const auto dq = summary.train.dq.col(joint);
   const double fastest = std::max(dq.cwiseAbs().maxCoeff(), 1e-9);
-  std::vector<double> sum(kBins, 0.0);
-  std::vector<double> square(kBins, 0.0);
-  std::vector<int> count(kBins, 0);
+  std::vector<double> sum(kVelocityBins, 0.0);
+  std::vector<double> square(kVelocityBins, 0.0);
+  std::vector<int> count(kVelocityBins, 0);
   for (Eigen::Index i = 0; i < dq.size(); ++i) {
-    const int bin =
-        std::clamp(static_cast<int>((dq[i] / fastest + 1.0) * 0.5 * kBins), 0, kBins - 1);
+    const int bin = std::clamp(static_cast<int>((dq[i] / fastest + 1.0) * 0.5 * kVelocityBins), 0,
+                               kVelocityBins - 1);
     const double value = rest(i, joint) + viscous * dq[i] +
                          coulomb * (dq[i] > 0.0   ? 1.0
                                     : dq[i] < 0.0 ? -1.0
@@ -53,9 +53,9 @@ std::string friction_plot(const TorqueSummary& summary, Eigen::Index joint,
   std::vector<Eigen::Vector2d> model;
   double low = 0.0;
   double high = 0.0;
-  for (int b = 0; b < kBins; ++b) {
+  for (int b = 0; b < kVelocityBins; ++b) {
     const auto k = static_cast<std::size_t>(b);
-    const double velocity = ((b + 0.5) / kBins * 2.0 - 1.0) * fastest;
+    const double velocity = ((b + 0.5) / kVelocityBins * 2.0 - 1.0) * fastest;
     const double friction = viscous * velocity + std::copysign(coulomb, velocity);
     model.emplace_back(velocity, friction);
     low = std::min(low, friction);
@@ -141,7 +141,7 @@ std::string parameter_table(const TorqueFacts& facts) {
               facts.result);
   table.header({"Combination of inertial parameters", "Value", "U (k = 2)", "Unit of the first"});
   const Identification& found = facts.summary.identification;
-  const auto count = std::min<std::size_t>(kMostParameters, found.names.size());
+  const auto count = std::min<std::size_t>(kMostListed, found.names.size());
   for (std::size_t k = 0; k < count; ++k) {
     table.begin_row();
     table.text(found.names[k]);

@@ -17,7 +17,7 @@
 namespace kinescope::report {
 namespace {
 
-constexpr Eigen::Index kBins = 40;
+constexpr Eigen::Index kMostBins = 40;
 
 // Means of the values over bins of equal count; NaN values are left out.
 struct Binned {
@@ -34,7 +34,7 @@ Binned bin(const EffectPicture& picture, double x_factor, double y_factor) {
   std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return picture.at[i]; });
   Binned out;
   const auto n = static_cast<Eigen::Index>(order.size());
-  const Eigen::Index bins = std::min(kBins, n);
+  const Eigen::Index bins = std::min(kMostBins, n);
   for (Eigen::Index b = 0; b < bins; ++b) {
     const Eigen::Index first = b * n / bins;
     const Eigen::Index last = (b + 1) * n / bins;

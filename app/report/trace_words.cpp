@@ -4,19 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include <fmt/format.h>
 
 #include "app/report/findings.h"
+#include "app/report/numbers.h"
 #include "app/report/trace_lines.h"
 #include "calib/trace/stage.h"
 
 namespace kinescope {
 namespace report {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 // Significant digits down to the second one of the interval's half, between 2 and 6.
 int digits_for(double value, double half_width) {
@@ -36,13 +34,13 @@ std::string two_digits(double value) {
 AmountUnit amount_unit(const std::string& si_unit) {
   static const std::map<std::string, AmountUnit> kUnits{{
                                                             "rad",
-                                                            {kDegrees, "°"},
+                                                            {kDegreesPerRadian, "°"},
                                                         },
                                                         {"m", {1e3, "mm"}},
                                                         {"s", {1e3, "ms"}},
                                                         {"m/turn", {1e3, "mm/turn"}},
-                                                        {"rad/m", {kDegrees, "°/m"}},
-                                                        {"rad/s", {kDegrees, "°/s"}},
+                                                        {"rad/m", {kDegreesPerRadian, "°/m"}},
+                                                        {"rad/s", {kDegreesPerRadian, "°/s"}},
                                                         {"m/s", {1e3, "mm/s"}},
                                                         {"s/s", {1e6, "ppm"}}};
   const auto found = kUnits.find(si_unit);
@@ -222,9 +220,9 @@ std::string start_words(const Trace& trace) {
 }
 
 std::string trace_paragraph(const Trace& trace) {
-  constexpr std::size_t kMost = 4;  // sentences; the others stand in their own section
+  constexpr std::size_t kMostSentences = 4;  // sentences; the others stand in their own section
   std::vector<std::string> findings = findings_of(trace);
-  if (findings.size() > kMost) findings.resize(1);
+  if (findings.size() > kMostSentences) findings.resize(1);
   std::string out;
   for (const std::string& finding : findings) out += (out.empty() ? "" : " ") + sentence(finding);
   return out;

@@ -13,11 +13,11 @@
 namespace kinescope::report {
 namespace {
 
-constexpr double kRow = 66.0;  ///< from a link to its child
+constexpr double kLevel = 66.0;  ///< from a link to its child
 constexpr double kBoxHeight = 34.0;
 constexpr double kBoxWidth = 150.0;
 constexpr double kColumn = 320.0;  ///< from a leaf to the next
-constexpr double kMargin = 10.0;
+constexpr double kTreeMargin = 10.0;
 constexpr std::size_t kMostMarkers = 4;
 
 /// Where each link stands: depth below the root, column of its leftmost leaf.
@@ -109,10 +109,12 @@ std::string tree_drawing(const Facts& facts) {
   const KinematicTree& tree = facts.run.calibration.tree;
   const Layout layout = lay_out(tree);
   const double width = std::max(620.0, kColumn * layout.columns + kBoxWidth);
-  const double height = 2 * kMargin + kRow * (layout.depths - 1) + kBoxHeight;
+  const double height = 2 * kTreeMargin + kLevel * (layout.depths - 1) + kBoxHeight;
   const std::size_t letters = layout.columns == 1 ? 80 : 44;
-  const auto x_of = [&](LinkId link) { return kMargin + kColumn * layout.column[link.index()]; };
-  const auto y_of = [&](LinkId link) { return kMargin + kRow * layout.depth[link.index()]; };
+  const auto x_of = [&](LinkId link) {
+    return kTreeMargin + kColumn * layout.column[link.index()];
+  };
+  const auto y_of = [&](LinkId link) { return kTreeMargin + kLevel * layout.depth[link.index()]; };
   std::string edges, words, boxes;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const Joint& joint = tree.joints[j];

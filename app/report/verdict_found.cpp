@@ -52,7 +52,7 @@ bool is_chain(const KinematicTree& tree) {
   return true;
 }
 
-std::size_t moving_joints(const KinematicTree& tree) {
+std::size_t moving_joint_count(const KinematicTree& tree) {
   return static_cast<std::size_t>(std::ranges::count_if(
       tree.joints, [](const Joint& joint) { return joint.type != JointType::kFixed; }));
 }
@@ -77,7 +77,7 @@ std::string driving_words(const RunSummary& run) {
     if (joint.type != JointType::kFixed && joint.channel.empty()) undriven.push_back(joint.name);
   }
   if (run.log.empty()) return "no joint log: the joint values are estimates from the markers";
-  const std::size_t moving = moving_joints(run.calibration.tree);
+  const std::size_t moving = moving_joint_count(run.calibration.tree);
   if (undriven.empty()) {
     const std::vector<std::string> shared = shared_channels(run.calibration.tree);
     if (!shared.empty()) return fmt::format("driven by logged channels, {}", joined(shared));
@@ -198,7 +198,7 @@ std::string column_words(const KinematicTree& tree, const JointLog& log) {
 
 std::string found_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
-  const std::size_t moving = moving_joints(tree);
+  const std::size_t moving = moving_joint_count(tree);
   const std::string_view what =
       run.calibration.kind == MeasurementKind::kPoint ? "point" : "marker";
   std::string text;

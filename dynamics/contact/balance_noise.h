@@ -35,6 +35,9 @@ struct BalanceNoise {
 [[nodiscard]] BalanceNoise estimate_noise_of_both(const std::vector<BalanceSample>& samples,
                                                   const std::vector<char>& use, std::size_t second);
 
+/// After a gap longer than so many usual steps, detectors begin anew.
+inline constexpr double kGapSteps = 10.0;
+
 /// The usual step between samples, s. Throws undetermined for fewer than two.
 [[nodiscard]] double median_step_s(const std::vector<BalanceSample>& samples);
 

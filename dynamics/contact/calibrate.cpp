@@ -18,7 +18,6 @@ namespace kinescope {
 namespace {
 
 constexpr int kMaxRounds = 8;
-constexpr double kSecondsPerHour = 3600.0;
 /// Thresholds of the first round, where nothing is left out yet: this many medians of the
 /// statistic.
 constexpr double kFirstMedians = 12.0;

@@ -11,8 +11,6 @@
 namespace kinescope {
 namespace {
 
-constexpr double kSecondsPerHour = 3600.0;
-
 void require(bool good, const char* option, const char* remedy) {
   if (!good)
     throw bad_request("contact", std::string("option ") + option + " makes no sense", remedy);

@@ -15,8 +15,6 @@
 namespace kinescope {
 namespace {
 
-/// Longer gaps begin detection anew.
-constexpr double kGapSteps = 10.0;
 /// Without external torque, all end windows are below their level at 99.9 % of the samples.
 constexpr double kQuietZ = 3.1;
 

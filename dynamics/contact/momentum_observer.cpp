@@ -11,8 +11,6 @@
 namespace kinescope {
 namespace {
 
-constexpr double kGapSteps = 10.0;
-
 std::vector<double> statistic(const ObserverCalibration& calibration,
                               const Eigen::MatrixXd& observed) {
   std::vector<double> out(static_cast<std::size_t>(observed.cols()));

@@ -9,6 +9,8 @@
 
 namespace kinescope {
 
+inline constexpr double kSecondsPerHour = 3600.0;
+
 /// Exceedances come in clusters; a cluster counts once, with its peak.
 struct TailFit {
   double level = 0.0;        ///< above it the tail is fitted

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "dynamics/data/rough_torque.h"
+#include "dynamics/data/statistics.h"
+#include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/log/smoothing_spline.h"
 
@@ -13,11 +15,9 @@ namespace {
 
 constexpr double kRoughCutoff = 0.05;  // of the sampling rate
 constexpr double kRoughestHz = 5.0;
-constexpr double kStill = 1e-3;  // rad or m: spread of a joint that does not move
 constexpr double kSmallest =
     1e-3;  // share of a joint that moves: its acceleration never counts nothing
-constexpr double kSignSpeed = 0.05;  // of the largest speed
-constexpr Eigen::Index kFewestRows = 32;
+constexpr double kFrictionWidth = 0.05;  // of the largest speed
 constexpr Eigen::Index kMostSamples = 2000;
 
 struct Rough {
@@ -39,7 +39,7 @@ Rough rough_motion(const TorqueLog& log, double step_s) {
   const std::vector<Eigen::Index> bounds = log.bounds();
   for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
     const Eigen::Index n = bounds[b + 1] - bounds[b];
-    if (n < kFewestRows) continue;
+    if (n < kFewestFilteredRows) continue;
     Eigen::MatrixXd all(n, 2 * joints);
     all << log.q.middleRows(bounds[b], n), log.torque.middleRows(bounds[b], n);
     const Eigen::VectorXd t = log.t_s.segment(bounds[b], n);
@@ -59,7 +59,7 @@ double variance(const Eigen::VectorXd& x) { return (x.array() - x.mean()).square
 
 double share_of_joint(const Rough& rough, Eigen::Index joint) {
   const Eigen::Index n = rough.q.rows();
-  const double slow = kSignSpeed * rough.dq.col(joint).cwiseAbs().maxCoeff() + 1e-12;
+  const double slow = kFrictionWidth * rough.dq.col(joint).cwiseAbs().maxCoeff() + 1e-12;
   const Eigen::MatrixXd rest = rough_torque_features(rough.q, rough.dq, joint, slow);
   Eigen::MatrixXd both(n, 2);
   both << rough.ddq.col(joint), rough.torque.col(joint);
@@ -81,7 +81,7 @@ Eigen::VectorXd acceleration_shares(const TorqueLog& log, double step_s) {
   Rough rough;
   if (log.torque.cols() == joints) rough = rough_motion(log, step_s);
   for (Eigen::Index joint = 0; joint < joints; ++joint) {
-    if (variance(log.q.col(joint)) < kStill * kStill)
+    if (variance(log.q.col(joint)) < kStillSpread * kStillSpread)
       shares(joint) = 0.0;
     else if (rough.q.rows() > 4 * (3 + 2 * joints))
       shares(joint) = share_of_joint(rough, joint);

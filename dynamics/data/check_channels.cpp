@@ -25,10 +25,9 @@ constexpr std::size_t kFewValues = 8;    // a grid needs that many levels to be 
 constexpr double kHeldShare = 0.35;      // of the rows without change
 constexpr double kManyLevels = 0.5;      // of the changes: values that hardly ever come back
 constexpr std::size_t kFewLevels =
-    20;                          // a channel of fewer has its ends often without being cut off
-constexpr double kStill = 1e-3;  // rad or m: spread of a joint that does not move
+    20;  // a channel of fewer has its ends often without being cut off
 constexpr double kLagReachS = 0.3;
-constexpr double kLagGain = 0.8;
+constexpr double kCommandLagGain = 0.8;
 
 /// The distance between neighbouring values of a channel that takes few, equally spaced values.
 std::optional<double> grid_step(const std::vector<double>& values) {
@@ -175,7 +174,7 @@ bool look_at_signal(const TorqueLog& log, const Eigen::MatrixXd& signal,
   bool constant_while_moving = false;
   for (Eigen::Index c = 0; c < signal.cols(); ++c) {
     const Channel channel = look_at(log, signal.col(c), names[static_cast<std::size_t>(c)]);
-    const bool joint_moves = standard_deviation(log.q.col(c)) > kStill;
+    const bool joint_moves = standard_deviation(log.q.col(c)) > kStillSpread;
     if (channel.sigma == 0.0) {
       const bool position = &signal == &log.q;
       const bool torque = &signal == &log.torque;
@@ -235,7 +234,8 @@ std::optional<LogFinding> command_lag(const TorqueLog& log) {
     costs.push_back(cost);
   }
   const auto best = std::ranges::min_element(costs) - costs.begin();
-  if (best == 0 || costs[static_cast<std::size_t>(best)] > kLagGain * costs[0]) return std::nullopt;
+  if (best == 0 || costs[static_cast<std::size_t>(best)] > kCommandLagGain * costs[0])
+    return std::nullopt;
   const double lag_s = static_cast<double>(best) * step_s;
   return LogFinding{LogFault::kLag,
                     FaultWeight::kNote,

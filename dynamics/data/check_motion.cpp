@@ -23,11 +23,12 @@ constexpr Eigen::Index kWindowRows = 5;    // at least
 constexpr double kFits = 0.9;              // of the change of q explained by the integral of dq
 constexpr double kFactorTolerance = 0.03;  // of a wrong factor worth naming
 constexpr double kUnitTolerance = 0.1;     // around 57.3, 1000, ..
-constexpr double kStill = 1e-3;  // rad or m: change of q over a window that is no motion (rms)
+constexpr double kStillChange =
+    1e-3;  // rad or m: change of q over a window that is no motion (rms)
 constexpr double kLargestLagSteps = 40.0;
-constexpr double kLagStep = 0.25;        // of a row, of the scan
-constexpr double kLagWorthNaming = 0.5;  // rows
-constexpr double kLagGain = 0.7;         // of the residual left when the lag is undone
+constexpr double kLagStep = 0.25;         // of a row, of the scan
+constexpr double kLagWorthNaming = 0.5;   // rows
+constexpr double kVelocityLagGain = 0.7;  // of the residual left when the lag is undone
 
 constexpr double kSlowestStepS = 0.05;  // accelerations change too fast for trapezoids beyond
 
@@ -220,7 +221,7 @@ class MotionCheck {
     for (Eigen::Index joint = 0; joint < log_.q.cols(); ++joint) {
       summed_.push_back(integral(log_, log_.dq.col(joint)));
       found_.push_back(compare(log_, windows_, log_.q.col(joint), summed_.back(), 0.0));
-      if (found_.back().change_rms < kStill) continue;
+      if (found_.back().change_rms < kStillChange) continue;
       moving_.push_back(joint);
       if (found_.back().slope.explained > kFits) factors_.push_back(found_.back().slope.value);
     }
@@ -267,7 +268,7 @@ class MotionCheck {
                  "velocities are derived from positions instead; are the columns of one joint?");
     }
     if (const auto unit = unit_suspicion(log_, joint, factor)) return findings_.push_back(*unit);
-    if (std::abs(lag.seconds) > kLagWorthNaming * step_s_ && lag.gain < kLagGain) {
+    if (std::abs(lag.seconds) > kLagWorthNaming * step_s_ && lag.gain < kVelocityLagGain) {
       drop_velocity_ = drop_velocity_ || std::abs(lag.seconds) > step_s_;
       add(LogFault::kVelocityLag, FaultWeight::kWarning, 1.0, lag.seconds,
           fmt::format("column '{}' comes {:.3g} ms {} the change of '{}'", name,
@@ -308,7 +309,7 @@ void judge_acceleration(CheckedLog& checked) {
     if (log.ddq.col(joint).minCoeff() == log.ddq.col(joint).maxCoeff()) continue;  // check_channels
     const Eigen::VectorXd summed = integral(log, log.ddq.col(joint));
     const Comparison found = compare(log, windows, log.dq.col(joint), summed, 0.0);
-    if (found.change_rms < 10.0 * kStill) continue;
+    if (found.change_rms < 10.0 * kStillChange) continue;
     if (found.slope.explained > kFits && near(found.slope.value, 1.0, 0.1)) continue;
     drop = true;
     const auto at = static_cast<std::size_t>(joint);

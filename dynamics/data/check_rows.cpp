@@ -12,7 +12,6 @@
 namespace kinescope {
 namespace {
 
-constexpr double kAbsurd = 1e9;        // rad, m, Nm: no robot's value
 constexpr double kMostlyBroken = 0.5;  // of the rows
 constexpr double kDisordered = 0.05;   // of the rows; a few late packets are less
 constexpr Eigen::Index kRestartRows =
@@ -23,10 +22,6 @@ constexpr double kFewStale = 0.01;
 constexpr double kManyStale = 0.1;          // of the rows
 constexpr Eigen::Index kLongestStale = 50;  // rows; beyond, the robot rests
 
-double share_of(Eigen::Index part, Eigen::Index whole) {
-  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
-}
-
 /// Rows of one column that are no finite number, and rows that are too large.
 struct BadCells {
   Eigen::Index missing = 0, infinite = 0, first_missing = -1, first_infinite = -1;
@@ -36,7 +31,7 @@ BadCells find_bad_cells(const Eigen::Ref<const Eigen::VectorXd>& values, std::ve
   BadCells bad;
   for (Eigen::Index row = 0; row < values.size(); ++row) {
     const double value = values(row);
-    if (std::abs(value) <= kAbsurd) continue;
+    if (std::abs(value) <= kAbsurdValue) continue;
     keep[static_cast<std::size_t>(row)] = 0;
     if (std::isnan(value)) {
       if (bad.missing++ == 0) bad.first_missing = row;
@@ -61,7 +56,7 @@ void name_bad_cells(const TorqueLog& log, const std::string& column, const BadCe
                         share_of(bad.infinite, log.rows()), static_cast<double>(bad.infinite),
                         log.place(bad.first_infinite),
                         fmt::format("column '{}' is infinite or over {:g} in {} rows", column,
-                                    kAbsurd, bad.infinite),
+                                    kAbsurdValue, bad.infinite),
                         "the rows were left out; is the file cut or corrupt there?"});
   }
 }

@@ -29,10 +29,6 @@ constexpr double kSpikeOfSteps = 20.0;   // times the usual change from row to r
 constexpr double kMostSpikes = 0.02;     // of the rows
 constexpr Eigen::Index kNeighbours = 2;  // on either side
 
-double share_of(Eigen::Index part, Eigen::Index whole) {
-  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
-}
-
 /// Distance of every sample from the median of itself and its neighbours (Hampel's identifier).
 Eigen::VectorXd from_neighbours(const TorqueLog& log, const Eigen::Ref<const Eigen::VectorXd>& x) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(x.size());

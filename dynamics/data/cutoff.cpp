@@ -13,8 +13,6 @@ namespace kinescope {
 namespace {
 
 constexpr double kStepsPerOctave = 16.0;
-constexpr double kHighest = 0.4;  // of the sampling rate
-constexpr double kLowestHz = 0.05;
 constexpr double kMostlyNoise = 1.0;  // relative error of a signal that is lost
 
 /// One signal's part of the criterion.
@@ -94,7 +92,8 @@ Criterion make_criterion(const CutoffEvidence& evidence, int order) {
     out.end_hz(joint) = parts.end_hz;
     out.motion.push_back(make_term(spectrum, parts, evidence.derivatives));
     if (spectrum.frequency_hz.size() == 0) continue;
-    out.highest_hz = std::min(out.highest_hz, 2.0 * kHighest * spectrum.frequency_hz.maxCoeff());
+    out.highest_hz =
+        std::min(out.highest_hz, 2.0 * kHighestCutoff * spectrum.frequency_hz.maxCoeff());
   }
   for (const Spectrum& spectrum : evidence.torque) {
     out.torque.push_back(make_term(spectrum, separate(spectrum, 0), 0));
@@ -131,7 +130,8 @@ CutoffChoice choose_cutoff(const CutoffEvidence& evidence, int order, double sta
   const bool moves = (criterion.end_hz.array() > 0.0 && criterion.shares.array() > 0.0).any();
   if (!moves || !std::isfinite(criterion.highest_hz)) return choice;
   double best = std::numeric_limits<double>::infinity();
-  const double lowest_hz = std::clamp(typical_end(criterion), kLowestHz, criterion.highest_hz);
+  const double lowest_hz =
+      std::clamp(typical_end(criterion), kLowestCutoffHz, criterion.highest_hz);
   const int steps = static_cast<int>(kStepsPerOctave * std::log2(criterion.highest_hz / lowest_hz));
   for (int k = 0; k <= steps; ++k) {
     const double cutoff_hz = criterion.highest_hz * std::exp2(-k / kStepsPerOctave);

@@ -21,6 +21,10 @@
 
 namespace kinescope {
 
+/// Range of the cut-offs that are tried; the highest of the sampling rate.
+inline constexpr double kHighestCutoff = 0.4;
+inline constexpr double kLowestCutoffHz = 0.05;
+
 /// The response of the filters of this room: 1 / (1 + (sqrt 2 - 1) (f / cutoff)^2n), -3 dB at the
 /// cut-off.
 [[nodiscard]] double filter_response(double frequency_hz, double cutoff_hz, int order);

@@ -16,6 +16,9 @@
 
 namespace kinescope {
 
+/// rad, m, Nm: no robot's value.
+inline constexpr double kAbsurdValue = 1e9;
+
 struct LogCheckOptions {
   double max_gap_s = 0.0;  ///< longer gaps split a trajectory; 0: ten median steps
 };

@@ -22,7 +22,6 @@ constexpr int kSplineOrder = 3;
 constexpr int kButterworthOrder = 4;
 constexpr double kSamplesPerPeriod =
     10.0;  // of the cut-off: smooth to the eye, no longer independent
-constexpr Eigen::Index kFewestRows = 32;
 constexpr Eigen::Index kFewestSamples = 4;
 
 int order_of(LowPass filter) {
@@ -126,7 +125,7 @@ class MotionDeriver {
     for (Eigen::Index c = 0; c < signal.cols(); ++c) {
       EvenSeries series{step_s_, {}};
       for (std::size_t b = 0; b + 1 < bounds_.size(); ++b) {
-        if (bounds_[b + 1] - bounds_[b] < kFewestRows) continue;
+        if (bounds_[b + 1] - bounds_[b] < kFewestFilteredRows) continue;
         series.pieces.emplace_back(
             on_even_grid(log_, signal.col(c), bounds_[b], bounds_[b + 1], step_s_));
       }
@@ -227,7 +226,7 @@ class MotionDeriver {
     const auto count = static_cast<Eigen::Index>(std::floor(usable_s / sample_step_s_ + 1e-6)) + 1;
     const std::string& name =
         log_.trajectory_names[static_cast<std::size_t>(log_.trajectory(begin))];
-    if (end - begin < kFewestRows || count < kFewestSamples) {
+    if (end - begin < kFewestFilteredRows || count < kFewestSamples) {
       out_.findings.push_back(
           {LogFault::kTooShort, FaultWeight::kWarning, "",
            static_cast<double>(end - begin) / static_cast<double>(log_.rows()),

@@ -5,7 +5,10 @@
 #include <array>
 #include <cmath>
 
+#include "dynamics/data/cutoff.h"
 #include "dynamics/data/rough_torque.h"
+#include "dynamics/data/statistics.h"
+#include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/log/smoothing_spline.h"
 
@@ -14,21 +17,17 @@ namespace {
 
 constexpr int kBlocks = 10;
 constexpr double kSignificant = 2.821;  // Student's t of 9 degrees of freedom, 1 %, one-sided
-constexpr double kStepsPerOctave = 2.0;
-constexpr int kStepsDown = 4;     // to a quarter
-constexpr double kHighest = 0.4;  // of the sampling rate
-constexpr double kLowestHz = 0.05;
+constexpr double kTrialsPerOctave = 2.0;
+constexpr int kStepsDown = 4;                // to a quarter
 constexpr Eigen::Index kMostRows = 60000;    // filtered; of a longer log the middle of each part
 constexpr Eigen::Index kMostTargets = 2000;  // torques that are predicted
 constexpr Eigen::Index kFewestTargets = 200;
-constexpr Eigen::Index kFewestRows = 32;
 constexpr double kMostEdge = 0.1;  // of a part, dropped at either end
 constexpr double kRidge = 1e-6;    // of a feature's power: against collinearity only
 // Gravity of a joint that hardly turns is no curve through its torque: its amplitude is taken as
 // three times the torque's rms, beside errors of a tenth of that.
 constexpr double kGravityRidge = 1e-3;
 constexpr double kUsualWidth = 0.01;  // rad/s or m/s: of the models' Coulomb friction
-constexpr double kStill = 1e-3;       // rad or m: spread of a joint that does not move
 
 /// Consecutive rows, and those of them whose torques are predicted.
 struct Part {
@@ -51,7 +50,7 @@ std::vector<Part> parts_of(const TorqueLog& log, double edge_s) {
   for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
     const Eigen::Index all = bounds[b + 1] - bounds[b];
     const auto rows = static_cast<Eigen::Index>(kept * static_cast<double>(all));
-    if (rows < kFewestRows) continue;
+    if (rows < kFewestFilteredRows) continue;
     Part part{bounds[b] + (all - rows) / 2, rows, {}};
     const double begin_s = log.t_s(part.begin);
     const double end_s = log.t_s(part.begin + rows - 1);
@@ -179,7 +178,7 @@ Eigen::MatrixXd errors_at(const TorqueLog& log, const Targets& targets, MotionSo
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kBlocks, log.q.cols());
   for (Eigen::Index j = 0; j < log.q.cols(); ++j) {
     const Eigen::ArrayXd q = log.q.col(j);
-    if ((q - q.mean()).square().mean() < kStill * kStill) continue;
+    if ((q - q.mean()).square().mean() < kStillSpread * kStillSpread) continue;
     out.col(j) = block_errors(motion, targets.torque.col(j), j);
   }
   return out;
@@ -203,15 +202,15 @@ std::vector<CutoffTrial> try_cutoffs(const TorqueLog& log, double step_s, Motion
                                      double cutoff_hz) {
   if (log.torque.cols() != log.q.cols() || !(step_s > 0.0) || !(cutoff_hz > 0.0)) return {};
   const double lowest_hz =
-      std::max(kLowestHz, cutoff_hz * std::exp2(-kStepsDown / kStepsPerOctave));
+      std::max(kLowestCutoffHz, cutoff_hz * std::exp2(-kStepsDown / kTrialsPerOctave));
   const Targets targets = targets_of(log, 1.0 / lowest_hz);
   if (targets.torque.rows() < kFewestTargets) return {};
   const Eigen::MatrixXd reference = errors_at(log, targets, source, cutoff_hz);
   std::vector<CutoffTrial> trials;
   for (int k = -kStepsDown;; ++k) {
-    const double trial_hz = cutoff_hz * std::exp2(k / kStepsPerOctave);
-    if (trial_hz > kHighest / step_s) break;
-    if (trial_hz < kLowestHz || k == 0) continue;
+    const double trial_hz = cutoff_hz * std::exp2(k / kTrialsPerOctave);
+    if (trial_hz > kHighestCutoff / step_s) break;
+    if (trial_hz < kLowestCutoffHz || k == 0) continue;
     trials.push_back(compare(errors_at(log, targets, source, trial_hz), reference, trial_hz));
   }
   return trials;

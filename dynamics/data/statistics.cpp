@@ -14,6 +14,10 @@ double quantile(std::vector<double> values, double share) {
   return *nth;
 }
 
+double share_of(Eigen::Index part, Eigen::Index whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
 std::vector<double> to_vector(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return {values.data(), values.data() + values.size()};
 }

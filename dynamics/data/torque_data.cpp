@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/data/log_checks.h"
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -13,8 +14,6 @@
 
 namespace kinescope {
 namespace {
-
-constexpr double kAbsurd = 1e9;
 
 void append(std::vector<LogFinding>& findings, const std::vector<LogFinding>& more) {
   findings.insert(findings.end(), more.begin(), more.end());
@@ -35,7 +34,7 @@ std::vector<LogFinding> look_at_rest(const ChannelTable& table, const TorqueLog&
     Eigen::Index missing = 0, infinite = 0, first = -1;
     for (Eigen::Index row = 0; row < table.rows(); ++row) {
       const double value = table.values(row, static_cast<Eigen::Index>(c));
-      if (std::abs(value) <= kAbsurd) continue;
+      if (std::abs(value) <= kAbsurdValue) continue;
       (std::isnan(value) ? missing : infinite) += 1;
       if (first < 0) first = row;
     }

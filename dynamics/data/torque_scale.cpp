@@ -19,9 +19,9 @@ constexpr double kClearCorrelation = 0.7;  // a rough model reaches it; chance d
 constexpr double kThousandLow = 100.0;     // a model wrong by a factor 10 is still no factor 1000
 constexpr double kCommonFactor = 1.3;
 constexpr double kCommonSpread = 0.15;
-constexpr int kLargestLag = 8;       // samples
-constexpr double kLagGain = 0.9;     // of the residual
-constexpr double kSignSpeed = 0.02;  // of the largest speed: where Coulomb friction turns
+constexpr int kLargestLag = 8;          // samples
+constexpr double kTorqueLagGain = 0.9;  // of the residual
+constexpr double kCoulombSpeed = 0.02;  // of the largest speed: where Coulomb friction turns
 
 /// Least squares of the torque on the model (taken `shift` samples earlier) and friction.
 struct Fit {
@@ -35,7 +35,7 @@ Fit fit_joint(const TorqueSamples& samples, const Eigen::MatrixXd& predicted, Ei
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd friction(n, 3);
   Eigen::VectorXd model(n), torque(n);
-  const double slow = kSignSpeed * samples.dq.col(joint).cwiseAbs().maxCoeff() + 1e-12;
+  const double slow = kCoulombSpeed * samples.dq.col(joint).cwiseAbs().maxCoeff() + 1e-12;
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::Index row = rows[static_cast<std::size_t>(k)];
     const double speed = samples.dq(row - shift, joint);
@@ -80,7 +80,7 @@ double find_lag(const TorqueSamples& samples, const Eigen::MatrixXd& predicted, 
   const auto best =
       static_cast<std::size_t>(std::ranges::min_element(residuals) - residuals.begin());
   if (best == 0 || best + 1 == residuals.size()) return 0.0;
-  if (residuals[best] > kLagGain * residuals[kLargestLag]) return 0.0;
+  if (residuals[best] > kTorqueLagGain * residuals[kLargestLag]) return 0.0;
   const double curvature = residuals[best - 1] - 2.0 * residuals[best] + residuals[best + 1];
   const double within =
       curvature > 0.0 ? 0.5 * (residuals[best - 1] - residuals[best + 1]) / curvature : 0.0;

@@ -11,6 +11,9 @@
 
 namespace kinescope {
 
+/// A part of a log with fewer rows is not filtered.
+inline constexpr Eigen::Index kFewestFilteredRows = 32;
+
 /// A second-order section, a0 = 1.
 struct FilterSection {
   double b0 = 1.0, b1 = 0.0, b2 = 0.0, a1 = 0.0, a2 = 0.0;

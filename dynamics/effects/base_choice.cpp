@@ -11,7 +11,6 @@
 namespace kinescope::effects {
 namespace {
 
-constexpr double kUnseen = 1e-10;  // share of the largest direction's square, columns of length 1
 constexpr int kRobustSteps = 8;
 constexpr double kHuber = 1.345;
 
@@ -30,7 +29,7 @@ struct Normal {
     const Eigen::VectorXd scale = unit_scale(full);
     const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * full * scale.asDiagonal());
     const Eigen::VectorXd& values = eigen.values;
-    const double least = kUnseen * std::max(values[values.size() - 1], 1e-300);
+    const double least = kUnobservable * std::max(values[values.size() - 1], 1e-300);
     const Eigen::VectorXd inverse =
         values.unaryExpr([least](double v) { return v > least ? 1.0 / v : 0.0; });
     const Eigen::VectorXd turned = eigen.vectors.transpose() * (scale.asDiagonal() * g);

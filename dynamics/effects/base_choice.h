@@ -12,6 +12,10 @@
 
 namespace kinescope::effects {
 
+/// Directions of parameters below this share of the largest one's square, columns of length 1, are
+/// not observable.
+inline constexpr double kUnobservable = 1e-10;
+
 /// The log at the instants, ready for regressions.
 struct BaseData {
   Eigen::MatrixXd q, dq, ddq, torque;   ///< instants x joints

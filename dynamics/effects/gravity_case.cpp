@@ -9,8 +9,6 @@
 namespace kinescope::effects {
 namespace {
 
-constexpr double kUnseen = 1e-10;  // base parameters: share of the largest direction's square
-
 /// Combinations of the bodies' parameters that the log shows, each of unit effect on the whitened
 /// torque: 10 bodies x base parameters.
 Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen::VectorXd& sigma) {
@@ -23,7 +21,7 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
   const Eigen::VectorXd& values = eigen.values;
   Eigen::Index first = 0;
-  while (first < n && !(values[first] > kUnseen * values[n - 1])) ++first;
+  while (first < n && !(values[first] > kUnobservable * values[n - 1])) ++first;
   return scale.asDiagonal() * eigen.vectors.rightCols(n - first) *
          values.tail(n - first).cwiseSqrt().cwiseInverse().asDiagonal();
 }

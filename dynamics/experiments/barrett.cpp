@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "dynamics/experiments/quartiles.h"
 #include "dynamics/gp/leave_out.h"
 #include "dynamics/gp/robust.h"
 #include "dynamics/identify/model_features.h"
@@ -19,7 +19,6 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kFolds = 10;
 constexpr double kTrimmedShare = 0.1;
 constexpr double kMiddle_rad = 1.3;  // of all motions
@@ -111,8 +110,12 @@ GridChoice choose(const std::vector<GridPoint>& grid, double GridPoint::* error,
 
 BarrettFit judged(std::string name, const gp::FittedGp& fitted, const gp::Dataset& used,
                   const gp::Dataset& all, const Unseen& unseen, int threads) {
-  BarrettFit out{
-      std::move(name), 0.0, kNone, unseen.error(fitted), static_cast<int>(used.samples()), {}};
+  BarrettFit out{std::move(name),
+                 0.0,
+                 kNotMeasured,
+                 unseen.error(fitted),
+                 static_cast<int>(used.samples()),
+                 {}};
   out.in_sample_rms =
       rms(used.targets - gp::predict(fitted, used.inputs, {.variance = false}).mean);
   out.at_log = gp::predict(fitted, all.inputs, {.variance = false}).mean;
@@ -127,14 +130,15 @@ BarrettFit by_support_vectors(const BarrettLog& log, const Unseen& unseen) {
   const auto at = [&](const TorqueSamples& samples) {
     return Vector(fitted.predict(samples.q, samples.dq, samples.ddq).mean);
   };
-  BarrettFit out{"support vectors", 0.0, kNone, 0.0, static_cast<int>(log.measured.size()),
+  BarrettFit out{"support vectors", 0.0, kNotMeasured, 0.0, static_cast<int>(log.measured.size()),
                  at(log.measured)};
   out.in_sample_rms = rms(log.measured.torque - out.at_log);
   out.unseen_rms = rms(at(unseen.log.measured) - unseen.log.clean);
   return out;
 }
 
-std::vector<FrictionPoint> friction_of(const gp::FittedGp& fitted, const BarrettOptions& options) {
+std::vector<FrictionPoint> friction_profile(const gp::FittedGp& fitted,
+                                            const BarrettOptions& options) {
   const Vector dq = Vector::LinSpaced(kProfilePoints, -kProfileSpeed_rad_s, kProfileSpeed_rad_s);
   const Vector q = Vector::Constant(dq.size(), kMiddle_rad);
   const Vector still = Vector::Zero(dq.size());
@@ -238,7 +242,7 @@ BarrettResult run_barrett(const BarrettOptions& options, int threads, const Prog
   for (const int row : out.log.wrong) {
     if (std::ranges::binary_search(trimmed.removed, Eigen::Index{row})) ++out.removed_wrong;
   }
-  out.friction = friction_of(trimmed.fitted, options);
+  out.friction = friction_profile(trimmed.fitted, options);
   out.gravity_dq = kGravitySpeed_rad_s;
   out.gravity = gravity_of(trimmed.fitted, options);
   out.sensor = weigh(trimmed.fitted, kept, threads);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/experiments/comparison_runs.h"
 
-#include <limits>
 #include <utility>
 
+#include "dynamics/experiments/quartiles.h"
 #include "dynamics/identify/prediction.h"
 #include "kinematics/core/error.h"
 
@@ -25,9 +25,8 @@ Trial trial_of(Learner learner, const ComparisonCase& one, const LearnOptions& o
   try {
     judge(one, predict_by(learner, one.believed, one.train, one.test, options), trial);
   } catch (const Error& error) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    trial.nmse_percent = Eigen::VectorXd::Constant(one.test.joints(), kNone);
-    trial.global_nmse_percent = kNone;
+    trial.nmse_percent = Eigen::VectorXd::Constant(one.test.joints(), kNotMeasured);
+    trial.global_nmse_percent = kNotMeasured;
     trial.failure = error.what();
   }
   return trial;

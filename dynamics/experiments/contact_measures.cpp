@@ -2,7 +2,6 @@
 #include "dynamics/experiments/contact_measures.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <utility>
 
@@ -11,7 +10,6 @@ namespace {
 
 constexpr std::size_t kGroups = 10;
 constexpr std::size_t kFewestOfAGroup = 10;  // a share in steps of a tenth
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 using Trials = std::vector<const ContactTrial*>;
 
@@ -30,7 +28,7 @@ const ContactOutcome& outcome(const ContactTrial& trial, std::optional<std::size
 
 DetectionMeasure measure(std::span<const ContactTrial* const> trials,
                          std::optional<std::size_t> observer) {
-  DetectionMeasure out{.delay_s = {kNone, kNone, kNone}};
+  DetectionMeasure out{.delay_s = {kNotMeasured, kNotMeasured, kNotMeasured}};
   std::vector<double> delays;
   for (const ContactTrial* trial : trials) {
     const ContactOutcome& one = outcome(*trial, observer);
@@ -87,7 +85,7 @@ PairedDelay paired_delay(const ContactDetection& contacts, std::size_t kind) {
     theirs.push_back(observer.delay_s);
   }
   const int count = static_cast<int>(ours.size());
-  if (count == 0) return {.contacts = 0, .detector_s = kNone, .observer_s = kNone};
+  if (count == 0) return {.contacts = 0, .detector_s = kNotMeasured, .observer_s = kNotMeasured};
   return {.contacts = count,
           .detector_s = quartiles(std::move(ours)).median,
           .observer_s = quartiles(std::move(theirs)).median};

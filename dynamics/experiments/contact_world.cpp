@@ -17,14 +17,14 @@ struct Sine {
   double amplitude, rate, phase;
 };
 
-struct Motion {
+struct Excitation {
   Eigen::MatrixXd q, dq, ddq;
 };
 
-Motion random_motion(Eigen::Index joints, Eigen::Index samples, double rate_hz, Rng& rng) {
-  Motion out{.q = Eigen::MatrixXd::Zero(samples, joints),
-             .dq = Eigen::MatrixXd::Zero(samples, joints),
-             .ddq = Eigen::MatrixXd::Zero(samples, joints)};
+Excitation random_excitation(Eigen::Index joints, Eigen::Index samples, double rate_hz, Rng& rng) {
+  Excitation out{.q = Eigen::MatrixXd::Zero(samples, joints),
+                 .dq = Eigen::MatrixXd::Zero(samples, joints),
+                 .ddq = Eigen::MatrixXd::Zero(samples, joints)};
   for (Eigen::Index j = 0; j < joints; ++j) {
     for (int s = 0; s < kSines; ++s) {
       const Sine sine{.amplitude = rng.uniform(0.05, 0.25),
@@ -76,8 +76,8 @@ Eigen::Index next_reversal(const Eigen::MatrixXd& dq, Eigen::Index from) {
   return k;
 }
 
-void add_contact(const RigidModel& model, const Motion& motion, const ContactWorldOptions& options,
-                 int number, ContactWorld& world, Rng& rng) {
+void add_contact(const RigidModel& model, const Excitation& motion,
+                 const ContactWorldOptions& options, int number, ContactWorld& world, Rng& rng) {
   const auto joints = static_cast<int>(model.size());
   const int body = joints - 1 - number % std::max(1, joints - 1);
   const double spacing_s = options.duration_s / (options.contacts + 1.0);
@@ -149,7 +149,7 @@ ContactWorld contact_world(const DynamicModel& model, const ContactWorldOptions&
                            Rng& rng) {
   const RigidModel rigid = make_rigid_model(model);
   const auto count = static_cast<Eigen::Index>(options.duration_s * options.rate_hz);
-  const Motion motion = random_motion(rigid.size(), count, options.rate_hz, rng);
+  const Excitation motion = random_excitation(rigid.size(), count, options.rate_hz, rng);
   ContactWorld world;
   world.external = Eigen::MatrixXd::Zero(count, rigid.size());
   for (int c = 0; c < options.contacts; ++c) {

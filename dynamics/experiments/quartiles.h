@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <vector>
 
 namespace kinescope::experiments {
+
+/// In place of a value that nothing was measured for.
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 struct Quartiles {
   double lower = 0.0;

@@ -42,7 +42,7 @@ TorqueEffect effect(const char* name, const std::string& joint, double value, do
   return out;
 }
 
-std::vector<TorqueEffect> friction_of(const DynamicModel& arm) {
+std::vector<TorqueEffect> friction_effects(const DynamicModel& arm) {
   std::vector<TorqueEffect> out;
   const std::vector<JointId> joints = moving_joints(arm.tree);
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -180,7 +180,7 @@ WamWorld wam_world(const WamControlOptions& options) {
   Rng rng = Rng::from_name("wam world", options.seed);
   WamWorld out{
       believed(options, rng), with_drives(wam_arm(options.sensor_kg), options.joints), {}, {}};
-  out.friction = friction_of(out.truth);
+  out.friction = friction_effects(out.truth);
   constexpr double kRadius_m = 0.03;  // of gyration
   out.payload =
       from_central({options.payload_kg,

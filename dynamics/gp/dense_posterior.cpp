@@ -162,8 +162,8 @@ Factorised factorise(Workers& workers, const Covariance& covariance, const Prepa
     out.factor.diagonal().array() += out.jitter;
     const Index failed = tiled_cholesky(workers, out.factor);
     if (failed == 0) return out;
-    constexpr double kFirst = 1e-14;
-    relative = relative == 0.0 ? kFirst : 10.0 * relative;
+    constexpr double kFirstJitter = 1e-14;
+    relative = relative == 0.0 ? kFirstJitter : 10.0 * relative;
     if (relative > max_jitter) {
       throw undetermined(
           "kernel matrix",

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kChunk = 1024;
+constexpr Index kPredictionChunk = 1024;
 
 struct Given {
   std::shared_ptr<const KernelNode> node;
@@ -100,15 +100,16 @@ class FeaturePosterior : public Posterior {
     Moments out;
     out.mean.resize(inputs.rows() * m);
     if (variance) out.variance.resize(inputs.rows() * m);
-    workers.run((inputs.rows() + kChunk - 1) / kChunk, [&](Index task, Scratch&) {
-      const Index begin = task * kChunk;
-      const Index size = std::min(kChunk, inputs.rows() - begin);
-      Eigen::MatrixXd rows = scaled_features(inputs.middleRows(begin, size), solution);
-      product(1.0, rows, solution.weights, 0.0, out.mean.segment(begin * m, size * m));
-      if (!variance) return;
-      solve_lower_transposed_right(solution.lower, rows);
-      out.variance.segment(begin * m, size * m) = rows.rowwise().squaredNorm();
-    });
+    workers.run((inputs.rows() + kPredictionChunk - 1) / kPredictionChunk,
+                [&](Index task, Scratch&) {
+                  const Index begin = task * kPredictionChunk;
+                  const Index size = std::min(kPredictionChunk, inputs.rows() - begin);
+                  Eigen::MatrixXd rows = scaled_features(inputs.middleRows(begin, size), solution);
+                  product(1.0, rows, solution.weights, 0.0, out.mean.segment(begin * m, size * m));
+                  if (!variance) return;
+                  solve_lower_transposed_right(solution.lower, rows);
+                  out.variance.segment(begin * m, size * m) = rows.rowwise().squaredNorm();
+                });
     return out;
   }
 

@@ -13,21 +13,19 @@ namespace {
 
 using Eigen::Index;
 
-// Rows that go through one QR; fixed, so that the number of workers does not show.
-Index chunk_samples(Index features) { return std::max<Index>(1024, 2 * features); }
+double log_two_pi() { return std::log(2.0 * std::numbers::pi); }
 
-// [R; rows] to R again.
-void absorb(Eigen::MatrixXd& triangle, const Eigen::MatrixXd& rows) {
-  const Index d = triangle.cols();
-  Eigen::MatrixXd stacked(d + rows.rows(), d);
+}  // namespace
+
+Index rows_per_qr(Index features) { return std::max<Index>(1024, 2 * features); }
+
+void absorb_rows(Eigen::MatrixXd& triangle, const Eigen::MatrixXd& rows) {
+  const Index d = rows.cols();
+  Eigen::MatrixXd stacked(triangle.rows() + rows.rows(), d);
   stacked << triangle, rows;
   upper_of_qr(stacked);
   triangle = stacked.topRows(d).triangularView<Eigen::Upper>();
 }
-
-double log_two_pi() { return std::log(2.0 * std::numbers::pi); }
-
-}  // namespace
 
 FeatureSystem press(Workers& workers, const KernelNode& node, const Problem& problem,
                     const std::vector<Index>& samples) {
@@ -42,7 +40,7 @@ FeatureSystem press(Workers& workers, const KernelNode& node, const Problem& pro
   FeatureSystem out;
   out.exponents = node.basis(problem.inputs.topRows(1)).exponents;
   const Index d = out.features();
-  const Index chunk = chunk_samples(d);
+  const Index chunk = rows_per_qr(d);
   const Index chunks = (total + chunk - 1) / chunk;
   out.outputs.resize(static_cast<std::size_t>(outputs));
   // One triangle for each chunk and output, made by the workers, joined in order.
@@ -61,7 +59,7 @@ FeatureSystem press(Workers& workers, const KernelNode& node, const Problem& pro
         rows.row(i) /= std::sqrt(problem.noise_scale[row]);
       }
       Eigen::MatrixXd triangle = Eigen::MatrixXd::Zero(d + 1, d + 1);
-      absorb(triangle, rows);
+      absorb_rows(triangle, rows);
       parts[static_cast<std::size_t>(task * outputs + o)] = std::move(triangle);
     }
   });
@@ -69,7 +67,7 @@ FeatureSystem press(Workers& workers, const KernelNode& node, const Problem& pro
     PressedOutput& pressed = out.outputs[static_cast<std::size_t>(o)];
     pressed.triangle = Eigen::MatrixXd::Zero(d + 1, d + 1);
     for (Index c = 0; c < chunks; ++c) {
-      absorb(pressed.triangle, parts[static_cast<std::size_t>(c * outputs + o)]);
+      absorb_rows(pressed.triangle, parts[static_cast<std::size_t>(c * outputs + o)]);
     }
     pressed.count = total;
     for (const Index sample : chosen) {
@@ -85,7 +83,7 @@ FeatureSystem press_together(const std::vector<const FeatureSystem*>& parts) {
   for (std::size_t p = 1; p < parts.size(); ++p) {
     for (std::size_t o = 0; o < out.outputs.size(); ++o) {
       const PressedOutput& other = parts[p]->outputs[o];
-      absorb(out.outputs[o].triangle, other.triangle);
+      absorb_rows(out.outputs[o].triangle, other.triangle);
       out.outputs[o].count += other.count;
       out.outputs[o].log_noise_scale += other.log_noise_scale;
     }

@@ -11,6 +11,11 @@
 
 namespace kinescope::gp {
 
+/// Fixed, so that the number of workers does not show.
+[[nodiscard]] Eigen::Index rows_per_qr(Eigen::Index features);
+/// The triangle R becomes that of [R; rows].
+void absorb_rows(Eigen::MatrixXd& triangle, const Eigen::MatrixXd& rows);
+
 /// Samples of one output, pressed.
 struct PressedOutput {
   Eigen::MatrixXd triangle;      ///< d+1 x d+1: [R z; 0 rho]

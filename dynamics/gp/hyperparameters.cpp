@@ -22,7 +22,7 @@ using Eigen::Index;
 
 // A free parameter's logarithm lies between its ends: a + (b - a) / (1 + exp(-4 u / (b - a))), with
 // slope 1 in the middle.
-struct Range {
+struct LogRange {
   double low;
   double high;
 
@@ -43,7 +43,7 @@ struct Range {
 
 struct Free {
   Index index;
-  Range range;
+  LogRange range;
   double prior_mean;
   double prior_sigma;  // 0: none
 };

@@ -71,7 +71,7 @@ Functions joint_functions(JointKind kind, const Eigen::VectorXd& q, std::size_t 
   return out;
 }
 
-Functions product(const Functions& a, const Functions& b) {
+Functions product_functions(const Functions& a, const Functions& b) {
   const Index count = a.value.cols() * b.value.cols();
   const Index samples = a.value.rows();
   Functions out{Eigen::MatrixXd(samples, count),
@@ -96,8 +96,8 @@ Functions position_functions(const JointKinds& joints,
                              const Inputs& inputs, Index parameters) {
   Functions out = one_function(inputs.rows(), joints.size(), parameters);
   for (std::size_t j = 0; j < positions.size(); ++j) {
-    out = product(out, joint_functions(joints[j], inputs.col(static_cast<Index>(j)), j,
-                                       joints.size(), positions[j], degree, parameters));
+    out = product_functions(out, joint_functions(joints[j], inputs.col(static_cast<Index>(j)), j,
+                                                 joints.size(), positions[j], degree, parameters));
   }
   return out;
 }

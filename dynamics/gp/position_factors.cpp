@@ -35,9 +35,9 @@ KINESCOPE_WIDE void multiply_factors(const double* x0, const double* x1, Slopes 
 // sum_i w_i d/d (a0, a1, b0, b1) of the factors' product; w_i becomes w_i times that product.
 KINESCOPE_WIDE void contract_factors(const double* x0, const double* x1, Slopes s, Index rows,
                                      double* weights, std::array<double, 4>& sums) {
-  constexpr Index kLanes = 8;
-  double lanes[4][kLanes] = {};
-  const Index whole = rows / kLanes * kLanes;
+  constexpr Index kPartialSums = 8;
+  double lanes[4][kPartialSums] = {};
+  const Index whole = rows / kPartialSums * kPartialSums;
   const auto one = [&](Index i, Index lane) {
     const double first = 1.0 + s.a0 * x0[i] + s.a1 * x1[i];
     const double second = 1.0 + s.b0 * x0[i] + s.b1 * x1[i];
@@ -49,8 +49,8 @@ KINESCOPE_WIDE void contract_factors(const double* x0, const double* x1, Slopes 
     lanes[3][lane] += by_second * x1[i];
     weights[i] = by_first * first;
   };
-  for (Index i = 0; i < whole; i += kLanes) {
-    for (Index lane = 0; lane < kLanes; ++lane) one(i + lane, lane);
+  for (Index i = 0; i < whole; i += kPartialSums) {
+    for (Index lane = 0; lane < kPartialSums; ++lane) one(i + lane, lane);
   }
   for (Index i = whole; i < rows; ++i) one(i, 0);
   for (std::size_t k = 0; k < sums.size(); ++k) {

@@ -12,8 +12,6 @@ namespace {
 
 using Eigen::Index;
 
-Index chunk_for(Index features) { return std::max<Index>(1024, 2 * features); }
-
 bool factorise(Workers& workers, const Covariance& covariance, const Prepared& inducing,
                double max_jitter, Eigen::MatrixXd& factor, double& jitter) {
   double relative = 1e-14;
@@ -28,19 +26,12 @@ bool factorise(Workers& workers, const Covariance& covariance, const Prepared& i
   return false;
 }
 
-void absorb(Eigen::MatrixXd& triangle, const Eigen::MatrixXd& rows) {
-  Eigen::MatrixXd stacked(triangle.rows() + rows.rows(), rows.cols());
-  stacked << triangle, rows;
-  upper_of_qr(stacked);
-  triangle = stacked.topRows(rows.cols()).triangularView<Eigen::Upper>();
-}
-
 void press_samples(Workers& workers, const Problem& problem, SparseSystem& system) {
   const Index m = system.count();
   const Prepared at = system.covariance.prepare(problem.inputs);
   const Eigen::VectorXd prior = system.covariance.diagonal(workers, at);
   const Eigen::VectorXd noise = noise_of_rows(problem, system.log_noise);
-  const Index chunk = chunk_for(m);
+  const Index chunk = rows_per_qr(m);
   const Index chunks = (problem.samples + chunk - 1) / chunk;
   std::vector<Eigen::MatrixXd> parts(static_cast<std::size_t>(chunks));
   std::vector<double> lost(static_cast<std::size_t>(chunks));
@@ -56,13 +47,13 @@ void press_samples(Workers& workers, const Problem& problem, SparseSystem& syste
     rows.col(m) = problem.targets.segment(begin, size);
     rows = problem.noise_scale.segment(begin, size).cwiseSqrt().cwiseInverse().asDiagonal() * rows;
     Eigen::MatrixXd triangle = Eigen::MatrixXd::Zero(m + 1, m + 1);
-    absorb(triangle, rows);
+    absorb_rows(triangle, rows);
     parts[static_cast<std::size_t>(task)] = std::move(triangle);
   });
   PressedOutput pressed{Eigen::MatrixXd::Zero(m + 1, m + 1), problem.samples,
                         problem.noise_scale.array().log().sum()};
   for (std::size_t c = 0; c < parts.size(); ++c) {
-    absorb(pressed.triangle, parts[c]);
+    absorb_rows(pressed.triangle, parts[c]);
     system.lost += lost[c];
   }
   system.pressed.outputs = {std::move(pressed)};
@@ -128,7 +119,7 @@ Eigen::VectorXd bound_gradient(Workers& workers, const SparseSystem& system,
       });
   // K_xz, tile rows share their features: whole chunks of samples.
   const Eigen::MatrixXd damping = Eigen::MatrixXd::Identity(m, m) - a_inverse;
-  const Index chunk = chunk_for(m);
+  const Index chunk = rows_per_qr(m);
   for (Index begin = 0; begin < problem.samples; begin += chunk) {
     const Index size = std::min(chunk, problem.samples - begin);
     Eigen::MatrixXd phi(size, m);

@@ -13,12 +13,12 @@ using Eigen::Index;
 // still give both cores enough tiles. Depends on the size alone, never on the number of threads.
 Index tile_for(Index rows) { return rows > 3000 ? 512 : 256; }
 
-struct Range {
+struct TileRange {
   Index begin;
   Index size;
 };
 
-Range tile(Index index, Index width, Index rows) {
+TileRange tile(Index index, Index width, Index rows) {
   const Index begin = index * width;
   return {begin, std::min(width, rows - begin)};
 }
@@ -35,14 +35,14 @@ Index tiled_cholesky(Workers& workers, Block a) {
   const Index width = tile_for(n);
   const Index tiles = (n + width - 1) / width;
   for (Index k = 0; k < tiles; ++k) {
-    const Range pivot = tile(k, width, n);
+    const TileRange pivot = tile(k, width, n);
     Block diagonal = a.block(pivot.begin, pivot.begin, pivot.size, pivot.size);
     if (const int info = cholesky(diagonal); info != 0) return pivot.begin + info;
     diagonal.triangularView<Eigen::StrictlyUpper>().setZero();
     a.block(pivot.begin, pivot.begin + pivot.size, pivot.size, n - pivot.begin - pivot.size)
         .setZero();
     workers.run(tiles - k - 1, [&](Index task, Scratch&) {
-      const Range row = tile(k + 1 + task, width, n);
+      const TileRange row = tile(k + 1 + task, width, n);
       solve_lower_transposed_right(diagonal, a.block(row.begin, pivot.begin, row.size, pivot.size));
     });
     std::vector<Pair> trailing;
@@ -51,8 +51,8 @@ Index tiled_cholesky(Workers& workers, Block a) {
     }
     workers.run(static_cast<Index>(trailing.size()), [&](Index task, Scratch&) {
       const Pair pair = trailing[static_cast<std::size_t>(task)];
-      const Range row = tile(pair.row, width, n);
-      const Range col = tile(pair.col, width, n);
+      const TileRange row = tile(pair.row, width, n);
+      const TileRange col = tile(pair.col, width, n);
       const ConstBlock left = a.block(row.begin, pivot.begin, row.size, pivot.size);
       Block target = a.block(row.begin, col.begin, row.size, col.size);
       if (pair.row == pair.col) {
@@ -73,7 +73,7 @@ void tiled_invert_lower(Workers& workers, Block l) {
   const Index tiles = (n + kWidth - 1) / kWidth;
   Eigen::MatrixXd panel(n, std::min(n, kWidth));
   for (Index j = tiles - 1; j >= 0; --j) {
-    const Range col = tile(j, kWidth, n);
+    const TileRange col = tile(j, kWidth, n);
     Block diagonal = l.block(col.begin, col.begin, col.size, col.size);
     invert_lower(diagonal);
     const Index below = col.begin + col.size;
@@ -81,7 +81,7 @@ void tiled_invert_lower(Workers& workers, Block l) {
     workers.run(tiles - j - 1, [&](Index task, Scratch& scratch) {
       const Scratch::Frame frame(scratch);
       // The longest rows first, so that the workers end together.
-      const Range row = tile(tiles - 1 - task, kWidth, n);
+      const TileRange row = tile(tiles - 1 - task, kWidth, n);
       const Index inner = row.begin + row.size - below;
       Eigen::Map<Eigen::MatrixXd> sum = scratch.take(row.size, col.size);
       product(-1.0, l.block(row.begin, below, row.size, inner),

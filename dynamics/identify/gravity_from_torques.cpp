@@ -125,17 +125,17 @@ std::vector<Eigen::Vector3d> directions() {
   return out;
 }
 
-struct Found {
+struct DirectionFit {
   Eigen::Vector3d direction;
   double left_over = 0.0;
 };
 
 // Downhill from one of them, in smaller and smaller steps.
-Found refined(const Sums& sums, const Eigen::Vector3d& start) {
-  Found best{start, sums.left_over(start)};
+DirectionFit refined(const Sums& sums, const Eigen::Vector3d& start) {
+  DirectionFit best{start, sums.left_over(start)};
   for (double step = kFirstStep; step > kLastStep;) {
     const Eigen::Quaterniond R = rotation_to_axis(best.direction);
-    const Found before = best;
+    const DirectionFit before = best;
     for (const auto& [x, y] : {std::pair{step, 0.0}, {-step, 0.0}, {0.0, step}, {0.0, -step}}) {
       const Eigen::Vector3d tried = (R * Eigen::Vector3d(x, y, 1.0)).normalized();
       const double left = sums.left_over(tried);
@@ -157,15 +157,15 @@ GravityFromTorques gravity_from_torques(const DynamicModel& model, const TorqueS
   if (!(model.gravity_m_s2.norm() > 0.0) || samples.size() == 0) return out;
   const Eigen::Vector3d own = model.gravity_m_s2.normalized();
   const Sums sums(model, samples);
-  Found best{own, sums.left_over(own)};
+  DirectionFit best{own, sums.left_over(own)};
   const double before = best.left_over;
   for (const Eigen::Vector3d& direction : directions()) {
     const double left = sums.left_over(direction);
     if (left < best.left_over) best = {direction, left};
   }
-  const Found one = refined(sums, best.direction);
-  const Found opposite = refined(sums, -one.direction);
-  const auto away = [&](const Found& found) { return (found.direction - own).norm(); };
+  const DirectionFit one = refined(sums, best.direction);
+  const DirectionFit opposite = refined(sums, -one.direction);
+  const auto away = [&](const DirectionFit& found) { return (found.direction - own).norm(); };
   const bool alike = std::sqrt(opposite.left_over) < (1.0 + kAlike) * std::sqrt(one.left_over);
   best = alike && away(opposite) < away(one) ? opposite : one;
   out.direction = best.direction;

@@ -180,13 +180,13 @@ Judged judge(const JointModel& joint, const Search& search, const RobustTorque& 
   return out;
 }
 
-struct Found {
+struct CrossValidated {
   Search search;
   Judged judged;
 };
 
 /// One coordinate after the other, doubled or halved for as long as that helps.
-Found cross_validate(const JointModel& joint, const RobustTorque& folds) {
+CrossValidated cross_validate(const JointModel& joint, const RobustTorque& folds) {
   constexpr int kMostSweeps = 4;
   constexpr double kWorthwhile = 0.5;  // of log density; less is no reason to go on
   const Search step(Search::Constant(std::log(2.0)));
@@ -194,7 +194,7 @@ Found cross_validate(const JointModel& joint, const RobustTorque& folds) {
   start << std::log(4.0), std::log(8.0), std::log(8.0), std::log(0.05), std::log(0.02);
   const Search lower = start - 6.0 * step;
   const Search upper = start + 6.0 * step;
-  Found best{start, judge(joint, start, folds)};
+  CrossValidated best{start, judge(joint, start, folds)};
   const auto try_step = [&](Index k, double sign) {
     Search moved = best.search;
     moved[k] += sign * step[k];
@@ -220,7 +220,7 @@ Found cross_validate(const JointModel& joint, const RobustTorque& folds) {
 void learn_joint(const DynamicModel& model, int index, const RobustTorqueOptions& options,
                  RobustTorque& out) {
   const JointModel joint(model, out.samples, index, options.drives);
-  const Found found = cross_validate(joint, out);
+  const CrossValidated found = cross_validate(joint, out);
   RobustJoint facts;
   facts.bandwidth = found.search.head<3>().array().exp();
   facts.beyond = joint.scale() * std::exp(found.search[3]);

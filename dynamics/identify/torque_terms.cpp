@@ -162,12 +162,12 @@ std::vector<Eigen::MatrixXd> term_columns(const RigidModel& model, const DriveTe
                                           const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                                           const Eigen::MatrixXd& ddq) {
   // The full regressor of a stretch at a time: all columns of a long log would not fit the cache.
-  constexpr Eigen::Index kStretch = 512;
+  constexpr Eigen::Index kRegressorRows = 512;
   const auto count = static_cast<Eigen::Index>(terms.size());
   std::vector<Eigen::MatrixXd> out(static_cast<std::size_t>(model.size()),
                                    Eigen::MatrixXd::Zero(q.rows(), count));
-  for (Eigen::Index first = 0; first < q.rows(); first += kStretch) {
-    const Eigen::Index rows = std::min(kStretch, q.rows() - first);
+  for (Eigen::Index first = 0; first < q.rows(); first += kRegressorRows) {
+    const Eigen::Index rows = std::min(kRegressorRows, q.rows() - first);
     fill(model, drives, terms,
          {.q = q.middleRows(first, rows),
           .dq = dq.middleRows(first, rows),

@@ -16,7 +16,7 @@ namespace {
 // come nowhere near either bound.
 constexpr double kBadPercent = 30.0;
 constexpr double kBetter = 0.25;  // of what the columns as logged leave
-constexpr int kMostSamples = 2000;
+constexpr int kMostExchangedSamples = 2000;
 
 std::vector<int> bad_joints(const Eigen::VectorXd& left_out_percent) {
   std::vector<int> out;
@@ -58,7 +58,8 @@ std::optional<ExchangedTorques> find_exchanged_torques(const DynamicModel& model
                                                        const IdentifyOptions& options, int folds) {
   const std::vector<int> bad = bad_joints(left_out_percent);
   if (bad.size() < 2) return std::nullopt;
-  const TorqueSamples few = select_rows(samples, evenly_chosen(samples.size(), kMostSamples));
+  const TorqueSamples few =
+      select_rows(samples, evenly_chosen(samples.size(), kMostExchangedSamples));
   std::optional<ExchangedTorques> best;
   for (std::size_t a = 0; a < bad.size(); ++a) {
     for (std::size_t b = a + 1; b < bad.size(); ++b) {

@@ -93,15 +93,6 @@ Matrix prior_mean(const Identification& prior, const Motion& motion) {
   return predict_torque_mean(prior, prior.parameters, motion.q, motion.dq, motion.ddq);
 }
 
-gp::JointKinds kinds_of(const RigidModel& rigid) {
-  gp::JointKinds kinds;
-  for (const RigidBody& body : rigid.bodies) {
-    kinds.push_back(body.type == JointType::kPrismatic ? gp::JointKind::kPrismatic
-                                                       : gp::JointKind::kRevolute);
-  }
-  return kinds;
-}
-
 gp::Kernel kernel_of_joint(TorqueModelKind kind, const DynamicModel& model,
                            const gp::JointKinds& joints, const TorqueSamples& samples, int joint,
                            const DriveTerms& drives) {
@@ -395,7 +386,7 @@ Processes fit_semi_parametric(Added added, const DynamicModel& model, const Prio
 Processes fit_processes(TorqueModelKind kind, const DynamicModel& model, double memory,
                         const TorqueSamples& samples, const TorqueModelOptions& options,
                         const Processes* known, const Counter& counter) {
-  const gp::JointKinds joints = kinds_of(make_rigid_model(model));
+  const gp::JointKinds joints = joint_kinds(make_rigid_model(model));
   const int n = static_cast<int>(joints.size());
   const gp::Dataset all{motion_inputs(samples.q, samples.dq, samples.ddq), samples.torque, {}, {}};
   Processes out;
@@ -430,7 +421,7 @@ Processes fit_processes(TorqueModelKind kind, const DynamicModel& model, double 
 }
 
 // Processes of all samples, those that left a fold out, and what they said about it.
-struct Trained {
+struct TrainedProcesses {
   Processes all;
   std::vector<Processes> folds;
   std::vector<TorqueSamples> tests;  // of the folds
@@ -445,8 +436,9 @@ int band_folds(const TorqueModelOptions& options) {
   return std::min(options.band_folds, options.process_band_folds);
 }
 
-Trained train(const Fit& fit, const TorqueSamples& samples, const TorqueModelOptions& options) {
-  Trained out{fit(0, samples, options, nullptr), {}, {}, {}};
+TrainedProcesses train(const Fit& fit, const TorqueSamples& samples,
+                       const TorqueModelOptions& options) {
+  TrainedProcesses out{fit(0, samples, options, nullptr), {}, {}, {}};
   if (band_folds(options) < 2) return out;
   const auto all = static_cast<double>(samples.size());
   out.left = leave_folds_out(
@@ -463,7 +455,7 @@ Trained train(const Fit& fit, const TorqueSamples& samples, const TorqueModelOpt
 // Joints whose processes predict motion left out worse than those of a plainer model get the
 // latter's: neighbouring samples err alike, and a likelihood that takes them for independent can
 // prefer a process that has learned their noise.
-std::vector<int> take_the_plainer(const Trained& plainer, Trained& trained) {
+std::vector<int> take_the_plainer(const TrainedProcesses& plainer, TrainedProcesses& trained) {
   std::vector<int> out;
   if (!trained.left || !plainer.left) return out;
   for (Eigen::Index j = 0; j < trained.left->residual.cols(); ++j) {
@@ -517,7 +509,7 @@ constexpr int kCarriers = 256;
 
 // One joint as numbers, with the doubt of the folds' processes under the hyperparameters of all
 // samples: its scale is calibrated on the residuals of the folds' own.
-void save_joint(const Trained& trained, std::size_t joint, double step_s,
+void save_joint(const TrainedProcesses& trained, std::size_t joint, double step_s,
                 const TorqueModelOptions& options, JointProcess& process, Matrix& root,
                 Eigen::VectorXd* left_sigma) {
   const Processes& all = trained.all;
@@ -557,9 +549,10 @@ void save_joint(const Trained& trained, std::size_t joint, double step_s,
 }
 
 // All joints as numbers; `left` then holds their doubt.
-SavedTorqueModel save(TorqueModelKind kind, const DynamicModel& model, const Trained& trained,
-                      const std::vector<int>& plainer, const TorqueSamples& samples,
-                      const TorqueModelOptions& options, LeftOutTorques* left) {
+SavedTorqueModel save(TorqueModelKind kind, const DynamicModel& model,
+                      const TrainedProcesses& trained, const std::vector<int>& plainer,
+                      const TorqueSamples& samples, const TorqueModelOptions& options,
+                      LeftOutTorques* left) {
   SavedTorqueModel out;
   out.kind = kind;
   out.robot = model.tree.name;
@@ -670,7 +663,8 @@ FittedTorqueModel fit_gaussian_processes(TorqueModelKind kind, const DynamicMode
                         const Processes* known) {
     return fit_processes(kind, model, memory, own, of_part, known, counter);
   };
-  Trained trained = train(semi_parametric ? with(Added::kFunction) : plain, samples, options);
+  TrainedProcesses trained =
+      train(semi_parametric ? with(Added::kFunction) : plain, samples, options);
   std::vector<int> plainer;
   if (semi_parametric && trained.left)
     plainer = take_the_plainer(train(with(Added::kConstant), samples, options), trained);

@@ -120,20 +120,20 @@ class Trainer {
   dlib::resizable_tensor tensor_;
 };
 
-struct Trained {
+struct TrainedNetwork {
   Net net;
   Eigen::RowVectorXd error;  ///< rms on what was held out, standardised
   int epochs = 0;
 };
 
-Trained train(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& targets, const Fold& fold,
-              const NeuralNetworkOptions& options, Rng& rng) {
+TrainedNetwork train(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& targets,
+                     const Fold& fold, const NeuralNetworkOptions& options, Rng& rng) {
   const Vectors x = rows_of(inputs(fold.train, Eigen::all));
   const Vectors y = rows_of(targets(fold.train, Eigen::all));
   const Vectors unseen = rows_of(inputs(fold.test, Eigen::all));
   const Eigen::MatrixXd wanted = targets(fold.test, Eigen::all);
   Trainer trainer(fresh_network(x, targets.cols(), rng), x, y, options.weight_decay);
-  Trained best{trainer.net(), {}, 0};
+  TrainedNetwork best{trainer.net(), {}, 0};
   double least = std::numeric_limits<double>::infinity();
   double rate = options.learning_rate;
   int waited = 0;
@@ -180,8 +180,8 @@ FittedTorqueModel fit_neural_network(const TorqueSamples& samples,
   const gp::SingleThreadedBlas guard;
   const Standardised data(samples);
   Rng rng = Rng::from_name("neural network", seed);
-  const Trained trained = train(data.inputs(samples.q, samples.dq, samples.ddq),
-                                data.targets(samples.torque), fold, options, rng);
+  const TrainedNetwork trained = train(data.inputs(samples.q, samples.dq, samples.ddq),
+                                       data.targets(samples.torque), fold, options, rng);
   FittedTorqueModel out{TorqueModelKind::kNeuralNetwork, static_cast<int>(samples.size()), {}};
   Eigen::RowVectorXd error = trained.error;
   out.left_out_nmse_percent.resize(error.size());

@@ -11,15 +11,6 @@ namespace {
 
 using Eigen::Index;
 
-gp::JointKinds kinds_of(const RigidModel& rigid) {
-  gp::JointKinds kinds;
-  for (const RigidBody& body : rigid.bodies) {
-    kinds.push_back(body.type == JointType::kPrismatic ? gp::JointKind::kPrismatic
-                                                       : gp::JointKind::kRevolute);
-  }
-  return kinds;
-}
-
 // Parameters one after another.
 class Values {
  public:
@@ -99,9 +90,18 @@ void append_motions(const Eigen::MatrixXd& motions, Eigen::MatrixXd& all) {
 
 }  // namespace
 
+gp::JointKinds joint_kinds(const RigidModel& rigid) {
+  gp::JointKinds kinds;
+  for (const RigidBody& body : rigid.bodies) {
+    kinds.push_back(body.type == JointType::kPrismatic ? gp::JointKind::kPrismatic
+                                                       : gp::JointKind::kRevolute);
+  }
+  return kinds;
+}
+
 void add_process(TorqueModelKind kind, const JointProcess& process, const Eigen::MatrixXd& root,
                  SavedTorqueModel& model) {
-  const gp::JointKinds joints = kinds_of(model.rigid);
+  const gp::JointKinds joints = joint_kinds(model.rigid);
   const Index columns = 3 * std::ssize(joints);
   const gp::Normalisation& normalisation = process.function.normalisation;
   const double scale = normalisation.target_scale[0];

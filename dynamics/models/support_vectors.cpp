@@ -16,7 +16,7 @@
 namespace kinescope::models {
 namespace {
 
-constexpr int kFolds = 4;
+constexpr int kSearchFolds = 4;
 constexpr Eigen::Index kSearchSamples = 500;
 constexpr double kCacheMegabytes = 200.0;
 
@@ -135,12 +135,12 @@ Choice choose(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& targets, con
 }  // namespace
 
 FittedTorqueModel fit_support_vectors(const TorqueSamples& samples) {
-  if (samples.size() < 4 * kFolds) {
+  if (samples.size() < 4 * kSearchFolds) {
     throw undetermined("support vectors", "too few samples", "record longer");
   }
   const Standardised data(samples);
   const auto few = evenly_chosen(samples.size(), kSearchSamples);
-  const Folds folds = split_folds(select_rows(samples, few), {.folds = kFolds});
+  const Folds folds = split_folds(select_rows(samples, few), {.folds = kSearchFolds});
   const Eigen::MatrixXd inputs = data.inputs(samples.q, samples.dq, samples.ddq);
   const Eigen::MatrixXd targets = data.targets(samples.torque);
   std::vector<Machine> machines;

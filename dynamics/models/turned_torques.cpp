@@ -12,8 +12,8 @@
 namespace kinescope {
 namespace {
 
-constexpr int kMostSamples = 1000;
-constexpr int kFolds = 8;
+constexpr int kMostTurnedSamples = 1000;
+constexpr int kTurnedFolds = 8;
 // Sigmas from which on friction clearly takes energy: 5 % for seven joints together, Student's t of
 // 20 blocks. A turned torque would have it drive.
 constexpr double kDissipates = 2.7;
@@ -55,7 +55,7 @@ LogLikelihood log_likelihood(const DynamicModel& model, const TorqueSamples& sam
 }
 
 TorqueSamples some_of(const TorqueSamples& samples) {
-  return select_rows(samples, evenly_chosen(samples.size(), kMostSamples));
+  return select_rows(samples, evenly_chosen(samples.size(), kMostTurnedSamples));
 }
 
 double gain(const LogLikelihood& turned, const LogLikelihood& as_logged) {
@@ -66,7 +66,7 @@ double gain(const LogLikelihood& turned, const LogLikelihood& as_logged) {
 std::vector<double> left_out_errors(const DynamicModel& model, const TorqueSamples& samples,
                                     const IdentifyOptions& options) {
   const auto left = leave_folds_out(
-      samples, kFolds, 0, [&](const TorqueSamples& train, const TorqueSamples& test) {
+      samples, kTurnedFolds, 0, [&](const TorqueSamples& train, const TorqueSamples& test) {
         return predict_torque(identify_dynamics(model, train, options), test.q, test.dq, test.ddq);
       });
   if (!left) return {};
