@@ -75,24 +75,24 @@ Quantity quantity_of(std::string_view si_unit) {
   return Quantity::kPlain;
 }
 
-std::string value_text(double si_value, Quantity quantity) {
-  const double shown = si_value * display_unit(quantity).factor;
+std::string value_text(double value_si, Quantity quantity) {
+  const double shown = value_si * display_unit(quantity).factor;
   if (quantity == Quantity::kCount) {
     return std::isfinite(shown) ? fmt::format("{:.0f}", shown) : "n/a";
   }
   return significant(shown, quantity == Quantity::kChannel ? kChannelDigits : kStatisticDigits);
 }
 
-std::string text_with_unit(double si_value, Quantity quantity) {
+std::string text_with_unit(double value_si, Quantity quantity) {
   const std::string_view unit = display_unit(quantity).text;
   const bool spaced = !unit.empty() && quantity != Quantity::kAngle;
-  return value_text(si_value, quantity) + (spaced ? " " : "") + std::string(unit);
+  return value_text(value_si, quantity) + (spaced ? " " : "") + std::string(unit);
 }
 
-std::string value_and_uncertainty(double si_value, std::optional<double> expanded,
+std::string value_and_uncertainty(double value_si, std::optional<double> expanded,
                                   Quantity quantity) {
   const double factor = display_unit(quantity).factor;
-  const double value = si_value * factor;
+  const double value = value_si * factor;
   if (!std::isfinite(value)) return "n/a";
   const double uncertainty = expanded ? *expanded * factor : 0.0;
   if (!std::isfinite(uncertainty) || uncertainty <= 0.0) return significant(value, kChannelDigits);
@@ -104,8 +104,8 @@ std::string value_and_uncertainty(double si_value, std::optional<double> expande
                      uncertainty, decimals);
 }
 
-std::string rounded_value(double si_value, std::optional<double> expanded, Quantity quantity) {
-  const std::string both = value_and_uncertainty(si_value, expanded, quantity);
+std::string rounded_value(double value_si, std::optional<double> expanded, Quantity quantity) {
+  const std::string both = value_and_uncertainty(value_si, expanded, quantity);
   return both.substr(0, both.find(" ± "));
 }
 

@@ -37,15 +37,15 @@ struct DisplayUnit {
 [[nodiscard]] Quantity quantity_of(std::string_view si_unit);
 
 /// The number alone, three significant digits; "n/a" for what is not finite.
-[[nodiscard]] std::string value_text(double si_value, Quantity quantity);
+[[nodiscard]] std::string value_text(double value_si, Quantity quantity);
 /// The number with its unit: "0.0712 px", "1.25 mm".
-[[nodiscard]] std::string text_with_unit(double si_value, Quantity quantity);
+[[nodiscard]] std::string text_with_unit(double value_si, Quantity quantity);
 /// "12.340 ± 0.012": two significant digits of the uncertainty, the value to the same place.
 /// Without an uncertainty the value stands alone.
-[[nodiscard]] std::string value_and_uncertainty(double si_value, std::optional<double> expanded,
+[[nodiscard]] std::string value_and_uncertainty(double value_si, std::optional<double> expanded,
                                                 Quantity quantity);
 /// The value alone, to the place of two significant digits of its uncertainty.
-[[nodiscard]] std::string rounded_value(double si_value, std::optional<double> expanded,
+[[nodiscard]] std::string rounded_value(double value_si, std::optional<double> expanded,
                                         Quantity quantity);
 /// The uncertainty alone, two significant digits; "not determined" where there is none.
 [[nodiscard]] std::string uncertainty_text(std::optional<double> expanded, Quantity quantity);

@@ -47,9 +47,9 @@ AmountUnit amount_unit(const std::string& si_unit) {
   return found == kUnits.end() ? AmountUnit{1.0, si_unit} : found->second;
 }
 
-std::string amount_text(double si_value, const std::string& si_unit) {
+std::string amount_text(double value_si, const std::string& si_unit) {
   AmountUnit unit = amount_unit(si_unit);
-  double value = si_value * unit.factor;
+  double value = value_si * unit.factor;
   // A line of a rolling shutter takes microseconds.
   if (si_unit == "s" && std::abs(value) < 0.1) {
     value *= 1e3;

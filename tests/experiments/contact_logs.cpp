@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <functional>
-#include <numbers>
 #include <sstream>
 #include <string>
 
@@ -31,8 +30,6 @@ namespace {
 using namespace experiments;
 
 namespace fs = std::filesystem;
-
-constexpr double kQuarter = 0.5 * std::numbers::pi;
 
 class Folder {
  public:
@@ -123,11 +120,11 @@ constexpr double kBeforeObstacle_deg = -89.0;
 
 DynamicModel ur5_kinematics() {
   return dh_arm({{0, 0, 0.089159},
-                 {0, kQuarter, 0},
+                 {0, kQuarterTurn, 0},
                  {-0.425, 0, 0},
                  {-0.39225, 0, 0.10915},
-                 {0, kQuarter, 0.09465},
-                 {0, -kQuarter, 0.0823}});
+                 {0, kQuarterTurn, 0.09465},
+                 {0, -kQuarterTurn, 0.0823}});
 }
 
 // The part of a sweep before the obstacle, for certain: the first 60 %.
@@ -230,12 +227,12 @@ TorqueLog iiwa_log(const fs::path& set) {
 
 DynamicModel iiwa_kinematics() {
   return dh_arm({{0, 0, 0.36},
-                 {0, -kQuarter, 0},
-                 {0, kQuarter, 0.42},
-                 {0, kQuarter, 0},
-                 {0, -kQuarter, 0.4},
-                 {0, -kQuarter, 0},
-                 {0, kQuarter, 0.126}});
+                 {0, -kQuarterTurn, 0},
+                 {0, kQuarterTurn, 0.42},
+                 {0, kQuarterTurn, 0},
+                 {0, -kQuarterTurn, 0.4},
+                 {0, -kQuarterTurn, 0},
+                 {0, kQuarterTurn, 0.126}});
 }
 
 /// One constant speed after another, start-up included.
@@ -251,7 +248,7 @@ std::vector<TorqueLog> kinova_parts(const fs::path& set) {
     log.q = table.values.col(*table.column("q"));
     for (Eigen::Index t = 1; t < log.rows(); ++t) {
       const double step = log.q(t, 0) - log.q(t - 1, 0);
-      log.q(t, 0) -= 4.0 * kQuarter * std::round(step / (4.0 * kQuarter));
+      log.q(t, 0) -= 4.0 * kQuarterTurn * std::round(step / (4.0 * kQuarterTurn));
     }
     log.torque = table.values.col(*table.column("i_meas"));
     log.torque_unit = "A";

@@ -26,7 +26,7 @@ constexpr std::array kFiles{"base_sweep_1degps_1", "base_sweep_1degps_2", "base_
 constexpr double kFreeShare = 0.6;
 constexpr double kBetweenFiles_s = 100.0;
 
-struct Recording {
+struct Ur5Recording {
   std::string name;
   JointRun run;
   double stop_s = 0.0;
@@ -45,7 +45,7 @@ double first_departure(const Eigen::VectorXd& t, const Eigen::VectorXd& sensor) 
   return std::nan("");
 }
 
-Recording read_recording(const std::filesystem::path& folder, const std::string& name) {
+Ur5Recording read_recording(const std::filesystem::path& folder, const std::string& name) {
   const CsvTable table = read_csv(folder / (name + ".csv"));
   const auto column = [&](const char* header) {
     Eigen::VectorXd out(static_cast<Eigen::Index>(table.rows.size()));
@@ -54,7 +54,7 @@ Recording read_recording(const std::filesystem::path& folder, const std::string&
     }
     return out;
   };
-  Recording out;
+  Ur5Recording out;
   out.name = name;
   out.run.t_s = 1e-3 * column("t_ms");
   out.run.q = column("q_deg1");
@@ -71,14 +71,14 @@ Recording read_recording(const std::filesystem::path& folder, const std::string&
   return out;
 }
 
-std::vector<BalanceSample> residuals(const Recording& recording, const RippleModel& model,
+std::vector<BalanceSample> residuals(const Ur5Recording& recording, const RippleModel& model,
                                      Eigen::Index rows, double shift_s) {
   const JointRun& run = recording.run;
   return balance_samples((run.t_s.array() + shift_s).matrix().head(rows), run.current.head(rows),
                          model.predict(run).head(rows), model.sigma(run).head(rows));
 }
 
-std::vector<const JointRun*> without(const std::vector<Recording>& all, std::size_t a,
+std::vector<const JointRun*> without(const std::vector<Ur5Recording>& all, std::size_t a,
                                      std::size_t b) {
   std::vector<const JointRun*> runs;
   for (std::size_t k = 0; k < all.size(); ++k) {
@@ -87,7 +87,7 @@ std::vector<const JointRun*> without(const std::vector<Recording>& all, std::siz
   return runs;
 }
 
-std::vector<BalanceSample> calibration_samples(const std::vector<Recording>& all,
+std::vector<BalanceSample> calibration_samples(const std::vector<Ur5Recording>& all,
                                                std::size_t held_out,
                                                const std::vector<double>& frequencies) {
   std::vector<BalanceSample> out;
@@ -107,7 +107,7 @@ struct Outcome {
   int in_free_part = 0;
 };
 
-Outcome judge(const Recording& recording, const std::vector<DetectedContact>& detections) {
+Outcome judge(const Ur5Recording& recording, const std::vector<DetectedContact>& detections) {
   Outcome out;
   const double free_s = recording.run.t_s[recording.run.free];
   for (const DetectedContact& detection : detections) {
@@ -120,7 +120,7 @@ Outcome judge(const Recording& recording, const std::vector<DetectedContact>& de
   return out;
 }
 
-void print_outcome(const Recording& recording, const Outcome& outcome) {
+void print_outcome(const Ur5Recording& recording, const Outcome& outcome) {
   const JointRun& run = recording.run;
   if (std::isnan(outcome.first_s)) {
     std::printf(" | none before the end, %d in free part", outcome.in_free_part);
@@ -152,7 +152,7 @@ std::vector<DetectedContact> lowpass_alarms(double gain, const std::vector<Balan
 
 /// The gain with the most files that are stopped in time without an alarm before, then the earliest
 /// alarms: tuned on the very data it is judged on.
-double best_gain(const std::vector<Recording>& all,
+double best_gain(const std::vector<Ur5Recording>& all,
                  const std::vector<std::vector<BalanceSample>>& logs,
                  const std::vector<std::vector<BalanceSample>>& tests) {
   double best = -1e9;
@@ -180,7 +180,7 @@ void contact_on_ur5() {
     std::printf("ur5_contact: not on this machine\n");
     return;
   }
-  std::vector<Recording> all;
+  std::vector<Ur5Recording> all;
   for (const char* name : kFiles) all.push_back(read_recording(*folder, name));
   std::vector<ContactCalibration> calibrations;
   std::vector<std::vector<BalanceSample>> logs;

@@ -15,8 +15,6 @@ namespace kinescope::real {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kDegree = 0.017453292519943295;
-
 std::vector<std::string> numbered(const std::string& prefix, int count) {
   std::vector<std::string> names;
   for (int i = 1; i <= count; ++i) names.push_back(fmt::format("{}{}", prefix, i));
@@ -98,7 +96,7 @@ RecordingPaths motoman_tracker(const fs::path& data, const fs::path& into) {
     rows.push_back(
         {row[0].get<double>(), row[1].get<double>(), row[2].get<double>(), row[3].get<double>()});
   }
-  rows.front().alpha = 15.0 * kDegree;  // "same as left with alpha of the first row +15 deg"
+  rows.front().alpha = 15.0 * kRadPerDegree;  // "same as left with alpha of the first row +15 deg"
   write_nominal(into, classic_dh("motoman_right", rows, joints));
   return in_folder(into);
 }

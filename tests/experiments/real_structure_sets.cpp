@@ -16,7 +16,6 @@ namespace kinescope::real {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kDegree = 0.017453292519943295;
 constexpr double kMillimetre = 1e-3;
 
 std::vector<double> times_of(const std::vector<PoseRow>& rows) {
@@ -98,7 +97,7 @@ RecordingPaths laser_sweeps(const fs::path& data, const fs::path& into) {
   write_poses(into, poses);
   write_joints(
       into, times_of(poses), {"j1", "j2", "j3", "j4", "j5", "j6"},
-      kDegree * table.matrix({"j1_deg", "j2_deg", "j3_deg", "j4_deg", "j5_deg", "j6_deg"}));
+      kRadPerDegree * table.matrix({"j1_deg", "j2_deg", "j3_deg", "j4_deg", "j5_deg", "j6_deg"}));
   return in_folder(into);
 }
 

@@ -15,7 +15,6 @@ namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kQuarter = 0.5 * std::numbers::pi;
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::VectorXd column(const ChannelTable& table, const std::string& name) {
@@ -79,8 +78,8 @@ TorqueLog tx40_log(const fs::path& folder) {
   gears << 32, 32, 45, -48, 45, 32;
   Eigen::MatrixXd q = columns(table, "qm", 6) * gears.cwiseInverse().asDiagonal();
   q.col(5) -= q.col(4);
-  q.col(1).array() -= kQuarter;
-  q.col(2).array() += kQuarter;
+  q.col(1).array() -= kQuarterTurn;
+  q.col(2).array() += kQuarterTurn;
   Eigen::MatrixXd torque = taum * gears.asDiagonal();
   torque.col(4) += gears[5] * taum.col(5);
   return log_of("tx40", column(table, "t"), std::move(q), std::move(torque));
@@ -122,7 +121,7 @@ TorqueLog kinova_log(const fs::path& folder) {
   return join(runs);
 }
 
-DynamicModel pendulum() { return dh_arm({{0, kQuarter, 0}}); }
+DynamicModel pendulum() { return dh_arm({{0, kQuarterTurn, 0}}); }
 
 PendulumLog pendulum_log(const fs::path& folder, const std::string& servo, double mass_kg,
                          double length_m) {

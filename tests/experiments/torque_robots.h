@@ -4,6 +4,7 @@
 // cut them. Folders are those of the shared data; each has a README with origin and units.
 #pragma once
 
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "kinematics/model/dynamic_model.h"
 
 namespace kinescope {
+
+inline constexpr double kQuarterTurn = 0.5 * std::numbers::pi;
 
 /// The rows from one time to another, both included.
 [[nodiscard]] TorqueLog rows_between(const TorqueLog& log, double from_s, double to_s);

@@ -17,7 +17,7 @@ constexpr double kBefore = 2.0;    // s, in which play forgets where it began
 constexpr double kStep = 0.0005;   // s, of the play's memory
 constexpr double kGravity = 9.81;  // m/s^2
 constexpr double kCreep = 1.5;     // s
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kFullTurn = 2.0 * std::numbers::pi;
 
 std::size_t joint_named(const KinematicTree& tree, const std::string& name) {
   const auto joint = tree.joint(name);
@@ -91,7 +91,7 @@ Mechanics::Law encoder_law(const InjectedEffect& effect, bool turns, double phas
   }
   if (effect.effect == "gear_error") {
     // Periods a turn are radians of error a radian of the joint; on a slide, periods a metre.
-    const double wave = turns ? detail : kTwoPi * detail;
+    const double wave = turns ? detail : kFullTurn * detail;
     return [=](double q, const auto&, double) { return q + size * std::sin(wave * q + phase); };
   }
   return {};
@@ -111,7 +111,7 @@ Mechanics::Law law_of_time(const InjectedEffect& effect, double duration_s, doub
     };
   }
   if (effect.effect == "own_vibration") {
-    return [=, omega = kTwoPi * effect.detail](double q, const auto&, double t) {
+    return [=, omega = kFullTurn * effect.detail](double q, const auto&, double t) {
       return q + size * std::sin(omega * t + phase);
     };
   }
@@ -174,7 +174,7 @@ Mechanics::Motion motion_of(const InjectedEffect& effect, double phase,
   const double size = effect.size;
   if (effect.effect == "helical") {
     return [=](double q) {
-      return Pose{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, size * q / kTwoPi}} * before(q);
+      return Pose{{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, size * q / kFullTurn}} * before(q);
     };
   }
   if (effect.effect == "curved_slider") {
@@ -302,7 +302,7 @@ Mechanics::Mechanics(const FilmedRobot& robot, const std::vector<InjectedEffect>
 
 void Mechanics::add(const InjectedEffect& effect) {
   Rng rng = Rng::from_name(fmt::format("injected {} {}", effect.effect, effect.place), robot_.seed);
-  const double phase = rng.uniform(0.0, kTwoPi);
+  const double phase = rng.uniform(0.0, kFullTurn);
   const std::size_t j = joint_named(robot_.tree, effect.place);
   if (is_late_joint(effect)) {
     laws_[j].push_back(

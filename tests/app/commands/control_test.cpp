@@ -25,9 +25,9 @@ std::string path_csv(const std::vector<std::string>& joints, double duration_s, 
   std::string text = "t";
   for (const std::string& joint : joints) text += "," + joint;
   text += "\n";
-  constexpr double kRate_hz = 100.0;
-  for (int i = 0; i <= static_cast<int>(duration_s * kRate_hz); ++i) {
-    const double t = i / kRate_hz;
+  constexpr double kReferenceRate_hz = 100.0;
+  for (int i = 0; i <= static_cast<int>(duration_s * kReferenceRate_hz); ++i) {
+    const double t = i / kReferenceRate_hz;
     text += fmt::format("{}", t);
     for (std::size_t j = 0; j < joints.size(); ++j) {
       const double w = 1.3 + 0.41 * static_cast<double>(j) + 0.2 * phase;

@@ -15,6 +15,7 @@
 #include "kinematics/core/gzip.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "kinematics/urdf/urdf.h"
+#include "tests/app/commands/folder_contents.h"
 #include "tests/app/commands/poses_of_arm.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
@@ -798,16 +799,6 @@ const std::vector<LyingInput>& table() {
        {"torque.json"}},
   };
   return cases;
-}
-
-Files contents(const fs::path& folder) {
-  Files files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      files[entry.path().lexically_relative(folder).string()] = read_text_file(entry.path());
-    }
-  }
-  return files;
 }
 
 void expect_one_line(const Outcome& outcome) {

@@ -49,7 +49,7 @@ Recording with_columns(const std::vector<std::string>& columns) {
   return recording;
 }
 
-std::string refusal(const Recording& recording) {
+std::string refusal_of_channels(const Recording& recording) {
   try {
     static_cast<void>(match_channels(recording));
   } catch (const Error& error) {
@@ -83,13 +83,13 @@ TEST(NominalChannels, AColumnOfItsOwnComesBeforeFollowing) {
 }
 
 TEST(NominalChannels, AMisspeltColumnIsNamedWithItsJoint) {
-  const std::string misspelt = refusal(with_columns({"shoulder", "elbow", "fnger"}));
+  const std::string misspelt = refusal_of_channels(with_columns({"shoulder", "elbow", "fnger"}));
   EXPECT_NE(misspelt.find("'finger'"), std::string::npos) << misspelt;
   EXPECT_NE(misspelt.find("the column 'fnger'"), std::string::npos) << misspelt;
 }
 
 TEST(NominalChannels, AJointBeforeLoggedOnesMustBeLogged) {
-  const std::string missing = refusal(with_columns({"elbow", "finger"}));
+  const std::string missing = refusal_of_channels(with_columns({"elbow", "finger"}));
   EXPECT_NE(missing.find("'shoulder'"), std::string::npos) << missing;
   EXPECT_NE(missing.find("known: elbow, finger"), std::string::npos) << missing;
 }
@@ -97,7 +97,8 @@ TEST(NominalChannels, AJointBeforeLoggedOnesMustBeLogged) {
 TEST(NominalChannels, WithoutALogItsFileIsNamed) {
   Recording recording = with_columns({});
   recording.log = {};
-  EXPECT_NE(refusal(recording).find("lab/joints.csv"), std::string::npos) << refusal(recording);
+  EXPECT_NE(refusal_of_channels(recording).find("lab/joints.csv"), std::string::npos)
+      << refusal_of_channels(recording);
 }
 
 TEST(NominalChannels, FollowersHaveNoPlaceInTheOrder) {

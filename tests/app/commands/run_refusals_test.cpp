@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/app/commands/folder_contents.h"
 #include "tests/app/commands/poses_of_arm.h"
 #include "tests/app/commands/program.h"
 #include "tests/truth/render.h"
@@ -17,16 +18,6 @@ namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::map<std::string, std::string> contents(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      files[entry.path().lexically_relative(folder).string()] = read_text_file(entry.path());
-    }
-  }
-  return files;
-}
 
 class RunRefusals : public testing::Test {
  protected:

@@ -9,6 +9,7 @@
 
 #include "kinematics/core/file.h"
 #include "kinematics/log/joint_log.h"
+#include "kinematics/model/kinematic_tree.h"
 #include "tests/app/commands/poses_of_arm.h"
 #include "tests/app/commands/program.h"
 
@@ -17,12 +18,10 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-
 RecordingOptions exact() {
   RecordingOptions out;
   out.sigma_m = 3e-5;
-  out.sigma_rad = 0.01 * kDegree;
+  out.sigma_rad = 0.01 * kRadPerDegree;
   return out;
 }
 
@@ -79,7 +78,7 @@ TEST_F(SecondColumns, HowCommandsDifferIsSaid) {
 // The joints stand four fifths of the way from what is read to what is commanded.
 TEST_F(SecondColumns, ReadingsBeforeAJointHasComeToRestAreCorrected) {
   constexpr double kShare = 0.8;
-  constexpr double kLeft = 0.3 * kDegree;
+  constexpr double kLeft = 0.3 * kRadPerDegree;
   PosesOfArm early = arm("read early", exact());
   const JointLog truth = early.recording.log;
   JointLog& log = early.recording.log;

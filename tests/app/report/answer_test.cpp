@@ -8,10 +8,6 @@
 namespace kinescope {
 namespace {
 
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 // As where the frames of the joints are estimated.
 void add_turns(Calibration& calibration) {
   for (const Joint& joint : calibration.tree.joints) {

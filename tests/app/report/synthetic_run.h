@@ -4,6 +4,9 @@
 // uncertainties are plausible.
 #pragma once
 
+#include <string>
+#include <string_view>
+
 #include "app/report/run_summary.h"
 
 namespace kinescope {
@@ -20,5 +23,9 @@ struct SyntheticRunOptions {
 
 /// A chain of turn, turn, slide with a marker on the base and on each link.
 [[nodiscard]] RunSummary synthetic_run(const SyntheticRunOptions& options = {});
+
+[[nodiscard]] inline bool has(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
+}
 
 }  // namespace kinescope

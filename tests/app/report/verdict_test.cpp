@@ -10,10 +10,6 @@
 namespace kinescope {
 namespace {
 
-bool has(const std::string& text, std::string_view part) {
-  return text.find(part) != std::string::npos;
-}
-
 TEST(Verdict, OfAVideoWithALog) {
   const Verdict verdict = make_verdict(synthetic_run());
   EXPECT_TRUE(has(verdict.found, "3 joints in a chain (R R P)")) << verdict.found;

@@ -6,18 +6,13 @@
 #include "calib/bundle/folds.h"
 #include "calib/bundle/pose_block.h"
 #include "kinematics/core/rng.h"
+#include "tests/calib/bundle/random_pose.h"
 
 namespace kinescope::bundle {
 namespace {
 
 constexpr double kStep = 1e-6;
 constexpr double kSlopeTolerance = 1e-8;  // central differences of functions of order one
-
-Pose random_pose(Rng& rng) {
-  Vector6d d;
-  d << rng.normal3(1.0), rng.normal3(0.5);
-  return exp_pose(d);
-}
 
 struct Chain {
   Pose camera_base;
@@ -29,10 +24,10 @@ struct Chain {
 };
 
 Chain random_chain(Rng& rng) {
-  Chain chain{random_pose(rng), {}, random_pose(rng)};
+  Chain chain{random_pose(rng, 1.0, 0.5), {}, random_pose(rng, 1.0, 0.5)};
   for (const JointType type :
        {JointType::kRevolute, JointType::kPrismatic, JointType::kFixed, JointType::kRevolute}) {
-    chain.joints.push_back({type, rng.unit3(), random_pose(rng), rng.normal()});
+    chain.joints.push_back({type, rng.unit3(), random_pose(rng, 1.0, 0.5), rng.normal()});
   }
   return chain;
 }
@@ -82,7 +77,7 @@ TEST(PoseManifold, PlusAndMinusAreInverse) {
   Rng rng = Rng::from_name("pose manifold");
   const PoseManifold full({true, true, true, true, true, true});
   for (int trial = 0; trial < 50; ++trial) {
-    const PoseBlock x = to_block(random_pose(rng));
+    const PoseBlock x = to_block(random_pose(rng, 1.0, 0.5));
     Vector6d d;
     d << rng.normal3(0.3), rng.normal3(0.3);
     PoseBlock y{};
@@ -103,7 +98,7 @@ TEST(PoseManifold, JacobiansAgreeWithDifferences) {
   const PoseManifold manifold(mask);
   ASSERT_EQ(manifold.TangentSize(), 4);
   for (int trial = 0; trial < 20; ++trial) {
-    const PoseBlock x = to_block(random_pose(rng));
+    const PoseBlock x = to_block(random_pose(rng, 1.0, 0.5));
     Eigen::Matrix<double, 7, 4, Eigen::RowMajor> plus;
     Eigen::Matrix<double, 4, 7, Eigen::RowMajor> minus;
     ASSERT_TRUE(manifold.PlusJacobian(x.data(), plus.data()));

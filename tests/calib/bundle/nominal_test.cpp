@@ -12,11 +12,12 @@
 #include "calib/bundle/place_markers.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
+#include "tests/calib/bundle/random_pose.h"
 
 namespace kinescope {
 namespace {
 
-constexpr int kPostures = 80;
+constexpr int kLabPostures = 80;
 constexpr double kDistance = std::numbers::sqrt3;  // rms, over the sigma of a coordinate
 
 struct Lab {
@@ -27,12 +28,6 @@ struct Lab {
   JointLog log;
   std::vector<double> times_s;
 };
-
-Pose random_pose(Rng& rng, double rad, double m) {
-  Vector6d d;
-  d << rng.normal3(rad), rng.normal3(m);
-  return exp_pose(d);
-}
 
 // A six-axis arm whose drawing is wrong by `offset_rad` at every zero and `geometry` at every
 // frame.
@@ -58,8 +53,8 @@ Lab make_lab(const char* name, double offset_rad, double geometry) {
                            Pose{exp_rotation({0.0, 0.0, rng.normal(offset_rad)}), {0, 0, 0}};
   }
   lab.T_tracker_base = random_pose(rng, 1.0, 1.0);
-  lab.values.resize(kPostures, 6);
-  for (int f = 0; f < kPostures; ++f) {
+  lab.values.resize(kLabPostures, 6);
+  for (int f = 0; f < kLabPostures; ++f) {
     lab.times_s.push_back(f);
     for (int j = 0; j < 6; ++j) lab.values(f, j) = rng.uniform(-1.5, 1.5);
   }
@@ -88,7 +83,7 @@ Calibration run(const Lab& lab, const Measurements& measurements, const Placemen
 Measurements tracked_poses(const Lab& lab, const Pose& mount, double sigma_rad, double sigma_m) {
   Rng rng = Rng::from_name("tracked poses");
   PoseTrack track{TagId{3}, {}};
-  for (int f = 0; f < kPostures; ++f) {
+  for (int f = 0; f < kLabPostures; ++f) {
     PoseSample sample;
     sample.frame = f;
     Vector6d noise;
@@ -317,7 +312,7 @@ TEST(Nominal, PointsOfATracker) {
   Measurements measurements;
   measurements.times_s = lab.times_s;
   measurements.points.times_s = lab.times_s;
-  for (int f = 0; f < kPostures; ++f) {
+  for (int f = 0; f < kLabPostures; ++f) {
     const Eigen::Vector3d seen = lab.T_tracker_base * (flange(lab, f) * ball) + rng.normal3(kSigma);
     measurements.points.observations.push_back({f, TagId{1}, seen, "", kSigma});
   }
@@ -333,7 +328,7 @@ TEST(Nominal, PointsOfATracker) {
 TEST(Nominal, WhatMovesNoMeasurementHasNoUncertainty) {
   const Lab lab = make_lab("a turn of a point", 0.01, 0.002);
   Measurements measurements;
-  for (int f = 0; f < kPostures; ++f)
+  for (int f = 0; f < kLabPostures; ++f)
     measurements.points.observations.push_back(
         {f, TagId{0}, lab.T_tracker_base * flange(lab, f) * Eigen::Vector3d(0.02, 0.01, 0.12), "",
          1e-4});

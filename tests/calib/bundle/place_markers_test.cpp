@@ -13,19 +13,14 @@
 
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
+#include "tests/calib/bundle/random_pose.h"
 
 namespace kinescope {
 namespace {
 
 constexpr int kPostures = 60;
-constexpr double kSigmaRad = 2e-4;
-constexpr double kSigmaM = 1e-4;
-
-Pose random_pose(Rng& rng, double rad, double m) {
-  Vector6d d;
-  d << rng.normal3(rad), rng.normal3(m);
-  return exp_pose(d);
-}
+constexpr double kMarkerSigmaRad = 2e-4;
+constexpr double kMarkerSigmaM = 1e-4;
 
 struct Robot {
   KinematicTree tree;
@@ -83,7 +78,7 @@ Robot make_robot(const KinematicTree& tree, const std::vector<int>& links, std::
       sample.frame = f;
       const auto at = forward_kinematics(tree, robot.values.row(f));
       sample.T_camera_marker = robot.T_camera_base * at[static_cast<std::size_t>(links[m])] *
-                               mount * random_pose(rng, kSigmaRad, kSigmaM);
+                               mount * random_pose(rng, kMarkerSigmaRad, kMarkerSigmaM);
       track.samples.push_back(sample);
     }
     robot.tracks.tracks.push_back(track);
@@ -106,8 +101,8 @@ Placement expect_placed(const Robot& robot, const std::vector<int>& links) {
       squares += log_pose(predicted.inverse() * sample.T_camera_marker).array().square().matrix();
     }
     const Vector6d rms = (squares / kPostures).cwiseSqrt();
-    EXPECT_LT(rms.head<3>().maxCoeff(), 1.5 * kSigmaRad) << "tag " << m;
-    EXPECT_LT(rms.tail<3>().maxCoeff(), 1.5 * kSigmaM) << "tag " << m;
+    EXPECT_LT(rms.head<3>().maxCoeff(), 1.5 * kMarkerSigmaRad) << "tag " << m;
+    EXPECT_LT(rms.tail<3>().maxCoeff(), 1.5 * kMarkerSigmaM) << "tag " << m;
   }
   return placement;
 }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kExact = 1e-12;  // rad: a sine and a sum
 
 // Two hinges; the second one's channel counts ticks.
-constexpr double kTick = 1e-3;
+constexpr double kRadPerTick = 1e-3;
 constexpr double kZero = 0.2;
 
 KinematicTree robot() {
@@ -32,7 +32,7 @@ KinematicTree robot() {
     joint.T_parent_joint.translation = {0.3, 0.0, 0.1};
     tree.joints.push_back(joint);
   }
-  tree.joints[1].scale = kTick;
+  tree.joints[1].scale = kRadPerTick;
   tree.joints[1].offset = kZero;
   return tree;
 }
@@ -53,7 +53,7 @@ JointLog log_of(const Eigen::MatrixXd& joint_values) {
   log.source = "new_joints.csv";
   log.channels = {"axis2", "axis1"};
   log.values.resize(joint_values.rows(), 2);
-  log.values.col(0) = (joint_values.col(1).array() - kZero) / kTick;
+  log.values.col(0) = (joint_values.col(1).array() - kZero) / kRadPerTick;
   log.values.col(1) = joint_values.col(0);
   for (Eigen::Index i = 0; i < joint_values.rows(); ++i)
     log.times_s.push_back(5.0 + 0.02 * static_cast<double>(i));
@@ -63,7 +63,7 @@ JointLog log_of(const Eigen::MatrixXd& joint_values) {
 Eigen::MatrixXd values_of(const JointLog& log) {
   Eigen::MatrixXd out(log.values.rows(), 2);
   out.col(0) = log.values.col(1);
-  out.col(1) = (kTick * log.values.col(0).array() + kZero).matrix();
+  out.col(1) = (kRadPerTick * log.values.col(0).array() + kZero).matrix();
   return out;
 }
 
@@ -138,7 +138,7 @@ TEST(CorrectedLog, AJointThatTwoChannelsMoveStandsWhereBothPutIt) {
   KinematicTree coupled = robot();
   coupled.joints[1].couplings = {{"axis1", kRatio}};
   const Eigen::MatrixXd logged = values_as_logged();
-  const Eigen::ArrayXd q = logged.col(1).array() + kRatio * kTick * logged.col(0).array();
+  const Eigen::ArrayXd q = logged.col(1).array() + kRatio * kRadPerTick * logged.col(0).array();
   Eigen::MatrixXd truth = logged;
   truth.col(1).array() += 0.004 * q.sin();
   expect_values(corrected_log(log_of(logged), coupled,

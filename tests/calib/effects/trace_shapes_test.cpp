@@ -78,9 +78,9 @@ TEST(TraceCalibration, APlaceInTheImageIsWhereTheCornerIsExpected) {
     return bundle.fit({}, {}).place_px;
   };
   // The same errors, of two sizes.
-  constexpr double kNoise = 0.5;  // px
-  const Eigen::MatrixX2d once = places_of(kNoise);
-  const Eigen::MatrixX2d twice = places_of(2.0 * kNoise);
+  constexpr double kCornerNoise = 0.5;  // px
+  const Eigen::MatrixX2d once = places_of(kCornerNoise);
+  const Eigen::MatrixX2d twice = places_of(2.0 * kCornerNoise);
   ASSERT_EQ(once.rows(), twice.rows());
   double sum = 0.0;
   int count = 0;
@@ -90,7 +90,7 @@ TEST(TraceCalibration, APlaceInTheImageIsWhereTheCornerIsExpected) {
     count += 2;
   }
   ASSERT_GT(count, 1000);
-  EXPECT_LT(std::sqrt(sum / count), 0.3 * kNoise);
+  EXPECT_LT(std::sqrt(sum / count), 0.3 * kCornerNoise);
 }
 
 TEST(TraceCalibration, AShiftByPlaceIsUnknownOverThePlaceInTheImage) {

@@ -11,7 +11,7 @@
 namespace kinescope {
 namespace {
 
-constexpr int kFrames = 60;
+constexpr int kObservedFrames = 60;
 
 Pose pose(double turn, const Eigen::Vector3d& at) {
   return {exp_rotation(Eigen::Vector3d(0.3, -0.2, 1.0).normalized() * turn), at};
@@ -29,9 +29,9 @@ Calibration robot() {
     joint.T_parent_joint = pose(0.9 * (j + 1), {0.3, 0.05 * j, 0.1});
   }
   out.T_camera_base = pose(-0.7, {0.1, 0.2, 1.5});
-  out.joint_values.resize(kFrames, 2);
+  out.joint_values.resize(kObservedFrames, 2);
   Rng rng = Rng::from_name("carrying link");
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kObservedFrames; ++f) {
     out.joint_values.row(f) << rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0);
     out.times_s.push_back(f);
   }
@@ -46,7 +46,7 @@ TEST_P(CarryingLink, IsTheOneInWhoseFrameTheMarkerStandsMostStill) {
   const Pose T_link_marker = pose(0.4, {0.08, -0.03, 0.02});
   PoseTrack track{TagId{7}, {}};
   Rng rng = Rng::from_name("bent marker");
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kObservedFrames; ++f) {
     const Pose link = of.T_camera_base * forward_kinematics(of.tree, of.joint_values.row(f))
                                              .at(static_cast<std::size_t>(GetParam()));
     PoseSample sample;

@@ -8,14 +8,14 @@
 namespace kinescope {
 namespace {
 
-constexpr int kFrames = 200;
+constexpr int kScoredFrames = 200;
 
 // A model of one body that was seen in every frame, and is off by `sigma_m`.
 Calibration off_by(double sigma_m) {
   Rng rng = Rng::from_name("predictive score");
   Calibration out;
   out.kind = MeasurementKind::kPoint;
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kScoredFrames; ++f) {
     SightingResidual residual;
     residual.frame = f;
     residual.id = TagId{1};
@@ -28,7 +28,7 @@ Calibration off_by(double sigma_m) {
 
 Measurements seen() {
   Measurements out;
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kScoredFrames; ++f) {
     PointObservation point;
     point.frame = f;
     point.id = TagId{1};
@@ -44,8 +44,8 @@ double odds(const Calibration& of, const Calibration& against) {
 
 TEST(PredictiveScore, TheNearerModelIsTheMoreProbable) {
   // Of noise that is known, n d ln(ratio).
-  EXPECT_NEAR(odds(off_by(1e-3), off_by(2e-3)), 3.0 * kFrames * std::log(2.0), 1e-6);
-  EXPECT_NEAR(odds(off_by(2e-3), off_by(1e-3)), -3.0 * kFrames * std::log(2.0), 1e-6);
+  EXPECT_NEAR(odds(off_by(1e-3), off_by(2e-3)), 3.0 * kScoredFrames * std::log(2.0), 1e-6);
+  EXPECT_NEAR(odds(off_by(2e-3), off_by(1e-3)), -3.0 * kScoredFrames * std::log(2.0), 1e-6);
 }
 
 TEST(PredictiveScore, OneOutlierIsNoReasonToGiveUpAModel) {
@@ -57,7 +57,7 @@ TEST(PredictiveScore, OneOutlierIsNoReasonToGiveUpAModel) {
 
 TEST(PredictiveScore, WhatAModelHasNoPlaceForMayBeAnywhere) {
   Calibration fewer = off_by(1e-3);
-  fewer.residuals.resize(kFrames / 2);
+  fewer.residuals.resize(kScoredFrames / 2);
   EXPECT_LT(odds(fewer, off_by(1e-3)), 0.0);
   EXPECT_LT(odds(fewer, off_by(5e-3)), 0.0);
 }

@@ -9,7 +9,7 @@
 namespace kinescope::trace {
 namespace {
 
-constexpr int kInstants = 300;
+constexpr int kMotionInstants = 300;
 constexpr int kBodies = 3;
 constexpr int kRowsOfBody = 4;
 
@@ -25,12 +25,12 @@ Linearisation world(const Unrest& unrest) {
   Rng rng(7);
   constexpr int kRows = kBodies * kRowsOfBody;
   Linearisation out;
-  out.residual.resize(kInstants * kRows);
+  out.residual.resize(kMotionInstants * kRows);
   out.unit = Eigen::VectorXd::Ones(out.residual.size());
   out.jacobian = RowMatrix::Zero(out.residual.size(), 1);
-  out.time_s = Eigen::VectorXd::LinSpaced(kInstants, 0.0, 10.0);
+  out.time_s = Eigen::VectorXd::LinSpaced(kMotionInstants, 0.0, 10.0);
   std::vector<Eigen::Triplet<double>> carriers;
-  for (int i = 0; i < kInstants; ++i) {
+  for (int i = 0; i < kMotionInstants; ++i) {
     out.first_row.push_back(i * kRows);
     out.fold.push_back(i % 5);
     const double shake = rng.normal(unrest.shake);
@@ -49,7 +49,7 @@ Linearisation world(const Unrest& unrest) {
       }
     }
   }
-  out.first_row.push_back(kInstants * kRows);
+  out.first_row.push_back(kMotionInstants * kRows);
   out.carriers.resize(out.residual.size(), 2);
   out.carriers.setFromTriplets(carriers.begin(), carriers.end());
   return out;

@@ -13,7 +13,7 @@ namespace kinescope::trace {
 namespace {
 
 constexpr Eigen::Index kInstants = 240;
-constexpr Eigen::Index kRows = 3;  // an instant
+constexpr Eigen::Index kRowsPerInstant = 3;
 constexpr Eigen::Index kParameters = 4;
 
 // Normal equations lose half of a double's digits, twice solved.
@@ -26,7 +26,7 @@ constexpr double kRidge = 1e-6;
 Linearisation linear_model(double memory = 0.5) {
   Linearisation out;
   Rng rng = Rng::from_name("score test");
-  const Eigen::Index rows = kInstants * kRows;
+  const Eigen::Index rows = kInstants * kRowsPerInstant;
   out.residual.resize(rows);
   out.jacobian.resize(rows, kParameters);
   double noise = 0.0;
@@ -42,7 +42,7 @@ Linearisation linear_model(double memory = 0.5) {
   out.carriers.setFromTriplets(entries.begin(), entries.end());
   out.prior = 5.0 * Eigen::MatrixXd::Identity(kParameters, kParameters);
   out.time_s = Eigen::VectorXd::LinSpaced(kInstants, 0.0, 0.1 * (kInstants - 1));
-  for (Eigen::Index i = 0; i <= kInstants; ++i) out.first_row.push_back(i * kRows);
+  for (Eigen::Index i = 0; i <= kInstants; ++i) out.first_row.push_back(i * kRowsPerInstant);
   for (Eigen::Index i = 0; i < kInstants; ++i) out.fold.push_back(static_cast<int>(i / 11 % 5));
   out.unit = Eigen::VectorXd::Constant(rows, 0.1);
   out.unit_name = "px";
@@ -62,7 +62,8 @@ Eigen::MatrixXd explicit_columns(const Linearisation& linear,
   const Eigen::MatrixXd carriers(linear.carriers);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     for (Eigen::Index row = 0; row < out.rows(); ++row) {
-      const double share = columns[k].share.size() == 0 ? 1.0 : columns[k].share[row / kRows];
+      const double share =
+          columns[k].share.size() == 0 ? 1.0 : columns[k].share[row / kRowsPerInstant];
       out(row, static_cast<Eigen::Index>(k)) = share * carriers(row, columns[k].carrier);
     }
   }
@@ -138,7 +139,7 @@ TEST(ScoreTest, CovarianceIsTheSandwichOverStretches) {
   const auto stretches = static_cast<Eigen::Index>(partition.stretches);
   Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(kParameters + 2, stretches);
   for (Eigen::Index row = 0; row < left.size(); ++row) {
-    scores.col(partition.stretch[static_cast<std::size_t>(row / kRows)]) +=
+    scores.col(partition.stretch[static_cast<std::size_t>(row / kRowsPerInstant)]) +=
         left[row] * plain.A.row(row).transpose();
   }
   const auto m = static_cast<double>(stretches);
@@ -158,7 +159,8 @@ Eigen::MatrixXd explicit_jackknife(const Linearisation& linear, const Partition&
   for (int s = 0; s < partition.stretches; ++s) {
     Eigen::VectorXd weights = ones(linear);
     for (Eigen::Index row = 0; row < weights.size(); ++row) {
-      if (partition.stretch[static_cast<std::size_t>(row / kRows)] == s) weights[row] = 0.0;
+      if (partition.stretch[static_cast<std::size_t>(row / kRowsPerInstant)] == s)
+        weights[row] = 0.0;
     }
     estimates.col(s) = plain_fit(linear, E, weights).solution.tail(count);
   }
@@ -277,8 +279,8 @@ TEST(ScoreTest, FewStretchesAreJudgedByWhatOtherWindowsShow) {
     Eigen::VectorXd drift;
     for (Eigen::Index i = 0; i < kInstants; ++i) {
       if (i % kWindow == 0) drift = Eigen::VectorXd::NullaryExpr(3, [&] { return rng.normal(); });
-      linear.residual.segment(i * kRows, kRows) =
-          linear.carriers.middleRows(i * kRows, kRows) * (0.6 * drift);
+      linear.residual.segment(i * kRowsPerInstant, kRowsPerInstant) =
+          linear.carriers.middleRows(i * kRowsPerInstant, kRowsPerInstant) * (0.6 * drift);
     }
     for (double& r : linear.residual) r += rng.normal();
     const NormalSystem system(linear, make_partition(linear));

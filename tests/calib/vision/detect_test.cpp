@@ -16,7 +16,7 @@
 namespace kinescope {
 namespace {
 
-constexpr int kFrames = 24;
+constexpr int kFilmedFrames = 24;
 constexpr double kErrors = 5.0;  // sigmas, of 24 x 2 x 8 coordinates none should be beyond
 
 // Two markers, one at rest, one that moves and turns.
@@ -26,7 +26,7 @@ class Detect : public TemporaryFolder {
     TemporaryFolder::SetUp();
     camera_ = pinhole_guess(320, 240, 500.0);
     Rng rng = Rng::from_name("detect");
-    for (int f = 0; f < kFrames; ++f) {
+    for (int f = 0; f < kFilmedFrames; ++f) {
       PlacedMarker still;
       still.art = apriltag_art("tag36h11", 4);
       still.T_camera_tag = pose_showing(camera_, {70.0, 70.0}, 60.0, still.size_m, 0.3, 0.2, 0.1);
@@ -42,7 +42,7 @@ class Detect : public TemporaryFolder {
 
   std::filesystem::path image_folder() const {
     std::string times = "image,t\n";
-    for (int f = 0; f < kFrames; ++f) {
+    for (int f = 0; f < kFilmedFrames; ++f) {
       const GreyImage& image = frames_[static_cast<std::size_t>(f)];
       const std::string name = fmt::format("{:03d}.png", f);
       const cv::Mat picture(image.height, image.width, CV_8UC1,
@@ -76,9 +76,9 @@ TEST_F(Detect, FindsEveryMarkerInEveryFrameWhereItIs) {
   const Detection found = detect_tags(image_folder(), markers_);
   EXPECT_EQ(found.observations.width, 320);
   EXPECT_EQ(found.observations.height, 240);
-  ASSERT_EQ(found.observations.times_s.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(found.observations.times_s.size(), static_cast<std::size_t>(kFilmedFrames));
   EXPECT_DOUBLE_EQ(found.observations.times_s[7], 0.7);
-  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFrames));
+  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFilmedFrames));
   EXPECT_TRUE(found.observations.rejected.empty());
   EXPECT_TRUE(found.warnings.empty());
   expect_truth(found, 0.0);
@@ -86,7 +86,7 @@ TEST_F(Detect, FindsEveryMarkerInEveryFrameWhereItIs) {
 
 TEST_F(Detect, TheCamerasToneCurveIsCorrectedAndNamed) {
   Rng rng = Rng::from_name("detect, tone");
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kFilmedFrames; ++f) {
     std::vector<PlacedMarker> all(2);
     for (std::size_t i = 0; i < 2; ++i) {
       all[i].art = apriltag_art("tag36h11", i == 0 ? 4 : 9);
@@ -98,7 +98,7 @@ TEST_F(Detect, TheCamerasToneCurveIsCorrectedAndNamed) {
         render_markers(camera_, all, {.supersample = 4, .gamma = 2.2}, rng);
   }
   const Detection found = detect_tags(image_folder(), markers_);
-  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFrames));
+  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFilmedFrames));
   ASSERT_EQ(found.warnings.size(), 1U);
   EXPECT_NE(found.warnings[0].find("tone curve"), std::string::npos) << found.warnings[0];
   EXPECT_NE(found.warnings[0].find("corrected"), std::string::npos) << found.warnings[0];
@@ -107,10 +107,10 @@ TEST_F(Detect, TheCamerasToneCurveIsCorrectedAndNamed) {
 
 TEST_F(Detect, FromAVideoToo) {
   VideoSpec spec{frames_, {}, 2};
-  for (int f = 0; f < kFrames; ++f) spec.stamps_ms.push_back(33 * f);
+  for (int f = 0; f < kFilmedFrames; ++f) spec.stamps_ms.push_back(33 * f);
   write_video(folder_ / "v.mp4", spec);
   const Detection found = detect_tags(folder_ / "v.mp4", markers_);
-  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFrames));
+  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(2 * kFilmedFrames));
   constexpr double kMpeg4 = 0.05;  // px, what this codec moves edges by
   expect_truth(found, kMpeg4);
 }
@@ -122,7 +122,7 @@ TEST_F(Detect, MarkersThatEnterAndLeaveAreNoticed) {
   constexpr int kLeaves = 17;
   Rng rng = Rng::from_name("detect, entering");
   VideoSpec spec{frames_, {}, 0};
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kFilmedFrames; ++f) {
     spec.stamps_ms.push_back(33 * f);
     std::vector<PlacedMarker> all;
     const std::map<int, Eigen::Vector2d> places = {
@@ -142,14 +142,14 @@ TEST_F(Detect, MarkersThatEnterAndLeaveAreNoticed) {
   const Detection found = detect_tags(folder_ / "v.mp4", markers_);
   std::map<int, int> count;
   for (const TagObservation& tag : found.observations.observations) ++count[tag.id.value];
-  EXPECT_EQ(count[4], kFrames);
+  EXPECT_EQ(count[4], kFilmedFrames);
   EXPECT_EQ(count[9], kLeaves);
-  EXPECT_EQ(count[12], kFrames - kEnters);
+  EXPECT_EQ(count[12], kFilmedFrames - kEnters);
 }
 
 TEST_F(Detect, TheNumberOfThreadsChangesNothing) {
   VideoSpec spec{frames_, {}, 2};
-  for (int f = 0; f < kFrames; ++f) spec.stamps_ms.push_back(33 * f);
+  for (int f = 0; f < kFilmedFrames; ++f) spec.stamps_ms.push_back(33 * f);
   const auto folder = folder_ / "v.mp4";
   write_video(folder, spec);
   DetectOptions one;
@@ -180,16 +180,16 @@ TEST_F(Detect, ReportsProgressAndReadsWhatIsAsked) {
         last = done;
         total = all;
       });
-  EXPECT_EQ(last, kFrames);
-  EXPECT_EQ(total, kFrames);
-  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(kFrames));
-  EXPECT_EQ(found.observations.rejected.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(last, kFilmedFrames);
+  EXPECT_EQ(total, kFilmedFrames);
+  EXPECT_EQ(found.observations.observations.size(), static_cast<std::size_t>(kFilmedFrames));
+  EXPECT_EQ(found.observations.rejected.size(), static_cast<std::size_t>(kFilmedFrames));
 }
 
 TEST_F(Detect, NoMarkerIsAnAnswerToo) {
   for (GreyImage& image : frames_) std::ranges::fill(image.pixels, std::uint8_t{128});
   const Detection found = detect_tags(image_folder(), markers_);
-  EXPECT_EQ(found.observations.times_s.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(found.observations.times_s.size(), static_cast<std::size_t>(kFilmedFrames));
   EXPECT_TRUE(found.observations.observations.empty());
 }
 

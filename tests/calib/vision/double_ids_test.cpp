@@ -19,14 +19,15 @@ using Seen = std::function<bool(int)>;
 
 bool always(int /*frame*/) { return true; }
 
-struct Scene {
+struct DoubledSightings {
   TagObservations all;
   double rate_hz = 30.0;
 
-  Scene() {
+  DoubledSightings() {
     for (int f = 0; f < kFrames; ++f) all.times_s.push_back(f / rate_hz);
   }
-  Scene& add(const Place& place, const Seen& seen = always, double margin = 80.0, int id = 265) {
+  DoubledSightings& add(const Place& place, const Seen& seen = always, double margin = 80.0,
+                        int id = 265) {
     for (int f = 0; f < kFrames; ++f) {
       if (!seen(f)) continue;
       TagObservation tag;
@@ -72,7 +73,7 @@ const char* const kNoneTaken =
     "one is the robot's)";
 
 TEST(DoubleIds, OneAtRestAndOneThatMoves) {
-  Scene scene;
+  DoubledSightings scene;
   scene.add(robot).add(sheet);
   EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kMovingTaken});
   EXPECT_EQ(scene.left_at(robot), static_cast<std::size_t>(kFrames));
@@ -83,7 +84,7 @@ TEST(DoubleIds, OneAtRestAndOneThatMoves) {
 TEST(DoubleIds, OfTheMovingOneAlsoStretchesInWhichTheOtherIsHidden) {
   // The robot's marker is lost now and then, and the spare one for good.
   const Seen robot_seen = [](int f) { return f % 40 < 25; };
-  Scene scene;
+  DoubledSightings scene;
   scene.add(robot, robot_seen).add(sheet, [](int f) { return f < 60; });
   EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kMovingTaken});
   EXPECT_EQ(scene.left_at(robot), 75U);
@@ -92,7 +93,7 @@ TEST(DoubleIds, OfTheMovingOneAlsoStretchesInWhichTheOtherIsHidden) {
 
 TEST(DoubleIds, SeenInTurns) {
   // Never in the same frame: what follows in windows often sees one of them only.
-  Scene scene;
+  DoubledSightings scene;
   scene.add(robot, [](int f) { return f % 2 == 0; });
   scene.add(sheet, [](int f) { return f % 2 == 1; });
   EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kMovingTaken});
@@ -102,7 +103,7 @@ TEST(DoubleIds, SeenInTurns) {
 
 TEST(DoubleIds, ARobotThatRestsBetweenMoves) {
   const Place stops = [](double t) { return robot(t < 1.5 ? 0.0 : std::min(t - 1.5, 1.0)); };
-  Scene scene;
+  DoubledSightings scene;
   // Hidden before it moves, so that its rest is a tracklet of its own.
   scene.add(stops, [](int f) { return f < 25 || f > 55; }).add(sheet);
   EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kMovingTaken});
@@ -111,7 +112,7 @@ TEST(DoubleIds, ARobotThatRestsBetweenMoves) {
 }
 
 TEST(DoubleIds, PosturesOneByOne) {
-  Scene scene;
+  DoubledSightings scene;
   for (double& t : scene.all.times_s) t *= 60.0;  // 2 s apart
   scene.add([](double t) { return Eigen::Vector2d{robot(37.0 * t)}; }).add(sheet);
   EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kMovingTaken});
@@ -122,7 +123,7 @@ TEST(DoubleIds, PosturesOneByOne) {
 TEST(DoubleIds, TwoThatMoveOrTwoAtRestAreLeftOut) {
   const Place second = [](double t) { return Eigen::Vector2d{robot(t + 3.0) + sheet(t)}; };
   for (const auto& [a, b] : {std::pair<Place, Place>{robot, second}, {sheet, other_sheet}}) {
-    Scene scene;
+    DoubledSightings scene;
     scene.add(a).add(b).add(robot, always, 80.0, 7);
     EXPECT_EQ(scene.sort_out(), std::vector<std::string>{kNoneTaken});
     EXPECT_EQ(scene.all.observations.size(), static_cast<std::size_t>(kFrames));
@@ -135,25 +136,25 @@ TEST(DoubleIds, OneMarkerIsOne) {
   const Place there_and_back = [](double t) {
     return t < 1.0 || t > 3.0 ? robot(0.0) : robot(std::abs(t - 2.0));
   };
-  Scene scene;
+  DoubledSightings scene;
   scene.add(there_and_back, [](int f) { return f % 30 < 24; });
   EXPECT_TRUE(scene.sort_out().empty());
   // A shadow that is taken for the marker now and then.
-  Scene ghosts;
+  DoubledSightings ghosts;
   ghosts.add(robot).add(sheet, [](int f) { return f % 12 == 0; }, 20.0);
   for (const std::string& warning : ghosts.sort_out()) {
     EXPECT_EQ(warning.find(kTwoMarkers), std::string::npos) << warning;
   }
   EXPECT_EQ(ghosts.left_at(robot), static_cast<std::size_t>(kFrames));
   // A base marker beside a pattern on the robot that is taken for it.
-  Scene base;
+  DoubledSightings base;
   base.add(sheet).add(robot, [](int f) { return f > 100; }, 20.0);
   for (const std::string& warning : base.sort_out()) {
     EXPECT_EQ(warning.find(kTwoMarkers), std::string::npos) << warning;
   }
   EXPECT_EQ(base.left_at(sheet), static_cast<std::size_t>(kFrames));
   // Stops reached from one frame to the next.
-  Scene stops;
+  DoubledSightings stops;
   stops.add([](double t) { return robot(10.0 * std::floor(2.0 * t)); });
   EXPECT_TRUE(stops.sort_out().empty());
 }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMarkers = 6;
 constexpr int kViewsOfEach = 2;
-const TagLayout kLayout{};  // tag36h11
+const TagLayout kTag36h11{};
 
 // Pictures of one camera, about 60 px large.
 struct Pictures {
@@ -39,7 +39,7 @@ struct Pictures {
       truth.push_back(true_corners(camera, marker));
     }
     for (std::size_t i = 0; i < images.size(); ++i) {
-      const RefinedCorners refined = refine_border(images[i].view(), truth[i], kLayout);
+      const RefinedCorners refined = refine_border(images[i].view(), truth[i], kTag36h11);
       EXPECT_EQ(refined.status, RefineStatus::kDone);
       views.push_back({images[i].view(), TagId{static_cast<int>(i) % kMarkers}, refined.corners_px,
                        PlacedMarker{}.size_m});
@@ -51,7 +51,7 @@ struct Pictures {
   [[nodiscard]] double outward(const ToneCurve& tone) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < images.size(); ++i) {
-      const Corners found = refine_border(images[i].view(), truth[i], kLayout, tone).corners_px;
+      const Corners found = refine_border(images[i].view(), truth[i], kTag36h11, tone).corners_px;
       const Eigen::Vector2d middle = 0.25 * (truth[i][0] + truth[i][1] + truth[i][2] + truth[i][3]);
       for (std::size_t c = 0; c < 4; ++c)
         sum += (found[c] - truth[i][c]).dot((truth[i][c] - middle).normalized());
@@ -64,7 +64,7 @@ TEST(FindTone, CornersAreWhereTheyShouldBeInItsLight) {
   for (const double gamma : {1.8, 2.2}) {
     const Pictures pictures({.supersample = 4, .gamma = gamma});
     EXPECT_LT(pictures.outward(ToneCurve()), -0.25);
-    const std::optional<FoundTone> found = find_tone(pictures.views, kLayout);
+    const std::optional<FoundTone> found = find_tone(pictures.views, kTag36h11);
     ASSERT_TRUE(found && found->is_explained());
     EXPECT_NEAR(found->curve.gamma(), gamma, 0.08);
     EXPECT_NEAR(pictures.outward(found->curve), 0.0, 0.02);
@@ -76,14 +76,14 @@ TEST(FindTone, CornersAreWhereTheyShouldBeInItsLight) {
 TEST(FindTone, NothingInLinearPictures) {
   for (const double noise : {2.0, 6.0}) {
     const Pictures pictures({.noise = noise, .supersample = 4});
-    EXPECT_FALSE(find_tone(pictures.views, kLayout));
+    EXPECT_FALSE(find_tone(pictures.views, kTag36h11));
   }
 }
 
 // What is whiter than white spreads further than any tone curve lets it.
 TEST(FindTone, OverexposureIsNoToneCurve) {
   const Pictures pictures({.black = 60.0, .white = 2500.0, .supersample = 4});
-  const std::optional<FoundTone> found = find_tone(pictures.views, kLayout);
+  const std::optional<FoundTone> found = find_tone(pictures.views, kTag36h11);
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->is_explained());
   EXPECT_GT(found->shift_px, 0.3);
@@ -91,8 +91,8 @@ TEST(FindTone, OverexposureIsNoToneCurve) {
 
 TEST(FindTone, FewViewsTellNothing) {
   const Pictures pictures({.supersample = 4, .gamma = 2.2});
-  EXPECT_FALSE(find_tone(std::span(pictures.views).first(kFewestToneViews - 1), kLayout));
-  EXPECT_FALSE(find_tone({}, kLayout));
+  EXPECT_FALSE(find_tone(std::span(pictures.views).first(kFewestToneViews - 1), kTag36h11));
+  EXPECT_FALSE(find_tone({}, kTag36h11));
 }
 
 TEST(ToneCurve, GreyAndLightAreInverse) {

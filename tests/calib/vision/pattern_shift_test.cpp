@@ -13,15 +13,16 @@ namespace kinescope {
 namespace {
 
 constexpr std::array<double, 3> kSides = {24.0, 40.0, 110.0};  // px
-constexpr int kTrials = 6;
+constexpr int kShiftTrials = 6;
 constexpr double kStartSigma = 0.3;  // px, of the detector
 
-struct Scene {
+struct WideLensPicture {
   GreyImage image;
   Corners corners;
 };
 
-Scene make_scene(const std::string& family, double side, int trial, const ImageOptions& options) {
+WideLensPicture wide_lens_picture(const std::string& family, double side, int trial,
+                                  const ImageOptions& options) {
   Rng rng = Rng::from_name("pattern shift " + family, static_cast<std::uint64_t>(trial));
   // Away from the middle of a wide lens.
   CameraModel camera = pinhole_guess(190, 190, 700.0);
@@ -39,7 +40,7 @@ Scene make_scene(const std::string& family, double side, int trial, const ImageO
 
 // Something white over a strip along one edge, up to `depth` px inside; the corners are what a
 // border found there would give.
-void cover(Scene& scene, std::size_t edge, double depth, const ImageOptions& options) {
+void cover(WideLensPicture& scene, std::size_t edge, double depth, const ImageOptions& options) {
   const Eigen::Vector2d a = scene.corners[edge];
   const Eigen::Vector2d b = scene.corners[(edge + 1) % 4];
   const Eigen::Vector2d along = (b - a).normalized();
@@ -60,8 +61,8 @@ void cover(Scene& scene, std::size_t edge, double depth, const ImageOptions& opt
 }
 
 // As the fit of the border gives it, or as the detector gives it where no fit was possible.
-RefinedCorners border_of(const Scene& scene, const ImageOptions& options, RefineStatus status,
-                         Rng& rng) {
+RefinedCorners border_of(const WideLensPicture& scene, const ImageOptions& options,
+                         RefineStatus status, Rng& rng) {
   if (status != RefineStatus::kDone) {
     RefinedCorners out{.status = status, .corners_px = scene.corners};
     for (Eigen::Vector2d& corner : out.corners_px)
@@ -81,8 +82,8 @@ int count_hidden(const std::string& family, double side, double covered_cells,
   const TagLayout layout = tag_layout(family);
   Rng rng = Rng::from_name("border " + family, static_cast<std::uint64_t>(side));
   int hidden = 0;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    Scene scene = make_scene(family, side, trial, options);
+  for (int trial = 0; trial < kShiftTrials; ++trial) {
+    WideLensPicture scene = wide_lens_picture(family, side, trial, options);
     const auto edge = static_cast<std::size_t>(trial % 4);
     if (covered_cells > 0.0) {
       const double cell =
@@ -118,7 +119,7 @@ TEST(PatternShift, SeesThatAnEdgeIsCovered) {
   constexpr double kMost = 0.7;  // a far edge, tilted, is covered by less than a pixel
   for (const char* family : {"tag36h11", "DICT_4X4_50"}) {
     for (const double side : {50.0, 110.0}) {
-      EXPECT_GE(count_hidden(family, side, 0.3, {.supersample = 3}), kMost * kTrials)
+      EXPECT_GE(count_hidden(family, side, 0.3, {.supersample = 3}), kMost * kShiftTrials)
           << family << " " << side << " px";
     }
   }
@@ -134,7 +135,7 @@ TEST(PatternShift, LooksAtTheDetectorsCornersWhereNoBorderCouldBeFitted) {
         const ImageOptions options{.blur_px = blur, .supersample = 3};
         doubted += count_hidden(family, side, 0.0, options, RefineStatus::kMoved);
         covered += count_hidden(family, side, 0.5, options, RefineStatus::kMoved);
-        all += kTrials;
+        all += kShiftTrials;
       }
     }
   }

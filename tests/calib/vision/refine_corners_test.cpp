@@ -28,13 +28,13 @@ constexpr double kChi2Least = 0.25;
 
 const CameraModel kLens = pinhole_guess(220, 220, 900.0);
 
-struct Scene {
+struct MarkerPicture {
   GreyImage image;
   Corners truth;
 };
 
-Scene make_scene(double side, std::uint64_t salt, const ImageOptions& options,
-                 double max_tilt_deg = 55.0) {
+MarkerPicture render_marker(double side, std::uint64_t salt, const ImageOptions& options,
+                            double max_tilt_deg = 55.0) {
   Rng rng = Rng::from_name("refine corners", salt);
   PlacedMarker marker;
   marker.art = apriltag_art("tag36h11", rng.index(500));
@@ -42,7 +42,7 @@ Scene make_scene(double side, std::uint64_t salt, const ImageOptions& options,
       kLens, {110.0 + rng.uniform(-5.0, 5.0), 110.0 + rng.uniform(-5.0, 5.0)}, side, marker.size_m,
       rng.uniform(0.0, max_tilt_deg) * std::numbers::pi / 180.0,
       rng.uniform(0.0, 2.0 * std::numbers::pi), rng.uniform(0.0, 2.0 * std::numbers::pi));
-  Scene scene{render_markers(kLens, {marker}, options, rng), true_corners(kLens, marker)};
+  MarkerPicture scene{render_markers(kLens, {marker}, options, rng), true_corners(kLens, marker)};
   return scene;
 }
 
@@ -67,7 +67,7 @@ TEST(RefineCorners, ReachesItsGoalsWithAnHonestSigma) {
     int corners = 0;
     for (int trial = 0; trial < kTrials; ++trial) {
       const auto salt = static_cast<std::uint64_t>(trial);
-      const Scene scene = make_scene(goal.side_px, salt, {.supersample = 6});
+      const MarkerPicture scene = render_marker(goal.side_px, salt, {.supersample = 6});
       const RefinedCorners found = refined(scene.image, disturbed(scene.truth, 0.3, salt));
       if (found.status != RefineStatus::kDone) continue;
       const Eigen::Vector2d middle =
@@ -94,7 +94,7 @@ TEST(RefineCorners, ItsEllipsesHoldTheTruth) {
   int corners = 0;
   for (const double side : {60.0, 90.0}) {
     for (std::uint64_t salt = 0; salt < 30; ++salt) {
-      const Scene scene = make_scene(side, salt, {.supersample = 4});
+      const MarkerPicture scene = render_marker(side, salt, {.supersample = 4});
       const RefinedCorners found = refined(scene.image, disturbed(scene.truth, 0.3, salt));
       ASSERT_EQ(found.status, RefineStatus::kDone);
       for (std::size_t i = 0; i < 4; ++i, ++corners) {
@@ -111,7 +111,7 @@ TEST(RefineCorners, ItsEllipsesHoldTheTruth) {
 TEST(RefineCorners, DoesNotDependOnTheStart) {
   constexpr double kSame = 0.004;  // px, a fraction of sigma
   for (std::uint64_t salt = 0; salt < 10; ++salt) {
-    const Scene scene = make_scene(50.0, salt, {.supersample = 6});
+    const MarkerPicture scene = render_marker(50.0, salt, {.supersample = 6});
     const RefinedCorners a = refined(scene.image, disturbed(scene.truth, 0.6, salt));
     const RefinedCorners b = refined(scene.image, disturbed(scene.truth, 0.6, salt + 100));
     ASSERT_EQ(a.status, RefineStatus::kDone);
@@ -128,7 +128,7 @@ TEST(RefineCorners, AToneCurveDoesNotShrinkSmallMarkers) {
     double outward = 0.0;
     double border_outward = 0.0;
     for (std::uint64_t salt = 0; salt < 12; ++salt) {
-      const Scene scene = make_scene(side, salt, {.supersample = 6, .gamma = 2.2}, 30.0);
+      const MarkerPicture scene = render_marker(side, salt, {.supersample = 6, .gamma = 2.2}, 30.0);
       const RefinedCorners border = refine_border(scene.image.view(), scene.truth, {});
       const RefinedCorners found = refined(scene.image, scene.truth);
       ASSERT_TRUE(found.by_cells) << salt;
@@ -147,7 +147,7 @@ TEST(RefineCorners, AToneCurveDoesNotShrinkSmallMarkers) {
 
 // What does not look like a marker of dark and bright cells is left to the border.
 TEST(RefineCorners, AShadowIsNotForTheCells) {
-  Scene scene = make_scene(70.0, 0, {.supersample = 4}, 20.0);
+  MarkerPicture scene = render_marker(70.0, 0, {.supersample = 4}, 20.0);
   EXPECT_TRUE(refined(scene.image, scene.truth).by_cells);
   for (int y = 0; y < scene.image.height; ++y) {
     for (int x = 0; x < scene.image.width / 2; ++x) {
@@ -159,8 +159,8 @@ TEST(RefineCorners, AShadowIsNotForTheCells) {
 }
 
 TEST(RefineCorners, MoreNoiseGivesMoreSigma) {
-  const Scene quiet = make_scene(60.0, 1, {.noise = 2.0, .supersample = 6});
-  const Scene loud = make_scene(60.0, 1, {.noise = 8.0, .supersample = 6});
+  const MarkerPicture quiet = render_marker(60.0, 1, {.noise = 2.0, .supersample = 6});
+  const MarkerPicture loud = render_marker(60.0, 1, {.noise = 8.0, .supersample = 6});
   const RefinedCorners a = refined(quiet.image, quiet.truth);
   const RefinedCorners b = refined(loud.image, loud.truth);
   ASSERT_EQ(a.status, RefineStatus::kDone);
@@ -176,7 +176,7 @@ TEST(RefineCorners, MoreNoiseGivesMoreSigma) {
 TEST(RefineCorners, AShadowAcrossTheTagDoesNotMoveIt) {
   constexpr double kShadowed = 0.1;  // px; without levels that follow the shadow it is 0.4 px
   for (std::uint64_t salt = 0; salt < 8; ++salt) {
-    Scene scene = make_scene(70.0, salt, {.supersample = 6}, 20.0);
+    MarkerPicture scene = render_marker(70.0, salt, {.supersample = 6}, 20.0);
     for (int y = 0; y < scene.image.height; ++y) {
       for (int x = 0; x < scene.image.width; ++x) {
         auto& grey = scene.image.pixels[static_cast<std::size_t>(y * scene.image.width + x)];
@@ -193,7 +193,7 @@ TEST(RefineCorners, AShadowAcrossTheTagDoesNotMoveIt) {
 }
 
 TEST(RefineCorners, SaysWhyItGaveUp) {
-  const Scene scene = make_scene(50.0, 3, {.supersample = 6}, 20.0);
+  const MarkerPicture scene = render_marker(50.0, 3, {.supersample = 6}, 20.0);
   // Bright inside is expected, and there is none.
   EXPECT_EQ(refined(scene.image, scene.truth, {8, false}).status, RefineStatus::kWrongContrast);
   const GreyImage flat{220, 220, std::vector<std::uint8_t>(220 * 220, 90)};

@@ -6,7 +6,7 @@
 namespace kinescope {
 namespace {
 
-constexpr int kFrames = 60;
+constexpr int kSightingFrames = 60;
 
 TagObservation sighting(int frame, int id, double x, double margin = 80.0, double edge = 30.0) {
   TagObservation tag;
@@ -20,7 +20,7 @@ TagObservation sighting(int frame, int id, double x, double margin = 80.0, doubl
 // Marker 3 passes to the right, two px a frame.
 TagObservations passing() {
   TagObservations all;
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kSightingFrames; ++f) {
     all.times_s.push_back(f / 30.0);
     all.observations.push_back(sighting(f, 3, 50.0 + 2.0 * f));
   }
@@ -44,7 +44,7 @@ int rejected(const TagObservations& all, const std::string& why) {
 TEST(Sightings, AQuietRecordingKeepsAll) {
   TagObservations all = passing();
   EXPECT_TRUE(sort_out_sightings(all, declared(), 5).empty());
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames));
   EXPECT_TRUE(all.rejected.empty());
 }
 
@@ -52,7 +52,7 @@ TEST(Sightings, IdsSeenRarelyAreGhosts) {
   TagObservations all = passing();
   for (const int f : {4, 20, 21, 40}) all.observations.push_back(sighting(f, 17, 300.0));
   (void)sort_out_sightings(all, declared(), 5);
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames));
   EXPECT_EQ(rejected(all, "fewer than 5"), 4);
 }
 
@@ -80,21 +80,21 @@ TEST(Sightings, OfTwoTheOneOnItsTrackIsKept) {
   TagObservations all = passing();
   all.observations.push_back(sighting(30, 3, 400.0, 200.0));  // elsewhere, and clearer
   (void)sort_out_sightings(all, declared(), 5);
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames));
   EXPECT_EQ(rejected(all, "second marker"), 1);
   EXPECT_EQ(all.observations[30].corners_px[0].x(), 110.0);
 }
 
 TEST(Sightings, TwoMarkersWithOneIdAreBothRejectedAndReported) {
   TagObservations all;
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < kSightingFrames; ++f) {
     all.times_s.push_back(f / 30.0);
     all.observations.push_back(sighting(f, 3, 50.0));
     all.observations.push_back(sighting(f, 3, 250.0));
   }
   const auto warnings = sort_out_sightings(all, declared(), 5);
   EXPECT_TRUE(all.observations.empty());
-  EXPECT_EQ(rejected(all, "not to be told apart"), 2 * kFrames);
+  EXPECT_EQ(rejected(all, "not to be told apart"), 2 * kSightingFrames);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("two markers with id 3 are in view: remove one"), std::string::npos);
 }
@@ -103,7 +103,7 @@ TEST(Sightings, JumpsAwayAndBackAreRejected) {
   TagObservations all = passing();
   all.observations[30] = sighting(30, 3, 300.0);
   (void)sort_out_sightings(all, declared(), 5);
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames - 1));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames - 1));
   ASSERT_EQ(rejected(all, "jumps"), 1);
   EXPECT_EQ(all.rejected[0].frame, 30);
 }
@@ -162,16 +162,17 @@ TEST(Sightings, CornersThatCouldNotBeFittedAreLeftWhereTheOthersCould) {
   TagObservations all = passing();
   for (const int f : {7, 30, 31}) all.observations[static_cast<std::size_t>(f)].fitted = false;
   put_unfitted_aside(all);
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames - 3));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames - 3));
   EXPECT_EQ(rejected(all, "could not be fitted"), 3);
 }
 
 // A small or blurred marker has no others.
 TEST(Sightings, CornersThatCanSeldomBeFittedAreKept) {
   TagObservations all = passing();
-  for (int f = 0; f < kFrames; f += 3) all.observations[static_cast<std::size_t>(f)].fitted = false;
+  for (int f = 0; f < kSightingFrames; f += 3)
+    all.observations[static_cast<std::size_t>(f)].fitted = false;
   put_unfitted_aside(all);
-  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(all.observations.size(), static_cast<std::size_t>(kSightingFrames));
   EXPECT_TRUE(all.rejected.empty());
 }
 

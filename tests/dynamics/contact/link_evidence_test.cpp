@@ -12,18 +12,18 @@
 namespace kinescope {
 namespace {
 
-constexpr int kJoints = 5;
+constexpr int kChainJoints = 5;
 constexpr double kLevel = 0.01;
 constexpr int kTrials = 2000;
 
 Eigen::MatrixXd random_covariance(Rng& rng) {
-  Eigen::MatrixXd A(kJoints, kJoints);
+  Eigen::MatrixXd A(kChainJoints, kChainJoints);
   for (Eigen::Index i = 0; i < A.size(); ++i) A.data()[i] = rng.normal();
-  return A * A.transpose() + 0.1 * Eigen::MatrixXd::Identity(kJoints, kJoints);
+  return A * A.transpose() + 0.1 * Eigen::MatrixXd::Identity(kChainJoints, kChainJoints);
 }
 
 Eigen::VectorXd normals(Rng& rng) {
-  Eigen::VectorXd out(kJoints);
+  Eigen::VectorXd out(kChainJoints);
   for (double& value : out) value = rng.normal();
   return out;
 }
@@ -32,7 +32,7 @@ Eigen::VectorXd normals(Rng& rng) {
 /// level says for each joint beyond, at most.
 TEST(LinkEvidence, ErrsAtTheStatedLevel) {
   Rng rng = Rng::from_name("link_evidence");
-  for (int link = 0; link < kJoints; ++link) {
+  for (int link = 0; link < kChainJoints; ++link) {
     int too_far = 0;
     int too_near = 0;
     double probability = 0.0;
@@ -50,7 +50,7 @@ TEST(LinkEvidence, ErrsAtTheStatedLevel) {
       ASSERT_NEAR(evidence.probability.sum(), 1.0, 1e-12);
     }
     // Four sigma of a count about (joints beyond) x level x trials.
-    const double expected = (kJoints - 1 - link) * kLevel * kTrials;
+    const double expected = (kChainJoints - 1 - link) * kLevel * kTrials;
     EXPECT_LE(too_far, expected + 4.0 * std::sqrt(expected) + 1.0) << link;
     EXPECT_LE(too_near, 0.02 * kTrials) << link;
     EXPECT_GT(probability, 0.7) << link;
@@ -69,11 +69,11 @@ TEST(LinkEvidence, SegmentsShowWhatTheMeanHides) {
 
 /// A trunk that carries two arms of two joints each.
 TEST(LinkEvidence, FollowsTheBranchesOfATree) {
-  const std::array<int, kJoints> parents = {-1, 0, 1, 0, 3};
-  const std::array<std::vector<int>, kJoints> answering = {
+  const std::array<int, kChainJoints> parents = {-1, 0, 1, 0, 3};
+  const std::array<std::vector<int>, kChainJoints> answering = {
       {{0}, {0, 1}, {0, 1, 2}, {0, 3}, {0, 3, 4}}};
   Rng rng = Rng::from_name("link_evidence tree");
-  for (int link = 0; link < kJoints; ++link) {
+  for (int link = 0; link < kChainJoints; ++link) {
     int right = 0;
     for (int t = 0; t < kTrials; ++t) {
       const Eigen::MatrixXd S = random_covariance(rng);
@@ -91,16 +91,16 @@ TEST(LinkEvidence, FollowsTheBranchesOfATree) {
 }
 
 TEST(LinkEvidence, TwoBranchesAtOnceAreNoLink) {
-  const std::array<int, kJoints> parents = {-1, 0, 1, 0, 3};
-  const Eigen::MatrixXd S = Eigen::MatrixXd::Identity(kJoints, kJoints);
-  const Eigen::VectorXd torque = Eigen::VectorXd::Constant(kJoints, 50.0);
+  const std::array<int, kChainJoints> parents = {-1, 0, 1, 0, 3};
+  const Eigen::MatrixXd S = Eigen::MatrixXd::Identity(kChainJoints, kChainJoints);
+  const Eigen::VectorXd torque = Eigen::VectorXd::Constant(kChainJoints, 50.0);
   const std::array looks{
       JointAnswers{.squares = joint_answers(torque, S, parents).cwiseAbs2(), .count = 1}};
   EXPECT_EQ(link_evidence(looks, kLevel, parents).link, -1);
 }
 
 TEST(LinkEvidence, ASeriesIsTheTreeWithoutBranches) {
-  const std::array<int, kJoints> parents = {-1, 0, 1, 2, 3};
+  const std::array<int, kChainJoints> parents = {-1, 0, 1, 2, 3};
   Rng rng = Rng::from_name("link_evidence series");
   const Eigen::MatrixXd S = random_covariance(rng);
   const Eigen::VectorXd torque = normals(rng);

@@ -21,7 +21,7 @@ constexpr double kStep_s = 2e-4;
 constexpr int kSteps = 4000;
 constexpr int kJoints = 7;
 
-DynamicModel arm() {
+DynamicModel arm_with_rotors() {
   DynamicModel out = panda_arm();
   for (const JointId id : moving_joints(out.tree)) out.joints[id.index()].motor_inertia = 0.2;
   return out;
@@ -29,7 +29,7 @@ DynamicModel arm() {
 
 /// What the controller believes: masses a fifth too small, so that there is an error to compare.
 RigidModel believed() {
-  DynamicModel out = arm();
+  DynamicModel out = arm_with_rotors();
   for (InertialParameters& link : out.links) {
     link = InertialParameters::from_vector(0.8 * link.vector());
   }
@@ -40,7 +40,7 @@ Eigen::VectorXd middle() {
   return (Eigen::VectorXd(kJoints) << 0.1, 0.4, -0.3, -1.6, 0.2, 1.7, 0.5).finished();
 }
 
-MotionPoint reference(double t_s) {
+MotionPoint reference_at(double t_s) {
   MotionPoint out{t_s, middle(), Eigen::VectorXd(kJoints), Eigen::VectorXd(kJoints)};
   for (int j = 0; j < kJoints; ++j) {
     const double w = 2.0 + 0.7 * j;
@@ -63,10 +63,10 @@ Controller controller(ControlLaw law) {
 
 Eigen::VectorXd our_end(ControlLaw law) {
   Controller control = controller(law);
-  const Plant plant = make_plant(with_effects(arm()));
+  const Plant plant = make_plant(with_effects(arm_with_rotors()));
   Simulation simulation(plant, PlantState::at(plant, middle(), Eigen::VectorXd::Zero(kJoints)));
   for (int k = 0; k < kSteps; ++k) {
-    const MotionPoint now = reference(k * kStep_s);
+    const MotionPoint now = reference_at(k * kStep_s);
     const PlantState& state = simulation.state();
     (void)simulation.step(control.command(now, {state.q, state.dq, now.q, now.dq}), kStep_s);
   }
@@ -75,7 +75,7 @@ Eigen::VectorXd our_end(ControlLaw law) {
 
 Eigen::VectorXd mujoco_end(ControlLaw law) {
   Controller control = controller(law);
-  const MujocoModel model = to_mujoco(arm());
+  const MujocoModel model = to_mujoco(arm_with_rotors());
   model->opt.timestep = kStep_s;
   model->opt.integrator = mjINT_RK4;
   const MujocoData data(mj_makeData(model.get()));
@@ -84,7 +84,7 @@ Eigen::VectorXd mujoco_end(ControlLaw law) {
   Eigen::Map<Eigen::VectorXd> torque(data->qfrc_applied, kJoints);
   q = middle();
   for (int k = 0; k < kSteps; ++k) {
-    const MotionPoint now = reference(k * kStep_s);
+    const MotionPoint now = reference_at(k * kStep_s);
     torque = control.command(now, {q, dq, now.q, now.dq});
     mj_step(model.get(), data.get());
   }
@@ -96,7 +96,7 @@ TEST(Mujoco, ItsArmFollowsAsOursDoes) {
   constexpr double kIntegrators_rad = 1e-5;
   for (const ControlLaw law : all_control_laws()) {
     const Eigen::VectorXd ours = our_end(law);
-    EXPECT_GT((ours - reference(kSteps * kStep_s).q).lpNorm<Eigen::Infinity>(),
+    EXPECT_GT((ours - reference_at(kSteps * kStep_s).q).lpNorm<Eigen::Infinity>(),
               200.0 * kIntegrators_rad)
         << to_string(law);
     EXPECT_LT((ours - mujoco_end(law)).lpNorm<Eigen::Infinity>(), kIntegrators_rad)

@@ -2,18 +2,17 @@
 #include "dynamics/data/cutoff.h"
 
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "dynamics/data/spectrum.h"
 #include "kinematics/core/rng.h"
 #include "kinematics/log/smoothing_spline.h"
+#include "tests/dynamics/data/log_world.h"
 
 namespace kinescope {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kStepS = 0.005;
 constexpr double kSideLobes = 3.0;  // the sharp edge of the motion, seen through the window
 

@@ -48,7 +48,7 @@ std::string refusal(const LogWorld& world) {
   });
 }
 
-LogWorldOptions usual() {
+LogWorldOptions usual_noise() {
   return {.position_noise = 2e-5, .velocity_noise = 1e-3, .torque_noise = 0.02};
 }
 
@@ -63,13 +63,13 @@ void expect_line(const LogFinding& finding, std::size_t line) {
 constexpr std::size_t kFirstLine = 2;
 
 TEST(DamagedLog, ASoundLogHasNothingToSay) {
-  const Looked looked = look(make_log_world(usual()));
+  const Looked looked = look(make_log_world(usual_noise()));
   EXPECT_TRUE(looked.report.findings.empty()) << to_line(looked.report.findings.front());
   EXPECT_EQ(looked.report.log.rows(), looked.report.rows_read);
 }
 
 TEST(DamagedLog, EmptyAndInfiniteCells) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows(100, world.column("q2")) = std::nan("");
   world.rows(101, world.column("tau3")) = HUGE_VAL;
   world.rows(102, world.column("tau3")) = 1e282;
@@ -83,13 +83,13 @@ TEST(DamagedLog, EmptyAndInfiniteCells) {
 }
 
 TEST(DamagedLog, MostlyEmptyIsRefused) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows.col(world.column("q2")).head(1500).setConstant(std::nan(""));
   EXPECT_NE(refusal(world).find("of 2001 rows hold numbers"), std::string::npos);
 }
 
 TEST(DamagedLog, RepeatedStamps) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows(200, 0) = world.rows(199, 0);
   const Looked looked = look(world);
   EXPECT_EQ(looked.loud(), "repeated_stamps ");
@@ -97,18 +97,18 @@ TEST(DamagedLog, RepeatedStamps) {
 }
 
 TEST(DamagedLog, AFewLateRowsAreLeftOutAndShuffledRowsRefused) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows.row(300).swap(world.rows.row(301));
   const Looked looked = look(world);
   EXPECT_EQ(looked.loud(), "stamps_go_back ");
   expect_line(looked.first(LogFault::kStampsGoBack), kFirstLine + 301);
-  LogWorld reversed = make_log_world(usual());
+  LogWorld reversed = make_log_world(usual_noise());
   reversed.rows = reversed.rows.colwise().reverse().eval();
   EXPECT_NE(refusal(reversed).find("(sort the rows by time)"), std::string::npos);
 }
 
 TEST(DamagedLog, AClockThatStartsAgainBeginsATrajectory) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   const Eigen::MatrixXd once = world.rows;
   world.rows.resize(2 * once.rows(), once.cols());
   world.rows << once, once;
@@ -120,7 +120,7 @@ TEST(DamagedLog, AClockThatStartsAgainBeginsATrajectory) {
 }
 
 TEST(DamagedLog, GapsAreFoundAndLongOnesSplit) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   Eigen::MatrixXd kept(world.rows.rows() - 103, world.rows.cols());
   kept << world.rows.topRows(500), world.rows.middleRows(503, 497), world.rows.bottomRows(901);
   world.rows = kept;
@@ -134,7 +134,7 @@ TEST(DamagedLog, GapsAreFoundAndLongOnesSplit) {
 }
 
 TEST(DamagedLog, StaleRows) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   for (Eigen::Index r = 0; r < world.rows.rows(); ++r) {
     const double t = world.rows(r, 0);
     world.rows.row(r) = world.rows.row(r - r % 4);
@@ -163,7 +163,7 @@ TEST(DamagedLog, ARobotAtRestIsNotStale) {
 }
 
 TEST(DamagedLog, Spikes) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows(700, world.column("tau1")) += 80.0;
   world.rows(900, world.column("q1")) -= 3.0;
   const Looked looked = look(world);
@@ -174,7 +174,7 @@ TEST(DamagedLog, Spikes) {
 }
 
 TEST(DamagedLog, WrappedAnglesAreUnwrapped) {
-  const LogWorld sound = make_log_world(usual());
+  const LogWorld sound = make_log_world(usual_noise());
   LogWorld world = sound;
   const Eigen::Index q = world.column("q1");
   const double turn = 2.0 * std::numbers::pi;
@@ -189,10 +189,10 @@ TEST(DamagedLog, WrappedAnglesAreUnwrapped) {
 }
 
 TEST(DamagedLog, DegreesForRadians) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   for (const char* name : {"q1", "q2"}) world.rows.col(world.column(name)) *= kDegrees;
   EXPECT_NE(refusal(world).find("dynamics: {position_unit: [deg]}"), std::string::npos);
-  LogWorld velocity = make_log_world(usual());
+  LogWorld velocity = make_log_world(usual_noise());
   velocity.rows.col(velocity.column("dq1")) *= kDegrees;
   EXPECT_NE(refusal(velocity).find("'q1' and 'dq1' differ by 1/57.3"), std::string::npos);
   // Declared, it is read without a word.
@@ -202,20 +202,20 @@ TEST(DamagedLog, DegreesForRadians) {
 }
 
 TEST(DamagedLog, DegreesEverywhereAreSeenByTheirSize) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   for (const char* name : {"q1", "q2", "dq1", "dq2"})
     world.rows.col(world.column(name)) *= kDegrees;
   EXPECT_NE(refusal(world).find("is it in degrees?"), std::string::npos);
 }
 
 TEST(DamagedLog, MillimetresForMetres) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows.col(world.column("q3")) *= 1000.0;
   EXPECT_NE(refusal(world).find("mm"), std::string::npos);
 }
 
 TEST(DamagedLog, MillisecondsForSeconds) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows.col(0) *= 1000.0;
   EXPECT_NE(refusal(world).find("are the stamps in ms?"), std::string::npos);
   EXPECT_NE(refusal(world).find("{time_unit: ms}"), std::string::npos);
@@ -229,28 +229,28 @@ TEST(DamagedLog, MillisecondsForSeconds) {
 }
 
 TEST(DamagedLog, VelocityOfTheWrongSizeSignLagOrJoint) {
-  LogWorld scaled = make_log_world(usual());
+  LogWorld scaled = make_log_world(usual_noise());
   scaled.rows.col(scaled.column("dq2")) *= 0.5;
   EXPECT_EQ(look(scaled).loud(), "velocity_scale ");
   EXPECT_NEAR(look(scaled).first(LogFault::kVelocityScale).value, 2.0, 0.02);
   EXPECT_EQ(look(scaled).report.log.dq.cols(), 0) << "derived instead";
-  LogWorld negative = make_log_world(usual());
+  LogWorld negative = make_log_world(usual_noise());
   negative.rows.col(negative.column("dq1")) *= -1.0;
   EXPECT_NEAR(look(negative).first(LogFault::kVelocityScale).value, -1.0, 0.02);
-  LogWorldOptions late = usual();
+  LogWorldOptions late = usual_noise();
   late.velocity_lag_s = 0.02;
   const Looked lagging = look(make_log_world(late));
   ASSERT_EQ(lagging.of(LogFault::kVelocityLag).size(), 3U);
   constexpr double kLagError = 1e-3;  // s; a fifth of a step
   for (const LogFinding& lag : lagging.of(LogFault::kVelocityLag))
     EXPECT_NEAR(lag.value, 0.02, kLagError);
-  LogWorld other = make_log_world(usual());
+  LogWorld other = make_log_world(usual_noise());
   other.rows.col(other.column("dq1")).swap(other.rows.col(other.column("dq2")));
   EXPECT_EQ(look(other).loud(), "velocity_mismatch velocity_mismatch ");
 }
 
 TEST(DamagedLog, AccelerationsThatAreNone) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.header.insert(world.header.end(), {"ddq1", "ddq2", "ddq3"});
   Eigen::MatrixXd rows(world.rows.rows(), world.rows.cols() + 3);
   rows << world.rows, world.ddq;
@@ -266,7 +266,7 @@ TEST(DamagedLog, AccelerationsThatAreNone) {
 }
 
 TEST(DamagedLog, ConstantTorque) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.rows.col(world.column("tau2")).setConstant(3.3);  // no sum of powers of two
   const Looked looked = look(world);
   EXPECT_EQ(looked.loud(), "constant ");
@@ -274,7 +274,7 @@ TEST(DamagedLog, ConstantTorque) {
 }
 
 TEST(DamagedLog, TorquesThatNobodyMeasured) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   for (const char* column : {"tau1", "tau2", "tau3"}) {
     world.rows.col(world.column(column)).setZero();
   }
@@ -284,7 +284,7 @@ TEST(DamagedLog, TorquesThatNobodyMeasured) {
 }
 
 TEST(DamagedLog, ClippedTorque) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   const Eigen::Index tau = world.column("tau1");
   const double limit = 0.6 * world.rows.col(tau).maxCoeff();
   world.rows.col(tau) = world.rows.col(tau).cwiseMin(limit);
@@ -294,14 +294,14 @@ TEST(DamagedLog, ClippedTorque) {
 }
 
 TEST(DamagedLog, QuantisedAndHeldTorque) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   const Eigen::Index tau = world.column("tau1");
   world.rows.col(tau) = (world.rows.col(tau) / 0.5).array().round() * 0.5;
   const Looked coarse = look(world);
   EXPECT_EQ(coarse.loud(), "");
   ASSERT_EQ(coarse.of(LogFault::kQuantised).size(), 1U);
   EXPECT_NEAR(coarse.first(LogFault::kQuantised).value, 0.5, 1e-6);
-  LogWorld held = make_log_world(usual());
+  LogWorld held = make_log_world(usual_noise());
   for (Eigen::Index r = 0; r < held.rows.rows(); ++r) held.rows(r, tau) = held.rows(r - r % 4, tau);
   const Looked slow = look(held);
   EXPECT_EQ(slow.loud(), "");
@@ -310,7 +310,7 @@ TEST(DamagedLog, QuantisedAndHeldTorque) {
 }
 
 TEST(DamagedLog, CommandsThatTheRobotFollowsLate) {
-  const LogWorldOptions options = usual();
+  const LogWorldOptions options = usual_noise();
   LogWorld world = make_log_world(options);
   world.header.insert(world.header.end(), {"q_cmd1", "q_cmd2", "q_cmd3"});
   Eigen::MatrixXd rows(world.rows.rows(), world.rows.cols() + 3);
@@ -327,7 +327,7 @@ TEST(DamagedLog, CommandsThatTheRobotFollowsLate) {
 }
 
 TEST(DamagedLog, WithoutAClockTheVelocityTellsTheRate) {
-  LogWorld world = make_log_world(usual());
+  LogWorld world = make_log_world(usual_noise());
   world.header[0] = "row";
   const Looked looked = look(world);
   EXPECT_EQ(looked.loud(), "no_clock ");
@@ -339,7 +339,7 @@ TEST(DamagedLog, WithoutAClockTheVelocityTellsTheRate) {
 }
 
 TEST(DamagedLog, CutOffAndCorruptFilesNameTheLine) {
-  const std::string text = make_log_world(usual()).csv();
+  const std::string text = make_log_world(usual_noise()).csv();
   const auto read = [&](const std::string& name, const std::string& bytes) {
     return refusal_of([&] { static_cast<void>(read_torque_data({write_log(name, bytes)}, {})); });
   };

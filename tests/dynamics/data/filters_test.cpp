@@ -9,11 +9,10 @@
 #include "dynamics/data/zero_phase_filter.h"
 #include "kinematics/core/rng.h"
 #include "kinematics/log/smoothing_spline.h"
+#include "tests/dynamics/data/log_world.h"
 
 namespace kinescope {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::VectorXd even_times(double duration_s, double rate_hz) {
   const auto n = static_cast<Eigen::Index>(std::lround(duration_s * rate_hz)) + 1;

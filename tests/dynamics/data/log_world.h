@@ -6,6 +6,7 @@
 #pragma once
 
 #include <functional>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "dynamics/data/torque_data.h"
 
 namespace kinescope {
+
+inline constexpr double kTurn = 2.0 * std::numbers::pi;
 
 struct LogWorldOptions {
   double duration_s = 10.0;

@@ -2,18 +2,17 @@
 #include "dynamics/data/predictive_cutoff.h"
 
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "dynamics/data/rough_torque.h"
 #include "kinematics/core/rng.h"
+#include "tests/dynamics/data/log_world.h"
 
 namespace kinescope {
 namespace {
 
-constexpr double kStepS = 0.01;
-constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kLogStepS = 0.01;
 
 /// One joint that swings slowly between reversals, with dry friction.
 TorqueLog slow_log() {
@@ -41,11 +40,11 @@ TEST(PredictiveCutoff, FollowsTheTurnsOfFrictionOfASlowMotion) {
   constexpr double kOfTheMotion_hz = 0.25;
   const TorqueLog log = slow_log();
   const std::vector<CutoffTrial> trials =
-      try_cutoffs(log, kStepS, MotionSource::kPosition, kOfTheMotion_hz);
+      try_cutoffs(log, kLogStepS, MotionSource::kPosition, kOfTheMotion_hz);
   ASSERT_FALSE(trials.empty());
   const double chosen = best_predicting_cutoff(trials, kOfTheMotion_hz);
   EXPECT_GT(chosen, 4.0 * kOfTheMotion_hz);
-  EXPECT_LT(chosen, 0.4 / kStepS);
+  EXPECT_LT(chosen, 0.4 / kLogStepS);
   EXPECT_GT(derive_motion(log).cutoff.cutoff_hz, 1.0);
 }
 
@@ -71,7 +70,7 @@ TEST(NarrowWidth, IsATenthOfAnUsualSpeedWhateverAFewPeaks) {
 TEST(PredictiveCutoff, OfALogWithoutTorqueSaysNothing) {
   TorqueLog log = slow_log();
   log.torque.resize(6000, 0);
-  EXPECT_TRUE(try_cutoffs(log, kStepS, MotionSource::kPosition, 1.0).empty());
+  EXPECT_TRUE(try_cutoffs(log, kLogStepS, MotionSource::kPosition, 1.0).empty());
 }
 
 }  // namespace

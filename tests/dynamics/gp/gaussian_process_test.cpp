@@ -20,8 +20,6 @@ namespace {
 
 // A few hundred operations on numbers of order one.
 constexpr double kRounding = 1e-11;
-// Two algorithms for one number, kernel matrices with a condition number up to 1e6.
-constexpr double kTwoRoads = 1e-8;
 
 bool same_bytes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.size() == b.size() &&
@@ -119,13 +117,12 @@ TEST(Fit, LikelihoodGradientAgreesWithDifferences) {
     const Eigen::VectorXd values = log_values_of(model);
     const Eigen::VectorXd gradient = objective->evaluate(values)->gradient;
     for (Eigen::Index p = 0; p < values.size(); ++p) {
-      constexpr double kStep = 1e-5;
       Eigen::VectorXd plus = values;
       Eigen::VectorXd minus = values;
-      plus[p] += kStep;
-      minus[p] -= kStep;
-      const double slope =
-          (objective->evaluate(plus)->value - objective->evaluate(minus)->value) / (2.0 * kStep);
+      plus[p] += kDifferenceStep;
+      minus[p] -= kDifferenceStep;
+      const double slope = (objective->evaluate(plus)->value - objective->evaluate(minus)->value) /
+                           (2.0 * kDifferenceStep);
       EXPECT_NEAR(gradient[p], slope, 1e-5 * std::max(1.0, gradient.cwiseAbs().maxCoeff())) << p;
     }
   }

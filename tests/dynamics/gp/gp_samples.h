@@ -13,6 +13,11 @@
 
 namespace kinescope::gp {
 
+/// Of central differences.
+inline constexpr double kDifferenceStep = 1e-5;
+/// Two algorithms for one number, kernel matrices with a condition number up to 1e6.
+inline constexpr double kTwoRoads = 1e-8;
+
 inline Eigen::MatrixXd random_matrix(Rng& rng, Eigen::Index rows, Eigen::Index cols,
                                      double sigma = 1.0) {
   Eigen::MatrixXd out(rows, cols);

@@ -15,9 +15,8 @@ namespace kinescope::gp {
 namespace {
 
 // Sums of a few hundred products of numbers of order one.
-constexpr double kRounding = 1e-12;
+constexpr double kKernelRounding = 1e-12;
 // Central differences with a step of 1e-6 of sums of order 100.
-constexpr double kStep = 1e-5;
 constexpr double kSlopeTolerance = 1e-6;
 
 const JointKinds kTwoTurnsOneSlide = {JointKind::kRevolute, JointKind::kPrismatic,
@@ -59,8 +58,8 @@ TEST(Kernel, IsSymmetricAndPositive) {
     const Eigen::MatrixXd x = random_matrix(rng, 40, c.columns);
     const Eigen::MatrixXd k = covariance(kernel, x, x);
     const double scale = k.diagonal().maxCoeff();
-    EXPECT_LT((k - k.transpose()).cwiseAbs().maxCoeff(), kRounding * scale) << c.name;
-    EXPECT_LT((k - covariance(kernel, x)).cwiseAbs().maxCoeff(), kRounding * scale) << c.name;
+    EXPECT_LT((k - k.transpose()).cwiseAbs().maxCoeff(), kKernelRounding * scale) << c.name;
+    EXPECT_LT((k - covariance(kernel, x)).cwiseAbs().maxCoeff(), kKernelRounding * scale) << c.name;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(k);
     EXPECT_GT(eigen.eigenvalues()[0], -1e-10 * eigen.eigenvalues().maxCoeff()) << c.name;
   }
@@ -81,7 +80,7 @@ TEST(Kernel, GradientsAgreeWithDifferences) {
         moved[p] += step;
         return covariance(kernel.with_log_values(moved), x).cwiseProduct(q).sum();
       };
-      const double slope = (sum(kStep) - sum(-kStep)) / (2.0 * kStep);
+      const double slope = (sum(kDifferenceStep) - sum(-kDifferenceStep)) / (2.0 * kDifferenceStep);
       const double size = covariance(kernel, x).cwiseProduct(q).cwiseAbs().sum();
       EXPECT_NEAR(gradient[p], slope, kSlopeTolerance * std::max(1.0, size))
           << c.name << ": " << kernel.parameters()[static_cast<std::size_t>(p)].name;
@@ -98,7 +97,7 @@ TEST(Kernel, TilesDoNotShow) {
   const Eigen::MatrixXd whole = covariance(kernel, x);
   const Eigen::MatrixXd part = covariance(kernel, x.topRows(5), x.bottomRows(7));
   EXPECT_LT((whole.topRightCorner(5, 7) - part).cwiseAbs().maxCoeff(),
-            kRounding * whole.maxCoeff());
+            kKernelRounding * whole.maxCoeff());
 }
 
 // Inputs as far from the origin as time stamps are give the same distances.
@@ -140,7 +139,7 @@ TEST(Kernel, FeaturesGiveTheSameCovariance) {
           for (int b = 0; b < kernel.outputs(); ++b) {
             EXPECT_NEAR(by_features(a * 7 + i, b * 7 + j),
                         k(i * kernel.outputs() + a, j * kernel.outputs() + b),
-                        kRounding * k.maxCoeff())
+                        kKernelRounding * k.maxCoeff())
                 << c.name;
           }
         }
@@ -180,7 +179,7 @@ TEST(Gip, IsTheProductOfItsDefinition) {
   }
   ASSERT_EQ(at, w.size());
   EXPECT_NEAR(covariance(kernel, x.row(0), x.row(1))(0, 0), expected,
-              kRounding * std::abs(expected));
+              kKernelRounding * std::abs(expected));
 }
 
 }  // namespace

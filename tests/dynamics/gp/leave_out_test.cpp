@@ -13,9 +13,6 @@
 namespace kinescope::gp {
 namespace {
 
-// Two roads, kernel matrices with a condition number up to 1e5.
-constexpr double kTwoRoads = 1e-8;
-
 struct Naive {
   Eigen::MatrixXd mean;
   Eigen::MatrixXd variance;

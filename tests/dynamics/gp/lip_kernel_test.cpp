@@ -18,9 +18,8 @@ namespace kinescope::gp {
 namespace {
 
 // Sums of a few thousand products.
-constexpr double kRounding = 1e-11;
-constexpr double kStep = 1e-5;
-constexpr double kSlopeTolerance = 1e-7;
+constexpr double kLipRounding = 1e-11;
+constexpr double kLipSlopeTolerance = 1e-7;
 
 const JointKinds kThree = {JointKind::kRevolute, JointKind::kPrismatic, JointKind::kRevolute};
 
@@ -157,7 +156,7 @@ TEST(Lip, IsTheLagrangeOperatorOnTheEnergies) {
         for (std::size_t b = 0; b < 3; ++b) {
           EXPECT_NEAR(k(3 * i + static_cast<Eigen::Index>(a), 3 * j + static_cast<Eigen::Index>(b)),
                       torque_covariance(kernel, x.row(i), y.row(j), a, b),
-                      kRounding * k.cwiseAbs().maxCoeff())
+                      kLipRounding * k.cwiseAbs().maxCoeff())
               << i << j << a << b;
         }
       }
@@ -173,7 +172,7 @@ TEST(Lip, IsSymmetricAndPositive) {
     const Kernel kernel = shuffled_parameters(lip(kinds), rng);
     const Eigen::MatrixXd x = random_matrix(rng, 21, 3 * static_cast<Eigen::Index>(joints));
     const Eigen::MatrixXd k = covariance(kernel, x, x);
-    EXPECT_LT((k - k.transpose()).cwiseAbs().maxCoeff(), kRounding * k.cwiseAbs().maxCoeff());
+    EXPECT_LT((k - k.transpose()).cwiseAbs().maxCoeff(), kLipRounding * k.cwiseAbs().maxCoeff());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(k);
     EXPECT_GT(eigen.eigenvalues()[0], -1e-10 * eigen.eigenvalues().maxCoeff());
   }
@@ -197,7 +196,9 @@ TEST(Lip, GradientAgreesWithDifferences) {
         moved[p] += step;
         return covariance(kernel.with_log_values(moved), x).cwiseProduct(q).sum();
       };
-      EXPECT_NEAR(gradient[p], (sum(kStep) - sum(-kStep)) / (2.0 * kStep), kSlopeTolerance * size)
+      EXPECT_NEAR(gradient[p],
+                  (sum(kDifferenceStep) - sum(-kDifferenceStep)) / (2.0 * kDifferenceStep),
+                  kLipSlopeTolerance * size)
           << kernel.parameters()[static_cast<std::size_t>(p)].name;
     }
   }
@@ -216,7 +217,7 @@ TEST(Lip, FeaturesGiveTheSameCovariance) {
   for (Eigen::Index i = 0; i < 10; ++i) {
     for (Eigen::Index j = 0; j < 10; ++j) {
       EXPECT_NEAR(by_features(i, j), k(2 * (i % 5) + i / 5, 2 * (j % 5) + j / 5),
-                  kRounding * k.cwiseAbs().maxCoeff());
+                  kLipRounding * k.cwiseAbs().maxCoeff());
     }
   }
 }

@@ -55,13 +55,12 @@ TEST(Sparse, GradientOfTheBoundAgreesWithDifferences) {
   const Eigen::VectorXd values = log_values_of(model);
   const Eigen::VectorXd gradient = objective->evaluate(values)->gradient;
   for (Eigen::Index p = 0; p < values.size(); ++p) {
-    constexpr double kStep = 1e-5;
     Eigen::VectorXd plus = values;
     Eigen::VectorXd minus = values;
-    plus[p] += kStep;
-    minus[p] -= kStep;
-    const double slope =
-        (objective->evaluate(plus)->value - objective->evaluate(minus)->value) / (2.0 * kStep);
+    plus[p] += kDifferenceStep;
+    minus[p] -= kDifferenceStep;
+    const double slope = (objective->evaluate(plus)->value - objective->evaluate(minus)->value) /
+                         (2.0 * kDifferenceStep);
     EXPECT_NEAR(gradient[p], slope, 1e-5 * gradient.cwiseAbs().maxCoeff()) << p;
   }
 }

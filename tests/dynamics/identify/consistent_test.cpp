@@ -6,14 +6,11 @@
 #include "dynamics/identify/prediction.h"
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
+#include "tests/dynamics/identify/random_arm.h"
 #include "tests/truth/torque_world.h"
 
 namespace kinescope {
 namespace {
-
-DynamicModel random_arm(int joints, Rng& rng) {
-  return random_masses(random_robot({.joints = joints, .prismatic_share = 0.0}, rng).tree, {}, rng);
-}
 
 void expect_a_body_everywhere(const DynamicModel& model) {
   for (const InertialParameters& link : model.links) EXPECT_TRUE(is_consistent(link));

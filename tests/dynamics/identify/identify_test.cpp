@@ -7,15 +7,11 @@
 
 #include "dynamics/identify/prediction.h"
 #include "kinematics/core/error.h"
+#include "tests/dynamics/identify/random_arm.h"
 #include "tests/truth/torque_world.h"
 
 namespace kinescope {
 namespace {
-
-DynamicModel random_arm(int joints, Rng& rng, double prismatic_share = 0.0) {
-  return random_masses(
-      random_robot({.joints = joints, .prismatic_share = prismatic_share}, rng).tree, {}, rng);
-}
 
 /// The true value of every parameter of a fit.
 Eigen::VectorXd true_parameters(const DynamicModel& model, const Identification& fit,

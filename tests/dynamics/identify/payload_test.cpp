@@ -79,7 +79,7 @@ TEST(Payload, NoiseAndOutliersStayWithinTheInterval) {
 }
 
 TEST(Payload, TheIntervalHoldsTheTruthAsOftenAsItSays) {
-  constexpr int kSeeds = 150;
+  constexpr int kPayloadSeeds = 150;
   // 95 % less four sigmas of a count of 150. More is no fault: the joints' disagreement can only
   // widen.
   constexpr double kFewest = 0.88;
@@ -88,7 +88,7 @@ TEST(Payload, TheIntervalHoldsTheTruthAsOftenAsItSays) {
   int held = 0;
   double error = 0.0;
   double claimed = 0.0;
-  for (int seed = 0; seed < kSeeds; ++seed) {
+  for (int seed = 0; seed < kPayloadSeeds; ++seed) {
     Rng rng = Rng::from_name("payload scatter", static_cast<std::uint64_t>(seed));
     const TorqueSamples loaded = torque_log_of(
         full, {.samples = 1000, .noise = 0.02, .noise_memory = 0.7, .common_noise = 0.3}, rng);
@@ -97,7 +97,7 @@ TEST(Payload, TheIntervalHoldsTheTruthAsOftenAsItSays) {
     error += std::pow(found.mass_kg - kMass, 2);
     claimed += std::pow(found.sigma_kg, 2);
   }
-  EXPECT_GE(held, kFewest * kSeeds);
+  EXPECT_GE(held, kFewest * kPayloadSeeds);
   const double ratio = std::sqrt(claimed / error);
   EXPECT_GT(ratio, 0.8);
   EXPECT_LT(ratio, 1.6) << "an interval that is too wide says nothing";

@@ -114,18 +114,18 @@ TEST(Bands, SigmaIsMadeOfThePartsThatResidualsHave) {
   Rng rng = Rng::from_name("parts of sigma");
   constexpr int kSamples = 4000;
   constexpr double kFactor = 0.5;
-  constexpr double kNoise = 0.3;
+  constexpr double kNoiseSigma = 0.3;
   LeftOutTorques left = left_out(Eigen::MatrixXd::Zero(kSamples, 1));
   for (int i = 0; i < kSamples; ++i) {
     left.model_sigma(i, 0) = rng.uniform(0.1, 3.0);
-    left.residual(i, 0) = rng.normal(std::hypot(kFactor * left.model_sigma(i, 0), kNoise));
+    left.residual(i, 0) = rng.normal(std::hypot(kFactor * left.model_sigma(i, 0), kNoiseSigma));
   }
   const SigmaParts parts = sigma_parts_of(left);
   // 4000 samples give a sigma to 1 %; its parts share them.
   EXPECT_NEAR(parts.model_factor[0], kFactor, 0.04);
-  EXPECT_NEAR(parts.noise_sigma[0], kNoise, 0.06);
+  EXPECT_NEAR(parts.noise_sigma[0], kNoiseSigma, 0.06);
   const TorquePrediction p = with_sigma_parts({left.residual, left.model_sigma, left.sigma}, parts);
-  EXPECT_NEAR(p.sigma(7, 0), std::hypot(kFactor * left.model_sigma(7, 0), kNoise),
+  EXPECT_NEAR(p.sigma(7, 0), std::hypot(kFactor * left.model_sigma(7, 0), kNoiseSigma),
               0.1 * p.sigma(7, 0));
   EXPECT_DOUBLE_EQ(p.model_sigma(7, 0), parts.model_factor[0] * left.model_sigma(7, 0));
   EXPECT_EQ(p.mean, left.residual);

@@ -37,7 +37,7 @@ TorqueSamples pendulums(Eigen::Index rows, double start_s, double noise_nm) {
   return out;
 }
 
-NeuralNetworkOptions quick() {
+NeuralNetworkOptions quick_training() {
   NeuralNetworkOptions options;
   options.epochs = 90;
   options.batch = 20;
@@ -61,7 +61,7 @@ Eigen::VectorXd linear_error_percent(const TorqueSamples& train, const TorqueSam
 TEST(NeuralNetwork, LearnsAKnownFunction) {
   const TorqueSamples train = pendulums(500, 0.0, 0.02);
   const TorqueSamples unseen = pendulums(300, 200.0, 0.0);
-  const FittedTorqueModel fitted = models::fit_neural_network(train, quick(), 1);
+  const FittedTorqueModel fitted = models::fit_neural_network(train, quick_training(), 1);
   EXPECT_EQ(fitted.samples, 500);
   const TorquePrediction prediction = fitted.predict(unseen.q, unseen.dq, unseen.ddq);
   // Per cent of the variance.
@@ -80,7 +80,7 @@ TEST(NeuralNetwork, LearnsAKnownFunction) {
 
 TEST(NeuralNetwork, SameSeedSameBytesOtherSeedOtherNetwork) {
   const TorqueSamples train = pendulums(300, 0.0, 0.02);
-  NeuralNetworkOptions options = quick();
+  NeuralNetworkOptions options = quick_training();
   options.epochs = 10;
   const Eigen::MatrixXd once = predicted(models::fit_neural_network(train, options, 1), train);
   const Eigen::MatrixXd again = predicted(models::fit_neural_network(train, options, 1), train);
@@ -91,7 +91,7 @@ TEST(NeuralNetwork, SameSeedSameBytesOtherSeedOtherNetwork) {
 
 TEST(NeuralNetwork, OneSampleIsAsGoodAsMany) {
   const TorqueSamples train = pendulums(300, 0.0, 0.02);
-  NeuralNetworkOptions options = quick();
+  NeuralNetworkOptions options = quick_training();
   options.epochs = 10;
   const FittedTorqueModel fitted = models::fit_neural_network(train, options, 1);
   const TorqueSamples one = select_rows(train, {7});
@@ -100,7 +100,7 @@ TEST(NeuralNetwork, OneSampleIsAsGoodAsMany) {
 }
 
 TEST(NeuralNetwork, WhatIsWrongIsSaid) {
-  const NeuralNetworkOptions options = quick();
+  const NeuralNetworkOptions options = quick_training();
   TorqueSamples damaged = pendulums(300, 0.0, 0.02);
   damaged.torque(5, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW((void)models::fit_neural_network(damaged, options, 1), Error);
@@ -114,7 +114,7 @@ TEST(NeuralNetwork, WhatIsWrongIsSaid) {
 TEST(NeuralNetwork, AConstantChannelDoesNoHarm) {
   TorqueSamples train = pendulums(300, 0.0, 0.02);
   train.q.col(1).setConstant(0.3);
-  NeuralNetworkOptions options = quick();
+  NeuralNetworkOptions options = quick_training();
   options.epochs = 5;
   EXPECT_TRUE(predicted(models::fit_neural_network(train, options, 1), train).allFinite());
 }

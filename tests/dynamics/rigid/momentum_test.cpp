@@ -11,7 +11,7 @@ namespace kinescope {
 namespace {
 
 /// Sums of about a hundred products each.
-constexpr double kRounding = 1e-11;
+constexpr double kMomentumRounding = 1e-11;
 
 TEST(Momentum, IsWhatTheMatricesSay) {
   Rng rng = Rng::from_name("momentum");
@@ -27,11 +27,12 @@ TEST(Momentum, IsWhatTheMatricesSay) {
         const MomentumTerms& terms = recursion.evaluate(q, dq);
         const Eigen::MatrixXd M = mass_matrix(model, q);
         const double scale = 1.0 + M.norm();
-        EXPECT_LT((terms.mass - M).norm(), kRounding * scale);
-        EXPECT_LT((terms.momentum - M * dq).norm(), kRounding * scale);
+        EXPECT_LT((terms.mass - M).norm(), kMomentumRounding * scale);
+        EXPECT_LT((terms.momentum - M * dq).norm(), kMomentumRounding * scale);
         EXPECT_LT((terms.velocity_torque - coriolis_matrix(model, q, dq).transpose() * dq).norm(),
-                  kRounding * scale * (1.0 + dq.squaredNorm()));
-        EXPECT_LT((terms.gravity_torque - gravity_torque(model, q)).norm(), kRounding * 10 * scale);
+                  kMomentumRounding * scale * (1.0 + dq.squaredNorm()));
+        EXPECT_LT((terms.gravity_torque - gravity_torque(model, q)).norm(),
+                  kMomentumRounding * 10 * scale);
       }
     }
   }

@@ -16,7 +16,7 @@
 namespace kinescope {
 namespace {
 
-std::string refusal(std::string_view bytes, std::uintmax_t max_bytes = 1U << 20U) {
+std::string gunzip_refusal(std::string_view bytes, std::uintmax_t max_bytes = 1U << 20U) {
   try {
     static_cast<void>(gunzip(bytes, "log.csv.gz", max_bytes));
   } catch (const Error& error) {
@@ -37,18 +37,18 @@ RC_GTEST_PROP(Gzip, ReadsMembersInTheirOrder, (const std::string& a, const std::
 RC_GTEST_PROP(Gzip, RefusesEveryTruncation, (const std::string& bytes)) {
   const std::string packed = gzip(bytes);
   const auto length = *rc::gen::inRange<std::size_t>(1, packed.size());
-  RC_ASSERT(refusal(std::string_view(packed).substr(0, length)) != "accepted");
+  RC_ASSERT(gunzip_refusal(std::string_view(packed).substr(0, length)) != "accepted");
 }
 
 TEST(Gzip, SaysWhatIsWrong) {
   const std::string packed = gzip(std::string(100000, 'a') + "bcd");
-  EXPECT_NE(refusal(packed.substr(0, packed.size() - 3)).find("cut off"), std::string::npos);
+  EXPECT_NE(gunzip_refusal(packed.substr(0, packed.size() - 3)).find("cut off"), std::string::npos);
   std::string flipped = packed;
   flipped[packed.size() - 6] = static_cast<char>(flipped[packed.size() - 6] ^ 1);  // checksum
-  EXPECT_NE(refusal(flipped).find("damaged"), std::string::npos);
-  EXPECT_NE(refusal(packed + "tail").find("bytes follow the end"), std::string::npos);
-  EXPECT_NE(refusal("t,q1\n").find("is no gzip file"), std::string::npos);
-  EXPECT_NE(refusal(packed, 1000).find("more than 1000 bytes"), std::string::npos);
+  EXPECT_NE(gunzip_refusal(flipped).find("damaged"), std::string::npos);
+  EXPECT_NE(gunzip_refusal(packed + "tail").find("bytes follow the end"), std::string::npos);
+  EXPECT_NE(gunzip_refusal("t,q1\n").find("is no gzip file"), std::string::npos);
+  EXPECT_NE(gunzip_refusal(packed, 1000).find("more than 1000 bytes"), std::string::npos);
 }
 
 TEST(Gzip, PacksTheSameBytesTwice) { EXPECT_EQ(gzip("t,q1\n0,1\n"), gzip("t,q1\n0,1\n")); }

@@ -13,8 +13,8 @@
 namespace kinescope {
 namespace {
 
-constexpr double kStep = 0.01;
-constexpr double kExact = 1e-12;
+constexpr double kReadingStep = 0.01;
+constexpr double kExactStep = 1e-12;
 
 struct Read {
   std::vector<double> times_s;
@@ -53,10 +53,10 @@ double rms_left(const Read& read) {
 }
 
 TEST(UnsteadyReading, TheStepIsThatOfTheGrid) {
-  for (const double step : {0.05, kStep, 2e-3}) {
+  for (const double step : {0.05, kReadingStep, 2e-3}) {
     const auto found = step_of(in_steps(step).reading);
     ASSERT_TRUE(found) << step;
-    EXPECT_NEAR(*found, step, kExact);
+    EXPECT_NEAR(*found, step, kExactStep);
   }
 }
 
@@ -83,14 +83,14 @@ TEST(UnsteadyReading, AFineGridAndASmoothMotionHaveNothingToSay) {
 
 // Three samples on each step: the edges tell the value to a fraction of a step.
 TEST(UnsteadyReading, BetweenTheStepsTheTimesOfTheChangesTellTheValue) {
-  const Read read = in_steps(kStep);
+  const Read read = in_steps(kReadingStep);
   const auto found = unsteady_reading(read.times_s, read.reading);
   ASSERT_TRUE(found);
   EXPECT_TRUE(found->in_steps);
-  EXPECT_NEAR(found->size, kStep, kExact);
-  EXPECT_LE((found->motion - read.reading).cwiseAbs().maxCoeff(), 0.5 * kStep + kExact);
-  EXPECT_NEAR(rms(read.reading - read.truth), kStep / std::sqrt(12.0), 0.05 * kStep);
-  EXPECT_LT(rms_left(read), 0.06 * kStep);
+  EXPECT_NEAR(found->size, kReadingStep, kExactStep);
+  EXPECT_LE((found->motion - read.reading).cwiseAbs().maxCoeff(), 0.5 * kReadingStep + kExactStep);
+  EXPECT_NEAR(rms(read.reading - read.truth), kReadingStep / std::sqrt(12.0), 0.05 * kReadingStep);
+  EXPECT_LT(rms_left(read), 0.06 * kReadingStep);
 }
 
 // A tenth of a degree beside a motion of up to four steps a sample.
@@ -102,23 +102,23 @@ TEST(UnsteadyReading, StepsThatAMotionLeapsOverAreNoise) {
 // A counter that cuts off is behind by half a step, whichever way the joint moves.
 TEST(UnsteadyReading, CuttingOffIsAnotherZero) {
   Read read = moved();
-  for (double& value : read.reading) value = kStep * std::floor(value / kStep);
-  EXPECT_LT(rms_left(read), 0.06 * kStep);
+  for (double& value : read.reading) value = kReadingStep * std::floor(value / kReadingStep);
+  EXPECT_LT(rms_left(read), 0.06 * kReadingStep);
 }
 
 TEST(UnsteadyReading, WhileItRestsOnAStepTheValueIsSomewhereInIt) {
   constexpr std::size_t kRests = 400;  // samples, from the first on
   Read read = moved();
-  const double shift = 0.3 * kStep;
+  const double shift = 0.3 * kReadingStep;
   for (std::size_t i = 0; i < read.times_s.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     if (i < kRests) read.truth[at] = read.truth[kRests];
-    read.reading[at] = kStep * std::round((read.truth[at] + shift) / kStep);
+    read.reading[at] = kReadingStep * std::round((read.truth[at] + shift) / kReadingStep);
   }
   const auto found = unsteady_reading(read.times_s, read.reading);
   ASSERT_TRUE(found);
   ASSERT_FALSE(found->doubts.empty());
-  const double anywhere = kStep / std::sqrt(12.0);
+  const double anywhere = kReadingStep / std::sqrt(12.0);
   const Doubt& rest = found->doubts.front();
   EXPECT_EQ(rest.first_s, read.times_s.front());
   EXPECT_NEAR(rest.last_s, read.times_s[kRests], 0.1);
@@ -127,9 +127,9 @@ TEST(UnsteadyReading, WhileItRestsOnAStepTheValueIsSomewhereInIt) {
   EXPECT_LT(rest.share(rest.last_s - 1e-6), 1e-3);
   EXPECT_EQ(rest.share(rest.last_s + 1.0), 0.0);
   for (const Doubt& doubt : found->doubts) {
-    EXPECT_LE(doubt.sigma, anywhere + kExact);
+    EXPECT_LE(doubt.sigma, anywhere + kExactStep);
     if (doubt.last_s < read.times_s[kRests]) {
-      EXPECT_NEAR(doubt.sigma, anywhere, kExact);
+      EXPECT_NEAR(doubt.sigma, anywhere, kExactStep);
     }
   }
   EXPECT_LT(found->doubts[2 * found->doubts.size() / 3].sigma, 0.5 * anywhere);
@@ -157,12 +157,12 @@ TEST(UnsteadyReading, WhatItIsOffByIsWhatItDoubts) {
 }
 
 TEST(UnsteadyReading, DoubtsThatNobodySeesAreNone) {
-  const Read read = in_steps(kStep);
+  const Read read = in_steps(kReadingStep);
   auto found = unsteady_reading(read.times_s, read.reading);
   ASSERT_TRUE(found);
   const std::vector<Doubt> all = found->doubts;
   const Eigen::Vector2d seen_s(read.times_s[900], read.times_s[300]);
-  const double clearly = 1e6 / (kStep * kStep);
+  const double clearly = 1e6 / (kReadingStep * kReadingStep);
   found->keep_visible(seen_s, Eigen::Vector2d(0.0, clearly));
   ASSERT_FALSE(found->doubts.empty());
   for (const Doubt& doubt : found->doubts) EXPECT_GT(doubt.share(seen_s[1]), 0.0);
@@ -174,11 +174,12 @@ TEST(UnsteadyReading, DoubtsThatNobodySeesAreNone) {
 TEST(UnsteadyReading, PosturesShowStepsInWhateverOrder) {
   Rng rng(5);
   Eigen::VectorXd values(60);
-  for (double& value : values) value = kStep * std::round(rng.uniform(-1.0, 1.0) / kStep);
+  for (double& value : values)
+    value = kReadingStep * std::round(rng.uniform(-1.0, 1.0) / kReadingStep);
   const auto found = reading_in_steps(values);
   ASSERT_TRUE(found);
-  EXPECT_NEAR(found->size, kStep, kExact);
-  EXPECT_NEAR(found->error, kStep / std::sqrt(12.0), kExact);
+  EXPECT_NEAR(found->size, kReadingStep, kExactStep);
+  EXPECT_NEAR(found->error, kReadingStep / std::sqrt(12.0), kExactStep);
   for (double& value : values) value = rng.uniform(-1.0, 1.0);
   EXPECT_FALSE(reading_in_steps(values));
 }
@@ -196,7 +197,7 @@ TEST(UnsteadyReading, NoiseIsAsLargeAsItIs) {
 }
 
 TEST(UnsteadyReading, ALogIsSteadiedWhereItJumps) {
-  const Read read = in_steps(kStep);
+  const Read read = in_steps(kReadingStep);
   JointLog log;
   log.times_s = read.times_s;
   log.channels = {"steps", "smooth"};

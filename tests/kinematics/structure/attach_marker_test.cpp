@@ -6,23 +6,18 @@
 #include <gtest/gtest.h>
 
 #include "kinematics/model/kinematic_tree.h"
+#include "tests/kinematics/structure/turned_pose.h"
 
 namespace kinescope {
 namespace {
-
-constexpr double kExact = 1e-12;  // products of a few poses
-
-Pose pose(double turn, const Eigen::Vector3d& at) {
-  return {exp_rotation(Eigen::Vector3d(0.3, -0.2, 1.0).normalized() * turn), at};
-}
 
 StructureJoint joint_between(int parent, int child, double turn) {
   StructureJoint out;
   out.parent_link = parent;
   out.child_link = child;
   out.channel = ChannelTerm{child - 1, 1.0, 0.0};
-  out.T_parent_joint = pose(turn, {0.2, 0.1 * turn, 1.0});
-  out.T_joint_child = pose(-2.0 * turn, {0.0, 0.1, 0.3 * turn});
+  out.T_parent_joint = turned_pose(turn, {0.2, 0.1 * turn, 1.0});
+  out.T_joint_child = turned_pose(-2.0 * turn, {0.0, 0.1, 0.3 * turn});
   return out;
 }
 
@@ -30,7 +25,7 @@ StructureJoint joint_between(int parent, int child, double turn) {
 Structure structure_with_a_free_marker() {
   Structure out;
   out.status = StructureStatus::kDetermined;
-  out.links = {{{TagId{1}}, {pose(0.5, {0.0, 0.0, 1.0})}}, {}, {{TagId{7}}, {Pose{}}}};
+  out.links = {{{TagId{1}}, {turned_pose(0.5, {0.0, 0.0, 1.0})}}, {}, {{TagId{7}}, {Pose{}}}};
   out.joints = {joint_between(0, 1, 0.4), joint_between(1, 2, -0.9)};
   out.free_markers = {TagId{5}};
   out.doubts = {{"tag 5 moves, but by no joint that could be found", "", {"tag_5"}},
@@ -57,7 +52,7 @@ class AttachMarker : public ::testing::TestWithParam<int> {};
 
 TEST_P(AttachMarker, PutsItOnTheLinkAndMovesNoOther) {
   const Structure before = structure_with_a_free_marker();
-  const Pose T_link_marker = pose(1.3, {0.05, -0.02, 0.1});
+  const Pose T_link_marker = turned_pose(1.3, {0.05, -0.02, 0.1});
   const Structure after = with_marker_on(before, TagId{5}, GetParam(), T_link_marker);
   std::map<int, Pose> expected = markers_in_camera(before);
   const std::vector<Pose> links =
@@ -66,7 +61,7 @@ TEST_P(AttachMarker, PutsItOnTheLinkAndMovesNoOther) {
   const std::map<int, Pose> found = markers_in_camera(after);
   ASSERT_EQ(found.size(), expected.size());
   for (const auto& [id, T] : expected)
-    EXPECT_LT((found.at(id).matrix4() - T.matrix4()).norm(), kExact) << "tag " << id;
+    EXPECT_LT((found.at(id).matrix4() - T.matrix4()).norm(), kExactProduct) << "tag " << id;
   EXPECT_TRUE(after.free_markers.empty());
   ASSERT_EQ(after.doubts.size(), 1U);
   EXPECT_EQ(after.doubts.front().names.front(), "q1");

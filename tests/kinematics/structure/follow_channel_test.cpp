@@ -11,19 +11,19 @@ namespace {
 // A joint that moves by the difference of two channels that go together a little follows neither of
 // them by half.
 TEST(FollowChannel, ADifferenceOfTwoIsDrivenByBoth) {
-  constexpr int kSamples = 100;
+  constexpr int kReadings = 100;
   constexpr double kTogether = 0.3;
   constexpr double kScale = 0.4;
   Readings readings;
-  readings.value.resize(kSamples, 3);
+  readings.value.resize(kReadings, 3);
   readings.mean = {0.0, 0.0, 0.0};
   readings.rms = {1.0, 1.0, 1.0};
   ChainModel free;
   free.joints.resize(1);
   free.joints.front().type = JointType::kRevolute;
   Motion motion;
-  for (int i = 0; i < kSamples; ++i) {
-    const double phase = 2.0 * M_PI * i / kSamples;
+  for (int i = 0; i < kReadings; ++i) {
+    const double phase = 2.0 * M_PI * i / kReadings;
     const double first = std::sin(phase);
     const double second =
         kTogether * first + std::sqrt(1.0 - kTogether * kTogether) * std::cos(phase);

@@ -10,12 +10,11 @@
 
 #include "kinematics/core/csv.h"
 #include "kinematics/structure/structure.h"
+#include "tests/kinematics/structure/scenes.h"
 #include "tests/truth/shared_data.h"
 
 namespace kinescope {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Matrix6d noise(double sigma_rad, double sigma_m) {
   Matrix6d covariance = Matrix6d::Zero();

@@ -7,15 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "kinematics/model/kinematic_tree.h"
+#include "tests/kinematics/structure/turned_pose.h"
 
 namespace kinescope {
 namespace {
-
-constexpr double kExact = 1e-12;  // products of a few rotations
-
-Pose pose(double turn, const Eigen::Vector3d& at) {
-  return {exp_rotation(Eigen::Vector3d(0.3, -0.2, 1.0).normalized() * turn), at};
-}
 
 // Camera - joint without a channel - marker 1 - joint of channel 0 - marker 2.
 Structure moving_base() {
@@ -25,14 +20,14 @@ Structure moving_base() {
   StructureJoint below;
   below.parent_link = 0;
   below.child_link = 1;
-  below.T_parent_joint = pose(0.4, {0.1, 0.2, 1.0});
-  below.T_joint_child = pose(-0.7, {0.0, 0.3, 0.1});
+  below.T_parent_joint = turned_pose(0.4, {0.1, 0.2, 1.0});
+  below.T_joint_child = turned_pose(-0.7, {0.0, 0.3, 0.1});
   StructureJoint driven;
   driven.parent_link = 1;
   driven.child_link = 2;
   driven.channel = ChannelTerm{0, 1.0, 0.0};
-  driven.T_parent_joint = pose(1.1, {0.2, 0.0, 0.0});
-  driven.T_joint_child = pose(0.2, {0.0, 0.1, 0.0});
+  driven.T_parent_joint = turned_pose(1.1, {0.2, 0.0, 0.0});
+  driven.T_joint_child = turned_pose(0.2, {0.0, 0.1, 0.0});
   out.joints = {below, driven};
   out.joint_values = Eigen::MatrixXd::Constant(3, 2, std::numeric_limits<double>::quiet_NaN());
   out.joint_values.col(0) << 0.01, 0.05, 0.02;
@@ -64,7 +59,7 @@ TEST(RestingBase, TheRobotStaysWhereItMostlyStood) {
   EXPECT_EQ(resting->links.front().markers, std::vector{TagId{1}});
   const Pose before = marker_2(moving, Eigen::Vector2d(0.02, 0.6));
   const Pose after = marker_2(*resting, Eigen::VectorXd::Constant(1, 0.6));
-  EXPECT_LT(log_pose(before.inverse() * after).norm(), kExact);
+  EXPECT_LT(log_pose(before.inverse() * after).norm(), kExactProduct);
 }
 
 TEST(RestingBase, OtherStructuresStayAsTheyAre) {

@@ -14,7 +14,7 @@ namespace {
 constexpr int kRobots = 3;
 
 // Refined corners of tags of 40 px at 1 m or so.
-RecordingOptions exact() {
+RecordingOptions refined_corners() {
   RecordingOptions o;
   o.frames = 330;
   o.sigma_m = 3e-4;
@@ -39,7 +39,7 @@ class SystematicErrors : public testing::TestWithParam<int> {
  protected:
   [[nodiscard]] static Scene scene() {
     return make_scene("Systematic " + std::to_string(GetParam()), {.joints = 3 + GetParam()},
-                      exact());
+                      refined_corners());
   }
 };
 
@@ -75,7 +75,7 @@ TEST_P(SystematicErrors, ACameraThatIsBumped) {
 // channel or a marker of its own.
 Structure rocking(int robot, double rad) {
   Scene s = make_scene("Rocking " + std::to_string(robot), {.joints = 3, .prismatic_share = 0.0},
-                       exact());
+                       refined_corners());
   PoseTrack& tip = track_on(s, 3);
   for (PoseSample& sample : tip.samples) {
     const double phase = 0.11 * sample.frame;

@@ -15,7 +15,7 @@ namespace {
 // Numbers are written so that they read back exactly; the central form costs some rounding.
 constexpr double kReadsBack = 1e-12;
 
-std::string robot(std::string_view inertial, std::string_view in_joint = "") {
+std::string robot_with_inertial(std::string_view inertial, std::string_view in_joint = "") {
   return fmt::format(
       "<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\">\n{}\n</link>\n"
       "<joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child "
@@ -24,7 +24,7 @@ std::string robot(std::string_view inertial, std::string_view in_joint = "") {
       inertial, in_joint);
 }
 
-std::string refusal(const std::string& text) {
+std::string dynamic_refusal(const std::string& text) {
   try {
     static_cast<void>(parse_dynamic_urdf(text, "robot.urdf"));
   } catch (const Error& error) {
@@ -39,7 +39,7 @@ constexpr std::string_view kInertia =
 
 TEST(DynamicUrdf, ReadsInertialsInTheLinksFrame) {
   const DynamicModel model = parse_dynamic_urdf(
-      robot(fmt::format(
+      robot_with_inertial(fmt::format(
           R"(<inertial><origin xyz="0 0 0.5" rpy="0 0 {}"/><mass value="2"/>{}</inertial>)",
           0.5 * std::numbers::pi, kInertia)),
       "robot.urdf");
@@ -88,36 +88,41 @@ TEST(DynamicUrdf, AMarkersMassBelongsToItsLink) {
 }
 
 TEST(DynamicUrdf, RefusesWithLineAndRemedy) {
-  EXPECT_EQ(refusal(robot("")), "accepted");
-  EXPECT_EQ(refusal(robot(fmt::format("<inertial>{}</inertial>", kInertia))),
+  EXPECT_EQ(dynamic_refusal(robot_with_inertial("")), "accepted");
+  EXPECT_EQ(dynamic_refusal(robot_with_inertial(fmt::format("<inertial>{}</inertial>", kInertia))),
             "robot.urdf:4: link 'b': <inertial> has no <mass value=\"..\"> (add it, or leave the "
             "whole element out)");
-  EXPECT_EQ(refusal(robot(fmt::format("<inertial><mass value=\"-1\"/>{}</inertial>", kInertia))),
+  EXPECT_EQ(dynamic_refusal(robot_with_inertial(
+                fmt::format("<inertial><mass value=\"-1\"/>{}</inertial>", kInertia))),
             "robot.urdf:4: link 'b': the mass is -1 kg (a mass is not negative)");
-  EXPECT_TRUE(refusal(robot(R"(<inertial><mass value="1"/><inertia ixx="0.1"/></inertial>)"))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial(
+                                  R"(<inertial><mass value="1"/><inertia ixx="0.1"/></inertial>)"))
                   .starts_with("robot.urdf:4: link 'b': <inertial> has no <inertia "));
-  EXPECT_TRUE(refusal(robot(fmt::format("<inertial><mass value=\"nan\"/>{}</inertial>", kInertia)))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial(fmt::format(
+                                  "<inertial><mass value=\"nan\"/>{}</inertial>", kInertia)))
                   .starts_with("robot.urdf:4: link 'b': <mass value=\"nan\"> holds 'nan'"));
-  EXPECT_TRUE(refusal(robot("", R"(<dynamics damping="-0.1"/>)"))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial("", R"(<dynamics damping="-0.1"/>)"))
                   .starts_with("robot.urdf:7: joint 'j': damping is -0.1"));
-  EXPECT_TRUE(refusal(robot("", R"(<dynamics friction="x"/>)"))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial("", R"(<dynamics friction="x"/>)"))
                   .starts_with("robot.urdf:7: joint 'j': <dynamics friction=\"x\"> holds 'x'"));
-  EXPECT_TRUE(refusal(robot("", R"(<mimic joint="k"/>)"))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial("", R"(<mimic joint="k"/>)"))
                   .starts_with("robot.urdf:7: joint 'j' follows another joint (mimic)"));
 }
 
 TEST(DynamicUrdf, RefusesSizesThatNoRobotHas) {
-  EXPECT_EQ(refusal(robot(fmt::format("<inertial><mass value=\"1e300\"/>{}</inertial>", kInertia))),
+  EXPECT_EQ(dynamic_refusal(robot_with_inertial(
+                fmt::format("<inertial><mass value=\"1e300\"/>{}</inertial>", kInertia))),
             "robot.urdf:4: link 'b': the mass is 1e+300, more than 1e+06 (URDF is in kg, m and s: "
             "correct it)");
-  EXPECT_TRUE(refusal(robot(R"(<inertial><mass value="1"/>
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial(R"(<inertial><mass value="1"/>
       <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="2e6"/></inertial>)"))
                   .starts_with("robot.urdf:4: link 'b': izz is 2e+06"));
-  EXPECT_TRUE(refusal(robot(fmt::format(R"(<inertial><origin xyz="0 0 1e200"/><mass value="1"/>{})"
-                                        "</inertial>",
-                                        kInertia)))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial(fmt::format(
+                                  R"(<inertial><origin xyz="0 0 1e200"/><mass value="1"/>{})"
+                                  "</inertial>",
+                                  kInertia)))
                   .starts_with("robot.urdf:4: link 'b': a coordinate of the centre of mass"));
-  EXPECT_TRUE(refusal(robot("", R"(<dynamics armature="1e7"/>)"))
+  EXPECT_TRUE(dynamic_refusal(robot_with_inertial("", R"(<dynamics armature="1e7"/>)"))
                   .starts_with("robot.urdf:7: joint 'j': armature is 1e+07"));
 }
 
