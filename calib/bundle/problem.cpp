@@ -242,10 +242,10 @@ void BuiltProblem::add_priors(const Spec& spec, State& state) {
     prior_ids_.push_back(problem_->AddResidualBlock(
         make_frame_prior(*spec.prior, spec.tree.joints[j]), nullptr, frame));
     // A zero may be far off, of how the robot was put together or homed: the prior gives way.
-    constexpr double kLossWidth = 2.0;
+    constexpr double kZeroLossWidth = 2.0;
     prior_ids_.push_back(
         problem_->AddResidualBlock(make_zero_prior(*spec.prior, spec.tree.joints[j]),
-                                   new ceres::CauchyLoss(kLossWidth), frame));
+                                   new ceres::CauchyLoss(kZeroLossWidth), frame));
   }
 }
 

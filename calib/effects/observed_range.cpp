@@ -40,11 +40,11 @@ std::optional<JointLimits> observed_range(const FittedEffect& effect,
 
 double beyond_range(const FittedEffect& effect, double value) {
   if (!effect.range) return 0.0;
-  constexpr double kTurn = 2.0 * std::numbers::pi;
+  constexpr double kFullTurn = 2.0 * std::numbers::pi;
   const auto& [lower, upper] = *effect.range;
   if (repeats_every_turn(effect.id)) {
     const double middle = 0.5 * (lower + upper);
-    if (value < lower || value > upper) value = middle + std::remainder(value - middle, kTurn);
+    if (value < lower || value > upper) value = middle + std::remainder(value - middle, kFullTurn);
   }
   return std::max({0.0, lower - value, value - upper});
 }

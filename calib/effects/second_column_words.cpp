@@ -26,9 +26,9 @@ Shown shown(const std::string& si_unit) {
 // Of a number that is known to `digits` digits of `size`.
 int decimals(double size, int digits) {
   constexpr int kMost = 9;
-  constexpr double kRounding = 1e-9;
+  constexpr double kLogRounding = 1e-9;
   if (!(size > 0.0)) return 0;
-  return std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(size) + kRounding)), 0,
+  return std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(size) + kLogRounding)), 0,
                     kMost);
 }
 

@@ -255,10 +255,11 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
   if (world.kind != MeasurementKind::kCorners) return {};
   RestField image{"camera", "px", "place in the image", "px", {}, {}, std::max(floor, kUsualShift)};
   for (int axis = 0; axis < 2; ++axis) {
-    constexpr int kCentre = 2;  // cx, cy among the intrinsic parameters: all corners shift alike
+    constexpr int kFirstOfCentre =
+        2;  // cx, cy among the intrinsic parameters: all corners shift alike
     Correction shift;
     shift.part = CorrectedPart::kIntrinsic;
-    shift.index = kCentre + axis;
+    shift.index = kFirstOfCentre + axis;
     image.carriers[static_cast<std::size_t>(axis)] = carriers.still(shift);
   }
   return {image};

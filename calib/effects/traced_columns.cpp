@@ -68,8 +68,9 @@ double median_magnitude(const Eigen::VectorXd& values) {
 // By what neighbours on both sides leave; a straight line leaves nothing.
 double noise_between_neighbours(const Eigen::VectorXd& r) {
   const Eigen::Index n = r.size() - 2;
-  const double kOfNoise = std::sqrt(6.0);  // squares of 1 -2 1
-  return kMad * median_magnitude(r.head(n) - 2.0 * r.segment(1, n) + r.tail(n)) / kOfNoise;
+  const double kOfSecondDifference = std::sqrt(6.0);  // squares of 1 -2 1
+  return kMad * median_magnitude(r.head(n) - 2.0 * r.segment(1, n) + r.tail(n)) /
+         kOfSecondDifference;
 }
 
 // Integral time of the autocorrelation up to where it vanishes, in steps.
@@ -252,7 +253,7 @@ TracedColumns::Widest TracedColumns::widest(const Shares& shares, double width) 
 // With all effects at once: what is left between neighbours, and who follows whom. With a band
 // either way in one search, two that cancel are found in noise (in 12 of 150 logs without any).
 void TracedColumns::fit_widest() {
-  constexpr double kOfNoise = 10.0;  // play in a noisy column: below, it is that noise
+  constexpr double kPlayOfNoise = 10.0;  // play in a noisy column: below, it is that noise
   const Shares shares = shares_at({start_shift_s_, Eigen::VectorXd::Zero(rows())});
   Widest best = widest(shares, 0.0);
   std::vector<Widest> with_band;
@@ -262,11 +263,11 @@ void TracedColumns::fit_widest() {
   noise_ = noise_of(best.left);
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < widths_.size(); ++k) {
-    if (widths_[k] < kOfNoise * noise_ || with_band[k].left.squaredNorm() >= least) continue;
+    if (widths_[k] < kPlayOfNoise * noise_ || with_band[k].left.squaredNorm() >= least) continue;
     least = with_band[k].left.squaredNorm();
     other_follows_ = with_band[k].play > 0.0;
   }
-  std::erase_if(widths_, [&](double width) { return width < kOfNoise * noise_; });
+  std::erase_if(widths_, [&](double width) { return width < kPlayOfNoise * noise_; });
 }
 
 // Not below what the columns' own digits, or rounding, make of it.

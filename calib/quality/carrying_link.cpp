@@ -12,9 +12,7 @@
 namespace kinescope {
 namespace {
 
-double turn_between(const Pose& a, const Pose& b) {
-  return a.rotation.angularDistance(b.rotation);
-}
+double turn_between(const Pose& a, const Pose& b) { return a.rotation.angularDistance(b.rotation); }
 
 Eigen::Vector3d middle_of(const std::vector<Pose>& poses) {
   Eigen::Vector3d out;

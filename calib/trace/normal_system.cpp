@@ -11,9 +11,6 @@
 namespace kinescope::trace {
 namespace {
 
-// Directions of the model's own parameters below this (scaled) are not seen by the data.
-constexpr double kUnseen = 1e-13;
-
 GroupSums sums_of(RowMatrix J, const Eigen::VectorXd& r) {
   const Eigen::Index parameters = J.cols();
   GroupSums out{

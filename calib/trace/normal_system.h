@@ -13,6 +13,9 @@
 
 namespace kinescope::trace {
 
+/// Directions of the model's own parameters below this (scaled) are not seen by the data.
+inline constexpr double kUnseen = 1e-13;
+
 /// J'J, J'r and r'r over the rows of a group; over all of them J'r less what priors pull.
 struct GroupSums {
   Eigen::MatrixXd H;

@@ -10,7 +10,6 @@ namespace kinescope::trace {
 // The normal matrix gives a basis that is nearly orthonormal; its own products say what is missing
 // (Cholesky QR twice, Yamamoto et al. 2015).
 OwnSpace::OwnSpace(const NormalSystem& system) {
-  constexpr double kUnseen = 1e-13;  // as in the inverse of the normal matrix
   const Linearisation& linear = system.linear();
   Eigen::MatrixXd H = system.total().H;
   if (linear.prior.size() > 0) H += linear.prior;

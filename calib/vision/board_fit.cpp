@@ -144,8 +144,8 @@ std::optional<ViewFit> fit_from(const CameraModel& camera, const BoardSight& vie
     const Vector6d step = solve_symmetric(H, g);
     if (!step.allFinite()) return std::nullopt;
     fit.T_camera_board = fit.T_camera_board * exp_pose(step);
-    constexpr double kConverged = 1e-12;
-    if (step.norm() < kConverged) break;
+    constexpr double kSmallStep = 1e-12;
+    if (step.norm() < kSmallStep) break;
   }
   double sum = 0.0;
   for (std::size_t i = 0; i < view.pixels.size(); ++i) {

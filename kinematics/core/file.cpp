@@ -27,13 +27,13 @@ Error too_large(const fs::path& path, std::uintmax_t bytes, std::uintmax_t max_b
 
 // Up to one byte beyond the most: a file may grow, and those of /proc have no size.
 std::string read_at_most(std::istream& stream, std::uintmax_t expected, std::uintmax_t max_bytes) {
-  constexpr std::size_t kBlock = std::size_t{1} << 16U;
+  constexpr std::size_t kReadBlock = std::size_t{1} << 16U;
   std::string text;
   text.reserve(expected + 1);
   while (stream && text.size() <= max_bytes) {
     const std::size_t before = text.size();
-    text.resize(before + kBlock);
-    stream.read(text.data() + before, kBlock);
+    text.resize(before + kReadBlock);
+    stream.read(text.data() + before, kReadBlock);
     text.resize(before + static_cast<std::size_t>(stream.gcount()));
   }
   return text;

@@ -12,8 +12,8 @@ namespace kinescope {
 namespace {
 
 constexpr std::size_t kFewestForVelocity = 10;  // samples; fewer show no velocity before and after
-constexpr double kManyTimes = 5.0;           // a jump is larger than the usual step by this
-constexpr double kUsual = 0.9;               // quantile of the steps, and of their roughness
+constexpr double kManyTimes = 5.0;              // a jump is larger than the usual step by this
+constexpr double kUsual = 0.9;                  // quantile of the steps, and of their roughness
 constexpr double kOfRoughness = 5.0;     // how far a jump may be from the velocity's prediction ..
 constexpr double kLeastOfPeriod = 0.01;  // .. or this share of the period ..
 constexpr double kMostOfPeriod = 0.1;    // .. and never more than this one

@@ -124,9 +124,9 @@ std::vector<Eigen::Index> best_channels(const Rows& rows, const std::vector<char
 // Variance across the joint with which a sample costs so much at least, and as much again for the
 // errors of few samples.
 double variance_of_cost(double cost) {
-  constexpr double kNoiseOnly = 6.0;
+  constexpr double kCostOfNoise = 6.0;
   constexpr double kSlack = 2.0;
-  return kSlack * std::exp(std::max(0.0, cost - kNoiseOnly) / 5.0);
+  return kSlack * std::exp(std::max(0.0, cost - kCostOfNoise) / 5.0);
 }
 
 bool may_hang(const Motion& motion, const Readings& readings, const std::vector<char>& usable,

@@ -193,8 +193,8 @@ double explained_positions(const Poses& marker, const Poses& flange, const Eigen
 
 // Rotations: of the pairs that fit best, after one fit to all.
 Closure closure_of(const Pairs& all, const Poses& marker, const Poses& flange) {
-  constexpr Eigen::Index kFewest = 20;
-  if (all.flange.cols() < kFewest || !turns_about_two_axes(all.flange)) return {};
+  constexpr Eigen::Index kFewestPairs = 20;
+  if (all.flange.cols() < kFewestPairs || !turns_about_two_axes(all.flange)) return {};
   const Eigen::RowVectorXd misfit =
       (all.marker - best_rotation(all) * all.flange).colwise().squaredNorm();
   std::vector<Eigen::Index> order(static_cast<std::size_t>(misfit.size()));

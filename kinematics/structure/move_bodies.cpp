@@ -141,12 +141,12 @@ void release_children(GrowthState& state, int link, std::size_t body) {
 }
 
 bool improve(GrowthState& state, std::size_t body) {
-  constexpr double kGain = 1e-6;  // less is rounding
+  constexpr double kLeastGain = 1e-6;  // less is rounding
   const GrownBody& grown = state.tree.bodies[body];
   if (grown.link < 0) return false;
   const double correlation = grown.attachment.fit.correlation;
   const Attachment* best = nullptr;
-  double least = grown.attachment.cost(correlation) - kGain;
+  double least = grown.attachment.cost(correlation) - kLeastGain;
   for (const Attachment& a : grown.alternatives) {
     if (is_below(state.tree, a.parent, body) || conflicts(state.tree, body, a)) continue;
     const bool free = !a.at_rest() && !a.driven();

@@ -67,9 +67,9 @@ bool may_rest(const Motion& motion, const Body& body) {
 
 std::optional<Attachment> practical_rest(const Body& body, int link, const LinkPath& path,
                                          const Readings& readings) {
-  constexpr std::size_t kFewest = 5;
+  constexpr std::size_t kFewestSeen = 5;
   const RelativeMotion relative = relative_motion(body, path, readings);
-  if (relative.motion.size() < kFewest) return std::nullopt;
+  if (relative.motion.size() < kFewestSeen) return std::nullopt;
   ChainModel model;
   model.mount = median_pose(relative.motion);
   if (!hardly_moves(relative.motion, model.mount, body, 1.0)) return std::nullopt;
@@ -79,11 +79,11 @@ std::optional<Attachment> practical_rest(const Body& body, int link, const LinkP
 
 bool rest_on_each_other(const Body& a, double motion_size, const Body& b,
                         const Readings& readings) {
-  constexpr std::size_t kFewest = 12;
+  constexpr std::size_t kFewestRelative = 12;
   constexpr double kNoiseOnly = 4.0;  // variance over the declared one; or
   constexpr double kOfMotion = 0.1;   // what is left over how far they move
   const RelativeMotion relative = relative_motion(b, seen_path(a), readings);
-  if (relative.motion.size() < kFewest) return false;
+  if (relative.motion.size() < kFewestRelative) return false;
   ChainModel model;
   model.mount = relative.motion[relative.motion.size() / 2].pose;
   const ChainFit fit = fit_chain(relative.motion, readings.value, model);

@@ -24,7 +24,7 @@ constexpr int kRoughInstants = 80;
 // How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
 constexpr double kClearlyLikelierOffset = 25.0;
 // Variances over the declared ones up to which a tree explains all there is.
-constexpr double kNoiseOnly = 1.5;
+constexpr double kVarianceOfNoise = 1.5;
 
 // Channels of one log are mostly of one kind: when the clear joints are in rad and m, the others
 // are too.
@@ -72,9 +72,9 @@ double score_of(const FoundTree& found) {
 // can be better.
 bool explains_all(const GrownTree& tree) {
   return std::ranges::all_of(tree.bodies, [](const GrownBody& b) {
-    if (b.link < 0 || b.attachment.fit.variance > kNoiseOnly) return false;
+    if (b.link < 0 || b.attachment.fit.variance > kVarianceOfNoise) return false;
     if (b.attachment.at_rest()) return true;
-    return b.attachment.driven() && b.attachment.fit.axis_variance < kNoiseOnly &&
+    return b.attachment.driven() && b.attachment.fit.axis_variance < kVarianceOfNoise &&
            std::ranges::all_of(
                b.attachment.fit.model.joints,
                [](const ChainJoint& j) { return j.terms.size() == 1; });

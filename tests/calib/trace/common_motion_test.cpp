@@ -23,22 +23,22 @@ struct Unrest {
 
 Linearisation world(const Unrest& unrest) {
   Rng rng(7);
-  constexpr int kRows = kBodies * kRowsOfBody;
+  constexpr int kRowsAtOnce = kBodies * kRowsOfBody;
   Linearisation out;
-  out.residual.resize(kMotionInstants * kRows);
+  out.residual.resize(kMotionInstants * kRowsAtOnce);
   out.unit = Eigen::VectorXd::Ones(out.residual.size());
   out.jacobian = RowMatrix::Zero(out.residual.size(), 1);
   out.time_s = Eigen::VectorXd::LinSpaced(kMotionInstants, 0.0, 10.0);
   std::vector<Eigen::Triplet<double>> carriers;
   for (int i = 0; i < kMotionInstants; ++i) {
-    out.first_row.push_back(i * kRows);
+    out.first_row.push_back(i * kRowsAtOnce);
     out.fold.push_back(i % 5);
     const double shake = rng.normal(unrest.shake);
     const double time = rng.normal(unrest.of_time);
     for (int b = 0; b < kBodies; ++b) {
       const double own = rng.normal(unrest.of_body);
       for (int k = 0; k < kRowsOfBody; ++k) {
-        const int row = i * kRows + b * kRowsOfBody + k;
+        const int row = i * kRowsAtOnce + b * kRowsOfBody + k;
         const double moved = b == 0 ? 0.0 : rng.uniform(1.0, 2.0);
         const double speed = rng.uniform(-2.0, 2.0);
         if (b > 0) carriers.emplace_back(row, 0, moved);
@@ -49,7 +49,7 @@ Linearisation world(const Unrest& unrest) {
       }
     }
   }
-  out.first_row.push_back(kMotionInstants * kRows);
+  out.first_row.push_back(kMotionInstants * kRowsAtOnce);
   out.carriers.resize(out.residual.size(), 2);
   out.carriers.setFromTriplets(carriers.begin(), carriers.end());
   return out;
