@@ -222,7 +222,7 @@ bool is_partly_hidden(const ImageView& image, const RefinedCorners& border, cons
   const double cell = longest / layout.cells;
   double elsewhere = kPixels + kShareOfCell * cell + kBending * longest * longest / 8.0;
   if (border.status == RefineStatus::kDone) {
-    if (border.blur_px > kSharp * shortest / layout.cells) return false;
+    if (border.blur_px > corner_fit::kSharp * shortest / layout.cells) return false;
     elsewhere += border.noise / border.contrast * (kNoisePixels + kNoiseOfCell * cell) +
                  kClearShift * border.sigma_px;
   } else {

@@ -170,7 +170,7 @@ class WholeTagFit {
     const LocalBlur blur = local_blur(place(middle.x(), middle.y()).on_tag, blur_);
     if (!(std::max(blur.x, blur.y) < kMostBlur)) return false;
     const std::optional<SeenCode> seen = read_code(image_, *seen_H, layout_, {blur.x, blur.y});
-    if (!seen || !(seen->bright - seen->dark > kMinContrast)) return false;
+    if (!seen || !(seen->bright - seen->dark > corner_fit::kMinContrast)) return false;
     code_ = seen->code;
     dark_(0) = seen->dark;
     bright_(0) = seen->bright;
@@ -426,7 +426,7 @@ class WholeTagFit {
     peak_ = std::clamp(peak_ + d(kPeak), -kMostPeak, kMostPeak);
     dark_ += d.segment<3>(kDark);
     bright_ += d.segment<3>(kBright);
-    bright_(0) = std::max(bright_(0), dark_(0) + kMinContrast);
+    bright_(0) = std::max(bright_(0), dark_(0) + corner_fit::kMinContrast);
     bowl_ += d.segment<3>(kBowl);
   }
 
@@ -463,7 +463,7 @@ class WholeTagFit {
     }
     out.by_cells = true;
     out.noise = noise;
-    out.sigma_px = std::hypot(predicted_sigma(), kFloorSigma);
+    out.sigma_px = std::hypot(predicted_sigma(), corner_fit::kFloorSigma);
     const double mean = 0.5 * (blur_(0, 0) + blur_(1, 1));
     out.blur_px = std::sqrt(mean + std::hypot(0.5 * (blur_(0, 0) - blur_(1, 1)), blur_(0, 1)));
     return out;
