@@ -105,6 +105,7 @@ Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
   const auto q = q_.col(effect.joint);
   const Eigen::VectorXd other = q_.col(kJoints - 1 - effect.joint);
   if (effect.shape == "scale") return q;
+  if (effect.shape == "coupling") return other;
   if (effect.shape == "sine") return q.array().sin();
   if (effect.shape == "gear") return (effect.detail * q.array() + 0.7).sin();
   if (effect.shape == "direction") return direction_of(q);
@@ -152,6 +153,13 @@ std::vector<Candidate> LinearWorld::candidates() const {
     Candidate bend = simple("bend", 0, 1);
     bend.columns = [](double) { return std::vector<EffectColumn>{{0, {}}}; };
     out.push_back(std::move(bend));
+  }
+  if (options_.imitates) {
+    Candidate imitation = simple("imitation", 0, 1);
+    const Eigen::VectorXd shape =
+        share({0, "tanh_other"}).array() + 0.25 * (2.1 * time_s_.array()).sin();
+    imitation.columns = [shape](double) { return std::vector<EffectColumn>{{0, shape}}; };
+    out.push_back(std::move(imitation));
   }
   if (options_.stands_in) {
     const Eigen::VectorXd weave = share({0, "weave"});

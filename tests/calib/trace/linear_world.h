@@ -25,6 +25,8 @@ struct LinearWorldOptions {
   /// Candidate "bend" at joint1: at nothing it does what the joint's zero does, in the fit it is
   /// "tanh_other" (as friction frees the width of its turn).
   bool bends = false;
+  /// Candidate "imitation" at joint1: nearly what "tanh_other" does, and some of its own.
+  bool imitates = false;
   /// Candidates "first_half" and "second_half" at joint1: far larger each than the "weave" that
   /// they are together, which candidate "weave" tells alone, below a floor that nothing reaches.
   bool stands_in = false;
@@ -34,8 +36,8 @@ struct LinearWorldOptions {
 /// What is in the data and not in the model: one term of `LinearWorld::share`.
 struct Injected {
   int joint = 0;
-  std::string
-      shape;  ///< "scale", "sine", "gear", "direction", "step", "tanh_other", "weave", "field"
+  std::string shape;  ///< "scale", "coupling", "sine", "gear", "direction", "step", "tanh_other",
+                      ///< "weave", "field"
   double size = 0.0;
   double detail = 0.0;  ///< periods of the gear, time of the step in s
 };

@@ -48,7 +48,8 @@ TEST(TraceTest, NamesAndSizesEachEffect) {
       {{1, "sine", 2.0, 0.0}, {"sine", "joint2"}},
       {{0, "gear", 0.5, 17.0}, {"gear", "joint1"}},
       {{1, "direction", 0.4, 0.0}, {"direction", "joint2"}},
-      {{0, "step", 0.6, 6.3}, {"step", "joint1"}}};
+      {{0, "step", 0.6, 6.3}, {"step", "joint1"}},
+      {{0, "coupling", 0.3, 0.0}, {"coupling", "joint1"}}};
   for (const auto& [injected, id] : cases) {
     int right = 0;
     int held = 0;
@@ -126,6 +127,20 @@ TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
     EXPECT_LT(trace.held_out_after.value, 1.05);  // of noise 1
   }
   EXPECT_GE(right, 9);
+}
+
+// What the library's effect cannot imitate is a small part of what it explains; one curve says all.
+TEST(TraceTest, ACurveThatSaysMoreThanAnEffectAndACurveTakesItsName) {
+  constexpr int kRuns = 10;
+  int unnamed = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    LinearWorldOptions options;
+    options.seed = static_cast<std::uint64_t>(seed);
+    options.imitates = true;
+    const Trace trace = trace_effects(LinearWorld(options, {{0, "tanh_other", 4.0}}));
+    if (trace.accepted.empty() && trace.verdict == TraceVerdict::kUnknown) ++unnamed;
+  }
+  EXPECT_GE(unnamed, 6);  // two without the comparison
 }
 
 TEST(TraceTest, AThousandthOfWhatIsNamedDoesNotMakeItUnknown) {
