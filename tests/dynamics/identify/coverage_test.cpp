@@ -21,7 +21,7 @@ struct Coverage {
 constexpr int kSeeds = 200;
 
 /// 97.5 % point of Student's t, Abramowitz and Stegun 26.7.5.
-double student_point(double freedom) {
+double student_quantile(double freedom) {
   constexpr double kX = 1.959964;
   return kX + (kX * kX * kX + kX) / (4.0 * freedom) +
          (5.0 * std::pow(kX, 5) + 16.0 * kX * kX * kX + 3.0 * kX) / (96.0 * freedom * freedom);
@@ -59,7 +59,7 @@ Coverage measure(const TorqueWorldOptions& world, RobustLoss loss) {
     const Eigen::ArrayXd error = (fit.parameters - truth).array().abs();
     errors.col(seed) = fit.parameters - truth;
     claimed.col(seed) = fit.covariance.diagonal().cwiseSqrt();
-    const double point = student_point(fit.blocks - 1);
+    const double point = student_quantile(fit.blocks - 1);
     out.share += (error <= point * claimed.col(seed).array()).cast<double>().mean() / kSeeds;
     out.white_share +=
         (error <= 1.96 * fit.white_covariance.diagonal().array().sqrt()).cast<double>().mean() /
