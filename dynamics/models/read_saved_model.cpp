@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/models/process_values.h"
 #include "dynamics/models/saved_model_file.h"
 #include "dynamics/models/saved_model_json.h"
 #include "dynamics/models/saved_model_schema.h"
@@ -96,15 +97,6 @@ SavedProcess process_of(const json& value, const gp::JointKinds& joints, const J
   return out;
 }
 
-gp::JointKinds joint_kinds(const RigidModel& rigid) {
-  gp::JointKinds out;
-  for (const RigidBody& body : rigid.bodies) {
-    out.push_back(body.type == JointType::kRevolute ? gp::JointKind::kRevolute
-                                                    : gp::JointKind::kPrismatic);
-  }
-  return out;
-}
-
 void read_uncertainty(const json& document, Index joints, const JsonReader& read,
                       SavedTorqueModel& model) {
   const json& sigma = read.at(document, "sigma");
@@ -162,7 +154,7 @@ SavedTorqueModel saved_model_of(const json& document, const JsonReader& read) {
   model.drives = drives_of(read.at(document, "drives"), read);
   model.parametric = parametric_of(read.at(document, "parametric"), read);
   model.motions = read.matrix(document, "points", 3 * model.rigid.size());
-  const gp::JointKinds kinds = joint_kinds(model.rigid);
+  const gp::JointKinds kinds = models::joint_kinds(model.rigid);
   for (const json& process : read.array(document, "processes"))
     model.processes.push_back(process_of(process, kinds, read));
   read_uncertainty(document, model.rigid.size(), read, model);
