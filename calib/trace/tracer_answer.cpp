@@ -259,14 +259,15 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
     if (!same_place(found.rest.place, id.place)) continue;
+    const bool doubtful = is_doubtful(found, i);
+    if (found.rest.is_field() && !doubtful) continue;
     StagePtr stage = stage_of(without(now_->added, i));
     const auto alone = found.rest.is_field()
                            ? find_field(stage->system, stage->fit.rest_fields, rest_level())
                            : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
                                        {}, rest_level(), options_);
     if (!alone || alone->rest.place != found.rest.place) continue;
-    const bool says_more = !found.rest.is_field() && alone->held_out.sum() < found.held_out.sum();
-    if (!says_more && !is_doubtful(found, i)) continue;
+    if (!doubtful && alone->held_out.sum() >= found.held_out.sum()) continue;
     const bool is_its_slope = alone->rest.covariate == found.rest.covariate &&
                               is_straight_over(*now_, now_->added[i], found.rest);
     if (!is_its_slope && !says_as_much(*stage, *alone, found)) continue;
