@@ -279,6 +279,13 @@ void add_noise_floor(const RunSummary& run, std::vector<Finding>& findings) {
   const bool spoiled = std::ranges::any_of(
       findings, [](const Finding& finding) { return finding.weight > kAdvice + 6.0; });
   if (spoiled || ratio == 0.0) return;
+  if (run.trace && run.trace->verdict == TraceVerdict::kUnknown) {
+    findings.push_back({kAdvice + 6.0,
+                        "What tracing found and no known effect explains limits the accuracy: the "
+                        "error on unseen data is that of the fit, and neither is noise alone.",
+                        ""});
+    return;
+  }
   const double change = 100.0 * (ratio - 1.0);
   findings.push_back(
       {kAdvice + 6.0,

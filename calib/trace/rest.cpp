@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calib/trace/score_test.h"
+#include "calib/trace/vibration.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/parallel_for.h"
 
@@ -173,6 +174,14 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
   return rest;
 }
 
+// A place and what it follows.
+struct Driven {
+  RestPlace place;
+  Covariate over;
+  Score score;
+  double p_value = 1.0;  // over all that were tried
+};
+
 // By how much the sum of squares falls in the step to the system's own solution.
 double still_to_gain(const NormalSystem& system) {
   const Eigen::VectorXd& step = system.step();
@@ -223,28 +232,29 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
     });
     if (!taken) scores[i] = score_test(system, columns_of(place, covariate));
   });
-  const RestPlace* best_place = nullptr;
-  const Covariate* best_covariate = nullptr;
-  Score best;
+  std::optional<Driven> best;
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const RestPlace& place = places[i / covariates.size()];
     const Covariate& covariate = covariates[i % covariates.size()];
-    if (!passes(scores[i]) || (best_place != nullptr && scores[i].gain <= best.gain)) continue;
+    if (!passes(scores[i]) || (best && scores[i].gain <= best->score.gain)) continue;
     const Score confirmed = jackknife_test(system, columns_of(place, covariate));
     if (confirmed.p_value * tests > level) continue;
-    best = confirmed;
-    best_place = &place;
-    best_covariate = &covariate;
+    best = {place, covariate, confirmed, confirmed.p_value * tests};
   }
-  if (best_place == nullptr) return std::nullopt;
+  if (!best) {
+    auto vibration = find_vibration(system, places, level, options);
+    if (!vibration) return std::nullopt;
+    best = {places[vibration->place], std::move(vibration->phase), std::move(vibration->score),
+            vibration->p_value};
+  }
 
-  const std::vector<double> knots = equal_knots(best_covariate->value);
+  const std::vector<double> knots = equal_knots(best->over.value);
   FoundRest out;
-  out.columns = hats(best_place->carrier, best_covariate->value, knots);
-  const Posterior curve = best_posterior(gather(system, out.columns, best), knots);
+  out.columns = hats(best->place.carrier, best->over.value, knots);
+  const Posterior curve = best_posterior(gather(system, out.columns, best->score), knots);
   out.prior = curve.prior_information;
-  out.rest = describe(system, *best_place, *best_covariate, knots, curve);
-  out.rest.p_value = std::min(1.0, best.p_value * tests);
+  out.rest = describe(system, best->place, best->over, knots, curve);
+  out.rest.p_value = std::min(1.0, best->p_value);
   double gain = 0.0;
   if (!earns_its_place(system, out, gain)) return std::nullopt;
   if (system.shift_of(gain, out.columns) < options.floor ||

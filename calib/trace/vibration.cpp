@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/trace/vibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/median.h"
+#include "kinematics/core/parallel_for.h"
+
+namespace kinescope::trace {
+namespace {
+
+// Turns in the recording: fewer are a curve over time.
+constexpr double kLeastTurns = 12.0;
+// Frequencies tried, in steps of one turn in the recording.
+constexpr int kOversampling = 4;
+constexpr int kRefinements = 40;
+
+// Instants on an even grid of time, which a film's are but for frames left out.
+struct Grid {
+  double step_s = 0.0;
+  std::vector<std::size_t> cell;  // of every instant
+  std::size_t cells = 0;
+};
+
+std::optional<Grid> grid_of(const Eigen::VectorXd& time_s) {
+  constexpr Eigen::Index kFewInstants = 100;
+  constexpr double kMostCells = 8.0;  // an instant: with gaps as long there is no rate
+  const Eigen::Index n = time_s.size();
+  if (n < kFewInstants) return std::nullopt;
+  std::vector<double> steps;
+  for (Eigen::Index i = 1; i < n; ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  Grid grid;
+  grid.step_s = median_of(std::move(steps));
+  const double duration = time_s[n - 1] - time_s[0];
+  if (!(grid.step_s > 0.0) || duration > kMostCells * static_cast<double>(n) * grid.step_s)
+    return std::nullopt;
+  for (const double t : time_s)
+    grid.cell.push_back(static_cast<std::size_t>(std::lround((t - time_s[0]) / grid.step_s)));
+  grid.cells = grid.cell.back() + 1;
+  return grid;
+}
+
+// carrier'residual and carrier'carrier of every instant.
+struct Series {
+  Eigen::VectorXd with_residual;
+  Eigen::VectorXd with_itself;
+};
+
+Series series_of(const Linearisation& linear, int carrier) {
+  Series out{Eigen::VectorXd::Zero(linear.instants()), Eigen::VectorXd::Zero(linear.instants())};
+  std::size_t instant = 0;
+  for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, carrier); entry; ++entry) {
+    while (linear.first_row[instant + 1] <= entry.row()) ++instant;
+    const auto i = static_cast<Eigen::Index>(instant);
+    out.with_residual[i] += entry.value() * linear.residual[entry.row()];
+    out.with_itself[i] += entry.value() * entry.value();
+  }
+  return out;
+}
+
+std::vector<EffectColumn> swing(int carrier, const Eigen::VectorXd& time_s, double frequency_hz) {
+  const Eigen::ArrayXd phase = 2.0 * std::numbers::pi * frequency_hz * time_s.array();
+  return {{carrier, phase.cos().matrix()}, {carrier, phase.sin().matrix()}};
+}
+
+struct Peak {
+  double frequency_hz = 0.0;
+  double gain = 0.0;  // of the sum of squares, without the model's own parameters
+};
+
+// The periodogram's highest line above `least_hz`.
+Peak highest_line(const Series& series, const Grid& grid, double least_hz) {
+  const std::size_t size = static_cast<std::size_t>(kOversampling) * grid.cells;
+  std::vector<double> padded(size, 0.0);
+  for (std::size_t i = 0; i < grid.cell.size(); ++i)
+    padded[grid.cell[i]] += series.with_residual[static_cast<Eigen::Index>(i)];
+  std::vector<std::complex<double>> spectrum;
+  Eigen::FFT<double> fft;
+  fft.fwd(spectrum, padded);
+  const double unit_hz = 1.0 / (static_cast<double>(size) * grid.step_s);
+  const double weight = series.with_itself.sum();
+  Peak best;
+  for (std::size_t k = 0; 2 * k < size; ++k) {
+    const double frequency_hz = static_cast<double>(k) * unit_hz;
+    const double gain = 2.0 * std::norm(spectrum[k]) / weight;
+    if (frequency_hz >= least_hz && gain > best.gain) best = {frequency_hz, gain};
+  }
+  return best;
+}
+
+// Golden section over one step of the periodogram to either side.
+double refined(const NormalSystem& system, int carrier, double frequency_hz, double step_hz) {
+  constexpr double kGolden = 0.6180339887498949;
+  const auto gain = [&](double f) {
+    return gain_of(system, swing(carrier, system.linear().time_s, f));
+  };
+  double low = frequency_hz - step_hz;
+  double high = frequency_hz + step_hz;
+  double left = high - kGolden * (high - low);
+  double right = low + kGolden * (high - low);
+  double gain_left = gain(left);
+  double gain_right = gain(right);
+  for (int i = 0; i < kRefinements; ++i) {
+    if (gain_left > gain_right) {
+      high = std::exchange(right, left);
+      gain_right = gain_left;
+      left = high - kGolden * (high - low);
+      gain_left = gain(left);
+    } else {
+      low = std::exchange(left, right);
+      gain_left = gain_right;
+      right = low + kGolden * (high - low);
+      gain_right = gain(right);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+Covariate phase_of(const Eigen::VectorXd& time_s, double frequency_hz) {
+  Covariate out;
+  out.name = fmt::format("phase of a vibration of {:.3g} Hz", frequency_hz);
+  out.unit = "rad";
+  const Eigen::ArrayXd turns = frequency_hz * time_s.array();
+  out.value = 2.0 * std::numbers::pi * (turns - turns.floor()).matrix();
+  return out;
+}
+
+}  // namespace
+
+std::optional<Vibration> find_vibration(const NormalSystem& system,
+                                        const std::vector<RestPlace>& places, double level,
+                                        const TraceOptions& options) {
+  const Linearisation& linear = system.linear();
+  if (linear.independent_instants || linear.body.empty() || places.empty()) return std::nullopt;
+  const std::optional<Grid> grid = grid_of(linear.time_s);
+  if (!grid) return std::nullopt;
+  const double duration = static_cast<double>(grid->cells) * grid->step_s;
+  std::vector<Peak> peaks(places.size());
+  parallel_for(places.size(), [&](std::size_t k) {
+    const Series series = series_of(linear, places[k].carrier);
+    if (series.with_itself.sum() > 0.0)
+      peaks[k] = highest_line(series, *grid, kLeastTurns / duration);
+  });
+  const auto highest = std::ranges::max_element(peaks, {}, &Peak::gain);
+  if (!(highest->gain > 0.0)) return std::nullopt;
+  const auto place = static_cast<std::size_t>(highest - peaks.begin());
+  const int carrier = places[place].carrier;
+  const double frequency_hz =
+      refined(system, carrier, highest->frequency_hz, 1.0 / (kOversampling * duration));
+  // One independent frequency a turn in the recording (Scargle 1982, eq. 13).
+  const double tests = static_cast<double>(places.size() * grid->cells) / 2.0;
+  const std::vector<EffectColumn> columns = swing(carrier, linear.time_s, frequency_hz);
+  Vibration out{place, phase_of(linear.time_s, frequency_hz), score_test(system, columns), 1.0};
+  if (out.score.hidden() || !is_large(out.score, options)) return std::nullopt;
+  out.p_value = tests * std::max(out.score.p_value, jackknife_test(system, columns).p_value);
+  if (out.p_value > level) return std::nullopt;
+  return out;
+}
+
+}  // namespace kinescope::trace
