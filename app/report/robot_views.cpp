@@ -261,38 +261,67 @@ std::string draw_view(const Drawing& robot, const Calibration& calibration, doub
 
 }  // namespace
 
-std::string robot_views(const Facts& facts) {
-  const Calibration& calibration = facts.run.calibration;
-  const Predictor predictor(calibration);
-  const int frame = middle_frame(predictor, calibration.times_s.size());
-  if (frame < 0)
-    return paragraph("No posture of the recording is known: the robot is not drawn.", "note");
-  const std::vector<Pose>& links = predictor.links(frame);
-  const double extent = robot_extent(calibration, links);
-  Drawing drawing;
-  draw_links(calibration, links, drawing);
-  draw_joints(calibration.tree, links, kAxisShare * extent, drawing);
-  draw_markers(calibration.tree, links, 0.02 * extent, drawing);
-  // In the frame of the views: x right, y up, z towards the reader.
-  const bool video = calibration.kind == MeasurementKind::kCorners;
-  const std::array<View, 3> views = {{
+namespace {
+
+// In the frame of the views: x right, y up, z towards the reader.
+std::array<View, 3> views_of(MeasurementKind kind) {
+  const bool video = kind == MeasurementKind::kCorners;
+  return {{
       {video ? "as the camera sees it (no perspective)" : "from the front (x right, z up)", 0, 1.0,
        1, 1.0},
       {video ? "from above, the camera below" : "from above (x right, y up)", 0, 1.0, 2, -1.0},
       {video ? "from the camera's right" : "from the right (y right, z up)", 2, -1.0, 1, 1.0},
   }};
-  const Pose T_view_base = views_from_base(calibration);
+}
+
+/// The robot at one posture of the recording.
+struct Posture {
+  int frame = -1;  // -1: none is known
+  double extent = 1.0;
+  Drawing robot;
+};
+
+Posture drawn_posture(const Calibration& calibration) {
+  const Predictor predictor(calibration);
+  Posture out;
+  out.frame = middle_frame(predictor, calibration.times_s.size());
+  if (out.frame < 0) return out;
+  const std::vector<Pose>& links = predictor.links(out.frame);
+  out.extent = robot_extent(calibration, links);
+  draw_links(calibration, links, out.robot);
+  draw_joints(calibration.tree, links, kAxisShare * out.extent, out.robot);
+  draw_markers(calibration.tree, links, 0.02 * out.extent, out.robot);
+  return out;
+}
+
+std::string draw_view(const Posture& posture, const Calibration& calibration, const View& view) {
+  return draw_view(posture.robot, calibration, kFrustumShare * posture.extent,
+                   views_from_base(calibration), view);
+}
+
+}  // namespace
+
+std::string robot_still(const Facts& facts) {
+  const Calibration& calibration = facts.run.calibration;
+  const Posture posture = drawn_posture(calibration);
+  return posture.frame < 0 ? ""
+                           : draw_view(posture, calibration, views_of(calibration.kind).front());
+}
+
+std::string robot_views(const Facts& facts) {
+  const Calibration& calibration = facts.run.calibration;
+  const Posture posture = drawn_posture(calibration);
+  if (posture.frame < 0)
+    return paragraph("No posture of the recording is known: the robot is not drawn.", "note");
   std::string out = "<div class=\"views\">\n";
-  for (const View& view : views) {
-    out += draw_view(drawing, calibration, kFrustumShare * extent, T_view_base, view);
-  }
+  for (const View& view : views_of(calibration.kind)) out += draw_view(posture, calibration, view);
   out += "</div>\n";
   return out +
          paragraph(
              fmt::format(
                  "Posture at {}. Joint axes: red turns, blue slides; squares: markers with their "
                  "id; each view has its own scale.",
-                 text_with_unit(calibration.times_s[static_cast<std::size_t>(frame)],
+                 text_with_unit(calibration.times_s[static_cast<std::size_t>(posture.frame)],
                                 Quantity::kTime)),
              "note");
 }

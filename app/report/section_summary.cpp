@@ -116,17 +116,17 @@ std::string section_head(std::string_view id, std::string_view title) {
 }
 
 std::string verdict_section(const Facts& facts) {
-  std::string out = section_head("verdict", "Verdict");
   const auto& trace = facts.run.trace;
   const bool traced = trace && trace->verdict != TraceVerdict::kNotRun;
-  out += "<ul class=\"lights\">\n" + structure_light(facts.run) + geometry_light(facts) +
-         (traced ? residual_light(*trace, facts.run.calibration.sigma_scale) : "") +
-         "</ul>\n<dl class=\"verdict\">\n";
+  const std::string lights =
+      "<ul class=\"lights\">\n" + structure_light(facts.run) + geometry_light(facts) +
+      (traced ? residual_light(*trace, facts.run.calibration.sigma_scale) : "") + "</ul>\n";
+  std::string out = section_head("verdict", "Verdict") + first_screen(facts, lights);
+  out += "<dl class=\"verdict\">\n";
   out += verdict_line("Found", facts.verdict.found);
   out += verdict_line("Accuracy", facts.verdict.accurate);
   if (traced) out += verdict_line("What the model lacked", trace_paragraph(*trace));
   out += verdict_line("What limits it", facts.verdict.limits);
-  out += verdict_line("What to record next", facts.verdict.next);
   return out + "</dl></section>\n";
 }
 

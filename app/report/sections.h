@@ -12,6 +12,9 @@
 namespace kinescope::report {
 
 [[nodiscard]] std::string verdict_section(const Facts& facts);
+/// What a reader gets in ten seconds, and what opens the verdict: one sentence, one error with its
+/// interval, what each effect was worth, what to do next, beside the robot. `lights`: HTML.
+[[nodiscard]] std::string first_screen(const Facts& facts, std::string_view lights);
 [[nodiscard]] std::string identity_section(const Facts& facts);
 [[nodiscard]] std::string data_section(const Facts& facts);
 [[nodiscard]] std::string structure_section(const Facts& facts);
@@ -30,6 +33,10 @@ namespace kinescope::report {
 [[nodiscard]] std::string tree_drawing(const Facts& facts);
 /// Three orthographic views of the robot at a posture of the recording.
 [[nodiscard]] std::string robot_views(const Facts& facts);
+/// The first of them.
+[[nodiscard]] std::string robot_still(const Facts& facts);
+/// The 3-D view and its controls; hidden until the script shows it.
+[[nodiscard]] std::string viewer_panel();
 /// What the 3-D view plays, as JSON text that is safe inside a script element.
 [[nodiscard]] std::string viewer_data(const Facts& facts);
 

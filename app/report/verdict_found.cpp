@@ -33,6 +33,10 @@ std::string joined(const std::vector<std::string>& words) {
 
 namespace {
 
+std::string_view body_word(const RunSummary& run) {
+  return run.calibration.kind == MeasurementKind::kPoint ? "point" : "marker";
+}
+
 /// "R R P R": the moving joints in the tree's order.
 std::string type_letters(const KinematicTree& tree) {
   std::string letters;
@@ -196,17 +200,24 @@ std::string column_words(const KinematicTree& tree, const JointLog& log) {
 
 }  // namespace
 
-std::string found_words(const RunSummary& run) {
+std::string joints_words(const RunSummary& run) {
   const KinematicTree& tree = run.calibration.tree;
   const std::size_t moving = moving_joint_count(tree);
-  const std::string_view what =
-      run.calibration.kind == MeasurementKind::kPoint ? "point" : "marker";
-  std::string text;
+  const std::string letters = moving > 0 ? fmt::format(" ({})", type_letters(tree)) : "";
+  if (!run.structure)
+    return fmt::format("Nominal robot {}: {}{}", tree.name, counted(moving, "joint"), letters);
+  if (moving == 0)
+    return fmt::format("No joint found among {}", counted(tree.markers.size(), body_word(run)));
+  return fmt::format("{} in a {}{}", counted(moving, "joint"), is_chain(tree) ? "chain" : "tree",
+                     letters);
+}
+
+std::string found_words(const RunSummary& run) {
+  const KinematicTree& tree = run.calibration.tree;
+  const std::string bodies = counted(tree.markers.size(), body_word(run));
+  std::string text = joints_words(run);
   if (!run.structure) {
-    text = fmt::format("Nominal robot {}: {}", tree.name, counted(moving, "joint"));
-    if (moving > 0) text += fmt::format(" ({})", type_letters(tree));
-    text +=
-        fmt::format(", {} calibrated; {}.", counted(tree.markers.size(), what), driving_words(run));
+    text += fmt::format(", {} calibrated; {}.", bodies, driving_words(run));
     text += column_words(tree, run.log);
     if (run.nominal) {
       for (const std::string& words : fault_sentences(*run.nominal, run.nominal_faults))
@@ -214,13 +225,8 @@ std::string found_words(const RunSummary& run) {
     }
     return text;
   }
-  if (moving == 0) {
-    text = fmt::format("No joint found among {}", counted(tree.markers.size(), what));
-  } else {
-    text = fmt::format("{} in a {} ({}) carrying {}; {}", counted(moving, "joint"),
-                       is_chain(tree) ? "chain" : "tree", type_letters(tree),
-                       counted(tree.markers.size(), what), driving_words(run));
-  }
+  if (moving_joint_count(tree) > 0)
+    text += fmt::format(" carrying {}; {}", bodies, driving_words(run));
   text += "; " + certainty_words(*run.structure) + "." + coupling_words(tree);
   if (!run.structure->free_markers.empty()) {
     std::vector<std::string> names;

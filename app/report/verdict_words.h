@@ -13,6 +13,9 @@ namespace kinescope::report {
 /// "a, b and c".
 [[nodiscard]] std::string joined(const std::vector<std::string>& words);
 
+/// "4 joints in a chain (R R P R)", "Nominal robot arm: 6 joints (R R R R R R)".
+[[nodiscard]] std::string joints_words(const RunSummary& run);
+
 /// The structure: how many joints of which type, what drives them, how certain that is.
 [[nodiscard]] std::string found_words(const RunSummary& run);
 

@@ -146,10 +146,8 @@ std::string viewer_data(const Facts& facts) {
       camera_text(calibration), list(times, 4), values, arrows);
 }
 
-std::string view_section(const Facts& facts) {
-  std::string out = section_head("view", "The robot");
-  // Shown by the script; without it the three drawings below stand for it.
-  out += R"(<div id="viewer" hidden>
+std::string viewer_panel() {
+  return R"(<div id="viewer" hidden>
 <div id="viewer-canvas" tabindex="0" aria-label="3-D view of the robot"></div>
 <div id="viewer-controls">
 <button type="button" id="viewer-play" title="Space">Play</button>
@@ -160,10 +158,15 @@ std::string view_section(const Facts& facts) {
 <button type="button" id="viewer-camera" title="C">Camera's view</button>
 <button type="button" id="viewer-reset" title="R">Reset view</button>
 </div>
-<p class="note">Drag turns, right drag moves, wheel zooms (after a click). Space plays, arrow keys step, Home and End jump, + and - scale the residual arrows. A click on a plot over time comes here.</p>
 </div>
 )";
-  return out + robot_views(facts) + "</section>\n";
+}
+
+std::string view_section(const Facts& facts) {
+  return section_head("view", "The robot") + robot_views(facts) +
+         "<p class=\"note\">The 3-D view above: drag turns, right drag moves, wheel zooms (after a "
+         "click). Space plays, arrow keys step, Home and End jump, + and - scale the residual "
+         "arrows. A click on a plot over time goes there.</p></section>\n";
 }
 
 }  // namespace kinescope::report

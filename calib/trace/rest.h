@@ -31,8 +31,8 @@ struct FoundRest {
 
 /// The place and covariate that explain most, where that is significant at `level` over all pairs
 /// of them, moves the prediction by more than the floors of `options`, makes at least a hundredth
-/// of the residual's sum of squares, and helps to predict what is held out. Where there is none, the
-/// phase of a vibration (vibration.h). `known`: those that are in `system`.
+/// of the residual's sum of squares, and helps to predict what is held out. Where there is none,
+/// the phase of a vibration (vibration.h). `known`: those that are in `system`.
 [[nodiscard]] std::optional<FoundRest> find_rest(const NormalSystem& system,
                                                  const std::vector<RestPlace>& places,
                                                  const std::vector<Covariate>& covariates,

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <unsupported/Eigen/FFT>
 
 #include <fmt/format.h>
+#include <unsupported/Eigen/FFT>
 
 #include "kinematics/core/median.h"
 #include "kinematics/core/parallel_for.h"

@@ -69,9 +69,9 @@ TEST(Vibration, IsFoundWithItsFrequency) {
     EXPECT_EQ(found->place, 0U);
     const double phase = 2.0 * std::numbers::pi * frequency_hz * linear.time_s[kFrames - 1];
     // An eighth of a turn over the whole film.
-    EXPECT_LT(std::abs(std::remainder(found->phase.value[kFrames - 1] - phase,
-                                      2.0 * std::numbers::pi)),
-              0.25 * std::numbers::pi);
+    EXPECT_LT(
+        std::abs(std::remainder(found->phase.value[kFrames - 1] - phase, 2.0 * std::numbers::pi)),
+        0.25 * std::numbers::pi);
   }
 }
 

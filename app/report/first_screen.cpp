@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/findings.h"
+#include "app/report/html.h"
+#include "app/report/sections.h"
+#include "app/report/trace_words.h"
+#include "app/report/verdict_words.h"
+
+namespace kinescope::report {
+namespace {
+
+std::string names_of(const std::vector<TracedEffect>& effects) {
+  std::vector<std::string> names;
+  for (const TracedEffect& effect : effects) {
+    names.push_back(effect.is_curve() ? "what repeats with the value of " + effect.id.place
+                                      : fmt::format("{} at {}", effect.id.effect, effect.id.place));
+  }
+  return joined(names);
+}
+
+// What follows the joints in the verdict's one sentence.
+std::string outcome_words(const Trace& trace) {
+  const std::string corrected =
+      trace.accepted.empty() ? "" : ", corrected for " + names_of(trace.accepted);
+  switch (trace.verdict) {
+    case TraceVerdict::kClean:
+      return ", and nothing wrong with it that this recording shows";
+    case TraceVerdict::kEffects:
+      return corrected;
+    case TraceVerdict::kAmbiguous:
+      return corrected + ", or for what this recording cannot tell from that";
+    case TraceVerdict::kUnknown:
+      return corrected +
+             (trace.rest.empty()
+                  ? "; no known effect explains it"
+                  : fmt::format("; at {} something is left that no known effect explains",
+                                trace.rest.front().place));
+    case TraceVerdict::kNothingToSay:
+      return "; whether it lacks anything, the recording is too short to tell";
+    case TraceVerdict::kNotRun:
+      break;
+  }
+  return "";
+}
+
+std::string headline(const Facts& facts) {
+  const nlohmann::json& verdict = facts.result.at("verdict");
+  if (!verdict.at("answer").get<bool>())
+    return sentence("No answer: " + verdict.at("no_answer").get<std::string>());
+  const std::optional<Trace>& trace = facts.run.trace;
+  return sentence(joints_words(facts.run) + (trace ? outcome_words(*trace) : ""));
+}
+
+// The error's place in the result document, data that the fit has not seen first, lengths first.
+struct Figure {
+  std::string pointer;
+  Quantity quantity = Quantity::kLength;
+  bool held_out = true;
+};
+
+std::optional<Figure> figure_of_merit(const Facts& facts) {
+  for (const bool held_out : {true, false}) {
+    const std::string state = held_out ? "held_out" : "training";
+    const std::array<Figure, 2> figures{
+        {{fmt::format("/errors/all/{}_m/rms", state), Quantity::kLength, held_out},
+         {fmt::format("/errors/all/{}_px/rms", state), Quantity::kPixels, held_out}}};
+    for (const Figure& figure : figures)
+      if (number_at(facts.result, figure.pointer)) return figure;
+  }
+  return std::nullopt;
+}
+
+// " (95 %: 0.036 mm to 0.041 mm)": as wide, in proportion, as that of the error that tracing took.
+std::string interval_words(const Facts& facts, const Figure& figure) {
+  const std::optional<Trace>& trace = facts.run.trace;
+  if (!figure.held_out || !trace || !(trace->held_out_after.value > 0.0)) return "";
+  const HeldOutError& of = trace->held_out_after;
+  const double value = number_at(facts.result, figure.pointer).value_or(0.0) / of.value;
+  return fmt::format(" (95 %: {} to {})", text_with_unit(value * of.interval.low, figure.quantity),
+                     text_with_unit(value * of.interval.high, figure.quantity));
+}
+
+std::string merit(const Facts& facts) {
+  const std::optional<Figure> figure = figure_of_merit(facts);
+  if (!figure) return "";
+  const MeasurementKind kind = facts.run.calibration.kind;
+  std::string of = kind == MeasurementKind::kPoint ? "points" : "markers";
+  if (figure->held_out) of += facts.run.log.empty() ? " in stretches" : " at postures";
+  of += figure->held_out ? " that the fit has not seen" : " in the data of the fit itself";
+  if (figure->quantity == Quantity::kLength && kind == MeasurementKind::kCorners)
+    of += ", across the line of sight";
+  return fmt::format("<p class=\"merit\"><b>{}</b><span>rms error of {}{}</span></p>\n",
+                     inline_number(facts.result, figure->pointer, figure->quantity), of,
+                     escaped(interval_words(facts, *figure)));
+}
+
+// What was found, with the error on unseen data without and with it.
+struct Gain {
+  std::string what;
+  HeldOutError without;
+  HeldOutError with;
+  std::string_view with_words = "with it";
+};
+
+std::vector<Gain> gains_of(const Trace& trace) {
+  std::vector<Gain> out;
+  for (const TracedEffect& effect : trace.accepted)
+    out.push_back({effect.is_curve()
+                       ? names_of({effect})
+                       : fmt::format("{}: {}", effect_name(effect), size_words(effect)),
+                   effect.held_out_before, effect.held_out_after});
+  for (const Rest& rest : trace.rest)
+    out.push_back({fmt::format("{}: unexplained, follows the {}", rest.place, rest.covariate),
+                   rest.held_out_before, rest.held_out_after, "with a curve for it"});
+  return out;
+}
+
+std::string bar(const HeldOutError& error, double most, std::string_view css_class,
+                std::string_view words) {
+  return fmt::format(
+      "<div class=\"gain\"><i class=\"{}\" style=\"width:{:.1f}%\"></i><span>{} {}</span></div>",
+      css_class, 55.0 * error.value / most, escaped(amount_text(error.value, error.unit)), words);
+}
+
+// The largest ones: what they leave is in the section on effects.
+std::string gains(const Facts& facts) {
+  constexpr std::size_t kMostGains = 3;
+  if (!facts.run.trace) return "";
+  std::vector<Gain> all = gains_of(*facts.run.trace);
+  std::erase_if(all, [](const Gain& gain) { return !(gain.without.value > 0.0); });
+  if (all.empty()) return "";
+  std::ranges::stable_sort(all, std::greater{},
+                           [](const Gain& gain) { return gain.without.value; });
+  const std::size_t more = all.size() - std::min(all.size(), kMostGains);
+  all.resize(all.size() - more);
+  const double most = all.front().without.value;
+  std::string out = "<ul class=\"gains\">\n";
+  for (const Gain& gain : all) {
+    out += "<li>" + escaped(gain.what) + bar(gain.without, most, "without", "without") +
+           bar(gain.with, most, "with", gain.with_words) + "</li>\n";
+  }
+  if (more > 0) out += fmt::format("<li><a href=\"#trace\">and {} more</a></li>\n", more);
+  return out + "</ul>\n";
+}
+
+}  // namespace
+
+std::string first_screen(const Facts& facts, std::string_view lights) {
+  return fmt::format(
+      "<p class=\"headline\">{}</p>\n<div class=\"first\">\n<div class=\"said\">\n{}{}{}"
+      "<p class=\"next\"><b>What to record next</b> {}</p>\n</div>\n<div class=\"shown\">\n{}"
+      "<div id=\"viewer-still\">{}</div>\n</div>\n</div>\n",
+      escaped(headline(facts)), merit(facts), lights, gains(facts), escaped(facts.verdict.next),
+      viewer_panel(), robot_still(facts));
+}
+
+}  // namespace kinescope::report

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a reader gets in ten seconds.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "app/report/report.h"
+#include "tests/app/report/synthetic_run.h"
+
+namespace kinescope {
+namespace {
+
+HeldOutError px(double value) { return {value, {0.9 * value, 1.1 * value}, "px"}; }
+
+TracedEffect backlash(const std::string& place, double before, double after) {
+  TracedEffect effect;
+  effect.id = {"backlash", place};
+  effect.size = 0.01;
+  effect.interval = {0.0099, 0.0101};
+  effect.unit = "rad";
+  effect.held_out_before = px(before);
+  effect.held_out_after = px(after);
+  return effect;
+}
+
+RunSummary traced_run(TraceVerdict verdict) {
+  RunSummary run = synthetic_run();
+  run.trace = Trace{};
+  run.trace->verdict = verdict;
+  run.trace->held_out_before = run.trace->held_out_after = px(0.2);
+  return run;
+}
+
+std::string first_screen_of(const RunSummary& run) {
+  const std::string page = report_html(run, "");
+  const std::size_t begin = page.find("<section id=\"verdict\">");
+  return page.substr(begin, page.find("<dl class=\"verdict\">") - begin);
+}
+
+TEST(FirstScreen, SaysInOneSentenceWhatTheRobotIsAndWhatIsWrongWithIt) {
+  EXPECT_TRUE(has(first_screen_of(synthetic_run()),
+                  "<p class=\"headline\">3 joints in a chain (R R P).</p>"));
+  EXPECT_TRUE(has(first_screen_of(traced_run(TraceVerdict::kClean)),
+                  "(R R P), and nothing wrong with it that this recording shows.</p>"));
+  RunSummary effects = traced_run(TraceVerdict::kEffects);
+  effects.trace->accepted = {backlash("arm1", 0.5, 0.2), backlash("arm2", 0.3, 0.2)};
+  EXPECT_TRUE(has(first_screen_of(effects),
+                  "(R R P), corrected for backlash at arm1 and backlash at arm2.</p>"));
+  RunSummary unknown = traced_run(TraceVerdict::kUnknown);
+  unknown.trace->rest.resize(1);
+  unknown.trace->rest.front().place = "arm2";
+  EXPECT_TRUE(has(first_screen_of(unknown),
+                  "(R R P); at arm2 something is left that no known effect explains.</p>"));
+}
+
+TEST(FirstScreen, WithoutAnAnswerSaysSo) {
+  RunSummary run = synthetic_run();
+  run.calibration.status = CalibrationStatus::kUndetermined;
+  run.calibration.status_reason = "the axis of arm2 is not determined";
+  EXPECT_TRUE(has(first_screen_of(run),
+                  "<p class=\"headline\">No answer: the axis of arm2 is not determined.</p>"));
+}
+
+TEST(FirstScreen, ItsOneNumberIsThatOfTheResultWithItsInterval) {
+  const std::string page = first_screen_of(traced_run(TraceVerdict::kClean));
+  EXPECT_TRUE(has(page, "<p class=\"merit\"><b><span data-key=\"/errors/all/held_out_m/rms\""));
+  EXPECT_TRUE(has(page, "at postures that the fit has not seen, across the line of sight (95 %: "));
+  EXPECT_FALSE(has(first_screen_of(synthetic_run()), "(95 %: ")) << "nothing measured it";
+}
+
+TEST(FirstScreen, BarsAreAsLongAsTheErrorsTheyStandFor) {
+  RunSummary run = traced_run(TraceVerdict::kEffects);
+  run.trace->accepted = {backlash("arm2", 0.25, 0.2), backlash("arm1", 0.5, 0.2)};
+  const std::string page = first_screen_of(run);
+  EXPECT_TRUE(has(page, "<i class=\"without\" style=\"width:55.0%\"></i><span>0.5 px without"));
+  EXPECT_TRUE(has(page, "<i class=\"without\" style=\"width:27.5%\"></i><span>0.25 px without"));
+  EXPECT_TRUE(has(page, "<i class=\"with\" style=\"width:22.0%\"></i><span>0.2 px with it"));
+  EXPECT_LT(page.find("0.5 px"), page.find("0.25 px")) << "the largest first";
+}
+
+}  // namespace
+}  // namespace kinescope
