@@ -292,18 +292,24 @@ class Explainer {
                                  calibration.camera, markers);
   }
 
-  // The structure was searched for on tracks that the effects were in: once more without them.
+  // The structure was searched for on tracks that the effects were in: again without them, until
+  // it is the one that they were found beside.
   [[nodiscard]] Explanation asked_again(Explanation now) const {
-    if (!now.fitted || !now.structure || now.fitted->effects.empty()) return now;
-    if (is_structure_clear(now) && !is_bent(*now.fitted)) return now;
-    std::optional<Structure> again = proposed_structure(undone(now.fitted->calibration));
-    if (!again) return now;
-    if (shape_of(*again) == shape_of(*now.structure)) {
-      now.structure = std::move(again);
-      return now;
+    std::set<Shape> answers;
+    while (now.fitted && now.structure && !now.fitted->effects.empty() &&
+           (!is_structure_clear(now) || is_bent(*now.fitted))) {
+      std::optional<Structure> again = proposed_structure(undone(now.fitted->calibration));
+      if (!again) return now;
+      if (shape_of(*again) == shape_of(*now.structure)) {
+        now.structure = std::move(again);
+        return now;
+      }
+      if (!answers.insert(shape_of(*again)).second) return now;
+      Explanation other = of_structure(std::move(*again), now.fitted->trace.added);
+      if (!is_better(other, now)) return now;
+      now = std::move(other);
     }
-    Explanation other = of_structure(std::move(*again), now.fitted->trace.added);
-    return is_better(other, now) ? other : now;
+    return now;
   }
 
   // Joints that move in proportion may be coupled; or only one of them moves as it should not.
