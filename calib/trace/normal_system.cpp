@@ -108,17 +108,15 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
 
 NormalSystem::CarrierSums NormalSystem::carrier_sums(int index) const {
   CarrierSums sums{Eigen::VectorXd::Zero(linear_->instants()),
-                   Eigen::MatrixXd::Zero(linear_->instants(), parameters()),
+                   RowMatrix::Zero(linear_->instants(), parameters()),
                    Eigen::VectorXd::Zero(linear_->instants())};
-  RowMatrix with_jacobian = RowMatrix::Zero(linear_->instants(), parameters());
   for (Eigen::SparseMatrix<double>::InnerIterator entry(linear_->carriers, index); entry; ++entry) {
     const auto i = static_cast<Eigen::Index>(instant_[static_cast<std::size_t>(entry.row())]);
     sums.with_residual[i] += entry.value() * linear_->residual[entry.row()];
-    with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
+    sums.with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
     const double unit = linear_->unit[entry.row()];
     if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
   }
-  sums.with_jacobian = with_jacobian;
   return sums;
 }
 
@@ -227,16 +225,18 @@ std::vector<EffectSums> NormalSystem::grouped_sums(const std::vector<EffectColum
     const EffectColumn& column = columns[static_cast<std::size_t>(a)];
     const CarrierSums& sums = carrier(column.carrier);
     shares.push_back(share_of(column));
-    const RowMatrix with_jacobian = shares.back().asDiagonal() * sums.with_jacobian;
     for (Eigen::Index i = 0; i < linear_->instants(); ++i) {
+      const double share = shares.back()[i];
+      if (share == 0.0) continue;
       EffectSums& own = out[static_cast<std::size_t>(group[static_cast<std::size_t>(i)])];
-      own.Er[a] += shares.back()[i] * sums.with_residual[i];
-      own.JE.col(a) += with_jacobian.row(i);
+      own.Er[a] += share * sums.with_residual[i];
+      own.JE.col(a) += share * sums.with_jacobian.row(i);
     }
     for (Eigen::Index b = 0; b <= a; ++b) {
       const Eigen::VectorXd& products =
           product(column.carrier, columns[static_cast<std::size_t>(b)].carrier);
       for (Eigen::Index i = 0; i < linear_->instants(); ++i) {
+        if (shares.back()[i] == 0.0) continue;
         EffectSums& own = out[static_cast<std::size_t>(group[static_cast<std::size_t>(i)])];
         own.EE(a, b) += shares[static_cast<std::size_t>(b)][i] * shares.back()[i] * products[i];
       }

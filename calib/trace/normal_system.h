@@ -95,7 +95,7 @@ class NormalSystem {
   // weight (in the inverse square of the residual's unit).
   struct CarrierSums {
     Eigen::VectorXd with_residual;
-    Eigen::MatrixXd with_jacobian;  // instants x parameters
+    RowMatrix with_jacobian;  // instants x parameters
     Eigen::VectorXd weight;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "calib/trace/score_test.h"
@@ -174,6 +175,14 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
   return rest;
 }
 
+// By the floors of `options`, where the sum of squares falls by `gain`.
+bool moves_enough(const NormalSystem& system, double gain, const std::vector<EffectColumn>& columns,
+                  const TraceOptions& options) {
+  return system.shift_of(gain, columns) >= options.floor &&
+         (options.noise_floor == 0.0 ||
+          system.noise_share_of(gain, columns) >= options.noise_floor);
+}
+
 // A place and what it follows.
 struct Driven {
   RestPlace place;
@@ -181,6 +190,43 @@ struct Driven {
   Score score;
   double p_value = 1.0;  // over all that were tried
 };
+
+struct Pair {
+  const RestPlace* place = nullptr;
+  const Covariate* covariate = nullptr;
+  double gain = 0.0;
+};
+
+// All that move the prediction by the floors, those that explain most first: what is asked of each
+// beyond that costs more.
+std::vector<Pair> by_gain(
+    const NormalSystem& system, const std::vector<RestPlace>& places,
+    const std::vector<Covariate>& covariates, const std::vector<FoundRest>& known,
+    const std::function<std::vector<EffectColumn>(const RestPlace&, const Covariate&)>& columns_of,
+    const TraceOptions& options) {
+  std::vector<std::vector<Pair>> of_place(places.size());
+  parallel_for(places.size(), [&](std::size_t k) {
+    std::vector<Pair> pairs;
+    std::vector<std::vector<EffectColumn>> columns;
+    for (const Covariate& covariate : covariates) {
+      const bool taken = std::ranges::any_of(known, [&](const FoundRest& found) {
+        return found.rest.place == places[k].name && found.rest.covariate == covariate.name;
+      });
+      if (taken) continue;
+      pairs.push_back({&places[k], &covariate});
+      columns.push_back(columns_of(places[k], covariate));
+    }
+    const std::vector<double> gains = gains_of(system, columns);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      pairs[i].gain = gains[i];
+      if (moves_enough(system, gains[i], columns[i], options)) of_place[k].push_back(pairs[i]);
+    }
+  });
+  std::vector<Pair> out;
+  for (const std::vector<Pair>& pairs : of_place) out.insert(out.end(), pairs.begin(), pairs.end());
+  std::ranges::stable_sort(out, std::greater{}, &Pair::gain);
+  return out;
+}
 
 // By how much the sum of squares falls in the step to the system's own solution.
 double still_to_gain(const NormalSystem& system) {
@@ -220,26 +266,17 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
     return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
   };
-  const auto passes = [&](const Score& score) {
-    return !score.hidden() && score.p_value * tests <= level && is_large(score, options);
-  };
-  std::vector<Score> scores(places.size() * covariates.size());
-  parallel_for(scores.size(), [&](std::size_t i) {
-    const RestPlace& place = places[i / covariates.size()];
-    const Covariate& covariate = covariates[i % covariates.size()];
-    const bool taken = std::ranges::any_of(known, [&](const FoundRest& found) {
-      return found.rest.place == place.name && found.rest.covariate == covariate.name;
-    });
-    if (!taken) scores[i] = score_test(system, columns_of(place, covariate));
-  });
   std::optional<Driven> best;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    const RestPlace& place = places[i / covariates.size()];
-    const Covariate& covariate = covariates[i % covariates.size()];
-    if (!passes(scores[i]) || (best && scores[i].gain <= best->score.gain)) continue;
-    const Score confirmed = jackknife_test(system, columns_of(place, covariate));
+  for (const Pair& pair : by_gain(system, places, covariates, known, columns_of, options)) {
+    const std::vector<EffectColumn> columns = columns_of(*pair.place, *pair.covariate);
+    const auto passes = [&](const Score& score) {
+      return !score.hidden() && score.p_value * tests <= level && is_large(score, options);
+    };
+    if (!passes(score_test(system, columns))) continue;
+    const Score confirmed = jackknife_test(system, columns);
     if (confirmed.p_value * tests > level) continue;
-    best = {place, covariate, confirmed, confirmed.p_value * tests};
+    best = {*pair.place, *pair.covariate, confirmed, confirmed.p_value * tests};
+    break;
   }
   if (!best) {
     auto vibration = find_vibration(system, places, level, options);
@@ -257,10 +294,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   out.rest.p_value = std::min(1.0, best->p_value);
   double gain = 0.0;
   if (!earns_its_place(system, out, gain)) return std::nullopt;
-  if (system.shift_of(gain, out.columns) < options.floor ||
-      system.noise_share_of(gain, out.columns) < options.noise_floor) {
-    return std::nullopt;
-  }
+  if (!moves_enough(system, gain, out.columns, options)) return std::nullopt;
   return out;
 }
 

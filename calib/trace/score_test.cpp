@@ -82,15 +82,15 @@ StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
   Eigen::MatrixXd own_steps(p.delta.size(), k + 1);
   own_steps << p.B, p.delta;
   for (Eigen::Index s = 0; s < stretches; ++s) {
-    const EffectSums effect = combine(raw[static_cast<std::size_t>(s)], p.T);
+    const EffectSums& effect = raw[static_cast<std::size_t>(s)];
     const GroupSums& own = system.stretches()[static_cast<std::size_t>(s)];
     // B'H [B, delta]
     const Eigen::MatrixXd moved = own.squares_of(own_steps).topRows(k);
-    const Eigen::MatrixXd cross = p.B.transpose() * effect.JE;
-    out.scores.col(s) = effect.Er - effect.JE.transpose() * p.delta - effect.EE * p.theta -
-                        p.B.transpose() * own.g + moved.col(k) + cross * p.theta;
-    out.energy[s] =
-        (p.S_inverse * (effect.EE - cross - cross.transpose() + moved.leftCols(k))).trace();
+    const Eigen::MatrixXd EE = p.T.transpose() * effect.EE * p.T;
+    const Eigen::MatrixXd cross = (p.B.transpose() * effect.JE) * p.T;
+    out.scores.col(s) = p.T.transpose() * (effect.Er - effect.JE.transpose() * p.delta) -
+                        EE * p.theta - p.B.transpose() * own.g + moved.col(k) + cross * p.theta;
+    out.energy[s] = (p.S_inverse * (EE - cross - cross.transpose() + moved.leftCols(k))).trace();
   }
   return out;
 }
