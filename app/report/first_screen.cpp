@@ -37,11 +37,12 @@ std::string outcome_words(const Trace& trace) {
     case TraceVerdict::kAmbiguous:
       return corrected + ", or for what this recording cannot tell from that";
     case TraceVerdict::kUnknown:
-      return corrected +
-             (trace.rest.empty()
-                  ? "; no known effect explains it"
-                  : fmt::format("; at {} something is left that no known effect explains",
-                                trace.rest.front().place));
+      if (!trace.rest.empty())
+        return corrected + fmt::format("; at {} something is left that no known effect explains",
+                                       trace.rest.front().place);
+      if (std::ranges::any_of(trace.accepted, &TracedEffect::is_curve))
+        return corrected + ", whose cause is unknown";
+      return corrected + "; what is left is no noise, and no known effect explains it";
     case TraceVerdict::kNothingToSay:
       return "; whether it lacks anything, the recording is too short to tell";
     case TraceVerdict::kNotRun:
@@ -109,13 +110,16 @@ struct Gain {
   std::string_view with_words = "with it";
 };
 
+std::string named(const TracedEffect& effect) {
+  if (effect.is_curve()) return names_of({effect});
+  return fmt::format("{}: {}{}{}", effect_name(effect), size_words(effect),
+                     effect.words.empty() ? "" : "; ", effect.words);
+}
+
 std::vector<Gain> gains_of(const Trace& trace) {
   std::vector<Gain> out;
   for (const TracedEffect& effect : trace.accepted)
-    out.push_back({effect.is_curve()
-                       ? names_of({effect})
-                       : fmt::format("{}: {}", effect_name(effect), size_words(effect)),
-                   effect.held_out_before, effect.held_out_after});
+    out.push_back({named(effect), effect.held_out_before, effect.held_out_after});
   for (const Rest& rest : trace.rest)
     out.push_back({fmt::format("{}: unexplained, follows the {}", rest.place, rest.covariate),
                    rest.held_out_before, rest.held_out_after, "with a curve for it"});

@@ -52,6 +52,8 @@ TEST(FirstScreen, SaysInOneSentenceWhatTheRobotIsAndWhatIsWrongWithIt) {
   unknown.trace->rest.front().place = "arm2";
   EXPECT_TRUE(has(first_screen_of(unknown),
                   "(R R P); at arm2 something is left that no known effect explains.</p>"));
+  EXPECT_TRUE(has(first_screen_of(traced_run(TraceVerdict::kUnknown)),
+                  "(R R P); what is left is no noise, and no known effect explains it.</p>"));
 }
 
 TEST(FirstScreen, WithoutAnAnswerSaysSo) {
