@@ -236,8 +236,9 @@ State start_state(Spec& spec, const CalibrationStart& start, const CalibrateOpti
   return placed;
 }
 
-// A joint with no sighting behind it while its channel has a reading cannot be calibrated.
-void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) {
+// A joint with no sighting behind it while its channel has a reading cannot be calibrated; of a
+// nominal robot it stays as it is.
+void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable, bool nominal) {
   std::vector<bool> seen(spec.tree.joints.size(), false);
   for (const int index : usable) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
@@ -248,11 +249,9 @@ void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) 
   }
   std::string missing;
   for (std::size_t j = 0; j < seen.size(); ++j) {
-    // The joints of a nominal robot that carry no marker stay as they are.
     const bool fixed = spec.tree.joints[j].type == JointType::kFixed;
     const bool free = std::ranges::any_of(spec.free_joint[j], [](bool f) { return f; });
-    if (seen[j] || fixed || (!free && !spec.free_offset[j])) continue;
-    if (spec.prior) continue;
+    if (seen[j] || fixed || nominal || (!free && !spec.free_offset[j])) continue;
     missing += (missing.empty() ? "" : ", ") + spec.tree.joints[j].name;
   }
   if (missing.empty() && !usable.empty()) return;
@@ -261,7 +260,7 @@ void require_every_joint_seen(const Spec& spec, const std::vector<int>& usable) 
       missing.empty()
           ? std::string("no marker was seen while the joint log ran")
           : fmt::format("no marker behind {} was seen while the joint log ran", missing),
-      "check that joints.csv and the video cover the same time");
+      "check that joints.csv and what was seen cover the same time");
 }
 
 // The markers of links none of whose markers is where the robot says, mostly.
@@ -325,7 +324,7 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   State state = start_state(spec, start, options);
   const State before = state;
   const std::vector<int> usable = bundle::usable_sightings(spec, state);
-  require_every_joint_seen(spec, usable);
+  require_every_joint_seen(spec, usable, start.nominal);
   report_progress(progress, "calibrate", 0, 1);
   const RobustSolution robust =
       bundle::solve_robustly(spec, state, usable, options.reject_sigma, options.max_iterations);

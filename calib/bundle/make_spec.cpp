@@ -236,6 +236,11 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   std::ranges::stable_sort(spec.sightings, [](const Sighting& a, const Sighting& b) {
     return std::pair(a.frame, a.marker) < std::pair(b.frame, b.marker);
   });
+  if (spec.postures) {
+    std::erase_if(spec.sightings, [&](const Sighting& sighting) {
+      return !is_stamp(log, spec.times_s[static_cast<std::size_t>(sighting.frame)]);
+    });
+  }
   check_something_seen(spec);
   free_joints(start, options, spec);
   free_frames(start, spec);

@@ -270,14 +270,14 @@ std::optional<double> CsvTable::optional_number(std::size_t row, std::size_t col
 }
 
 int CsvTable::integer(std::size_t row, std::size_t column) const {
-  const double value = number(row, column);
-  if (value != std::floor(value) || std::abs(value) > 1e9) {
+  const std::optional<double> value = parse_number(rows[row][column]);
+  if (!value || *value != std::floor(*value) || std::abs(*value) > 1e9) {
     throw bad_input(place(row),
                     fmt::format("column '{}' holds '{}', not a whole number", header[column],
                                 rows[row][column]),
                     "correct or remove the line");
   }
-  return static_cast<int>(value);
+  return static_cast<int>(*value);
 }
 
 CsvTable parse_csv(std::string_view text, std::string source, RaggedRows ragged) {

@@ -72,8 +72,12 @@ struct ChannelValue {
                                              double time_offset_s = 0.0,
                                              double max_gap_s = kMaxGap);
 
-/// True for postures measured at rest, with nothing to interpolate and no clock to align: every one
-/// of the times is exactly a stamp of the log, and none of these channels (those that drive a
+/// True where a row of the log has exactly this stamp.
+[[nodiscard]] bool is_stamp(const JointLog& log, double time_s);
+
+/// True for postures measured at rest, with nothing to interpolate and no clock to align: the times
+/// are exactly stamps of the log (most of them: a row may have been left out, and nothing was read
+/// then), and none of these channels (those that drive a
 /// joint) moves smoothly from stamp to stamp. A script that writes a moving robot's readings once a
 /// frame has the frames' stamps, too, but the lag between camera and readings is to be found.
 /// Stamps alone cannot tell a sweep in equal steps from a motion: it is one when its stamps are no

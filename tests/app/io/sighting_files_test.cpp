@@ -157,7 +157,7 @@ TEST_F(SightingFiles, AFewBadPosesAreLeftOut) {
       {"41,1,nan,0,0,0,0,0,1", "column 'x' holds 'nan', not a finite number"},
       {"41,1,0,-2e6,0,0,0,0,1", "column 'y' holds -2e6, which is out of all reach"},
       {"41,1,0,0,0,0,0,0,1.02", "the quaternion has length 1.02"},
-      {"41,ERR,0,0,0,0,0,0,1", "column 'body' holds 'ERR', not a finite number"},
+      {"41,ERR,0,0,0,0,0,0,1", "column 'body' holds 'ERR', not a whole number"},
       {"41,1,0,0,0", "5 cells where the header has 9"},
       {"39,1,0,0,0,0,0,0,1", "body 1 at t = 39 stands there twice"}};
   for (const auto& [row, complaint] : bad) {

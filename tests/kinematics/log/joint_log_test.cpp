@@ -265,6 +265,16 @@ TEST(Resample, AddsTheOffsetToTheTimes) {
   EXPECT_NEAR(resample_rates(log, {0.15}, 0.0)(0, 0), 10.0, 1e-9);
 }
 
+TEST(PostureLog, APostureWhoseRowIsMissingLeavesTheOthersPostures) {
+  JointLog log;
+  log.times_s = {0.0, 1.0, 3.0};
+  log.values.resize(3, 1);
+  log.values << 1, 2, 3;
+  EXPECT_TRUE(is_posture_log(log, {0.0, 1.0, 2.0, 3.0}, {0}));
+  EXPECT_FALSE(is_posture_log(log, {0.0, 0.5, 1.0, 1.5, 2.0, 2.5}, {0})) << "a film of a slow log";
+  EXPECT_FALSE(is_stamp(log, 2.0));
+}
+
 TEST(PostureLog, WhenEveryTimeIsAStamp) {
   JointLog log;
   log.times_s = {0.0, 1.0, 2.0};
