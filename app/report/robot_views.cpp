@@ -259,10 +259,6 @@ std::string draw_view(const Drawing& robot, const Calibration& calibration, doub
       drawn(kViewSize), view.name, out, scale_bar(sheet.scale()));
 }
 
-}  // namespace
-
-namespace {
-
 // In the frame of the views: x right, y up, z towards the reader.
 std::array<View, 3> views_of(MeasurementKind kind) {
   const bool video = kind == MeasurementKind::kCorners;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calib/trace/distribution.h"
+#include "calib/trace/golden_section.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/parallel_for.h"
 
@@ -16,7 +17,6 @@ namespace {
 // tenth where it is only tested.
 constexpr int kRefinements = 10;
 constexpr int kTestRefinements = 4;
-constexpr double kGolden = 0.6180339887498949;
 // Between two listed values an effect explains at most this many times what it explains at the
 // better of them.
 constexpr double kMostRefined = 2.0;
@@ -41,27 +41,8 @@ double refine(const NormalSystem& system, const Candidate& candidate, std::size_
     }
     return value;
   }
-  double left = high - kGolden * (high - low);
-  double right = low + kGolden * (high - low);
-  double at_left = gain(left);
-  double at_right = gain(right);
-  for (int i = 0; i < refinements; ++i) {
-    if (at_left > at_right) {
-      high = right;
-      right = left;
-      at_right = at_left;
-      left = high - kGolden * (high - low);
-      at_left = gain(left);
-    } else {
-      low = left;
-      left = right;
-      at_left = at_right;
-      right = low + kGolden * (high - low);
-      at_right = gain(right);
-    }
-  }
-  const double middle = at_left > at_right ? left : right;
-  return std::max(at_left, at_right) > gain(scan[best]) ? middle : scan[best];
+  const Maximum found = golden_section(gain, low, high, refinements);
+  return found.value > gain(scan[best]) ? found.at : scan[best];
 }
 
 // The best of the listed values.

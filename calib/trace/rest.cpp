@@ -179,8 +179,7 @@ Rest describe(const NormalSystem& system, const RestPlace& place, const Covariat
 bool moves_enough(const NormalSystem& system, double gain, const std::vector<EffectColumn>& columns,
                   const TraceOptions& options) {
   return system.shift_of(gain, columns) >= options.floor &&
-         (options.noise_floor == 0.0 ||
-          system.noise_share_of(gain, columns) >= options.noise_floor);
+         system.noise_share_of(gain, columns) >= options.noise_floor;
 }
 
 // A place and what it follows.
@@ -269,10 +268,8 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   std::optional<Driven> best;
   for (const Pair& pair : by_gain(system, places, covariates, known, columns_of, options)) {
     const std::vector<EffectColumn> columns = columns_of(*pair.place, *pair.covariate);
-    const auto passes = [&](const Score& score) {
-      return !score.hidden() && score.p_value * tests <= level && is_large(score, options);
-    };
-    if (!passes(score_test(system, columns))) continue;
+    const Score score = score_test(system, columns);
+    if (score.hidden() || score.p_value * tests > level || !is_large(score, options)) continue;
     const Score confirmed = jackknife_test(system, columns);
     if (confirmed.p_value * tests > level) continue;
     best = {*pair.place, *pair.covariate, confirmed, confirmed.p_value * tests};

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
+#include "calib/trace/golden_section.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/parallel_for.h"
 
@@ -19,7 +20,7 @@ namespace {
 constexpr double kLeastTurns = 12.0;
 // Frequencies tried, in steps of one turn in the recording.
 constexpr int kOversampling = 4;
-constexpr int kRefinements = 40;
+constexpr int kFrequencySteps = 40;  // of the golden section: to 1e-8 of the bracket
 
 // Instants on an even grid of time, which a film's are but for frames left out.
 struct Grid {
@@ -94,32 +95,13 @@ Peak highest_line(const Series& series, const Grid& grid, double least_hz) {
   return best;
 }
 
-// Golden section over one step of the periodogram to either side.
-double refined(const NormalSystem& system, int carrier, double frequency_hz, double step_hz) {
-  constexpr double kGolden = 0.6180339887498949;
+// Over one step of the periodogram to either side.
+double refined_frequency(const NormalSystem& system, int carrier, double frequency_hz,
+                         double step_hz) {
   const auto gain = [&](double f) {
     return gain_of(system, swing(carrier, system.linear().time_s, f));
   };
-  double low = frequency_hz - step_hz;
-  double high = frequency_hz + step_hz;
-  double left = high - kGolden * (high - low);
-  double right = low + kGolden * (high - low);
-  double gain_left = gain(left);
-  double gain_right = gain(right);
-  for (int i = 0; i < kRefinements; ++i) {
-    if (gain_left > gain_right) {
-      high = std::exchange(right, left);
-      gain_right = gain_left;
-      left = high - kGolden * (high - low);
-      gain_left = gain(left);
-    } else {
-      low = std::exchange(left, right);
-      gain_left = gain_right;
-      right = low + kGolden * (high - low);
-      gain_right = gain(right);
-    }
-  }
-  return 0.5 * (low + high);
+  return golden_section(gain, frequency_hz - step_hz, frequency_hz + step_hz, kFrequencySteps).at;
 }
 
 Covariate phase_of(const Eigen::VectorXd& time_s, double frequency_hz) {
@@ -152,7 +134,7 @@ std::optional<Vibration> find_vibration(const NormalSystem& system,
   const auto place = static_cast<std::size_t>(highest - peaks.begin());
   const int carrier = places[place].carrier;
   const double frequency_hz =
-      refined(system, carrier, highest->frequency_hz, 1.0 / (kOversampling * duration));
+      refined_frequency(system, carrier, highest->frequency_hz, 1.0 / (kOversampling * duration));
   // One independent frequency a turn in the recording (Scargle 1982, eq. 13).
   const double tests = static_cast<double>(places.size() * grid->cells) / 2.0;
   const std::vector<EffectColumn> columns = swing(carrier, linear.time_s, frequency_hz);
