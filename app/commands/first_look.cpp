@@ -109,11 +109,15 @@ void refuse_other_convention(const Recording& recording, const PoseTracks& track
     if (structure && is_robot(*structure)) fitting.emplace_back(convention.words);
   }
   if (fitting.empty()) return;
-  throw undetermined(csv_of(recording, "poses"),
-                     fmt::format("the bodies do not move as a robot's links do, but {} they do",
-                                 fmt::join(fitting, ", or ")),
-                     "qx, qy, qz, qw and x, y, z are the pose of the body in the tracker's frame: "
-                     "convert the table");
+  throw undetermined(
+      csv_of(recording, "poses"),
+      fmt::format("the bodies do not move as a robot's links do, but {} they do",
+                  fmt::join(fitting, ", or ")),
+      fmt::format("qx, qy, qz, qw and x, y, z are the pose of the body in the "
+                  "tracker's frame: convert the table{}",
+                  fitting.size() == 1 ? ""
+                                      : "; which way, or whether it is right as it "
+                                        "is, the robot's drawing (--nominal) tells"));
 }
 
 std::string idle_channels(const Structure& structure, const JointLog& log) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope run`: every arrow of the data's path on one page.
+#include <algorithm>
 #include <cstdio>
 #include <map>
 
@@ -26,6 +27,7 @@
 #include "calib/quality/error_summary.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
 
@@ -220,6 +222,29 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
     run.warnings.push_back(odd_words(odd, recording));
 }
 
+// Frames for the report, spread evenly over those of which the calibration used the most markers.
+void add_film(const Recording& recording, RunSummary& run) {
+  constexpr std::size_t kMostStills = 24;  // with their markers about half a megabyte
+  constexpr int kStillWidth = 480;         // px
+  if (recording.entry != RecordingEntry::kVideo) return;
+  std::map<int, int> used;
+  int most = 0;
+  for (const SightingResidual& residual : run.calibration.residuals)
+    if (residual.used) most = std::max(most, ++used[residual.frame]);
+  std::vector<int> frames;
+  for (const auto& [frame, markers] : used)
+    if (2 * markers >= most) frames.push_back(frame);
+  const std::size_t count = std::min(kMostStills, frames.size());
+  std::vector<double> times_s;
+  for (std::size_t k = 0; k < count; ++k) {
+    const int frame = frames[k * (frames.size() - 1) / std::max<std::size_t>(1, count - 1)];
+    times_s.push_back(run.calibration.times_s[static_cast<std::size_t>(frame)] -
+                      recording.settings.video_start_s);
+  }
+  run.film = stills_at(recording.video, times_s, kStillWidth);
+  for (Still& still : run.film) still.time_s += recording.settings.video_start_s;
+}
+
 // Without a nominal robot there is no geometry to hold.
 void require_nominal(const RunOptions& options, const Recording& recording) {
   if (!options.free || *options.free == FreeGeometry::kGeometry || recording.nominal) return;
@@ -270,6 +295,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   for (std::size_t k = told; k < run.warnings.size(); ++k) print_warning(run.warnings[k]);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
   run.errors = summarise_errors(run.calibration);
+  add_film(recording, run);
 
   const std::string urdf = run.nominal
                                ? write_urdf(with_nominal_limits(run.calibration.tree, *run.nominal),

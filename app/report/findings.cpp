@@ -12,6 +12,7 @@
 #include "app/report/facts.h"
 #include "app/report/numbers.h"
 #include "app/report/verdict_words.h"
+#include "calib/quality/lone_posture.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -66,11 +67,29 @@ std::vector<std::string> read_in_steps(const RunSummary& run) {
   return out;
 }
 
+std::string words_of(const LonePosture& alone, const RunSummary& run) {
+  const auto error = [&](const ErrorRow& row) {
+    return run.calibration.kind == MeasurementKind::kCorners
+               ? text_with_unit(row.held_out_px.rms, Quantity::kPixels)
+               : text_with_unit(row.held_out_m.rms, Quantity::kLength);
+  };
+  return fmt::format(
+      "At t = {:.6g} the error is {} where the fit has not seen it, and {} at all others together: "
+      "it alone shows something of the robot, or a value there is wrong, and the fit has bent to "
+      "it.",
+      alone.time_s, error(alone.of_it), error(alone.of_others));
+}
+
 void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
   const double ratio = held_out_ratio(run.calibration);
   if (ratio == 0.0) {
     findings.push_back({kNoCheck, "The error on unseen data is not known: nothing was held out.",
                         "Record more postures, so that some can be held out."});
+  } else if (const auto alone =
+                 ratio > kRatioLimit ? lone_posture(run.calibration) : std::nullopt) {
+    findings.push_back({kUnseen, words_of(*alone, run),
+                        "Check what was read and measured there, leave it out, or record more "
+                        "postures like it."});
   } else if (const auto joints = read_in_steps(run); ratio > kRatioLimit && !joints.empty()) {
     const std::string names = fmt::format("{}", fmt::join(joints, ", "));
     findings.push_back(
@@ -186,24 +205,14 @@ double typical_travel(const Calibration& calibration, JointType type) {
 void add_small_travel(const RunSummary& run, const Analysis& analysis,
                       std::vector<Finding>& findings) {
   const Calibration& calibration = run.calibration;
-  const Joint* weakest = nullptr;
-  double travel = 0.0, worst = 0.0;
-  int moving = 0;
-  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
-       ++j) {
-    const JointEstimate& estimate = calibration.joints[j];
-    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
-    ++moving;
-    // What the base is uncertain by is in all axes alike.
-    const Sigma& own = estimate.among_direction_sigma_rad ? estimate.among_direction_sigma_rad
-                                                          : estimate.direction_sigma_rad;
-    if (own && *own > worst) {
-      worst = *own;
-      weakest = &calibration.tree.joints[j];
-      travel = estimate.range.upper - estimate.range.lower;
-    }
-  }
-  if (weakest == nullptr) return;
+  const int joint = least_certain_axis(calibration);
+  if (joint < 0) return;
+  const auto j = static_cast<std::size_t>(joint);
+  const Joint* const weakest = &calibration.tree.joints[j];
+  const JointLimits& range = calibration.joints[j].range;
+  const double travel = range.upper - range.lower;
+  const auto moving = std::ranges::count_if(
+      calibration.tree.joints, [](const Joint& one) { return one.type != JointType::kFixed; });
   const bool slides = weakest->type == JointType::kPrismatic;
   const std::string moved = text_with_unit(travel, slides ? Quantity::kLength : Quantity::kAngle);
   const bool small = !slides && travel < kSmallTurn;
@@ -211,10 +220,8 @@ void add_small_travel(const RunSummary& run, const Analysis& analysis,
   // An axis at the end of the chain is the least certain however far it moves.
   const bool moved_less = travel < kMovedLess * typical_travel(calibration, weakest->type) &&
                           (slides || travel < kWholeTurn);
-  const std::string uncertainty = uncertainty_text(kCoverageFactor * worst, Quantity::kAngle);
-  const std::string what =
-      fmt::format("The axis of {} is {} ({}°, k = 2); it moved through {}.", weakest->name,
-                  moving == 1 ? "uncertain" : "the least certain", uncertainty, moved);
+  const std::string what = fmt::format("The axis of {} is {}; it moved through {}.", weakest->name,
+                                       moving == 1 ? "uncertain" : "the least certain", moved);
   std::string remedy = fmt::format("Move {} further than the {} seen here.", weakest->name, moved);
   if (!small && !moved_less) {
     remedy = fmt::format(

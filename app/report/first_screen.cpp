@@ -160,9 +160,9 @@ std::string first_screen(const Facts& facts, std::string_view lights) {
   return fmt::format(
       "<p class=\"headline\">{}</p>\n<div class=\"first\">\n<div class=\"said\">\n{}{}{}"
       "<p class=\"next\"><b>What to record next</b> {}</p>\n</div>\n<div class=\"shown\">\n{}"
-      "<div id=\"viewer-still\">{}</div>\n</div>\n</div>\n",
+      "<div id=\"viewer-still\">{}</div>\n{}</div>\n</div>\n",
       escaped(headline(facts)), merit(facts), lights, gains(facts), escaped(facts.verdict.next),
-      viewer_panel(), robot_still(facts));
+      viewer_panel(), robot_still(facts), film(facts));
 }
 
 }  // namespace kinescope::report

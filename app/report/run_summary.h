@@ -16,6 +16,7 @@
 #include "calib/quality/error_summary.h"
 #include "calib/quality/freedom_levels.h"
 #include "calib/trace/trace_result.h"
+#include "calib/vision/stills.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/structure/pose_tracks.h"
 #include "kinematics/structure/structure.h"
@@ -72,6 +73,7 @@ struct RunSummary {
   std::vector<SecondColumn> second_columns;     ///< of the joints' copies; none without a trace
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   ErrorSummary errors;
+  std::vector<Still> film;  ///< some frames of the video, at times of the calibration's frames
   std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without
 };
 

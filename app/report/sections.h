@@ -37,6 +37,9 @@ namespace kinescope::report {
 [[nodiscard]] std::string robot_still(const Facts& facts);
 /// The 3-D view and its controls; hidden until the script shows it.
 [[nodiscard]] std::string viewer_panel();
+/// Frames of the video with the markers and residual arrows that were seen in them, the middle one
+/// shown; empty where there is no video.
+[[nodiscard]] std::string film(const Facts& facts);
 /// What the 3-D view plays, as JSON text that is safe inside a script element.
 [[nodiscard]] std::string viewer_data(const Facts& facts);
 

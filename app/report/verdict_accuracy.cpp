@@ -113,16 +113,16 @@ struct AxisFigures {
   std::vector<double> directions, positions;
   double worst = -1.0;
   std::optional<double> worst_position;
-  std::string worst_name;
+  int worst_joint = -1;
 
-  void add(const std::string& name, const Sigma& direction, const Sigma& position) {
+  void add(std::size_t joint, const Sigma& direction, const Sigma& position) {
     if (!direction) return;
     directions.push_back(*direction);
     if (position) positions.push_back(*position);
     if (*direction <= worst) return;
     worst = *direction;
     worst_position = position;
-    worst_name = name;
+    worst_joint = static_cast<int>(joint);
   }
 
   [[nodiscard]] std::string typical() const {
@@ -132,12 +132,35 @@ struct AxisFigures {
   }
 };
 
+struct Axes {
+  AxisFigures in_base, among;
+  std::vector<std::size_t> unknown;  // joints
+
+  explicit Axes(const Calibration& calibration) {
+    for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
+         ++j) {
+      const JointEstimate& joint = calibration.joints[j];
+      if (calibration.tree.joints[j].type == JointType::kFixed) continue;
+      if (!joint.direction_sigma_rad) unknown.push_back(j);
+      in_base.add(j, joint.direction_sigma_rad, joint.position_sigma_m);
+      among.add(j, joint.among_direction_sigma_rad, joint.among_position_sigma_m);
+    }
+  }
+
+  /// Where the base is far less certain than the axes, it is told apart from them.
+  [[nodiscard]] bool is_base_apart() const {
+    constexpr double kFarLess = 2.0;
+    return in_base.directions.size() > 1 && among.directions.size() == in_base.directions.size() &&
+           median(in_base.directions) > kFarLess * median(among.directions);
+  }
+  [[nodiscard]] const AxisFigures& told() const { return is_base_apart() ? among : in_base; }
+};
+
 const FreedomLevel* exported_level(const RunSummary& run) {
   const auto level = std::ranges::find_if(run.levels, &FreedomLevel::exported);
   return level == run.levels.end() ? nullptr : &*level;
 }
 
-/// Where the base is far less certain than the axes, it is told apart from them.
 std::string axis_words(const RunSummary& run) {
   const FreedomLevel* level = exported_level(run);
   if (level != nullptr && level->free != FreeGeometry::kGeometry) {
@@ -145,38 +168,27 @@ std::string axis_words(const RunSummary& run) {
                        level->free == FreeGeometry::kPlacement ? " and joint zeros" : "",
                        run.free_asked ? "" : ": freed, they predict unseen postures worse");
   }
-  const Calibration& calibration = run.calibration;
-  constexpr double kFarLess = 2.0;
-  AxisFigures in_base, among;
-  std::vector<std::string> unknown;
-  for (std::size_t j = 0; j < calibration.joints.size() && j < calibration.tree.joints.size();
-       ++j) {
-    const JointEstimate& joint = calibration.joints[j];
-    const std::string& name = calibration.tree.joints[j].name;
-    if (calibration.tree.joints[j].type == JointType::kFixed) continue;
-    if (!joint.direction_sigma_rad) unknown.push_back(name);
-    in_base.add(name, joint.direction_sigma_rad, joint.position_sigma_m);
-    among.add(name, joint.among_direction_sigma_rad, joint.among_position_sigma_m);
-  }
+  const Axes axes(run.calibration);
+  const auto name_of = [&](std::size_t joint) { return run.calibration.tree.joints[joint].name; };
   std::string text;
-  if (in_base.directions.size() == 1) {
+  if (const AxisFigures& told = axes.told(); told.directions.size() == 1) {
     text = fmt::format(" The axis of {} is known to {} (expanded uncertainty, k = 2).",
-                       in_base.worst_name, in_base.typical());
-  } else if (!in_base.directions.empty()) {
-    const bool apart = among.directions.size() == in_base.directions.size() &&
-                       median(in_base.directions) > kFarLess * median(among.directions);
-    const AxisFigures& axes = apart ? among : in_base;
+                       name_of(static_cast<std::size_t>(told.worst_joint)), told.typical());
+  } else if (!told.directions.empty()) {
     text = fmt::format(
         " Joint axes are known {}to {} (median, expanded uncertainty, k = 2); least certain is {} "
         "with {}.",
-        apart ? "among one another " : "", axes.typical(), axes.worst_name,
-        axis_uncertainty(axes.worst, axes.worst_position));
-    if (apart) {
+        axes.is_base_apart() ? "among one another " : "", told.typical(),
+        name_of(static_cast<std::size_t>(told.worst_joint)),
+        axis_uncertainty(told.worst, told.worst_position));
+    if (axes.is_base_apart()) {
       text += fmt::format(
           " Against the base, which its markers hold less exactly, they are known to {}.",
-          in_base.typical());
+          axes.in_base.typical());
     }
   }
+  std::vector<std::string> unknown;
+  for (const std::size_t joint : axes.unknown) unknown.push_back(name_of(joint));
   if (!unknown.empty()) {
     text += fmt::format(
         " No uncertainty can be given for the axis of {}: it was held, or the data do not "
@@ -196,6 +208,10 @@ std::string clock_words(const RunSummary& run) {
 }
 
 }  // namespace
+
+int least_certain_axis(const Calibration& calibration) {
+  return Axes(calibration).told().worst_joint;
+}
 
 std::string accuracy_words(const RunSummary& run) {
   return prediction_words(run) + axis_words(run) + declared_words(run.calibration) +

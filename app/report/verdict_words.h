@@ -19,6 +19,10 @@ namespace kinescope::report {
 /// The structure: how many joints of which type, what drives them, how certain that is.
 [[nodiscard]] std::string found_words(const RunSummary& run);
 
+/// The joint whose axis's direction has the largest uncertainty: against the base, or among one
+/// another where the base is far less certain than the axes. -1: none has one.
+[[nodiscard]] int least_certain_axis(const Calibration& calibration);
+
 /// Errors on data that the fit has not seen, uncertainties of the axes, what all figures take for
 /// granted, the clock.
 [[nodiscard]] std::string accuracy_words(const RunSummary& run);

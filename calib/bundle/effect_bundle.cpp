@@ -514,6 +514,14 @@ std::vector<int> EffectBundle::driven_joints() const {
   return out;
 }
 
+std::vector<int> EffectBundle::moving_joints() const {
+  std::vector<int> out = driven_joints();
+  std::erase_if(out, [&](int joint) {
+    return bundle::stands_still(impl_->spec, static_cast<std::size_t>(joint));
+  });
+  return out;
+}
+
 const std::vector<DesignCoupling>& EffectBundle::couplings() const { return impl_->couplings; }
 
 double EffectBundle::chosen_beyond(const EffectBundle& other) const {

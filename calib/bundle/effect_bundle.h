@@ -117,6 +117,8 @@ class EffectBundle {
   [[nodiscard]] JointMotion motion_of_log(double time_offset_s) const;
   /// Joints that a channel drives.
   [[nodiscard]] std::vector<int> driven_joints() const;
+  /// Those of them that move, whatever one reading says.
+  [[nodiscard]] std::vector<int> moving_joints() const;
   /// Those of channels that drive a joint themselves.
   [[nodiscard]] const std::vector<DesignCoupling>& couplings() const;
   /// Sightings that were chosen here and not there, over the square root of all: by how many

@@ -125,18 +125,6 @@ bool is_unit_scale(double scale) {
   return scale == 1.0 || scale == kRadPerDegree || scale == kMetrePerMillimetre;
 }
 
-// A joint that moves by less shows nothing of its axis that the prior of its frame leaves open.
-constexpr double kStillRad = 1e-3;
-constexpr double kStillM = 1e-4;
-
-bool stands_still(const Spec& spec, std::size_t joint) {
-  if (spec.channel[joint] < 0 || !spec.couplings[joint].empty()) return false;
-  const auto readings = spec.log.values.col(spec.channel[joint]);
-  const double travel =
-      (readings.maxCoeff() - readings.minCoeff()) * std::abs(spec.tree.joints[joint].scale);
-  return travel < (spec.tree.joints[joint].type == JointType::kRevolute ? kStillRad : kStillM);
-}
-
 void free_joints(const CalibrationStart& start, const CalibrateOptions& options, Spec& spec) {
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
@@ -254,6 +242,21 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
     if (spec.camera.model == DistortionModel::kPlumbBob) spec.free_intrinsics[8] = false;
   }
   return spec;
+}
+
+bool stands_still(const Spec& spec, std::size_t joint) {
+  if (spec.channel[joint] < 0 || !spec.couplings[joint].empty()) return false;
+  constexpr double kStillRad = 1e-3;
+  constexpr double kStillM = 1e-4;
+  std::vector<double> values;
+  for (const double value : spec.log.values.col(spec.channel[joint]))
+    if (std::isfinite(value)) values.push_back(value);
+  if (values.size() < 3) return true;
+  std::ranges::sort(values);
+  const std::size_t last = values.size() - 1;
+  const double travel = std::min(values[last] - values[1], values[last - 1] - values[0]) *
+                        std::abs(spec.tree.joints[joint].scale);
+  return travel < (spec.tree.joints[joint].type == JointType::kRevolute ? kStillRad : kStillM);
 }
 
 void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& state) {

@@ -11,6 +11,11 @@ namespace kinescope::bundle {
                              const JointLog& log, const CalibrationStart& start,
                              const CalibrateOptions& options);
 
+/// Whatever one reading says: the joint moves by less than shows anything of its axis that the
+/// prior of its frame leaves open (1 mrad, 0.1 mm). What it does in one posture alone nothing can
+/// check.
+[[nodiscard]] bool stands_still(const Spec& spec, std::size_t joint);
+
 /// Puts every target where its points (of the sightings given) are on average. Needs marker mounts.
 void guess_targets(const Spec& spec, const std::vector<int>& sightings, State& state);
 

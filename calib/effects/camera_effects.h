@@ -23,6 +23,7 @@ struct EffectWorld {
   MeasurementKind kind = MeasurementKind::kCorners;
   bool postures = false;
   std::vector<int> driven;  ///< joints
+  std::vector<int> moving;  ///< those of them that do, in more than one reading
   std::vector<int> seen;    ///< markers
   JointMotion frames;
   JointMotion loaded;  ///< at the frames, with what effects add to the values: where loads act

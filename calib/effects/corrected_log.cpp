@@ -28,6 +28,7 @@ effects::EffectWorld world_of(const JointLog& log, const KinematicTree& tree,
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     if (log.channel(tree.joints[j].channel)) world.driven.push_back(static_cast<int>(j));
   }
+  world.moving = world.driven;
   return world;
 }
 

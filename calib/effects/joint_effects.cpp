@@ -334,7 +334,7 @@ CameraEffect coupling(const EffectWorld& world, const Suspect& s) {
   };
   std::vector<std::string> names;
   for (const Joint& joint : world.tree.joints) names.push_back(joint.name);
-  for (const int other : world.driven) {
+  for (const int other : world.moving) {
     if (other != s.joint) out.candidate.scan.push_back(other);
   }
   out.candidate.scan_listed = true;

@@ -370,6 +370,7 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   world.kind = bundle_->kind();
   world.postures = bundle_->postures();
   world.driven = bundle_->driven_joints();
+  world.moving = bundle_->moving_joints();
   world.seen = bundle_->seen_markers();
   world.frames = bundle_->motion_at_frames(ahead_s);
   world.loaded = world.frames;

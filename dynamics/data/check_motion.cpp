@@ -230,7 +230,7 @@ class MotionCheck {
   void refuse_clock() {
     findings_.push_back({LogFault::kNoClock, FaultWeight::kRefusal, "", 1.0, 0.0,
                          log_.sources.front(),
-                         "no column of stamps, and no velocity to tell the rate",
+                         "no column of stamps, and no velocity that tells the rate",
                          "state it in recording.yaml, dynamics: {rate_hz: ..}"});
   }
 

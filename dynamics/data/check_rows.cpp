@@ -242,15 +242,15 @@ CheckedLog check_stale_rows(TorqueLog log) {
   }
   const double share = share_of(stale, log.rows());
   const double step = median_of(steps_of(log.t_s, log.trajectory));
-  const double renewed_hz = step > 0.0 ? (1.0 - share) / step : 0.0;
+  const bool timed = step > 0.0 && (log.stamped || log.time_unit_declared);
+  const std::string often =
+      timed ? fmt::format(", about {:.0f} times a second here", (1.0 - share) / step) : "";
   out.findings.push_back(
       {LogFault::kStaleRows, share > kFewStale ? FaultWeight::kWarning : FaultWeight::kNote, "",
        share, quantile(lengths, 1.0), log.place(first),
        fmt::format("{:.0f} % of the rows repeat the row before (at most {:.0f} alike in a run)",
                    100.0 * share, quantile(lengths, 1.0)),
-       fmt::format("the repeats were left out; log when values are renewed, about {:.0f} times a "
-                   "second here",
-                   renewed_hz)});
+       fmt::format("the repeats were left out; log when values are renewed{}", often)});
   out.log = keep_rows(log, keep);
   return out;
 }

@@ -112,12 +112,12 @@ Eigen::Index split_at_gaps(TorqueLog& log, double max_gap_s) {
 }
 
 void name_rate(const TorqueLog& log, const StepFacts& facts, std::vector<LogFinding>& findings) {
-  if (facts.median > kImpossibleStepS && !log.time_unit_declared) {
+  if (facts.median > kImpossibleStepS && log.stamped && !log.time_unit_declared) {
     findings.push_back({LogFault::kUnit, FaultWeight::kRefusal, "t", 1.0, facts.median,
                         log.sources.front(),
                         fmt::format("one row in {:.3g} s: are the stamps in ms?", facts.median),
                         "say so in recording.yaml, dynamics: {time_unit: ms} (or s)"});
-  } else if (facts.median > kSlowStepS) {
+  } else if (facts.median > kSlowStepS && (log.stamped || log.time_unit_declared)) {
     findings.push_back({LogFault::kSlow, FaultWeight::kWarning, "", 1.0, facts.median,
                         log.sources.front(),
                         fmt::format("{:.2g} rows a second", 1.0 / facts.median),

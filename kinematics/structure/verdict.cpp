@@ -345,8 +345,8 @@ void add_free_doubts(const GrownTree& tree, const Series& series, Verdict& verdi
     const std::string name = fmt::format("tag {}", series.bodies[b].id.value);
     verdict.doubts.push_back({fmt::format("{} moves, but by no joint that could be found", name),
                               fmt::format("if {} belongs to the robot, check that the log has the "
-                                          "channels that move it and that its links "
-                                          "carry markers",
+                                          "channels that move it and that the links between carry "
+                                          "markers, or give the robot's drawing with --nominal",
                                           name),
                               {fmt::format("tag_{}", series.bodies[b].id.value)}});
   }

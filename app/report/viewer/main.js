@@ -3,6 +3,7 @@
 // Starts the 3-D view. The page is complete without it: where it cannot start, it stays hidden and the root
 // element says why in data-viewer-error (tests read that too).
 import { connectTimePlots } from "./cursor.js";
+import { connectFilm } from "./film.js";
 import { connectControls, Player } from "./player.js";
 import { RobotScene } from "./scene.js";
 
@@ -63,6 +64,7 @@ function start() {
   });
   connectControls(player, scene, scale, holder);
   connectTimePlots(player);
+  connectFilm(player);
   holder.addEventListener("focusin", () => { scene.controls.enableZoom = true; });
   holder.addEventListener("focusout", () => { scene.controls.enableZoom = false; });
   holder.addEventListener("mousedown", () => holder.focus());

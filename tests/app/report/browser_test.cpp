@@ -90,6 +90,23 @@ TEST(Browser, OpensFromDiskAndStartsTheView) {
   }
 }
 
+TEST(Browser, TheVideoFollowsTheView) {
+  if (browser().empty()) GTEST_SKIP() << "no Chromium on this machine";
+  RunSummary run = synthetic_run();
+  const std::vector<double>& times_s = run.calibration.times_s;
+  for (const std::size_t frame : {std::size_t{0}, times_s.size() / 2, times_s.size() - 1})
+    run.film.push_back({times_s[frame], 640, 480, ""});
+  std::string console;
+  const std::string dom = opened(run, console);
+  if (root_element(dom).find("no-webgl") != std::string::npos)
+    GTEST_SKIP() << "this Chromium has no WebGL";
+  const std::size_t shown = dom.find("class=\"shown\"");
+  ASSERT_NE(shown, std::string::npos);
+  EXPECT_LT(shown, dom.find("data-t=\"", dom.find("data-t=\"") + 1))
+      << "the first, where it begins";
+  EXPECT_EQ(complaints(console), "");
+}
+
 TEST(Browser, AnEmptyRunOpensToo) {
   if (browser().empty()) GTEST_SKIP() << "no Chromium on this machine";
   std::string console;

@@ -3,6 +3,7 @@
 // What a reader gets in ten seconds.
 #include <string>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "app/report/report.h"
@@ -54,6 +55,22 @@ TEST(FirstScreen, SaysInOneSentenceWhatTheRobotIsAndWhatIsWrongWithIt) {
                   "(R R P); at arm2 something is left that no known effect explains.</p>"));
   EXPECT_TRUE(has(first_screen_of(traced_run(TraceVerdict::kUnknown)),
                   "(R R P); what is left is no noise, and no known effect explains it.</p>"));
+}
+
+TEST(FirstScreen, ShowsTheVideoWithMarkersAndResiduals) {
+  RunSummary run = synthetic_run();
+  EXPECT_FALSE(has(first_screen_of(run), "id=\"film\""));
+  const std::vector<double>& times_s = run.calibration.times_s;
+  for (const std::size_t frame : {std::size_t{0}, times_s.size() / 2, times_s.size() - 1})
+    run.film.push_back({times_s[frame], 640, 480, "QUJD"});
+  const std::string page = first_screen_of(run);
+  EXPECT_TRUE(has(page, "viewBox=\"0 0 640 480\"")) << page;
+  EXPECT_TRUE(has(page, "href=\"data:image/jpeg;base64,QUJD\""));
+  EXPECT_TRUE(has(page, fmt::format("<svg class=\"shown\" data-t=\"{:.4f}\"", run.film[1].time_s)))
+      << "the middle one, also without scripts";
+  const std::string film = page.substr(page.find("id=\"film\""));
+  EXPECT_TRUE(has(film, "<path d=\"M")) << "residual arrows";
+  EXPECT_TRUE(has(film, "<polygon class=\"c0\" points=\""));
 }
 
 TEST(FirstScreen, WithoutAnAnswerSaysSo) {

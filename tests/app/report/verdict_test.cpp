@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "app/report/findings.h"
@@ -22,6 +23,20 @@ TEST(Verdict, OfAVideoWithALog) {
   EXPECT_TRUE(has(verdict.accurate, "frame time + (12.30 ± 0.42) ms")) << verdict.accurate;
   EXPECT_TRUE(has(verdict.limits, "noise of the measurement limits")) << verdict.limits;
   EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;
+}
+
+TEST(Verdict, NamesThePostureThatStandsAlone) {
+  RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint});
+  EXPECT_FALSE(has(make_verdict(run).limits, "bent to it"));
+  SightingResidual& one = run.calibration.residuals[20];
+  one.used = true;
+  one.held_out_displacement << 0.0, 0.0, 0.0, 0.4, 0.0, 0.3;
+  run.calibration.held_out_rms = 20.0 * run.calibration.training_rms;
+  const std::string limits = make_verdict(run).limits;
+  const double time_s = run.calibration.times_s[static_cast<std::size_t>(one.frame)];
+  EXPECT_TRUE(has(limits, fmt::format("At t = {:.6g} the error is ", time_s))) << limits;
+  EXPECT_TRUE(has(limits, "the fit has bent to it")) << limits;
+  EXPECT_FALSE(has(limits, "not the measuring noise")) << limits;
 }
 
 TEST(Verdict, SaysWhatTheDeclaredSizesAndIntrinsicsAdd) {

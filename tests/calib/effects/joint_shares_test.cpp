@@ -209,6 +209,7 @@ EffectWorld hinge(double turns) {
   world.tree.links = {{"base"}, {"arm"}};
   world.tree.joints = {joint};
   world.driven = {0};
+  world.moving = {0};
   constexpr Eigen::Index kFrames = 900;
   world.frames.value.resize(kFrames, 1);
   world.frames.rate.setZero(kFrames, 1);

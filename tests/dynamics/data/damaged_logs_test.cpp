@@ -336,6 +336,7 @@ TEST(DamagedLog, WithoutAClockTheVelocityTellsTheRate) {
   world.header[5] = "b";
   world.header[6] = "c";
   EXPECT_NE(refusal(world).find("dynamics: {rate_hz: ..}"), std::string::npos);
+  EXPECT_EQ(look(world).loud(), "no_clock ") << "no stamps that could be in ms, no rate to be slow";
 }
 
 TEST(DamagedLog, CutOffAndCorruptFilesNameTheLine) {
