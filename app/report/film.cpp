@@ -49,8 +49,12 @@ std::string marker_drawing(const std::vector<const CornerPoint*>& corners, std::
     arrows += fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", corner->pixel.x(), corner->pixel.y(),
                           tip.x(), tip.y());
   }
-  return fmt::format("<polygon class=\"{}\" points=\"{}\"/><path d=\"{}\"/>", series_class(marker),
-                     outline, arrows);
+  constexpr std::size_t kOfASquare = 4;  // a board has more, in rows
+  const std::string square =
+      corners.size() == kOfASquare
+          ? fmt::format("<polygon class=\"{}\" points=\"{}\"/>", series_class(marker), outline)
+          : "";
+  return fmt::format("{}<path d=\"{}\"/>", square, arrows);
 }
 
 std::string picture(const Still& still, int frame, const Seen& seen, double scale, bool shown) {
