@@ -2,6 +2,15 @@
 //
 // Time: the slider, play and pause, the keyboard, and whoever wants to know where it stands.
 
+/// Index of the time nearest to one.
+export function nearest(times, time) {
+  let best = 0;
+  for (let k = 1; k < times.length; ++k) {
+    if (Math.abs(times[k] - time) < Math.abs(times[best] - time)) best = k;
+  }
+  return best;
+}
+
 export class Player {
   constructor(times) {
     this.times = times;
@@ -20,11 +29,7 @@ export class Player {
   }
 
   setTime(time) {
-    let best = 0;
-    for (let k = 1; k < this.times.length; ++k) {
-      if (Math.abs(this.times[k] - time) < Math.abs(this.times[best] - time)) best = k;
-    }
-    this.setFrame(best);
+    this.setFrame(nearest(this.times, time));
   }
 
   toggle() {
