@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/bundle/chain.h"
 
+#include <algorithm>
+
 namespace kinescope::bundle {
 
 ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const ChainJoint> joints,
@@ -26,6 +28,20 @@ ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const 
   out.d_camera_base = adjoint(rest.inverse());
   out.T_camera_marker = T_camera_base * rest;
   return out;
+}
+
+void grow(const Growth& growth, const Pose& T_camera_base, ChainDerivatives& chain) {
+  Pose T_base_marker = T_camera_base.inverse() * chain.T_camera_marker;
+  const double factor = 1.0 + growth.relative;
+  T_base_marker.translation = factor * T_base_marker.translation + growth.shift_m;
+  chain.T_camera_marker = T_camera_base * T_base_marker;
+  chain.d_camera_base = adjoint(T_base_marker.inverse());
+  // What moves the marker by a turn and a shift moves it by that turn and a larger shift.
+  const auto enlarge = [factor](auto& d) { d.template bottomRows<3>() *= factor; };
+  std::ranges::for_each(chain.d_joint, enlarge);
+  std::ranges::for_each(chain.d_value, enlarge);
+  std::ranges::for_each(chain.d_link, enlarge);
+  enlarge(chain.d_mount);
 }
 
 }  // namespace kinescope::bundle

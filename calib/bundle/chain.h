@@ -23,16 +23,26 @@ struct ChainJoint {
 
 struct ChainDerivatives {
   Pose T_camera_marker;
-  Matrix6d d_camera_base;         ///< of a right perturbation of T_camera_base
-  std::vector<Matrix6d> d_joint;  ///< of T_parent_joint, from the base outwards
-  std::vector<Vector6d> d_value;  ///< of the joint value, per rad or m
-  std::vector<Matrix6d> d_link;   ///< of a right perturbation of the link's frame
-  // The mount's derivative is the identity.
+  Matrix6d d_camera_base;                   ///< of a right perturbation of T_camera_base
+  std::vector<Matrix6d> d_joint;            ///< of T_parent_joint, from the base outwards
+  std::vector<Vector6d> d_value;            ///< of the joint value, per rad or m
+  std::vector<Matrix6d> d_link;             ///< of a right perturbation of the link's frame
+  Matrix6d d_mount = Matrix6d::Identity();  ///< of a right perturbation of T_link_marker
 };
 
 /// Murray, Li, Sastry 1994, section 3.2.4, in body coordinates.
 [[nodiscard]] ChainDerivatives differentiate_chain(const Pose& T_camera_base,
                                                    std::span<const ChainJoint> joints,
                                                    const Pose& T_link_marker);
+
+/// All that joints carry, larger by a factor as seen from the base's origin, and shifted.
+struct Growth {
+  double relative = 0.0;                              ///< of distances, minus 1
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();  ///< in the base's frame
+  [[nodiscard]] bool operator==(const Growth&) const = default;
+};
+
+/// Moves the marker as a growth does, with all derivatives.
+void grow(const Growth& growth, const Pose& T_camera_base, ChainDerivatives& chain);
 
 }  // namespace kinescope::bundle

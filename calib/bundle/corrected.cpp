@@ -75,6 +75,24 @@ Vector6d moved_before(const Vector6d& at, const Vector6d& by) {
 // exp(at + by) = exp(at) exp(out): the right one.
 Vector6d moved_behind(const Vector6d& at, const Vector6d& by) { return moved_before(-at, by); }
 
+Pose base_marker(const CorrectedError& at) {
+  return at.T_camera_base.inverse() * at.chain.T_camera_marker;
+}
+
+// Of the residual by the growth of all that joints carry.
+Eigen::VectorXd d_growth(const CorrectedError& at) {
+  const Pose T_base_marker = base_marker(at);
+  const Growth& growth = at.corrected.growth;
+  const Eigen::Vector3d before_m =
+      (T_base_marker.translation - growth.shift_m) / (1.0 + growth.relative);
+  return at.error.d_marker.rightCols<3>() * (T_base_marker.matrix3().transpose() * before_m);
+}
+
+// Of the residual by a shift of the marker along the base's axes.
+Eigen::VectorXd d_carried(const CorrectedError& at, const Eigen::Vector3d& shift_m) {
+  return at.error.d_marker.rightCols<3>() * (base_marker(at).matrix3().transpose() * shift_m);
+}
+
 bool acts_in(const Correction& correction, int frame) {
   if (correction.twists.rows() > 0) return !correction.twists.row(frame).isZero(0.0);
   return share_at(correction, frame) != 0.0;
@@ -115,6 +133,10 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
         bears = correction.index == kEverywhere ||
                 std::ranges::find(path, correction.index) != path.end();
         break;
+      case CorrectedPart::kGrowth:
+      case CorrectedPart::kCarried:
+        bears = !path.empty();
+        break;
       case CorrectedPart::kCamera:
         break;
     }
@@ -148,6 +170,12 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
       case CorrectedPart::kCamera:
         out.camera += twist;
         break;
+      case CorrectedPart::kGrowth:
+        out.growth.relative += amount;
+        break;
+      case CorrectedPart::kCarried:
+        out.growth.shift_m += twist.tail<3>();
+        break;
       case CorrectedPart::kIntrinsic:
         out.intrinsics[static_cast<std::size_t>(correction.index)] += amount;
         break;
@@ -174,8 +202,10 @@ std::optional<CorrectedError> corrected_error(
   }
   CorrectedError out;
   out.corrected = corrected;
-  out.chain = differentiate_chain(exp_pose(corrected.camera) * T_camera_base, joints,
-                                  T_link_marker * exp_pose(corrected.marker));
+  out.T_camera_base = exp_pose(corrected.camera) * T_camera_base;
+  out.chain =
+      differentiate_chain(out.T_camera_base, joints, T_link_marker * exp_pose(corrected.marker));
+  if (corrected.growth != Growth{}) grow(corrected.growth, out.T_camera_base, out.chain);
   auto error = compare(sighting, out.chain.T_camera_marker, changed(camera, corrected.intrinsics),
                        target_m, corrected.shape);
   if (!error) return std::nullopt;
@@ -204,10 +234,14 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
       return at.error.d_marker * (at.chain.d_link[k] * moved_behind(at.corrected.joints[k], twist));
     }
     case CorrectedPart::kMarker:
-      return at.error.d_marker * moved_behind(at.corrected.marker, twist);
+      return at.error.d_marker * (at.chain.d_mount * moved_behind(at.corrected.marker, twist));
     case CorrectedPart::kCamera:
       return at.error.d_marker * (adjoint(at.chain.T_camera_marker.inverse()) *
                                   moved_before(at.corrected.camera, twist));
+    case CorrectedPart::kGrowth:
+      return share * d_growth(at);
+    case CorrectedPart::kCarried:
+      return d_carried(at, twist.tail<3>());
     case CorrectedPart::kMarkerSize:
     case CorrectedPart::kMarkerWidth:
     case CorrectedPart::kMarkerShear:

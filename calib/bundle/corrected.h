@@ -16,6 +16,7 @@ struct CorrectedSighting {
   Vector6d camera = Vector6d::Zero();
   std::vector<Vector6d> joints;  ///< beside the path
   Vector6d marker = Vector6d::Zero();
+  Growth growth;
   MarkerShape shape;
   std::array<double, kMaxIntrinsics> intrinsics{};  ///< changes
   double line_delay_s = 0.0;
@@ -30,6 +31,7 @@ struct CorrectedSighting {
 struct CorrectedError {
   CorrectedSighting corrected;
   ChainDerivatives chain;
+  Pose T_camera_base;  ///< with what corrections move the camera by
   SightingError error;
   std::vector<double> rates;  ///< of the joints on the path, rad/s or m/s
   Eigen::VectorXd d_time;     ///< of the residual by the log's time, per s

@@ -19,6 +19,9 @@ enum class CorrectedPart {
   kMarkerShear,  ///< rad by which the marker's right angles are off, its axes turned alike
   kMarkerWarp,   ///< m by which two opposite corners stand before the marker's plane, two behind it
   kCamera,       ///< a twist of everything seen, in the camera's frame
+  kGrowth,       ///< distances from the base's origin of all that joints carry over those at first,
+                 ///< minus 1
+  kCarried,      ///< a shift of all that joints carry, along the base's axes
   kIntrinsic,    ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
   kFocalLength,  ///< fx and fy over the declared ones, minus 1
   kReadout,      ///< s per image row by which a corner is seen later than the frame's middle row
@@ -36,8 +39,9 @@ struct Correction {
   /// Of the joint or the marker in the tree, or of the intrinsic parameter; kEverywhere: the sizes
   /// of all markers, the readings of all joints.
   int index = 0;
-  Vector6d direction = Vector6d::Zero();  ///< twists: rotation, then translation
-  Eigen::VectorXd share;                  ///< frames; empty: 1 everywhere
+  /// Twists: rotation, then translation; of shifts the latter counts.
+  Vector6d direction = Vector6d::Zero();
+  Eigen::VectorXd share;  ///< frames; empty: 1 everywhere
   /// Frames x 6: the twist itself, where its direction changes from frame to frame; takes the place
   /// of direction and share.
   Eigen::Matrix<double, Eigen::Dynamic, 6> twists;

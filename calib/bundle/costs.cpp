@@ -124,7 +124,8 @@ class SightingCost final : public ceres::CostFunction {
       }
     }
     const std::size_t mount = 1 + 2 * path_->size();
-    fill_pose(jacobians[mount], error, adjoint(exp_pose(-corrected.marker)), parameters[mount]);
+    fill_pose(jacobians[mount], error, chain.d_mount * adjoint(exp_pose(-corrected.marker)),
+              parameters[mount]);
     if (jacobians[mount + 1] != nullptr) {
       Eigen::Map<Eigen::VectorXd>(jacobians[mount + 1], rows) = at.d_time;
     }

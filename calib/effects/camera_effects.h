@@ -92,7 +92,7 @@ struct CameraEffect {
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,
-/// clock_jump, zero_jump, zero_drift.
+/// thermal_growth, clock_jump, zero_jump, zero_drift.
 [[nodiscard]] std::vector<CameraEffect> time_effects(const EffectWorld& world);
 
 }  // namespace kinescope::effects

@@ -86,6 +86,11 @@ void creeps(const EffectWorld& world, Candidate& c) {
   for (const double constant : kConstants) c.scan.push_back(constant * length);
   c.scan_name = "time constant";
   c.scan_unit = world.postures ? "postures" : "s";
+  // What is far from its end by then goes along a straight line.
+  c.scan_words = [most = c.scan.back(), unit = c.scan_unit](double constant) {
+    return constant > most ? fmt::format("more than {:.3g} {}", most, unit)
+                           : fmt::format("{:.3g} {}", constant, unit);
+  };
 }
 
 // Further than its own size, or half a radian, a marker does not slip: it is put elsewhere.
@@ -141,6 +146,43 @@ CameraEffect camera_drift(const EffectWorld& world) {
   return out;
 }
 
+// Where the base is held while the robot grows: within a metre of its frame, of a growth that
+// nobody doubts.
+std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::VectorXd& share) {
+  constexpr double kMostShift = 1e-3;  // m
+  std::vector<Correction> out;
+  for (int axis = 0; axis < 3; ++axis) {
+    Correction shift = correct(CorrectedPart::kCarried, like, 0);
+    shift.name = fmt::format("{} held elsewhere {}", like.candidate.id.place, "xyz"[axis]);
+    shift.unit = "m";
+    shift.direction = Vector6d::Unit(3 + axis);
+    shift.share = share;
+    shift.is_nuisance = true;
+    shift.prior_sigma = kMostShift;
+    out.push_back(std::move(shift));
+  }
+  return out;
+}
+
+// Links, screws and racks of one temperature: every length grows alike.
+CameraEffect thermal_growth(const EffectWorld& world) {
+  CameraEffect out = effect("thermal_growth", "robot", "the robot grows (or shrinks) slowly",
+                            {{"relative growth", ""}}, "");
+  out.candidate.check =
+      "temperature of the links: aluminium grows by 23 millionths a kelvin, steel by 12";
+  out.candidate.record = "let the robot warm up first, or log its temperature";
+  creeps(world, out.candidate);
+  out.corrections = [like = out, time = creeping_time(world)](double constant) {
+    Correction growth = correct(CorrectedPart::kGrowth, like, 0);
+    growth.share = creep(time, constant);
+    return std::vector{growth};
+  };
+  out.nuisances = [like = out, time = creeping_time(world)](double constant) {
+    return held_elsewhere(like, creep(time, constant));
+  };
+  return out;
+}
+
 CameraEffect clock_jump(const EffectWorld& world) {
   CameraEffect out = effect("clock_jump", "clock", "one of the clocks jumped, or frames were lost",
                             {{"jump", "s"}}, "s");
@@ -190,6 +232,7 @@ std::vector<CameraEffect> time_effects(const EffectWorld& world) {
   for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
   out.push_back(camera_bump(world));
   out.push_back(camera_drift(world));
+  out.push_back(thermal_growth(world));
   if (!world.postures) out.push_back(clock_jump(world));
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);

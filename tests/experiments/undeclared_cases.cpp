@@ -34,7 +34,9 @@ struct Drawn {
   std::size_t library = 0;
   std::size_t own = 0;
 };
-constexpr std::array kDrawn{Drawn{1000, 16, 3}, Drawn{3000, 20, 9}};
+constexpr std::array kDrawn{Drawn{1000, 16, 3}, Drawn{3000, 20, 9}, Drawn{10000, 23, 9}};
+// Those below drew a growth of the robot where the test's own now have another effect.
+constexpr int kGrowthWasOwn = 10000;
 
 // Effects that a robot at rest before a tracker can have.
 bool shows_at_postures(const std::string& effect) {
@@ -63,7 +65,9 @@ bool clashes(const InjectedEffect& effect, const std::vector<InjectedEffect>& ot
 
 void draw_effects(std::size_t count, UndeclaredCase& of, Rng& rng) {
   const bool own = of.kind == UndeclaredKind::kOwn;
-  std::span<const std::string> names = own ? truth::own_effects() : truth::library_effects();
+  std::vector<std::string> known = own ? truth::own_effects() : truth::library_effects();
+  if (own && of.number < kGrowthWasOwn) std::ranges::replace(known, "own_sway", "thermal_growth");
+  std::span<const std::string> names = known;
   const auto drawn =
       std::ranges::find_if(kDrawn, [&](const Drawn& d) { return of.number < d.below; });
   if (drawn != kDrawn.end()) names = names.first(own ? drawn->own : drawn->library);
@@ -223,8 +227,11 @@ UndeclaredCase undeclared_case(int number) {
     case kClean:
       break;
     case kSingle:
+      draw_effects(1, out, rng);
+      break;
     case kOwn:
       draw_effects(1, out, rng);
+      if (!world.effects.front().effect.starts_with("own_")) out.kind = kSingle;
       break;
     case kPair:
       draw_effects(2, out, rng);

@@ -57,6 +57,15 @@ struct Drift {
   }
 };
 
+struct Growth {
+  double relative = 0.0;  ///< at the last frame
+  double time_constant_s = 1.0;
+  double duration_s = 1.0;
+  [[nodiscard]] double factor(double t_s) const {
+    return 1.0 + relative * creep(t_s, time_constant_s, duration_s);
+  }
+};
+
 struct Ripple {
   Eigen::Vector2d per_px = Eigen::Vector2d::Zero();  ///< rad, across the wave
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
@@ -89,6 +98,7 @@ struct Undeclared {
   double reference_row = 0.0;
   std::optional<Bump> bump;
   std::optional<Drift> drift;
+  Growth growth;
   std::optional<Chequer> chequer;
   std::optional<Ripple> ripple;
   std::map<TagId, double> size_factor;
@@ -192,6 +202,8 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, 
     out.bump = bump_of(effect, time_s, rng);
   } else if (effect.effect == "camera_drift") {
     out.drift = drift_of(effect, time_s, robot.duration_s, rng);
+  } else if (effect.effect == "thermal_growth") {
+    out.growth = {effect.size, time_s, robot.duration_s};
   } else if (effect.effect == "own_chequer") {
     const double direction = rng.uniform(0.0, kTwoPi);
     out.chequer = {effect.detail,
@@ -246,7 +258,9 @@ class Eye {
 
   [[nodiscard]] Pose camera_from_tag(const Marker& marker, double t_s) const {
     const Pose T_base_link = links_at(t_s)[marker.link.index()];
-    Pose T = robot_.T_camera_base * T_base_link * marker.T_link_marker;
+    Pose T_base_marker = T_base_link * marker.T_link_marker;
+    if (marker.link != LinkId{0}) T_base_marker.translation *= un_.growth.factor(t_s);
+    Pose T = robot_.T_camera_base * T_base_marker;
     if (un_.bump && t_s >= un_.bump->time_s) T = un_.bump->T_new_old * T;
     if (un_.drift) T = un_.drift->at(t_s) * T;
     const auto slip = un_.slips.find(marker.id);

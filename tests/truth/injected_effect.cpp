@@ -23,7 +23,7 @@ struct Strength {
   Unit kind = Unit::kPlain;
 };
 
-constexpr std::array<Strength, 32> kWeakest{{
+constexpr std::array<Strength, 33> kWeakest{{
     {"time_offset", 0.5e-3},
     {"clock_drift", 5e-5},  // 0.5 ms rms over 33 s
     {"encoder_scale", 500e-6},
@@ -55,7 +55,8 @@ constexpr std::array<Strength, 32> kWeakest{{
     {"own_acceleration", 0.06 * kRadPerDegree, Unit::kAngle},
     {"own_vibration", 0.03 * kRadPerDegree, Unit::kAngle},
     {"own_creep", 0.03 * kRadPerDegree, Unit::kAngle},
-    {"own_growth", 0.5e-3},
+    {"own_sway", 0.03 * kRadPerDegree},
+    {"thermal_growth", 0.5e-3},
 }};
 
 constexpr std::array<std::string_view, 18> kOnJoints{
@@ -87,7 +88,8 @@ double detail_of(std::string_view effect, const Joint* joint, Rng& rng) {
   if (effect == "eccentricity") return 1.0 + rng.index(2);
   if (effect == "axis_wobble") return -1.0;
   if (among(kAtATime, effect)) return rng.uniform(0.25, 0.75);
-  if (effect == "camera_drift" || effect == "zero_drift") return rng.uniform(0.2, 2.0);
+  if (effect == "camera_drift" || effect == "zero_drift" || effect == "thermal_growth")
+    return rng.uniform(0.2, 2.0);
   if (effect == "own_chequer" || effect == "own_ripple") return rng.uniform(60.0, 120.0);
   if (effect == "bent_tag") return rng.uniform(0.2, 1.4);
   if (effect == "own_vibration") return rng.uniform(2.0, 6.0);
@@ -128,18 +130,18 @@ std::vector<InjectedEffect> on_joint(std::string_view effect, const FilmedRobot&
 
 const std::vector<std::string>& library_effects() {
   static const std::vector<std::string> names{
-      "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity", "gear_error",
-      "backlash",      "compliance",      "coupling",        "helical",      "axis_wobble",
-      "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",     "tag_slip",
-      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",   "clock_jump",
-      "intrinsics",    "bent_tag",        "quantisation"};
+      "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity",  "gear_error",
+      "backlash",      "compliance",      "coupling",        "helical",       "axis_wobble",
+      "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",      "tag_slip",
+      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",    "clock_jump",
+      "intrinsics",    "bent_tag",        "quantisation",    "thermal_growth"};
   return names;
 }
 
 const std::vector<std::string>& own_effects() {
   static const std::vector<std::string> names{"own_tanh",      "own_speed",   "own_chequer",
                                               "own_ripple",    "own_product", "own_acceleration",
-                                              "own_vibration", "own_creep",   "own_growth"};
+                                              "own_vibration", "own_creep",   "own_sway"};
   return names;
 }
 
@@ -158,7 +160,7 @@ bool is_late_joint(const InjectedEffect& effect) {
 
 bool is_mechanical(const InjectedEffect& effect) {
   if (effect.effect == "quantisation") return false;
-  return sits_on_joint(effect.effect) || is_late_joint(effect) || effect.effect == "own_growth";
+  return sits_on_joint(effect.effect) || is_late_joint(effect) || effect.effect == "own_sway";
 }
 
 double creep(double t_s, double time_constant_s, double duration_s) {
@@ -176,7 +178,8 @@ std::string_view size_unit(std::string_view effect, JointType type) {
   if (effect == "clock_drift") return "s/s";
   if (effect == "helical" || effect == "tag_slip" || effect == "bent_tag") return "m";
   if (effect == "curved_slider") return "1/m";
-  if (effect == "axis_wobble" || effect.starts_with("camera_")) return "rad";
+  if (effect == "axis_wobble" || effect == "own_sway" || effect.starts_with("camera_"))
+    return "rad";
   if (effect == "own_chequer" || effect == "own_ripple") return "px";
   if (effect == "encoder_scale" || effect == "coupling" || !sits_on_joint(effect)) return "";
   return type == JointType::kPrismatic ? "m" : "rad";
@@ -201,7 +204,8 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
     if (effect == "tag_size" && slides > 1) places.emplace_back("tags");
   } else {
     const bool is_of_clock = effect == "time_offset" || effect.starts_with("clock_");
-    places.emplace_back(is_of_clock ? "clock" : effect == "own_growth" ? "robot" : "camera");
+    const bool is_of_robot = effect == "thermal_growth" || effect == "own_sway";
+    places.emplace_back(is_of_clock ? "clock" : is_of_robot ? "robot" : "camera");
     if (effect == "time_offset" && robot.tree.joints.size() > 1) {
       for (const Joint& joint : robot.tree.joints) places.push_back(joint.name);
     }

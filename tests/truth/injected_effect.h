@@ -42,6 +42,8 @@ namespace kinescope::truth {
 ///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
 ///   camera_drift     rad from the first frame to the last, about a point 0.3 m away; detail: time
 ///                    constant of its approach to rest, share of the time
+///   thermal_growth   1, growth of all the robot's lengths from the first frame to the last; detail
+///                    as of camera_drift
 ///   zero_jump        rad (m), the joint's zero from then on; detail: when, share of the time
 ///   zero_drift       rad (m) from the first frame to the last; detail as of camera_drift
 ///   clock_jump       s, joint-log time = frame time + size from then on; detail: when, share of
@@ -59,7 +61,7 @@ namespace kinescope::truth {
 ///   own_vibration    rad (m) amplitude; detail: Hz
 ///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
 ///                    and before, fading - its value) / reach
-///   own_growth       1, growth of all distances between joints, from the first frame to the last
+///   own_sway         rad, largest tilt of the base under the moment of the robot's weight about it
 struct InjectedEffect {
   std::string effect;
   std::string place;
@@ -80,7 +82,8 @@ struct InjectedEffect {
 [[nodiscard]] bool sits_on_joint(std::string_view effect);
 /// A time_offset that is not the clock's.
 [[nodiscard]] bool is_late_joint(const InjectedEffect& effect);
-/// Of the robot's own mechanics: of joints, late readings, growth; not of what the log makes of it.
+/// Of the robot's own mechanics: of joints, late readings, its base; not of what the log makes of
+/// it.
 [[nodiscard]] bool is_mechanical(const InjectedEffect& effect);
 /// Share, 0 at 0 and 1 at the end, of what creeps towards rest with a time constant.
 [[nodiscard]] double creep(double t_s, double time_constant_s, double duration_s);

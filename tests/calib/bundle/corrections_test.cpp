@@ -67,6 +67,9 @@ std::vector<Case> all_parts(int frames) {
   out.push_back({of_part(CorrectedPart::kIntrinsic, "p2", 7, frames), 0.01});
   out.push_back({of_part(CorrectedPart::kReadout, "line", 0, frames), 1e-5, 1e-7});
   out.push_back({of_part(CorrectedPart::kMarkerSize, "sizes", kEverywhere, frames), 0.02});
+  out.push_back({of_part(CorrectedPart::kGrowth, "growth", 0, frames), 0.02});
+  out.push_back({of_part(CorrectedPart::kCarried, "carried", 0, frames), 0.01});
+  out.back().correction.direction = twist(0.6);
   out.push_back({of_part(CorrectedPart::kClock, "joint's clock", 2, frames), 5e-3});
   out.push_back({of_part(CorrectedPart::kClock, "clock", kEverywhere, frames), 5e-3});
   out.push_back(out.back());
