@@ -2,6 +2,7 @@
 #include "calib/bundle/corrected.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kinescope::bundle {
 namespace {
@@ -93,6 +94,22 @@ Eigen::VectorXd d_carried(const CorrectedError& at, const Eigen::Vector3d& shift
   return at.error.d_marker.rightCols<3>() * (base_marker(at).matrix3().transpose() * shift_m);
 }
 
+// Of the residual by a shift of the edges of a square towards its centre, 1/px: a corner is where
+// two of them meet. The directions are those that were seen.
+Eigen::VectorXd d_bloom(const Sighting& sighting) {
+  constexpr std::size_t kSquare = 4;
+  const std::vector<Eigen::Vector2d>& corners = sighting.corners_px;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(sighting.dimension());
+  if (corners.size() != kSquare) return out;
+  for (std::size_t i = 0; i < kSquare; ++i) {
+    const Eigen::Vector2d a = (corners[(i + 1) % kSquare] - corners[i]).normalized();
+    const Eigen::Vector2d b = (corners[(i + kSquare - 1) % kSquare] - corners[i]).normalized();
+    const double sine = std::abs(a.x() * b.y() - a.y() * b.x());
+    out.segment<2>(static_cast<Eigen::Index>(2 * i)) = -(a + b) / (sine * sighting.sigma);
+  }
+  return out;
+}
+
 bool acts_in(const Correction& correction, int frame) {
   if (correction.twists.rows() > 0) return !correction.twists.row(frame).isZero(0.0);
   return share_at(correction, frame) != 0.0;
@@ -126,6 +143,7 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
         break;
       case CorrectedPart::kIntrinsic:
       case CorrectedPart::kFocalLength:
+      case CorrectedPart::kBloom:
       case CorrectedPart::kReadout:
         bears = sighting.kind == MeasurementKind::kCorners;
         break;
@@ -183,6 +201,9 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         out.intrinsics[0] += amount * spec.camera.fx;
         out.intrinsics[1] += amount * spec.camera.fy;
         break;
+      case CorrectedPart::kBloom:
+        out.bloom_px += amount;
+        break;
       case CorrectedPart::kReadout:
         out.line_delay_s += amount;
         break;
@@ -210,6 +231,7 @@ std::optional<CorrectedError> corrected_error(
                        target_m, corrected.shape);
   if (!error) return std::nullopt;
   out.error = std::move(*error);
+  if (corrected.bloom_px != 0.0) out.error.residual += corrected.bloom_px * d_bloom(sighting);
   Vector6d velocity = Vector6d::Zero();
   for (std::size_t k = 0; k < joints.size(); ++k) velocity += out.chain.d_value[k] * rates[k];
   out.d_time = out.error.d_marker * velocity;
@@ -260,6 +282,8 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
       return (at.error.d_intrinsics.col(0) * spec.camera.fx +
               at.error.d_intrinsics.col(1) * spec.camera.fy) *
              share;
+    case CorrectedPart::kBloom:
+      return share * d_bloom(sighting);
     case CorrectedPart::kReadout: {
       Eigen::VectorXd out = at.d_time * share;
       for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {

@@ -19,6 +19,7 @@ struct CorrectedSighting {
   Growth growth;
   MarkerShape shape;
   std::array<double, kMaxIntrinsics> intrinsics{};  ///< changes
+  double bloom_px = 0.0;
   double line_delay_s = 0.0;
 };
 

@@ -24,6 +24,7 @@ enum class CorrectedPart {
   kCarried,      ///< a shift of all that joints carry, along the base's axes
   kIntrinsic,    ///< a change of an intrinsic parameter (fx fy cx cy d1 ..)
   kFocalLength,  ///< fx and fy over the declared ones, minus 1
+  kBloom,        ///< px by which the edges of all markers stand inside of where they are
   kReadout,      ///< s per image row by which a corner is seen later than the frame's middle row
   kClock         ///< s by which the log is further ahead than the time offset says
 };

@@ -88,7 +88,7 @@ struct CameraEffect {
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
-/// intrinsics, tag_size, bent_tag.
+/// intrinsics, blooming, tag_size, bent_tag.
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,

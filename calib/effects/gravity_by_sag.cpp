@@ -61,8 +61,8 @@ std::vector<Eigen::Vector3d> first_directions() {
 
 }  // namespace
 
-Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle, const std::vector<AddedEffect>& start,
-                               const EffectId& sag) {
+GravityBySag gravity_by_sag(const TracedBundle& bundle, const std::vector<AddedEffect>& start,
+                            const EffectId& sag) {
   const trace::StagePtr stage = trace::make_stage(bundle, start);
   std::vector<AddedEffect> with_sag = start;
   with_sag.push_back({sag, 0.0});
@@ -97,7 +97,7 @@ Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle, const std::vector<Add
   }
   const FittedEffect single = bundle.corrected(with_sag, {}).effects.back();
   const Eigen::VectorXd pull = single.values.cwiseQuotient(single.references);
-  return pull.dot(best) < 0.0 ? Eigen::Vector3d(-best) : best;
+  return {pull.dot(best) < 0.0 ? Eigen::Vector3d(-best) : best, most};
 }
 
 }  // namespace kinescope::effects

@@ -14,10 +14,15 @@
 
 namespace kinescope::effects {
 
-/// Unit vector. `start`: effects of the model beside `sag`, which is a compliance. `bundle` without
-/// a declared gravity.
-[[nodiscard]] Eigen::Vector3d gravity_by_sag(const TracedBundle& bundle,
-                                             const std::vector<AddedEffect>& start,
-                                             const EffectId& sag);
+struct GravityBySag {
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector
+  double explained = 0.0;  ///< of the whitened squares, by the sag under it
+};
+
+/// `start`: effects of the model beside `sag`, which is a compliance. `bundle` without a declared
+/// gravity.
+[[nodiscard]] GravityBySag gravity_by_sag(const TracedBundle& bundle,
+                                          const std::vector<AddedEffect>& start,
+                                          const EffectId& sag);
 
 }  // namespace kinescope::effects

@@ -113,6 +113,21 @@ std::vector<CameraEffect> of_camera(const CameraModel& camera) {
   return out;
 }
 
+// Overexposed paper, ink that runs: by as many pixels at every distance.
+CameraEffect blooming() {
+  CameraEffect out = effect("blooming", "camera",
+                            "white shines into black (or ink runs): the edges of all markers are "
+                            "not where they are printed",
+                            {{"shift of edges", "px"}}, "px");
+  out.candidate.floor = kUsualShift;
+  out.candidate.check = "exposure: white paper must not be overexposed; toner or ink that runs";
+  out.candidate.record = "bring the markers nearer to the camera and farther away";
+  out.corrections = [like = out](double) {
+    return std::vector{correct(CorrectedPart::kBloom, like, 0)};
+  };
+  return out;
+}
+
 CameraEffect tag_size(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
   CameraEffect out = effect("tag_size", name, fmt::format("{} is not as large as declared", name),
@@ -152,6 +167,7 @@ CameraEffect bent_tag(const EffectWorld& world, int marker) {
   const double half = 0.5 * world.tree.markers[static_cast<std::size_t>(marker)].size_m;
   // Any of these bends the images of markers.
   out.candidate.refines = {{"tag_size", name},
+                           {"blooming", "camera"},
                            {"lens_distortion", "camera"},
                            {"lens_distortion", "camera tangential"},
                            {"intrinsics", kFocalLength},
@@ -212,6 +228,7 @@ std::vector<CameraEffect> camera_effects(const EffectWorld& world) {
   }
   if (corners) {
     for (CameraEffect& effect : of_camera(world.camera)) out.push_back(std::move(effect));
+    out.push_back(blooming());
     for (const int marker : world.seen) out.push_back(tag_size(world, marker));
     for (const int marker : world.seen) out.push_back(bent_tag(world, marker));
     if (may_be_misprinted(world)) out.push_back(all_tag_sizes());

@@ -2,7 +2,10 @@
 #include "calib/effects/trace_calibration.h"
 
 #include <algorithm>
+#include <functional>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -15,23 +18,55 @@
 namespace kinescope {
 namespace {
 
-// The sag that may say where gravity points: the one that explains most; where none was named, the
-// likeliest, if any is likely. What one mass in the middle of the links does is a poor
-// picture of a large sag, and what lasts as long leaves few stretches to judge it by.
-std::optional<EffectId> telling_sag(const Trace& trace) {
+/// A sag, and where gravity points if it is one.
+struct TellingSag {
+  EffectId id;
+  effects::GravityBySag gravity;
+};
+
+// Sags that may say where gravity points: of those that were named the one that explains most;
+// where none was, those that are likely and move most. What one mass in the middle of the links
+// does is a poor picture of a large sag, and what lasts as long leaves few stretches to judge it
+// by.
+std::vector<EffectId> likely_sags(const Trace& trace) {
+  constexpr std::size_t kMostTried = 3;
   const TracedEffect* named = nullptr;
   for (const TracedEffect& accepted : trace.accepted) {
     if (!effects::is_sag(accepted.id)) continue;
     if (named == nullptr || accepted.explained > named->explained) named = &accepted;
   }
-  if (named != nullptr) return named->id;
+  if (named != nullptr) return {named->id};
   if (trace.verdict == TraceVerdict::kNothingToSay) return {};
-  const TestedCandidate* hint = nullptr;
+  std::map<EffectId, double> moves;
   for (const TestedCandidate& tested : trace.candidates) {
     if (!effects::is_sag(tested.id) || tested.p_value > trace::kHint) continue;
-    if (hint == nullptr || tested.p_value < hint->p_value) hint = &tested;
+    double& most = moves[tested.id];
+    most = std::max(most, tested.moves);
   }
-  return hint == nullptr ? std::optional<EffectId>() : hint->id;
+  std::vector<EffectId> out;
+  for (const auto& [id, most] : moves) out.push_back(id);
+  std::ranges::stable_sort(out, std::greater{}, [&](const EffectId& id) { return moves.at(id); });
+  out.resize(std::min(out.size(), kMostTried));
+  return out;
+}
+
+// What else was found at this joint may have stood for what one mass does not say of the sag.
+std::vector<AddedEffect> elsewhere(std::vector<AddedEffect> known, const EffectId& sag) {
+  std::erase_if(known, [&](const AddedEffect& effect) { return effect.id.place == sag.place; });
+  return known;
+}
+
+// Under the gravity that each would have, the one that explains most.
+std::optional<TellingSag> telling_sag(const EffectBundle& bundle,
+                                      const CalibrationTraceOptions& options,
+                                      const std::vector<AddedEffect>& known, const Trace& trace) {
+  std::optional<TellingSag> out;
+  for (const EffectId& id : likely_sags(trace)) {
+    const effects::TracedBundle model(bundle, options);
+    TellingSag told{id, effects::gravity_by_sag(model, elsewhere(known, id), id)};
+    if (!out || told.gravity.explained > out->gravity.explained) out = std::move(told);
+  }
+  return out;
 }
 
 bool names(const Trace& trace, const EffectId& id) {
@@ -70,19 +105,17 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   if (options.gravity_base) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects, or leaves nothing that no effect explains.
-  const std::optional<EffectId> sag = telling_sag(out.trace);
-  if (!sag) return out;
-  // What else was found at this joint may have stood for what one mass does not say of the sag.
+  std::vector<AddedEffect> known = trace_options.start;
   for (const AddedEffect& added : out.trace.added) {
-    if (added.id.place != sag->place &&
-        std::ranges::find(trace_options.start, added.id, &AddedEffect::id) ==
-            trace_options.start.end())
-      trace_options.start.push_back(added);
+    if (std::ranges::find(known, added.id, &AddedEffect::id) == known.end()) known.push_back(added);
   }
+  const std::optional<TellingSag> told_by = telling_sag(bundle, options, known, out.trace);
+  if (!told_by) return out;
+  const EffectId& sag = told_by->id;
   CalibrationTraceOptions upright = options;
-  upright.gravity_base =
-      effects::gravity_by_sag(effects::TracedBundle(bundle, options), trace_options.start, *sag);
-  trace_options.start.push_back({*sag, 0.0});
+  upright.gravity_base = told_by->gravity.direction;
+  trace_options.start = elsewhere(std::move(known), sag);
+  trace_options.start.push_back({sag, 0.0});
   CalibrationTrace again =
       traced(effects::TracedBundle(bundle, upright), bundle, upright, trace_options, progress);
   const bool says_all =
@@ -97,16 +130,16 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
                        again.trace.accepted.size() < out.trace.accepted.size() &&
                        !trace::predicts_clearly_worse(again.trace, out.trace);
   // What was only likely is told by gravity, or gravity by nothing.
-  const bool told = names(out.trace, *sag) || names(again.trace, *sag);
+  const bool told = names(out.trace, sag) || names(again.trace, sag);
   // Other effects say it, too, and give way to what predicts clearly better.
-  const bool others_say = out.trace.verdict == TraceVerdict::kEffects && !names(out.trace, *sag);
+  const bool others_say = out.trace.verdict == TraceVerdict::kEffects && !names(out.trace, sag);
   const double bar = others_say ? before.interval.low : before.value;
   const bool better = again.trace.held_out_after.value < bar && !(needs_more && !says_all);
   if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || !(better || plainer)) {
     return out;
   }
   again.trace.steps.front().words =
-      fmt::format("the model as it is; gravity points where the sag of {} says", sag->place);
+      fmt::format("the model as it is; gravity points where the sag of {} says", sag.place);
   return again;
 }
 

@@ -21,6 +21,23 @@ double Stage::rms() const {
                    std::max(1.0, linear.points(0, linear.unit.size())));
 }
 
+double held_out_sum_without(const Stage& stage, std::size_t index) {
+  const std::vector<Eigen::VectorXd>& values = stage.fit.values;
+  const Linearisation& linear = stage.fit.linear;
+  Eigen::Index first = linear.jacobian.cols();
+  for (std::size_t i = index; i < values.size(); ++i) first -= values[i].size();
+  const Eigen::Index count = values[index].size();
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index c = 0; c < linear.jacobian.cols(); ++c)
+    if (c < first || c >= first + count) kept.push_back(c);
+  Linearisation less = linear;
+  less.residual += linear.jacobian.middleCols(first, count) * values[index];
+  less.jacobian = linear.jacobian(Eigen::all, kept);
+  if (linear.prior.size() > 0) less.prior = linear.prior(kept, kept);
+  if (linear.prior_gradient.size() > 0) less.prior_gradient = linear.prior_gradient(kept);
+  return held_out_instants(NormalSystem(less, stage.system.partition())).whitened.sum();
+}
+
 StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) {
   TracedFit fit = model.fit(effects);
   return std::make_shared<const Stage>(std::move(effects), std::move(fit));

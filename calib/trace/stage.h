@@ -30,6 +30,9 @@ struct Stage {
 
 using StagePtr = std::shared_ptr<const Stage>;
 
+/// To first order, where one of its effects is not there and all else gives way: no refit.
+[[nodiscard]] double held_out_sum_without(const Stage& stage, std::size_t index);
+
 [[nodiscard]] StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects);
 
 /// Nothing where the fit does not name it.

@@ -200,6 +200,7 @@ bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember
 
 StagePtr Tracer::without_idle(StagePtr stage, std::size_t known) {
   for (std::size_t i = stage->added.size(); i-- > known;) {
+    if (held_out_sum_without(*stage, i) > stage->held_out_sum()) continue;
     StagePtr less = stage_of(kinescope::trace::without(stage->added, i));
     if (!less->fit.converged || less->held_out_sum() > stage->held_out_sum()) continue;
     stage = std::move(less);

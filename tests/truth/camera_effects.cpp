@@ -101,6 +101,7 @@ struct Undeclared {
   Growth growth;
   std::optional<Chequer> chequer;
   std::optional<Ripple> ripple;
+  double bloom_px = 0.0;
   std::map<TagId, double> size_factor;
   std::map<TagId, Bend> bends;
   std::map<TagId, Slip> slips;
@@ -208,6 +209,8 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, 
     const double direction = rng.uniform(0.0, kTwoPi);
     out.chequer = {effect.detail,
                    effect.size * Eigen::Vector2d(std::cos(direction), std::sin(direction))};
+  } else if (effect.effect == "blooming") {
+    out.bloom_px = effect.size;
   } else if (effect.effect == "own_ripple") {
     out.ripple = ripple_of(effect, rng);
   } else if (effect.effect == "tag_size" && effect.place == "tags") {
@@ -249,6 +252,7 @@ class Eye {
         return std::nullopt;
       corners.push_back(shifted(*pixel));
     }
+    shrink(corners);
     return corners;
   }
 
@@ -296,6 +300,24 @@ class Eye {
                           std::floor(pixel.y() / un_.chequer->field_px);
     const bool black = std::fmod(fields, 2.0) == 0.0;
     return pixel + (black ? 1.0 : -1.0) * un_.chequer->shift_px;
+  }
+
+  void shrink(std::vector<Eigen::Vector2d>& corners) const {
+    if (un_.bloom_px == 0.0) return;
+    const std::vector<Eigen::Vector2d> sharp = corners;
+    const std::size_t n = sharp.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      // Where the lines through the neighbours meet once each has moved by that.
+      const Eigen::Vector2d one = sharp[(i + 1) % n] - sharp[i];
+      const Eigen::Vector2d other = sharp[(i + n - 1) % n] - sharp[i];
+      Eigen::Matrix2d normals;
+      normals << -one.y(), one.x(), -other.y(), other.x();
+      normals.rowwise().normalize();
+      Eigen::Vector2d inward = Eigen::Vector2d::Constant(un_.bloom_px);
+      if (normals.row(0).dot(other) < 0.0) inward[0] = -inward[0];
+      if (normals.row(1).dot(one) < 0.0) inward[1] = -inward[1];
+      corners[i] = sharp[i] + normals.inverse() * inward;
+    }
   }
 
   const FilmedRobot& robot_;

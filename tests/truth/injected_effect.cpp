@@ -55,7 +55,7 @@ constexpr std::array<Strength, 33> kWeakest{{
     {"own_acceleration", 0.06 * kRadPerDegree, Unit::kAngle},
     {"own_vibration", 0.03 * kRadPerDegree, Unit::kAngle},
     {"own_creep", 0.03 * kRadPerDegree, Unit::kAngle},
-    {"own_sway", 0.03 * kRadPerDegree},
+    {"blooming", 0.03},
     {"thermal_growth", 0.5e-3},
 }};
 
@@ -130,18 +130,18 @@ std::vector<InjectedEffect> on_joint(std::string_view effect, const FilmedRobot&
 
 const std::vector<std::string>& library_effects() {
   static const std::vector<std::string> names{
-      "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity",  "gear_error",
-      "backlash",      "compliance",      "coupling",        "helical",       "axis_wobble",
-      "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",      "tag_slip",
-      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",    "clock_jump",
-      "intrinsics",    "bent_tag",        "quantisation",    "thermal_growth"};
+      "time_offset",   "clock_drift",     "encoder_scale",   "eccentricity",   "gear_error",
+      "backlash",      "compliance",      "coupling",        "helical",        "axis_wobble",
+      "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",       "tag_slip",
+      "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",     "clock_jump",
+      "intrinsics",    "bent_tag",        "quantisation",    "thermal_growth", "blooming"};
   return names;
 }
 
 const std::vector<std::string>& own_effects() {
   static const std::vector<std::string> names{"own_tanh",      "own_speed",   "own_chequer",
                                               "own_ripple",    "own_product", "own_acceleration",
-                                              "own_vibration", "own_creep",   "own_sway"};
+                                              "own_vibration", "own_creep"};
   return names;
 }
 
@@ -160,7 +160,7 @@ bool is_late_joint(const InjectedEffect& effect) {
 
 bool is_mechanical(const InjectedEffect& effect) {
   if (effect.effect == "quantisation") return false;
-  return sits_on_joint(effect.effect) || is_late_joint(effect) || effect.effect == "own_sway";
+  return sits_on_joint(effect.effect) || is_late_joint(effect);
 }
 
 double creep(double t_s, double time_constant_s, double duration_s) {
@@ -178,9 +178,8 @@ std::string_view size_unit(std::string_view effect, JointType type) {
   if (effect == "clock_drift") return "s/s";
   if (effect == "helical" || effect == "tag_slip" || effect == "bent_tag") return "m";
   if (effect == "curved_slider") return "1/m";
-  if (effect == "axis_wobble" || effect == "own_sway" || effect.starts_with("camera_"))
-    return "rad";
-  if (effect == "own_chequer" || effect == "own_ripple") return "px";
+  if (effect == "axis_wobble" || effect.starts_with("camera_")) return "rad";
+  if (effect == "own_chequer" || effect == "own_ripple" || effect == "blooming") return "px";
   if (effect == "encoder_scale" || effect == "coupling" || !sits_on_joint(effect)) return "";
   return type == JointType::kPrismatic ? "m" : "rad";
 }
@@ -204,8 +203,7 @@ std::vector<InjectedEffect> weakest_effects(std::string_view effect, const Filme
     if (effect == "tag_size" && slides > 1) places.emplace_back("tags");
   } else {
     const bool is_of_clock = effect == "time_offset" || effect.starts_with("clock_");
-    const bool is_of_robot = effect == "thermal_growth" || effect == "own_sway";
-    places.emplace_back(is_of_clock ? "clock" : is_of_robot ? "robot" : "camera");
+    places.emplace_back(is_of_clock ? "clock" : effect == "thermal_growth" ? "robot" : "camera");
     if (effect == "time_offset" && robot.tree.joints.size() > 1) {
       for (const Joint& joint : robot.tree.joints) places.push_back(joint.name);
     }

@@ -37,6 +37,7 @@ namespace kinescope::truth {
 ///                    plane, two behind; detail: rad, of the cylinder's axis from the tag's x
 ///   quantisation     rad (m), the joint's reading is rounded to a multiple of that
 ///   rolling_shutter  s a row; detail: row exposed at the frame's stamp, share of the height
+///   blooming         px, white shines into black: all edges move towards the tag's centre
 ///   tag_size         1, the tag (on "tags": every one) is (1 + size) x as large as declared
 ///   tag_slip         m, in the tag's plane, with a small turn; detail: when, share of the time
 ///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
@@ -61,7 +62,6 @@ namespace kinescope::truth {
 ///   own_vibration    rad (m) amplitude; detail: Hz
 ///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
 ///                    and before, fading - its value) / reach
-///   own_sway         rad, largest tilt of the base under the moment of the robot's weight about it
 struct InjectedEffect {
   std::string effect;
   std::string place;
@@ -82,7 +82,7 @@ struct InjectedEffect {
 [[nodiscard]] bool sits_on_joint(std::string_view effect);
 /// A time_offset that is not the clock's.
 [[nodiscard]] bool is_late_joint(const InjectedEffect& effect);
-/// Of the robot's own mechanics: of joints, late readings, its base; not of what the log makes of
+/// Of the robot's own mechanics: of joints, late readings; not of what the log makes of
 /// it.
 [[nodiscard]] bool is_mechanical(const InjectedEffect& effect);
 /// Share, 0 at 0 and 1 at the end, of what creeps towards rest with a time constant.

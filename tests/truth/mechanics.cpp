@@ -257,15 +257,6 @@ Eigen::VectorXd Masses::torques(const KinematicTree& tree, const Eigen::VectorXd
   return out;
 }
 
-Eigen::Vector3d Masses::moment(const KinematicTree& tree, const Eigen::VectorXd& values,
-                               const Eigen::Vector3d& down) const {
-  const std::vector<Pose> links = forward_kinematics(tree, values);
-  Eigen::Vector3d out = Eigen::Vector3d::Zero();
-  for (const Mass& mass : masses_)
-    out += (links[mass.link] * mass.place_m).cross(mass.mass_kg * kGravity * down);
-  return out;
-}
-
 double Masses::work_of_falling(const KinematicTree& tree, const Eigen::VectorXd& values,
                                const Eigen::Vector3d& down) const {
   const std::vector<Pose> links = forward_kinematics(tree, values);
@@ -301,11 +292,7 @@ Mechanics::Mechanics(const FilmedRobot& robot, const std::vector<InjectedEffect>
         [&joint](double value) { return joint_motion(joint.type, joint.axis, value); });
   }
   for (const InjectedEffect& effect : effects) {
-    if (effect.effect == "own_sway") {
-      base_rad_per_nm_ = effect.size / largest_moment();
-    } else if (is_mechanical(effect)) {
-      add(effect);
-    }
+    if (is_mechanical(effect)) add(effect);
   }
 }
 
@@ -337,13 +324,6 @@ void Mechanics::add(const InjectedEffect& effect) {
   }
 }
 
-double Mechanics::largest_moment() const {
-  double out = 0.0;
-  for (const double t : instants(robot_.duration_s, 0.05))
-    out = std::max(out, masses_.moment(robot_.tree, robot_.encoders(t), robot_.down).norm());
-  return out;
-}
-
 Eigen::VectorXd Mechanics::values(double t_s) const {
   const Eigen::VectorXd encoders = robot_.encoders(t_s);
   Eigen::VectorXd values = encoders;
@@ -366,10 +346,6 @@ Eigen::VectorXd Mechanics::values(double t_s) const {
 std::vector<Pose> Mechanics::links(double t_s) const {
   const Eigen::VectorXd now = values(t_s);
   std::vector<Pose> T_base_link(robot_.tree.links.size());
-  if (base_rad_per_nm_ != 0.0) {
-    const Eigen::Vector3d tilt = base_rad_per_nm_ * masses_.moment(robot_.tree, now, robot_.down);
-    T_base_link.front().rotation = exp_rotation(tilt);
-  }
   for (std::size_t j = 0; j < robot_.tree.joints.size(); ++j) {
     const Joint& joint = robot_.tree.joints[j];
     T_base_link[joint.child.index()] = T_base_link[joint.parent.index()] * joint.T_parent_joint *

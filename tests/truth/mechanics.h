@@ -34,9 +34,6 @@ class Masses {
   /// Torque (force) of gravity on every joint, N m (N). `down`: unit, base frame.
   [[nodiscard]] Eigen::VectorXd torques(const KinematicTree& tree, const Eigen::VectorXd& values,
                                         const Eigen::Vector3d& down) const;
-  /// Of gravity about the base's origin, N m.
-  [[nodiscard]] Eigen::Vector3d moment(const KinematicTree& tree, const Eigen::VectorXd& values,
-                                       const Eigen::Vector3d& down) const;
   /// Work of gravity from the base's origin to this posture, J: its slope is the torque.
   [[nodiscard]] double work_of_falling(const KinematicTree& tree, const Eigen::VectorXd& values,
                                        const Eigen::Vector3d& down) const;
@@ -80,7 +77,7 @@ class Mechanics {
   Mechanics(const FilmedRobot& robot, const std::vector<InjectedEffect>& effects);
   /// True values of the joints at a time of the log's clock, rad or m.
   [[nodiscard]] Eigen::VectorXd values(double t_s) const;
-  /// Of every link in the frame in which the base stands before it yields.
+  /// T_base_link of every link.
   [[nodiscard]] std::vector<Pose> links(double t_s) const;
 
  private:
@@ -90,7 +87,6 @@ class Mechanics {
   };
 
   void add(const InjectedEffect& effect);
-  [[nodiscard]] double largest_moment() const;  // on the base, N m, over the recording
 
   const FilmedRobot& robot_;
   Masses masses_;
@@ -98,7 +94,6 @@ class Mechanics {
   std::vector<std::vector<Law>> laws_;
   std::vector<Motion> motions_;
   std::vector<Sag> sags_;
-  double base_rad_per_nm_ = 0.0;
 };
 
 }  // namespace kinescope::truth

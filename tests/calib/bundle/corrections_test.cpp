@@ -65,6 +65,7 @@ std::vector<Case> all_parts(int frames) {
   out.push_back({of_part(CorrectedPart::kIntrinsic, "cy", 3, frames), 3.0, 1e-3});
   out.push_back({of_part(CorrectedPart::kIntrinsic, "k1", 4, frames), 0.01});
   out.push_back({of_part(CorrectedPart::kIntrinsic, "p2", 7, frames), 0.01});
+  out.push_back({of_part(CorrectedPart::kBloom, "bloom", 0, frames), 0.2});
   out.push_back({of_part(CorrectedPart::kReadout, "line", 0, frames), 1e-5, 1e-7});
   out.push_back({of_part(CorrectedPart::kMarkerSize, "sizes", kEverywhere, frames), 0.02});
   out.push_back({of_part(CorrectedPart::kGrowth, "growth", 0, frames), 0.02});

@@ -59,8 +59,9 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{"tag_slip", "tag_12"}, std::pair{"camera_bump", "camera"},
                       std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"},
                       std::pair{"camera_drift", "camera"}, std::pair{"clock_jump", "clock"},
-                      std::pair{"thermal_growth", "robot"}, std::pair{"zero_jump", "q2"},
-                      std::pair{"zero_drift", "q3"}, std::pair{"intrinsics", "camera focal length"},
+                      std::pair{"thermal_growth", "robot"}, std::pair{"blooming", "camera"},
+                      std::pair{"zero_jump", "q2"}, std::pair{"zero_drift", "q3"},
+                      std::pair{"intrinsics", "camera focal length"},
                       std::pair{"intrinsics", "camera centre"}, std::pair{"bent_tag", "tag_13"}),
     [](const auto& tested) {
       std::string name = tested.param.first;
@@ -177,7 +178,7 @@ TEST_P(Unnamed, HasNoNameOfTheLibrary) {
 INSTANTIATE_TEST_SUITE_P(TraceCalibration, Unnamed,
                          ::testing::Values("own_tanh", "own_speed", "own_chequer", "own_ripple",
                                            "own_product", "own_acceleration", "own_creep",
-                                           "own_vibration", "own_sway"),
+                                           "own_vibration"),
                          [](const auto& tested) { return tested.param; });
 
 // Of 0.7 deg: the time constant that is best beside a model that has bent itself is not the right
