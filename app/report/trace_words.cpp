@@ -38,6 +38,7 @@ AmountUnit amount_unit(const std::string& si_unit) {
                                                         },
                                                         {"m", {1e3, "mm"}},
                                                         {"s", {1e3, "ms"}},
+                                                        {"m/m", {1e3, "mm/m"}},
                                                         {"m/turn", {1e3, "mm/turn"}},
                                                         {"rad/m", {kDegreesPerRadian, "°/m"}},
                                                         {"rad/s", {kDegreesPerRadian, "°/s"}},

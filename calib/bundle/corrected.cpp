@@ -98,6 +98,7 @@ Eigen::VectorXd d_carried(const CorrectedError& at, const Eigen::Vector3d& shift
 // two of them meet. The directions are those that were seen.
 Eigen::VectorXd d_bloom(const Sighting& sighting) {
   constexpr std::size_t kSquare = 4;
+  constexpr double kStraight = 1e-3;  // sine of an angle that is no corner's
   const std::vector<Eigen::Vector2d>& corners = sighting.corners_px;
   Eigen::VectorXd out = Eigen::VectorXd::Zero(sighting.dimension());
   if (corners.size() != kSquare) return out;
@@ -105,6 +106,7 @@ Eigen::VectorXd d_bloom(const Sighting& sighting) {
     const Eigen::Vector2d a = (corners[(i + 1) % kSquare] - corners[i]).normalized();
     const Eigen::Vector2d b = (corners[(i + kSquare - 1) % kSquare] - corners[i]).normalized();
     const double sine = std::abs(a.x() * b.y() - a.y() * b.x());
+    if (!(sine > kStraight)) continue;
     out.segment<2>(static_cast<Eigen::Index>(2 * i)) = -(a + b) / (sine * sighting.sigma);
   }
   return out;

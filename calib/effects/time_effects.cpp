@@ -146,8 +146,8 @@ CameraEffect camera_drift(const EffectWorld& world) {
   return out;
 }
 
-// Where the base is held while the robot grows: within a metre of its frame, of a growth that
-// nobody doubts.
+// The base need not be held where its frame is, but up to a metre away: by a growth of a millimetre
+// a metre that shifts all by a millimetre.
 std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::VectorXd& share) {
   constexpr double kMostShift = 1e-3;  // m
   std::vector<Correction> out;
@@ -167,10 +167,14 @@ std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::Ve
 // Links, screws and racks of one temperature: every length grows alike.
 CameraEffect thermal_growth(const EffectWorld& world) {
   CameraEffect out = effect("thermal_growth", "robot", "the robot grows (or shrinks) slowly",
-                            {{"relative growth", ""}}, "");
+                            {{"relative growth", "m/m"}}, "m/m");
   out.candidate.check =
-      "temperature of the links: aluminium grows by 23 millionths a kelvin, steel by 12";
+      "temperature of the links: aluminium grows by 0.023 mm/m a kelvin, steel by 0.012 mm/m";
   out.candidate.record = "let the robot warm up first, or log its temperature";
+  out.candidate.possible = [](const Eigen::VectorXd& growth) {
+    constexpr double kHottest = 0.01;  // aluminium over 400 K
+    return std::abs(growth[0]) < kHottest;
+  };
   creeps(world, out.candidate);
   out.corrections = [like = out, time = creeping_time(world)](double constant) {
     Correction growth = correct(CorrectedPart::kGrowth, like, 0);

@@ -4,6 +4,7 @@
 // element says why in data-viewer-error (tests read that too).
 import { connectTimePlots } from "./cursor.js";
 import { connectFilm } from "./film.js";
+import { foldSections } from "./fold.js";
 import { connectControls, Player } from "./player.js";
 import { RobotScene } from "./scene.js";
 
@@ -82,6 +83,7 @@ function start() {
 
 window.addEventListener("error", (event) => { root.dataset.viewerError = String(event.message); });
 try {
+  foldSections();
   start();
 } catch (error) {
   root.dataset.viewerError = String(error);

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "app/report/report.h"
+#include "tests/app/report/count_of.h"
 #include "tests/app/report/synthetic_run.h"
 #include "tests/truth/temporary_path.h"
 
@@ -38,7 +39,7 @@ std::string browser() {
 }
 
 /// The DOM after the scripts ran; the console's messages go to `console`.
-std::string opened(const RunSummary& run, std::string& console) {
+std::string opened(const RunSummary& run, std::string& console, const std::string& fragment = "") {
   const std::filesystem::path folder = truth::temporary_path("report");
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "report.html") << report_html(run, "");
@@ -49,7 +50,7 @@ std::string opened(const RunSummary& run, std::string& console) {
       "--disable-background-networking"
       " --disable-component-update --disable-sync --enable-logging=stderr --v=0 --user-data-dir=" +
       (folder / "profile").string() + " --virtual-time-budget=4000 --dump-dom file://" +
-      (folder / "report.html").string() + " 2>" + log);
+      (folder / "report.html").string() + fragment + " 2>" + log);
   std::ifstream in(log);
   console.assign(std::istreambuf_iterator<char>(in), {});
   std::filesystem::remove_all(folder);
@@ -104,6 +105,22 @@ TEST(Browser, TheVideoFollowsTheView) {
   ASSERT_NE(shown, std::string::npos);
   EXPECT_LT(shown, dom.find("data-t=\"", dom.find("data-t=\"") + 1))
       << "the first, where it begins";
+  EXPECT_EQ(complaints(console), "");
+}
+
+TEST(Browser, SectionsAreFoldedAndAnAddressOpensItsOwn) {
+  if (browser().empty()) GTEST_SKIP() << "no Chromium on this machine";
+  const RunSummary run = synthetic_run();
+  const std::string plain = report_html(run, "");
+  const int sections = count_of(plain, "<section id=");
+  EXPECT_EQ(count_of(plain, "<details class=\"fold\""), 0) << "whole without scripts";
+  std::string console;
+  const std::string closed = opened(run, console);
+  EXPECT_EQ(count_of(closed, "<details class=\"fold\">"), sections - 1) << "all but the verdict";
+  EXPECT_EQ(complaints(console), "");
+  const std::string at_one = opened(run, console, "#residuals");
+  EXPECT_EQ(count_of(at_one, "<details class=\"fold\">"), sections - 2);
+  EXPECT_EQ(count_of(at_one, "<section id=\"residuals\"><details class=\"fold\" open=\"\">"), 1);
   EXPECT_EQ(complaints(console), "");
 }
 

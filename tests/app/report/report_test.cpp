@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "tests/app/report/count_of.h"
 #include "tests/app/report/synthetic_run.h"
 
 namespace kinescope {
@@ -18,13 +19,6 @@ namespace {
 
 constexpr std::string_view kUrdf =
     "<robot name=\"bench_arm\">\n  <link name=\"base\"/>\n</robot>\n";
-
-int count_of(const std::string& text, std::string_view what) {
-  int count = 0;
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
-    ++count;
-  return count;
-}
 
 /// The page without its script elements: what a reader with scripts off sees.
 std::string without_scripts(const std::string& html) {
