@@ -172,7 +172,7 @@ CameraEffect thermal_growth(const EffectWorld& world) {
       "temperature of the links: aluminium grows by 0.023 mm/m a kelvin, steel by 0.012 mm/m";
   out.candidate.record = "let the robot warm up first, or log its temperature";
   out.candidate.possible = [](const Eigen::VectorXd& growth) {
-    constexpr double kHottest = 0.01;  // aluminium over 400 K
+    constexpr double kHottest = 0.02;  // plastic over 200 K
     return std::abs(growth[0]) < kHottest;
   };
   creeps(world, out.candidate);

@@ -56,7 +56,7 @@ constexpr std::array<Strength, 33> kWeakest{{
     {"own_vibration", 0.03 * kRadPerDegree, Unit::kAngle},
     {"own_creep", 0.03 * kRadPerDegree, Unit::kAngle},
     {"blooming", 0.03},
-    {"thermal_growth", 0.05e-3},
+    {"thermal_growth", 0.15e-3},
 }};
 
 constexpr std::array<std::string_view, 18> kOnJoints{
