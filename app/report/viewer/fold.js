@@ -52,7 +52,10 @@ export function foldSections() {
   item.append(openAllButton(folds));
   document.querySelector("nav ol").append(item);
   // A second click on the same entry of the contents changes no address.
-  document.querySelector("nav").addEventListener("click", () => setTimeout(() => openTarget(folds)));
+  document.querySelector("nav").addEventListener("click", (event) => {
+    const entry = event.target.closest("a");
+    if (entry !== null && entry.hash === window.location.hash) openTarget(folds);
+  });
   window.addEventListener("hashchange", () => openTarget(folds));
   openTarget(folds);
   let closed = [];
