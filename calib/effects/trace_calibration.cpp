@@ -29,7 +29,6 @@ struct TellingSag {
 // does is a poor picture of a large sag, and what lasts as long leaves few stretches to judge it
 // by.
 std::vector<EffectId> likely_sags(const Trace& trace) {
-  constexpr std::size_t kMostTried = 3;
   const TracedEffect* named = nullptr;
   for (const TracedEffect& accepted : trace.accepted) {
     if (!effects::is_sag(accepted.id)) continue;
@@ -46,7 +45,7 @@ std::vector<EffectId> likely_sags(const Trace& trace) {
   std::vector<EffectId> out;
   for (const auto& [id, most] : moves) out.push_back(id);
   std::ranges::stable_sort(out, std::greater{}, [&](const EffectId& id) { return moves.at(id); });
-  out.resize(std::min(out.size(), kMostTried));
+  out.resize(std::min(out.size(), trace::kMostHints));
   return out;
 }
 

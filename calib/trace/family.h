@@ -4,6 +4,7 @@
 // counted in.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "calib/trace/score_test.h"
@@ -12,6 +13,8 @@ namespace kinescope::trace {
 
 /// A p-value over the family, up to which an effect may be there and hidden.
 inline constexpr double kHint = 0.2;
+/// So many of those are tried: each costs fits.
+inline constexpr std::size_t kMostHints = 3;
 
 struct TestedMember {
   std::size_t index = 0;  ///< into the candidates

@@ -15,8 +15,6 @@
 namespace kinescope::trace {
 namespace {
 
-// So many effects that may be hidden by another one are tried.
-constexpr std::size_t kMostHints = 3;
 // Of the squares that are left: what explains as much may be one of several that hide each other.
 constexpr double kLargeShare = 0.05;
 constexpr int kLongestChain = 5;
