@@ -300,10 +300,6 @@ std::vector<int> with_what_lasts(const Spec& spec, const State& state,
     const auto is_rejected = [&](int index) {
       return !std::ranges::binary_search(solution.used, index);
     };
-    const auto rejected = std::ranges::count_if(indices, is_rejected);
-    // Outliers are the lesser part: a robust fit cannot tell which of two halves is right.
-    if (2 * rejected > std::ssize(indices) && rejected < std::ssize(indices))
-      out.insert(indices.begin(), indices.end());
     const auto add = [&](bool at_the_ends_alone) {
       Rejections of{indices, {}};
       for (const int index : indices) of.rejected.push_back(is_rejected(index));

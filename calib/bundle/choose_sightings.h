@@ -29,8 +29,8 @@ struct ChosenSightings {
 
 /// What a robust solution used, and what it rejected in a row and not by chance: up to an end of
 /// the recording (the marker may have slipped, the camera may have been bumped), or from one value
-/// of a joint that carries the marker to another (the joint may err there); all of a marker of
-/// which it rejected the larger part. Of postures, whose neighbours in time say nothing.
+/// of a joint that carries the marker to another (the joint may err there). Of postures, whose
+/// neighbours in time say nothing.
 [[nodiscard]] std::vector<int> with_what_lasts(const Spec& spec, const State& state,
                                                const RobustSolution& solution);
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <numbers>
 
 #include <ceres/solver.h>
 
@@ -26,6 +28,8 @@ constexpr double kLossWidth = 3.0;
 // Starts are good enough for nearly whole Gauss-Newton steps. With 1e8 what cannot be told apart
 // wanders in its null space.
 constexpr double kFirstRadius = 1e6;
+// RMS share of a marker's motion: with less than that left the robot describes where it goes.
+constexpr double kUndescribed = 0.25;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
 constexpr double kPlainTolerance = 1e-10;
@@ -144,6 +148,60 @@ std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfi
   return kept;
 }
 
+// What was measured, in units of its noise.
+Eigen::VectorXd whitened(const Sighting& sighting) {
+  if (sighting.kind == MeasurementKind::kPoint) return sighting.position_m / sighting.sigma;
+  if (sighting.kind == MeasurementKind::kPose) {
+    const double per_rad = sighting.whitening.leftCols<3>().norm() / std::sqrt(3.0);
+    const double per_m = sighting.whitening.rightCols<3>().norm() / std::sqrt(3.0);
+    Eigen::VectorXd out(12);
+    // Two rotations a small angle apart differ by its square times 2.
+    out << per_rad / std::numbers::sqrt2 * sighting.T_camera_marker.matrix3().reshaped(),
+        per_m * sighting.T_camera_marker.translation;
+    return out;
+  }
+  Eigen::VectorXd out(sighting.dimension());
+  for (std::size_t c = 0; c < sighting.corners_px.size(); ++c)
+    out.segment<2>(2 * static_cast<Eigen::Index>(c)) = sighting.corners_px[c] / sighting.sigma;
+  return out;
+}
+
+// Whether the misfits of a marker's sightings are small beside its motion.
+bool is_described(const Spec& spec, const std::vector<Misfit>& of_marker) {
+  const auto count = static_cast<double>(of_marker.size());
+  std::vector<Eigen::VectorXd> seen;
+  double left = 0.0;
+  for (const Misfit& misfit : of_marker) {
+    seen.push_back(whitened(spec.sightings[static_cast<std::size_t>(misfit.sighting)]));
+    left += misfit.chi_square;
+  }
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(seen.front().size());
+  for (const Eigen::VectorXd& one : seen) mean += one / count;
+  double motion = 0.0;
+  for (const Eigen::VectorXd& one : seen) motion += (one - mean).squaredNorm();
+  return left < kUndescribed * kUndescribed * motion;
+}
+
+// Outliers are the lesser part: which of two halves of a marker's sightings is right a robust fit
+// cannot tell. All of them go back into `kept`, where the robot describes the marker at all.
+void put_back_the_larger_part(const Spec& spec, const std::vector<Misfit>& misfits,
+                              std::vector<int>& kept) {
+  std::map<int, std::vector<Misfit>> by_marker;
+  for (const Misfit& misfit : misfits)
+    by_marker[spec.sightings[static_cast<std::size_t>(misfit.sighting)].marker].push_back(misfit);
+  for (const auto& [marker, all] : by_marker) {
+    const auto rejected = std::ranges::count_if(all, [&](const Misfit& misfit) {
+      return !std::ranges::binary_search(kept, misfit.sighting);
+    });
+    if (2 * rejected <= std::ssize(all) || !is_described(spec, all)) continue;
+    std::vector<int> with;
+    std::vector<int> of_marker;
+    for (const Misfit& misfit : all) of_marker.push_back(misfit.sighting);
+    std::ranges::set_union(kept, of_marker, std::back_inserter(with));
+    kept = std::move(with);
+  }
+}
+
 // Where a reading rests on its steps, each correction bears on a few frames: with a third of the
 // unknowns of that kind a sparse factor takes half the time (`undeclared`, 9405: 36 s of 69).
 bool has_many_local_corrections(const Spec& spec, int unknowns) {
@@ -234,6 +292,7 @@ RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightin
     rescale(spec, all, freedom_factor(spec, state, out.used));
     all = misfits(spec, state, sightings);
     out.used = keep_inliers(spec, all, reject_sigma);
+    put_back_the_larger_part(spec, all, out.used);
     second = solve(spec, state, out.used, {}, max_iterations);
     out.summary.iterations += second.iterations;
   }

@@ -32,7 +32,8 @@ struct RobustSolution {
 };
 
 /// Robust solve, noise level per marker (per rotation and translation for poses), rejection, plain
-/// refit, twice. Rescales the sigmas in `spec`.
+/// refit, twice. Where the larger part of a marker's sightings stands out from a robot that
+/// describes its motion, none of them is rejected. Rescales the sigmas in `spec`.
 [[nodiscard]] RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
                                             double reject_sigma, int max_iterations);
 

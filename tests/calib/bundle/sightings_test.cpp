@@ -168,17 +168,5 @@ TEST_F(Sightings, WhatIsRejectedFromOneValueOfAJointOnIsNotByChance) {
   EXPECT_EQ(used.size(), solution.used.size() + at_the_end.size());
 }
 
-// Which half of a marker's sightings is wrong, no robust fit can say.
-TEST_F(Sightings, TheLargerPartOfAMarkersSightingsIsNoOutlier) {
-  look();
-  RobustSolution solution;
-  std::size_t number = 0;
-  for (const int index : usable_) {
-    const bool most = spec_.sightings[static_cast<std::size_t>(index)].marker == 1;
-    (most && number++ % 3 != 0 ? solution.rejected : solution.used).push_back(index);
-  }
-  EXPECT_EQ(with_what_lasts(spec_, state_, solution), usable_);
-}
-
 }  // namespace
 }  // namespace kinescope::bundle
