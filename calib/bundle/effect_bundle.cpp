@@ -524,10 +524,8 @@ std::vector<int> EffectBundle::moving_joints() const {
 
 const std::vector<DesignCoupling>& EffectBundle::couplings() const { return impl_->couplings; }
 
-double EffectBundle::chosen_beyond(const EffectBundle& other) const {
-  std::vector<int> more;
-  std::ranges::set_difference(impl_->used, other.impl_->used, std::back_inserter(more));
-  return static_cast<double>(more.size()) / std::sqrt(static_cast<double>(impl_->used.size()));
+bool EffectBundle::chose_as(const EffectBundle& other) const {
+  return impl_->used == other.impl_->used;
 }
 
 double EffectBundle::finer_than(const EffectBundle& other) const {

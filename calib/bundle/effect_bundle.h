@@ -121,9 +121,8 @@ class EffectBundle {
   [[nodiscard]] std::vector<int> moving_joints() const;
   /// Those of channels that drive a joint themselves.
   [[nodiscard]] const std::vector<DesignCoupling>& couplings() const;
-  /// Sightings that were chosen here and not there, over the square root of all: by how many
-  /// standard deviations of a mean their noise, all of one sign, bends it.
-  [[nodiscard]] double chosen_beyond(const EffectBundle& other) const;
+  /// The same sightings are used.
+  [[nodiscard]] bool chose_as(const EffectBundle& other) const;
   /// How many times larger the noise of a marker's sightings is there than here: of the marker of
   /// which it is most, the geometric mean.
   [[nodiscard]] double finer_than(const EffectBundle& other) const;

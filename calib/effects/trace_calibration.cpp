@@ -156,17 +156,14 @@ std::vector<Correction> without_readings(const CalibrationTrace& found) {
   return out;
 }
 
-// Without the effects, what they do passed for noise: of postures what goes against them stood out,
-// of films what changes from one frame to the next.
+// Without the effects, what they do passed for noise: of postures those stood out whose noise adds
+// to it, and the others make it smaller than it is; of films it is what changes from one frame to
+// the next.
 bool judges_better(const EffectBundle& beside, const EffectBundle& without) {
-  // Where it was 0.9 and more (`undeclared`, numbers 5064, 5215, 5335) a rest was seen that is not
-  // there; at 0.2 (5135) and less a second search says hardly more.
-  constexpr double kBent = 0.5;
   // 4 to 6 beside effects of 1 to 2 degrees that a fit without them bends (5128, 5178); 1.0 to 1.1
   // where a second search says the same (9032, 9047).
   constexpr double kFiner = 1.5;
-  return beside.postures() ? beside.chosen_beyond(without) > kBent
-                           : beside.finer_than(without) > kFiner;
+  return beside.postures() ? !beside.chose_as(without) : beside.finer_than(without) > kFiner;
 }
 
 }  // namespace

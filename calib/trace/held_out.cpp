@@ -23,13 +23,14 @@ Eigen::VectorXd held_out_rows(const NormalSystem& system,
   Eigen::VectorXd out = linear.residual;
   for (std::size_t fold = 0; fold < folds.size(); ++fold) {
     const Eigen::VectorXd step = solve_without(total, folds[fold]);
-    const Eigen::VectorXd errors =
-        system.residual_after(step.head(system.parameters()), columns, step.tail(k));
+    const auto own = step.head(system.parameters());
+    const Eigen::VectorXd moved = system.moved_by(columns, step.tail(k));
     for (std::size_t i = 0; i < fold_of.size(); ++i) {
       if (fold_of[i] != static_cast<int>(fold)) continue;
       const Eigen::Index first = linear.first_row[i];
       const Eigen::Index rows = linear.first_row[i + 1] - first;
-      out.segment(first, rows) = errors.segment(first, rows);
+      out.segment(first, rows) -=
+          moved.segment(first, rows) + linear.jacobian.middleRows(first, rows) * own;
     }
   }
   return out;

@@ -11,13 +11,11 @@
 namespace kinescope::trace {
 namespace {
 
-GroupSums sums_of(RowMatrix J, const Eigen::VectorXd& r) {
+GroupSums sums_of(const RowMatrix& J, const Eigen::VectorXd& r) {
   const Eigen::Index parameters = J.cols();
-  GroupSums out{
-      Eigen::MatrixXd::Zero(parameters, parameters), J.transpose() * r, r.squaredNorm(), {}};
+  GroupSums out{Eigen::MatrixXd::Zero(parameters, parameters), J.transpose() * r, r.squaredNorm()};
   out.H.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
   out.H = Eigen::MatrixXd(out.H.selfadjointView<Eigen::Lower>());
-  if (J.rows() < parameters) out.J = std::move(J);
   return out;
 }
 
@@ -40,18 +38,12 @@ std::vector<GroupSums> grouped(const Linearisation& linear, const std::vector<in
       r.segment(at, count) = linear.residual.segment(linear.first_row[i], count);
       at += count;
     }
-    out.push_back(sums_of(std::move(J), r));
+    out.push_back(sums_of(J, r));
   }
   return out;
 }
 
 }  // namespace
-
-Eigen::MatrixXd GroupSums::squares_of(const Eigen::MatrixXd& steps) const {
-  if (J.cols() == 0) return steps.transpose() * (H * steps);
-  const Eigen::MatrixXd moved = J * steps;
-  return moved.transpose() * moved;
-}
 
 Eigen::MatrixXd scaled_pseudo_inverse(const Eigen::MatrixXd& matrix, double floor) {
   const Eigen::Index n = matrix.rows();
@@ -78,8 +70,7 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
   stretches_ = grouped(linear, partition_.stretch, partition_.stretches);
   folds_ = grouped(linear, partition_.fold, partition_.folds);
   const Eigen::Index parameters = linear.jacobian.cols();
-  total_ = {
-      Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters), 0.0, {}};
+  total_ = {Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters), 0.0};
   for (const GroupSums& stretch : stretches_) {
     total_.H += stretch.H;
     total_.g += stretch.g;
@@ -260,40 +251,50 @@ double NormalSystem::shift_of(double gain, const std::vector<EffectColumn>& colu
 }
 
 double NormalSystem::noise_share_of(double gain, const std::vector<EffectColumn>& columns) const {
-  const double rows = touched(columns, linear_->residual).rows;
-  return rows > 0.0 ? std::sqrt(std::max(0.0, gain) / rows) : 0.0;
+  const std::vector<bool> rows = touches(columns);
+  const auto count = std::ranges::count(rows, true);
+  return count > 0 ? std::sqrt(std::max(0.0, gain) / static_cast<double>(count)) : 0.0;
 }
 
-Eigen::VectorXd NormalSystem::residual_after(const Eigen::VectorXd& delta,
-                                             const std::vector<EffectColumn>& columns,
-                                             const Eigen::VectorXd& theta) const {
-  Eigen::VectorXd out = linear_->residual - linear_->jacobian * delta;
+Eigen::VectorXd NormalSystem::moved_by(const std::vector<EffectColumn>& columns,
+                                       const Eigen::VectorXd& theta) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(linear_->residual.size());
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const Eigen::VectorXd share = share_of(columns[k]);
     const double size = theta[static_cast<Eigen::Index>(k)];
     using Entries = Eigen::SparseMatrix<double>::InnerIterator;
     for (Entries entry(linear_->carriers, columns[k].carrier); entry; ++entry) {
-      out[entry.row()] -=
+      out[entry.row()] +=
           size * share[instant_[static_cast<std::size_t>(entry.row())]] * entry.value();
     }
   }
   return out;
 }
 
-NormalSystem::Touched NormalSystem::touched(const std::vector<EffectColumn>& columns,
-                                            const Eigen::VectorXd& residual) const {
-  Touched out;
-  std::vector<bool> counted(static_cast<std::size_t>(residual.size()), false);
+std::vector<bool> NormalSystem::touches(const std::vector<EffectColumn>& columns) const {
+  std::vector<bool> out(instant_.size(), false);
   for (const EffectColumn& column : columns) {
     const Eigen::VectorXd share = share_of(column);
     using Entries = Eigen::SparseMatrix<double>::InnerIterator;
     for (Entries entry(linear_->carriers, column.carrier); entry; ++entry) {
       const auto row = static_cast<std::size_t>(entry.row());
-      if (counted[row] || share[instant_[row]] == 0.0) continue;
-      counted[row] = true;
-      out.rows += 1.0;
-      out.squares += residual[entry.row()] * residual[entry.row()];
+      if (share[instant_[row]] != 0.0) out[row] = true;
     }
+  }
+  return out;
+}
+
+NormalSystem::Touched NormalSystem::touched_after(const Eigen::VectorXd& delta,
+                                                  const std::vector<EffectColumn>& columns,
+                                                  const Eigen::VectorXd& theta) const {
+  const std::vector<bool> counts = touches(columns);
+  const Eigen::VectorXd moved = moved_by(columns, theta);
+  Touched out;
+  for (Eigen::Index row = 0; row < moved.size(); ++row) {
+    if (!counts[static_cast<std::size_t>(row)]) continue;
+    const double left = linear_->residual[row] - moved[row] - linear_->jacobian.row(row).dot(delta);
+    out.rows += 1.0;
+    out.squares += left * left;
   }
   return out;
 }

@@ -21,9 +21,6 @@ struct GroupSums {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   double rr = 0.0;
-  RowMatrix J;  ///< the rows themselves where they are fewer than the parameters, else empty
-  /// steps'H steps.
-  [[nodiscard]] Eigen::MatrixXd squares_of(const Eigen::MatrixXd& steps) const;
 };
 
 /// The same of an effect's columns E beside the model's own J: J'E, E'E, E'r.
@@ -76,19 +73,19 @@ class NormalSystem {
   /// The same as a share of each row's own noise.
   [[nodiscard]] double noise_share_of(double gain, const std::vector<EffectColumn>& columns) const;
 
-  /// The residual where the model's parameters moved by `delta` and the columns have the size
+  /// Rows that the carriers of columns touch while their share is not zero, and the squares of the
+  /// residual there where the model's parameters moved by `delta` and the columns have the size
   /// `theta`.
-  [[nodiscard]] Eigen::VectorXd residual_after(const Eigen::VectorXd& delta,
-                                               const std::vector<EffectColumn>& columns,
-                                               const Eigen::VectorXd& theta) const;
-  /// Rows that the carriers of these columns touch while their share is not zero, and the squares
-  /// of `residual` there.
   struct Touched {
     double rows = 0.0;
     double squares = 0.0;
   };
-  [[nodiscard]] Touched touched(const std::vector<EffectColumn>& columns,
-                                const Eigen::VectorXd& residual) const;
+  [[nodiscard]] Touched touched_after(const Eigen::VectorXd& delta,
+                                      const std::vector<EffectColumn>& columns,
+                                      const Eigen::VectorXd& theta) const;
+  /// What columns of the size `theta` do to every row.
+  [[nodiscard]] Eigen::VectorXd moved_by(const std::vector<EffectColumn>& columns,
+                                         const Eigen::VectorXd& theta) const;
 
  private:
   // Of one carrier at each instant: carrier'residual, carrier'J, and of the rows it touches the
@@ -106,6 +103,7 @@ class NormalSystem {
                                                      const std::vector<int>& group,
                                                      int groups) const;
   [[nodiscard]] Eigen::VectorXd share_of(const EffectColumn& column) const;
+  [[nodiscard]] std::vector<bool> touches(const std::vector<EffectColumn>& columns) const;
 
   const Linearisation* linear_;
   Partition partition_;

@@ -196,13 +196,14 @@ struct Pair {
   double gain = 0.0;
 };
 
+using ColumnsOf = std::function<std::vector<EffectColumn>(const RestPlace&, const Covariate&)>;
+
 // All that move the prediction by the floors, those that explain most first: what is asked of each
 // beyond that costs more.
-std::vector<Pair> by_gain(
-    const NormalSystem& system, const std::vector<RestPlace>& places,
-    const std::vector<Covariate>& covariates, const std::vector<FoundRest>& known,
-    const std::function<std::vector<EffectColumn>(const RestPlace&, const Covariate&)>& columns_of,
-    const TraceOptions& options) {
+std::vector<Pair> by_gain(const NormalSystem& system, const std::vector<RestPlace>& places,
+                          const std::vector<Covariate>& covariates,
+                          const std::vector<FoundRest>& known, const ColumnsOf& columns_of,
+                          const TraceOptions& options) {
   std::vector<std::vector<Pair>> of_place(places.size());
   parallel_for(places.size(), [&](std::size_t k) {
     std::vector<Pair> pairs;
@@ -225,6 +226,30 @@ std::vector<Pair> by_gain(
   for (const std::vector<Pair>& pairs : of_place) out.insert(out.end(), pairs.begin(), pairs.end());
   std::ranges::stable_sort(out, std::greater{}, &Pair::gain);
   return out;
+}
+
+// The first of them that its own stretches show at this level, `tests` having been made; beyond the
+// level where a stretch is left out, too.
+std::optional<Driven> first_shown(const NormalSystem& system, const std::vector<Pair>& pairs,
+                                  const ColumnsOf& columns_of, double tests, double level,
+                                  const TraceOptions& options) {
+  constexpr std::size_t kAtOnce = 8;
+  for (std::size_t begin = 0; begin < pairs.size(); begin += kAtOnce) {
+    std::vector<Score> scores(std::min(kAtOnce, pairs.size() - begin));
+    parallel_for(scores.size(), [&](std::size_t k) {
+      const Pair& pair = pairs[begin + k];
+      scores[k] = score_test(system, columns_of(*pair.place, *pair.covariate));
+    });
+    for (std::size_t k = 0; k < scores.size(); ++k) {
+      if (scores[k].hidden() || scores[k].p_value * tests > level || !is_large(scores[k], options))
+        continue;
+      const Pair& pair = pairs[begin + k];
+      const Score confirmed = jackknife_test(system, columns_of(*pair.place, *pair.covariate));
+      if (confirmed.p_value * tests <= level)
+        return Driven{*pair.place, *pair.covariate, confirmed, confirmed.p_value * tests};
+    }
+  }
+  return std::nullopt;
 }
 
 // By how much the sum of squares falls in the step to the system's own solution.
@@ -265,16 +290,9 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
     return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
   };
-  std::optional<Driven> best;
-  for (const Pair& pair : by_gain(system, places, covariates, known, columns_of, options)) {
-    const std::vector<EffectColumn> columns = columns_of(*pair.place, *pair.covariate);
-    const Score score = score_test(system, columns);
-    if (score.hidden() || score.p_value * tests > level || !is_large(score, options)) continue;
-    const Score confirmed = jackknife_test(system, columns);
-    if (confirmed.p_value * tests > level) continue;
-    best = {*pair.place, *pair.covariate, confirmed, confirmed.p_value * tests};
-    break;
-  }
+  std::optional<Driven> best =
+      first_shown(system, by_gain(system, places, covariates, known, columns_of, options),
+                  columns_of, tests, level, options);
   if (!best) {
     auto vibration = find_vibration(system, places, level, options);
     if (!vibration) return std::nullopt;

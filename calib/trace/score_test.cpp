@@ -79,18 +79,18 @@ StretchScores stretch_scores(const NormalSystem& system, const Projected& p,
   const Eigen::Index k = p.theta.size();
   const auto stretches = static_cast<Eigen::Index>(raw.size());
   StretchScores out{Eigen::MatrixXd(k, stretches), Eigen::VectorXd(stretches)};
-  Eigen::MatrixXd own_steps(p.delta.size(), k + 1);
-  own_steps << p.B, p.delta;
+  // tr(S^-1 B'H B) = <B S^-1 B', H>: one pass over each stretch's H, however many columns B has.
+  const Eigen::MatrixXd imitated = p.B * p.S_inverse * p.B.transpose();
   for (Eigen::Index s = 0; s < stretches; ++s) {
     const EffectSums& effect = raw[static_cast<std::size_t>(s)];
     const GroupSums& own = system.stretches()[static_cast<std::size_t>(s)];
-    // B'H [B, delta]
-    const Eigen::MatrixXd moved = own.squares_of(own_steps).topRows(k);
     const Eigen::MatrixXd EE = p.T.transpose() * effect.EE * p.T;
     const Eigen::MatrixXd cross = (p.B.transpose() * effect.JE) * p.T;
     out.scores.col(s) = p.T.transpose() * (effect.Er - effect.JE.transpose() * p.delta) -
-                        EE * p.theta - p.B.transpose() * own.g + moved.col(k) + cross * p.theta;
-    out.energy[s] = (p.S_inverse * (EE - cross - cross.transpose() + moved.leftCols(k))).trace();
+                        EE * p.theta - p.B.transpose() * (own.g - own.H * p.delta) +
+                        cross * p.theta;
+    out.energy[s] = p.S_inverse.cwiseProduct(EE - cross - cross.transpose()).sum() +
+                    imitated.cwiseProduct(own.H).sum();
   }
   return out;
 }
@@ -106,8 +106,7 @@ PooledNoise pooled_noise(const NormalSystem& system, const Projected& p,
                          const std::vector<EffectColumn>& columns) {
   const Linearisation& linear = system.linear();
   const auto k = static_cast<double>(p.theta.size());
-  const NormalSystem::Touched touched =
-      system.touched(columns, system.residual_after(p.delta, columns, p.T * p.theta));
+  const NormalSystem::Touched touched = system.touched_after(p.delta, columns, p.T * p.theta);
   // Of the model's own parameters, these rows pay their part.
   const double own = static_cast<double>(system.parameters()) * touched.rows /
                      static_cast<double>(linear.residual.size());

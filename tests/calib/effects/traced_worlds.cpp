@@ -63,7 +63,8 @@ bool size_is_right(const TracedEffect& found, double size) {
          std::abs(std::abs(found.size) - std::abs(size)) <= kSizeTolerance * std::abs(size);
 }
 
-World tracked(truth::RobotKind kind, int postures, std::vector<InjectedEffect> effects) {
+World tracked(truth::RobotKind kind, int postures, std::vector<InjectedEffect> effects,
+              std::uint64_t noise_number) {
   constexpr double kSigmaM = 2e-4;
   constexpr double kSigmaRad = 1e-3;
   EffectWorldOptions options = filmed(std::move(effects), postures);
@@ -81,7 +82,7 @@ World tracked(truth::RobotKind kind, int postures, std::vector<InjectedEffect> e
     world.log.values.row(i) =
         robot.encoders(world.log.times_s[static_cast<std::size_t>(i)]).transpose();
   }
-  Rng rng = Rng::from_name("tracker");
+  Rng rng = Rng::from_name("tracker", noise_number);
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(kSigmaRad), Eigen::Vector3d::Constant(kSigmaM);
   variance = variance.cwiseAbs2().eval();

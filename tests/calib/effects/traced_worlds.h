@@ -3,6 +3,7 @@
 // Recordings with effects in them, and what tracing says of them: what the tests of tracing share.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,10 @@ inline constexpr double kWithoutAfterOverClean = 1.05;
 /// 33 s of motion before a camera.
 [[nodiscard]] truth::EffectWorldOptions filmed(std::vector<truth::InjectedEffect> effects = {},
                                                int frames = 200);
-/// The robot at rest before a tracker, posture after posture.
+/// The robot at rest before a tracker, posture after posture; of the same motion another `noise`.
 [[nodiscard]] truth::World tracked(truth::RobotKind kind, int postures,
-                                   std::vector<truth::InjectedEffect> effects);
+                                   std::vector<truth::InjectedEffect> effects,
+                                   std::uint64_t noise = 0);
 
 [[nodiscard]] CalibrationStart start_of(const truth::World& world);
 [[nodiscard]] CalibrationTrace trace_of(const truth::World& world);
