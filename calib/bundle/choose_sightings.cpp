@@ -10,6 +10,7 @@
 #include <Eigen/LU>
 
 #include "calib/bundle/corrected.h"
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/unsteady_reading.h"
@@ -361,13 +362,13 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
     for (std::size_t i = 0; i < series.indices.size(); ++i) {
       Sighting& sighting = spec.sightings[static_cast<std::size_t>(series.indices[i])];
       const double freedom = sighting.dimension();
-      // Median and scatter of a mean of `freedom` squares, to first order.
+      // Median of a mean of `freedom` squares, to first order.
       // All rows are off by the same time: together they say no more of it than one does.
       const double noise = typical / (1.0 - 2.0 / (9.0 * freedom)) +
                            out.jitter_s * out.jitter_s * series.d_time[i].squaredNorm();
       widen(sighting, std::sqrt(noise + bias * bias));
-      const bool as_near =
-          series.distance(i) < noise * (1.0 + reject_sigma * std::sqrt(2.0 / freedom));
+      const bool as_near = series.distance(i) * freedom <
+                           noise * chi_square_quantile(sighting.dimension(), reject_sigma);
       if (!series.far[i] && (as_near || series.goes_on(i))) {
         out.used.push_back(series.indices[i]);
       }

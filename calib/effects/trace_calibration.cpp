@@ -72,6 +72,14 @@ bool names(const Trace& trace, const EffectId& id) {
   return std::ranges::find(trace.accepted, id, &TracedEffect::id) != trace.accepted.end();
 }
 
+void take_corrections(const effects::TracedBundle& model, const CalibrationTraceOptions& options,
+                      CalibrationTrace& out) {
+  effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added, out.trace.accepted);
+  out.effects = std::move(corrected.effects);
+  out.corrections = std::move(corrected.corrections);
+  out.gravity_base = corrected.gravity_base ? corrected.gravity_base : options.gravity_base;
+}
+
 // `model`: of this bundle with these options.
 CalibrationTrace traced(const effects::TracedBundle& model, const EffectBundle& bundle,
                         const CalibrationTraceOptions& options, const TraceOptions& trace_options,
@@ -79,10 +87,7 @@ CalibrationTrace traced(const effects::TracedBundle& model, const EffectBundle& 
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
   effects::add_couplings_by_design(bundle, options, out.trace);
-  effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added, out.trace.accepted);
-  out.effects = std::move(corrected.effects);
-  out.corrections = std::move(corrected.corrections);
-  out.gravity_base = corrected.gravity_base ? corrected.gravity_base : options.gravity_base;
+  take_corrections(model, options, out);
   out.stamp_jitter_s = bundle.stamp_jitter_s();
   return out;
 }
@@ -157,13 +162,22 @@ std::vector<Correction> without_readings(const CalibrationTrace& found) {
 }
 
 // Without the effects, what they do passed for noise: of postures those stood out whose noise adds
-// to it, and the others make it smaller than it is; of films it is what changes from one frame to
-// the next.
+// to it, of films it is what changes from one frame to the next.
 bool judges_better(const EffectBundle& beside, const EffectBundle& without) {
   // 4 to 6 beside effects of 1 to 2 degrees that a fit without them bends (5128, 5178); 1.0 to 1.1
   // where a second search says the same (9032, 9047).
   constexpr double kFiner = 1.5;
   return beside.postures() ? !beside.chose_as(without) : beside.finer_than(without) > kFiner;
+}
+
+// Where those stood out whose noise adds to the effects, the others make them smaller than they
+// are.
+void size_again(const EffectBundle& chosen, const CalibrationTraceOptions& options,
+                CalibrationTrace& out) {
+  const effects::TracedBundle model(chosen, options);
+  if (model.possible(out.trace.added) != out.trace.added) return;
+  kinescope::size_again(model, out.trace);
+  take_corrections(model, options, out);
 }
 
 }  // namespace
@@ -178,9 +192,12 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   CalibrationStart known = start;
   known.corrections = without_readings(out);
   const EffectBundle chosen(measurements, markers, log, known, options.calibrate);
-  if (!judges_better(chosen, bundle)) return out;
   CalibrationTraceOptions begun = options;
   begun.gravity_base = out.gravity_base;
+  if (!judges_better(chosen, bundle)) {
+    if (!chosen.chose_as(bundle)) size_again(chosen, begun, out);
+    return out;
+  }
   begun.trace.start = out.trace.added;
   CalibrationTrace again = traced_with_gravity(chosen, begun, progress);
   again.trace.steps.front().words = out.trace.steps.front().words;

@@ -44,4 +44,8 @@ Trace trace_effects(const TracedModel& model, const TraceOptions& options,
   return trace::Tracer(model, options, progress).run();
 }
 
+void size_again(const TracedModel& model, Trace& found) {
+  trace::Tracer(model, {}, {}).size_again(found);
+}
+
 }  // namespace kinescope

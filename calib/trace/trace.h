@@ -39,4 +39,8 @@ struct TraceOptions {
 [[nodiscard]] Trace trace_effects(const TracedModel& model, const TraceOptions& options = {},
                                   const Progress& progress = {});
 
+/// Sizes, intervals and scans of the effects that `found` has, none of them a curve, as `model`
+/// has them: the same measurements judged again. What was found, and what it explains, stays.
+void size_again(const TracedModel& model, Trace& found);
+
 }  // namespace kinescope

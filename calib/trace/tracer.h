@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The search: forward selection (tracer.cpp), backward check and what cannot be told apart
-// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp), what is left and repeats
-// (tracer_curves.cpp), its plain causes (tracer_plain.cpp).
+// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp), sizes (tracer_sizes.cpp),
+// what is left and repeats (tracer_curves.cpp), its plain causes (tracer_plain.cpp).
 #pragma once
 
 #include <cstddef>
@@ -35,6 +35,8 @@ class Tracer {
  public:
   Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress);
   [[nodiscard]] Trace run();
+  /// size_again() of trace.h.
+  void size_again(Trace& found);
 
  private:
   // What the backward check says of an added effect.
@@ -144,6 +146,8 @@ class Tracer {
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);
   void add_step(int round, std::string words, const Stage& stage);
   void summarise();
+  /// What an added effect is in numbers, as it is fitted; `covariance` of its values.
+  void size_up(std::size_t index, const Eigen::MatrixXd& covariance, TracedEffect& effect) const;
   void list_not_found();
   /// The answer need not be `unknown` for it.
   [[nodiscard]] bool is_slight(const Rest& rest) const;

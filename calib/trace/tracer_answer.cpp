@@ -379,43 +379,21 @@ void Tracer::summarise() {
     const AddedEffect& added = now_->added[i];
     const Eigen::VectorXd& values = now_->fit.values[i];
     const Candidate& candidate = *find_candidate(base_->fit, added.id);
-    const Eigen::MatrixXd block = covariance.block(at, at, values.size(), values.size());
     TracedEffect effect = details_[i].effect;
     effect.id = added.id;
     effect.words = candidate.words;
     effect.check = candidate.check;
     effect.unit = candidate.size_unit;
-    effect.scan = added.scan;
     effect.scan_name = candidate.scan_name;
     effect.scan_unit = candidate.scan_unit;
     if (candidate.is_curve()) {
+      effect.scan = added.scan;
       effect.covariance = posterior.block(at, at, values.size(), values.size());
-      at += values.size();
       size_up_curve(find_candidate(now_->fit, added.id)->columns(added.scan), t, effect);
-      trace_.accepted.push_back(std::move(effect));
-      trace_.added.push_back(added);
-      continue;
+    } else {
+      size_up(i, covariance.block(at, at, values.size(), values.size()), effect);
     }
     at += values.size();
-    effect.size = size_of(candidate, values);
-    // Where few stretches carry the effect their scatter may be small by chance.
-    const Score& score = details_[i].score;
-    double half = t * size_sigma(candidate, values, block);
-    if (score.pooled.size() > 0) {
-      half = std::max(half, t_quantile(0.025, std::max(2.0, score.freedom)) *
-                                size_sigma(candidate, values, score.pooled));
-    }
-    effect.interval = {effect.size - half, effect.size + half};
-    for (const ScanAlternative& other : effect.as_likely) {
-      effect.interval.low = std::min(effect.interval.low, other.size.low);
-      effect.interval.high = std::max(effect.interval.high, other.size.high);
-    }
-    if (values.size() > 1) effect.interval.low = std::max(0.0, effect.interval.low);
-    for (Eigen::Index k = 0; k < values.size(); ++k) {
-      effect.values.push_back({candidate.parameters[static_cast<std::size_t>(k)], values[k],
-                               std::sqrt(std::max(0.0, block(k, k)))});
-    }
-    if (candidate.scan_words) effect.scan_words = candidate.scan_words(added.scan);
     trace_.accepted.push_back(std::move(effect));
     trace_.added.push_back(added);
   }
