@@ -15,7 +15,6 @@
 namespace kinescope {
 namespace {
 
-using trace::Stage;
 using trace::StagePtr;
 
 const AddedEffect kPlay{{"backlash", "q3"}, 0.03};
