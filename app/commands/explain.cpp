@@ -315,6 +315,7 @@ class Explainer {
   // Joints that move in proportion may be coupled; or only one of them moves as it should not.
   [[nodiscard]] Explanation with_couplings_doubted(Explanation now) const {
     if (!now.fitted || !now.structure || !options_.trace) return now;
+    if (now.fitted->trace.design_comes_first) return now;
     Structure free = *now.structure;
     bool any = false;
     for (StructureJoint& joint : free.joints) {

@@ -116,7 +116,8 @@ struct EffectBundle::Impl {
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  /// Where the best fit ended whose freedom the change has, too: the fit begins there.
+  /// Where the best fit ended whose freedom the change has, too: the fit begins there, and goes on
+  /// where that was cut off.
   void begin_near(const BundleChange& change, State& state) const;
   void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
@@ -136,12 +137,13 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
   bundle::guess_targets(spec, bundle::usable_sightings(spec, state), state);
   const std::vector<int> usable = thin_frames(spec, bundle::usable_sightings(spec, state));
   Spec robust = spec;
-  const bundle::RobustSolution solution =
-      bundle::solve_robustly(robust, state, usable, options.reject_sigma, options.max_iterations);
   if (spec.postures) {
+    const bundle::RobustSolution solution =
+        bundle::solve_robustly(robust, state, usable, options.reject_sigma, options.max_iterations);
     spec = std::move(robust);
     impl_->used = bundle::with_what_lasts(spec, state, solution);
   } else {
+    bundle::settle(robust, state, usable, options.max_iterations);
     bundle::ChosenSightings chosen =
         bundle::choose_by_neighbours(spec, state, usable, options.reject_sigma);
     impl_->used = std::move(chosen.used);
@@ -322,7 +324,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   begin_near(change, state);
   constexpr int kIterations = 60;
   const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
-  if (summary.converged) remember(change, state, summary.final_cost);
+  remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;

@@ -32,7 +32,7 @@ constexpr double kFirstRadius = 1e6;
 constexpr double kUndescribed = 0.25;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
-constexpr double kPlainTolerance = 1e-10;
+constexpr double kPlainTolerance = 1e-8;
 
 struct Misfit {
   int sighting = 0;
@@ -266,11 +266,8 @@ std::vector<int> usable_sightings(const Spec& spec, const State& state) {
   return usable;
 }
 
-RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
-                              double reject_sigma, int max_iterations) {
-  constexpr int kPasses = 2;
-  const double declared = rms_sigma(spec);
-  RobustSolution out;
+SolveSummary settle(Spec& spec, State& state, const std::vector<int>& sightings,
+                    int max_iterations) {
   // A first solve with declared sigmas and a wide loss, then the noise level is known well enough
   // for the loss to tell outliers from noise.
   rescale(spec, misfits(spec, state, sightings), 1.0);
@@ -281,12 +278,23 @@ RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightin
   constexpr double kAtFirst = 30.0;
   const std::optional<NominalSigmas> prior = spec.prior;
   if (prior) spec.prior = NominalSigmas{kAtFirst * prior->rad, kAtFirst * prior->m};
-  out.summary = solve(spec, state, sightings, robust, max_iterations);
+  const SolveSummary first = solve(spec, state, sightings, robust, max_iterations);
   spec.prior = prior;
   rescale(spec, misfits(spec, state, sightings), 1.0);
-  SolveSummary second = solve(spec, state, sightings, robust, max_iterations);
-  out.summary.iterations += second.iterations;
+  SolveSummary out = solve(spec, state, sightings, robust, max_iterations);
+  out.iterations += first.iterations;
+  out.initial_cost = first.initial_cost;
+  return out;
+}
+
+RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
+                              double reject_sigma, int max_iterations) {
+  constexpr int kPasses = 2;
+  const double declared = rms_sigma(spec);
+  RobustSolution out;
+  out.summary = settle(spec, state, sightings, max_iterations);
   out.used = sightings;
+  SolveSummary second;
   for (int pass = 0; pass < kPasses; ++pass) {
     std::vector<Misfit> all = misfits(spec, state, sightings);
     rescale(spec, all, freedom_factor(spec, state, out.used));

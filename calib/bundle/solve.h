@@ -24,6 +24,11 @@ struct SolveSummary {
 [[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
                                  const BuildOptions& options, int max_iterations);
 
+/// Robust solve, noise level per marker (per rotation and translation for poses), and once more:
+/// moves `state` to where no outlier pulls it. Rescales the sigmas in `spec`.
+SolveSummary settle(Spec& spec, State& state, const std::vector<int>& sightings,
+                    int max_iterations);
+
 struct RobustSolution {
   SolveSummary summary;
   std::vector<int> used;  ///< indices into Spec::sightings
@@ -31,9 +36,9 @@ struct RobustSolution {
   double sigma_scale = 1.0;  ///< noise found over noise declared, rms over all
 };
 
-/// Robust solve, noise level per marker (per rotation and translation for poses), rejection, plain
-/// refit, twice. Where the larger part of a marker's sightings stands out from a robot that
-/// describes its motion, none of them is rejected. Rescales the sigmas in `spec`.
+/// settle(), then noise level, rejection and plain refit, twice. Where the larger part of a
+/// marker's sightings stands out from a robot that describes its motion, none of them is rejected.
+/// Rescales the sigmas in `spec`.
 [[nodiscard]] RobustSolution solve_robustly(Spec& spec, State& state, std::vector<int> sightings,
                                             double reject_sigma, int max_iterations);
 

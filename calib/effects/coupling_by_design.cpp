@@ -107,14 +107,31 @@ bool leaves_too_much(const Described& coupling, const Trace& trace) {
          coupling.left >= trace::kDoubtfulShare * coupling.effect.explained;
 }
 
+// All of them are found one after the other by a search that knows none.
+bool come_first(const EffectBundle& bundle, const TracedBundle& without, TraceOptions options) {
+  std::erase_if(options.start,
+                [](const AddedEffect& effect) { return !is_clock_offset(effect.id); });
+  std::vector<AddedEffect> missing;
+  for (const DesignCoupling& coupling : bundle.couplings())
+    missing.push_back(effect_of(bundle, coupling));
+  while (!missing.empty()) {
+    const std::optional<AddedEffect> first = first_effect(without, options);
+    if (!first || std::erase(missing, *first) == 0) return false;
+    options.start.push_back(*first);
+  }
+  return true;
+}
+
 }  // namespace
 
 void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceOptions& options,
-                             Trace& trace) {
+                             const TraceOptions& trace_options, Trace& trace) {
   if (trace.verdict == TraceVerdict::kNothingToSay || bundle.couplings().empty()) return;
   std::vector<std::size_t> all(bundle.couplings().size());
   for (std::size_t k = 0; k < all.size(); ++k) all[k] = k;
-  const StagePtr plain = make_stage(TracedBundle(bundle, options, all), {});
+  const TracedBundle without(bundle, options, all);
+  const StagePtr plain = make_stage(without, {});
+  trace.design_comes_first = come_first(bundle, without, trace_options);
   std::vector<TracedEffect> found;
   std::string names;
   for (const std::size_t k : all) {

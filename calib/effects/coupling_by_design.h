@@ -12,8 +12,8 @@
 namespace kinescope::effects {
 
 /// Leaves a trace that says nothing as it is. The share of the squares that a coupling explains is
-/// taken of the model without any of them.
+/// taken of the model without any of them. `trace_options`: those of the trace.
 void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceOptions& options,
-                             Trace& trace);
+                             const TraceOptions& trace_options, Trace& trace);
 
 }  // namespace kinescope::effects

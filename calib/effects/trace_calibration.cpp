@@ -86,7 +86,7 @@ CalibrationTrace traced(const effects::TracedBundle& model, const EffectBundle& 
                         const Progress& progress) {
   CalibrationTrace out;
   out.trace = trace_effects(model, trace_options, progress);
-  effects::add_couplings_by_design(bundle, options, out.trace);
+  effects::add_couplings_by_design(bundle, options, trace_options, out.trace);
   take_corrections(model, options, out);
   out.stamp_jitter_s = bundle.stamp_jitter_s();
   return out;

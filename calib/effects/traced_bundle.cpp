@@ -123,25 +123,20 @@ std::vector<std::vector<Eigen::Index>> parameter_places(const std::vector<Camera
   return out;
 }
 
-// What effects do that depends on their size, at a solution.
-void take_sizes(const std::vector<CameraEffect>& library, const std::vector<AddedEffect>& effects,
-                const std::vector<Correction>& corrections, const BundleSolution& solution,
-                EffectWorld& world) {
-  const auto places =
-      parameter_places(library, effects, static_cast<Eigen::Index>(corrections.size()));
-  for (std::size_t i = 0; i < effects.size(); ++i) {
-    if (!depends_on_its_size(effects[i])) continue;
-    Eigen::VectorXd values = solution.values(places[i]);
-    const int joint = corrections[static_cast<std::size_t>(places[i].front())].index;
-    if (is_bend(effects[i].id, effects[i].scan)) {
-      world.bends.insert_or_assign(joint, Eigen::Vector2d(values));
-      continue;
-    }
-    for (std::size_t k = 0; k < places[i].size(); ++k)
-      values[static_cast<Eigen::Index>(k)] /=
-          corrections[static_cast<std::size_t>(places[i][k])].reference;
-    world.sags.insert_or_assign(joint, std::move(values));
-  }
+std::vector<AddedEffect> sized(std::vector<AddedEffect> effects) {
+  std::erase_if(effects, [](const AddedEffect& added) { return !depends_on_its_size(added); });
+  return effects;
+}
+
+// Both do the same at every instant, nearly.
+bool are_alike(const Correction& one, const Correction& other) {
+  // Of what the effect does: less than any interval of a size.
+  constexpr double kAlike = 1e-4;
+  const auto near = [](const auto& a, const auto& b) {
+    return a.size() == b.size() && (a - b).norm() <= kAlike * b.norm();
+  };
+  if (one.name != other.name) return false;
+  return one.is_nuisance || (near(one.share, other.share) && near(one.twists, other.twists));
 }
 
 // By its neighbours, in its unit per s.
@@ -395,35 +390,71 @@ Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
                                    time_offset_s);
 }
 
+TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
+                                           const std::vector<AddedEffect>& effects) const {
+  Ready out;
+  out.world = world_at(ahead_s);
+  if (last_sizes_ && last_sizes_->effects == sized(effects)) {
+    out.world.tree = last_sizes_->tree;
+    out.world.loaded.value += last_sizes_->added;
+    out.world.sags = last_sizes_->sags;
+    out.world.bends = last_sizes_->bends;
+  }
+  out.library = all_effects(out.world);
+  out.change = change_of(out.library, effects);
+  return out;
+}
+
+void TracedBundle::keep_sizes(const std::vector<AddedEffect>& effects, const Ready& ready,
+                              const BundleSolution& solution) const {
+  const std::vector<Correction>& corrections = ready.change.corrections;
+  const auto places =
+      parameter_places(ready.library, effects, static_cast<Eigen::Index>(corrections.size()));
+  Sized out{sized(effects),
+            solution.tree,
+            Eigen::MatrixXd::Zero(ready.world.frames.value.rows(), ready.world.frames.value.cols()),
+            {},
+            {}};
+  add_values(corrections, solution, out.added);
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    if (!depends_on_its_size(effects[i])) continue;
+    Eigen::VectorXd values = solution.values(places[i]);
+    const int joint = corrections[static_cast<std::size_t>(places[i].front())].index;
+    if (is_bend(effects[i].id, effects[i].scan)) {
+      out.bends.insert_or_assign(joint, Eigen::Vector2d(values));
+      continue;
+    }
+    for (std::size_t k = 0; k < places[i].size(); ++k)
+      values[static_cast<Eigen::Index>(k)] /=
+          corrections[static_cast<std::size_t>(places[i][k])].reference;
+    out.sags.insert_or_assign(joint, std::move(values));
+  }
+  last_sizes_ = std::move(out);
+}
+
 // Shares are taken where the joints are by the clock that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
 TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
   constexpr int kRounds = 2;           // each leaves of its error what the effect's size is, in rad
   constexpr double kSameTime = 20e-6;  // s: no joint moves noticeably
   const bool clock = std::ranges::any_of(effects, is_of_clock, &AddedEffect::id);
-  Eigen::MatrixXd ahead_s = likely_clock(effects);
-  Ready out;
-  out.world = world_at(ahead_s);
-  out.library = all_effects(out.world);
-  out.change = change_of(out.library, effects);
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
+  Eigen::MatrixXd ahead_s = likely_clock(effects);
+  Ready out = ready_at(ahead_s, effects);
   const int rounds = by_size ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
     BundleSolution solution = bundle_->solve(out.change);
     if (clock && solution.converged) last_ahead_s_ = solution.ahead_s;
-    if (!by_size && (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime) {
+    if (by_size && solution.converged) keep_sizes(effects, out, solution);
+    const bool same_time = (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime;
+    ahead_s = solution.ahead_s;
+    std::optional<Ready> next;
+    if (solution.converged && (by_size || !same_time)) next = ready_at(ahead_s, effects);
+    if (!next || std::ranges::equal(next->change.corrections, out.change.corrections, are_alike)) {
       out.solved = std::move(solution);
       break;
     }
-    ahead_s = solution.ahead_s;
-    out.world = world_at(ahead_s);
-    if (by_size && solution.converged) {
-      out.world.tree = solution.tree;
-      add_values(out.change.corrections, solution, out.world.loaded.value);
-      take_sizes(out.library, effects, out.change.corrections, solution, out.world);
-    }
-    out.library = all_effects(out.world);
-    out.change = change_of(out.library, effects);
+    out = std::move(*next);
   }
   return out;
 }

@@ -41,7 +41,20 @@ class TracedBundle final : public TracedModel {
     BundleChange change;
     std::optional<BundleSolution> solved;  ///< of the change, where that is known
   };
+  /// What depends on how large effects are, as a fit left it.
+  struct Sized {
+    std::vector<AddedEffect> effects;  ///< those that depend on their size
+    KinematicTree tree;
+    Eigen::MatrixXd added;                ///< frames x joints: to the joints' values, rad or m
+    std::map<int, Eigen::VectorXd> sags;  ///< as EffectWorld has them
+    std::map<int, Eigen::Vector2d> bends;
+  };
   [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
+  [[nodiscard]] Ready ready_at(const Eigen::MatrixXd& ahead_s,
+                               const std::vector<AddedEffect>& effects) const;
+  /// Remembers the sizes of a solution of `ready`.
+  void keep_sizes(const std::vector<AddedEffect>& effects, const Ready& ready,
+                  const BundleSolution& solution) const;
   /// `ahead_s`: frames x joints, joint-log time minus frame time.
   [[nodiscard]] EffectWorld world_at(const Eigen::MatrixXd& ahead_s) const;
   [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
@@ -54,6 +67,7 @@ class TracedBundle final : public TracedModel {
   std::vector<std::size_t> without_couplings_;
   std::map<int, UnsteadyReading> unsteady_;
   mutable std::optional<Eigen::MatrixXd> last_ahead_s_;
+  mutable std::optional<Sized> last_sizes_;
 };
 
 }  // namespace kinescope::effects

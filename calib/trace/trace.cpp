@@ -44,6 +44,10 @@ Trace trace_effects(const TracedModel& model, const TraceOptions& options,
   return trace::Tracer(model, options, progress).run();
 }
 
+std::optional<AddedEffect> first_effect(const TracedModel& model, const TraceOptions& options) {
+  return trace::Tracer(model, options, {}).first();
+}
+
 void size_again(const TracedModel& model, Trace& found) {
   trace::Tracer(model, {}, {}).size_again(found);
 }

@@ -10,6 +10,7 @@
 // Not here: what the effects are (calib/effects, dynamics/effects), cameras, robots.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "calib/trace/trace_result.h"
@@ -38,6 +39,11 @@ struct TraceOptions {
 /// Throws nothing: where nothing can be said the verdict and the reason say why.
 [[nodiscard]] Trace trace_effects(const TracedModel& model, const TraceOptions& options = {},
                                   const Progress& progress = {});
+
+/// The effect that the search adds first beside TraceOptions::start; none where none is shown by
+/// itself.
+[[nodiscard]] std::optional<AddedEffect> first_effect(const TracedModel& model,
+                                                      const TraceOptions& options = {});
 
 /// Sizes, intervals and scans of the effects that `found` has, none of them a curve, as `model`
 /// has them: the same measurements judged again. What was found, and what it explains, stays.

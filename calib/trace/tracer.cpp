@@ -50,6 +50,13 @@ Trace Tracer::run() {
   return trace_;
 }
 
+std::optional<AddedEffect> Tracer::first() {
+  now_ = stage_of(options_.start);
+  const StagePtr next =
+      refit_best(contenders(*now_, test_family(now_->system, now_->fit.candidates)), round_);
+  return next ? std::optional(next->added.back()) : std::nullopt;
+}
+
 void Tracer::search() {
   add_step(0, "the model as it is", *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
@@ -131,7 +138,7 @@ void Tracer::forward() {
     std::set<std::string> places;
     for (std::size_t i = before; i < now_->added.size(); ++i)
       places.insert(now_->added[i].id.place);
-    for (const std::string& place : places) search_again(place);
+    for (const std::string& place : places) static_cast<void>(search_again(place));
   }
 }
 
@@ -207,17 +214,23 @@ StagePtr Tracer::without_idle(StagePtr stage, std::size_t known) {
   return stage;
 }
 
+// One that is not needed decides: what the linear model says is needed least comes first.
 bool Tracer::all_needed(const Stage& stage, std::size_t known) {
-  for (std::size_t i = known; i < stage.added.size(); ++i) {
-    const StagePtr less = stage_of(kinescope::trace::without(stage.added, i));
-    const Candidate* candidate = find_candidate(less->fit, stage.added[i].id);
-    if (candidate == nullptr || !is_possible(*candidate, stage.fit.values[i])) return false;
-    const double p_value = std::min(
-        paired_p_value(stage.system.partition(), less->held_out.whitened, stage.held_out.whitened),
-        lost_p_value(*less, stage, static_cast<double>(stage.fit.values[i].size())));
-    if (p_value * number_of_tests(less->fit.candidates, *candidate) > level_) return false;
-  }
-  return true;
+  std::vector<std::pair<double, std::size_t>> order;  // squares held out without it, index
+  for (std::size_t i = known; i < stage.added.size(); ++i)
+    order.emplace_back(held_out_sum_without(stage, i), i);
+  std::ranges::sort(order);
+  return std::ranges::all_of(order, [&](const auto& one) { return is_needed(stage, one.second); });
+}
+
+bool Tracer::is_needed(const Stage& stage, std::size_t index) {
+  const StagePtr less = stage_of(kinescope::trace::without(stage.added, index));
+  const Candidate* candidate = find_candidate(less->fit, stage.added[index].id);
+  if (candidate == nullptr || !is_possible(*candidate, stage.fit.values[index])) return false;
+  const double p_value = std::min(
+      paired_p_value(stage.system.partition(), less->held_out.whitened, stage.held_out.whitened),
+      lost_p_value(*less, stage, static_cast<double>(stage.fit.values[index].size())));
+  return p_value * number_of_tests(less->fit.candidates, *candidate) <= level_;
 }
 
 const TestedMember* Tracer::most_telling(const Stage& stage,
@@ -262,8 +275,9 @@ StagePtr Tracer::chain(const AddedEffect& first) {
 
 // The value of a scan was the best beside the effects that were known then. All values are tried
 // everywhere, or at one place; a step from where it is costs little and is taken everywhere.
-void Tracer::search_again(const std::optional<std::string>& place) {
+bool Tracer::search_again(const std::optional<std::string>& place) {
   constexpr double kNoticeable = 1e-6;  // of what the effect explains
+  const StagePtr before = now_;
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const AddedEffect effect = now_->added[i];
     if (place && effect.id.place != *place) continue;
@@ -273,8 +287,8 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     const Candidate* candidate = find_candidate(stage->fit, effect.id);
     if (candidate == nullptr) continue;
     const double scan = best_scan(stage->system, *candidate);
-    const double before = gain_of(stage->system, candidate->columns(effect.scan));
-    if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * before) continue;
+    const double gain = gain_of(stage->system, candidate->columns(effect.scan));
+    if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * gain) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects[i].scan = scan;
     StagePtr moved = stage_of(std::move(effects));
@@ -283,6 +297,7 @@ void Tracer::search_again(const std::optional<std::string>& place) {
     }
   }
   for (std::size_t i = 0; i < now_->added.size(); ++i) sharpen(i);
+  return now_ != before;
 }
 
 // Without a large effect the model has bent itself, and its linearisation is not where the scan's

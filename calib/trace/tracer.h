@@ -35,6 +35,8 @@ class Tracer {
  public:
   Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress);
   [[nodiscard]] Trace run();
+  /// first_effect() of trace.h.
+  [[nodiscard]] std::optional<AddedEffect> first();
   /// size_again() of trace.h.
   void size_again(Trace& found);
 
@@ -77,7 +79,9 @@ class Tracer {
   [[nodiscard]] StagePtr without_idle(StagePtr stage, std::size_t known);
   /// All effects beyond the first `known` are: what is left with all in judges.
   [[nodiscard]] bool all_needed(const Stage& stage, std::size_t known);
-  void search_again(const std::optional<std::string>& place);
+  [[nodiscard]] bool is_needed(const Stage& stage, std::size_t index);
+  /// True where a value was found that predicts better.
+  [[nodiscard]] bool search_again(const std::optional<std::string>& place);
   void sharpen(std::size_t index);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();

@@ -87,14 +87,16 @@ bool Tracer::simplify() {
 
 bool Tracer::backward() {
   if (simplify()) return true;
-  search_again(std::nullopt);
-  details_.assign(now_->added.size(), {});
-  trace_.ambiguities.clear();
-  if (drop_without_size()) return true;
-  // The latest first: an early one may have stood for several that came after it.
-  for (std::size_t i = 0; i < now_->added.size(); ++i) {
-    if (check(i)) return true;
-  }
+  for (std::size_t i = 0; i < now_->added.size(); ++i) sharpen(i);
+  // All values of all scans cost more than to see that an effect is not needed.
+  do {
+    details_.assign(now_->added.size(), {});
+    trace_.ambiguities.clear();
+    if (drop_without_size()) return true;
+    for (std::size_t i = 0; i < now_->added.size(); ++i) {
+      if (check(i)) return true;
+    }
+  } while (search_again(std::nullopt));
   return false;
 }
 
