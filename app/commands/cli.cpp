@@ -68,7 +68,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
     message = "name a command";
     remedy =
         "run, trace, correct, dynamics, predict, simulate, control, export, contact, experiment, "
-        "policy, inspect or camera; see kinescope --help";
+        "policy, inspect, camera or markers; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -204,6 +204,7 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
       line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
     return inspect_command(line.inspect, console);
   }
+  if (app.got_subcommand("markers")) return markers_command(line.markers, console);
   return camera_command(line.camera, console);
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/commands/command_line.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -279,6 +282,58 @@ void add_camera(CLI::App& app, CommandLine& line) {
       kExitCodes));
 }
 
+// "0-7,12" in its order, each id once; nothing where it says something else.
+std::optional<std::vector<int>> parse_ids(const std::string& text) {
+  constexpr int kMost = 1000;  // on a sheet
+  std::vector<int> out;
+  for (const std::string& part : CLI::detail::split(text, ',')) {
+    const std::size_t dash = part.find('-');
+    const auto first = parse_number(part.substr(0, dash));
+    const auto last = dash == std::string::npos ? first : parse_number(part.substr(dash + 1));
+    if (!first || !last || *first < 0.0 || *last < *first || *last - *first >= kMost ||
+        *first > 1e9 || std::floor(*first) != *first || std::floor(*last) != *last)
+      return std::nullopt;
+    for (int id = static_cast<int>(*first); id <= static_cast<int>(*last); ++id) {
+      if (std::ranges::find(out, id) == out.end()) out.push_back(id);
+    }
+    if (out.size() > kMost) return std::nullopt;
+  }
+  return out;
+}
+
+void add_markers(CLI::App& app, CommandLine& line) {
+  static const std::map<std::string, Paper> kPapers = {{"A4", Paper::kA4},
+                                                       {"letter", Paper::kLetter}};
+  CLI::App& markers = *app.add_subcommand("markers", "A PDF of markers to print, in true size");
+  MarkerSheet& sheet = line.markers.sheet;
+  markers
+      .add_option_function<std::string>(
+          "--ids", [&sheet](const std::string& text) { sheet.ids = value_of(parse_ids(text)); },
+          "Which markers: numbers and ranges, such as 0-7,12; at most 1000")
+      ->check([](const std::string& text) -> std::string {
+        return parse_ids(text) ? "" : fmt::format("'{}' names no markers (such as 0-7,12)", text);
+      })
+      ->required()
+      ->type_name("IDS");
+  markers.add_option("--size", sheet.size_m, "Edge of the black square, m (such as 0.04)")
+      ->check(length_m())
+      ->required()
+      ->type_name("M");
+  markers.add_option("--family", sheet.family, "As in tags.yaml (default: tag36h11)")
+      ->type_name("NAME");
+  add_choice(markers, "--paper", kPapers, sheet.paper, "A4 (default) or letter")
+      ->type_name("PAPER");
+  markers
+      .add_option_function<std::string>(
+          "-o,--output", [&line](const std::string& text) { line.markers.output = text; },
+          "PDF to write (default: markers.pdf)")
+      ->type_name("FILE");
+  add_force(markers, line.markers.force, kReplaceFile);
+  add_output_options(markers, line.output);
+  markers.footer(
+      fmt::format("Example:\n  kinescope markers --ids 0-7 --size 0.04\n\n{}", kExitCodes));
+}
+
 }  // namespace
 
 void add_commands(CLI::App& app, CommandLine& line) {
@@ -304,6 +359,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_policy(app, line);
   add_inspect(app, line);
   add_camera(app, line);
+  add_markers(app, line);
 }
 
 }  // namespace kinescope

@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/markers.h"
 #include "app/commands/policy.h"
 
 namespace kinescope {
@@ -33,6 +34,7 @@ struct CommandLine {
   PolicyCommandOptions policy;
   InspectOptions inspect;
   CameraOptions camera;
+  MarkersOptions markers;
   TraceCommandOptions trace;
   CorrectOptions correct;
   std::optional<std::filesystem::path> settings;  ///< recording.yaml of a torque log

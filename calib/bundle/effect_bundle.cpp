@@ -116,8 +116,7 @@ struct EffectBundle::Impl {
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  /// Where the best fit ended whose freedom the change has, too: the fit begins there, and goes on
-  /// where that was cut off.
+  /// Where the best fit ended whose freedom the change has, too: the fit begins there.
   void begin_near(const BundleChange& change, State& state) const;
   void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
@@ -324,7 +323,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   begin_near(change, state);
   constexpr int kIterations = 60;
   const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
-  remember(change, state, summary.final_cost);
+  if (summary.converged) remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;

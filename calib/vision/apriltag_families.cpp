@@ -49,7 +49,18 @@ constexpr std::array<Entry, 10> kFamilies = {{
     {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
 }};
 
+// OpenCV's names. DICT_APRILTAG_36h10 is not in the AprilTag library.
+struct Alias {
+  std::string_view name;
+  std::string_view family;
+};
+constexpr std::array<Alias, 3> kAliases = {{{"DICT_APRILTAG_16h5", "tag16h5"},
+                                            {"DICT_APRILTAG_25h9", "tag25h9"},
+                                            {"DICT_APRILTAG_36h11", "tag36h11"}}};
+
 const Entry* find(std::string_view name) {
+  const auto* alias = std::ranges::find(kAliases, name, &Alias::name);
+  if (alias != kAliases.end()) name = alias->family;
   const auto* found = std::ranges::find(kFamilies, name, &Entry::name);
   return found == kFamilies.end() ? nullptr : found;
 }
@@ -59,6 +70,7 @@ const Entry* find(std::string_view name) {
 std::vector<std::string> apriltag_family_names() {
   std::vector<std::string> names;
   for (const Entry& entry : kFamilies) names.emplace_back(entry.name);
+  for (const Alias& alias : kAliases) names.emplace_back(alias.name);
   return names;
 }
 

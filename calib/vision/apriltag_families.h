@@ -19,6 +19,7 @@ struct FreeFamily {
 };
 using AprilTagFamily = std::unique_ptr<apriltag_family_t, FreeFamily>;
 
+/// The library's names, then OpenCV's for the same families.
 [[nodiscard]] std::vector<std::string> apriltag_family_names();
 [[nodiscard]] bool is_apriltag_family(std::string_view name);
 /// Null for a name that is none.

@@ -2,8 +2,8 @@
 #include "calib/vision/tag_detector.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string_view>
 
@@ -13,6 +13,7 @@
 #include <opencv2/core.hpp>
 
 #include "calib/vision/apriltag_families.h"
+#include "calib/vision/aruco_dictionaries.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -20,55 +21,6 @@ namespace {
 
 // Tables of corrected codes grow with codes x bits^2; beyond this they take gigabytes.
 constexpr std::uint32_t kMaxCodesForTwoBits = 5000;
-
-struct ArucoDictionary {
-  std::string_view name;
-  cv::aruco::PREDEFINED_DICTIONARY_NAME value;
-};
-
-constexpr std::array<ArucoDictionary, 17> kArucoDictionaries = {{
-    {"DICT_4X4_50", cv::aruco::DICT_4X4_50},
-    {"DICT_4X4_100", cv::aruco::DICT_4X4_100},
-    {"DICT_4X4_250", cv::aruco::DICT_4X4_250},
-    {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
-    {"DICT_5X5_50", cv::aruco::DICT_5X5_50},
-    {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
-    {"DICT_5X5_250", cv::aruco::DICT_5X5_250},
-    {"DICT_5X5_1000", cv::aruco::DICT_5X5_1000},
-    {"DICT_6X6_50", cv::aruco::DICT_6X6_50},
-    {"DICT_6X6_100", cv::aruco::DICT_6X6_100},
-    {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
-    {"DICT_6X6_1000", cv::aruco::DICT_6X6_1000},
-    {"DICT_7X7_50", cv::aruco::DICT_7X7_50},
-    {"DICT_7X7_100", cv::aruco::DICT_7X7_100},
-    {"DICT_7X7_250", cv::aruco::DICT_7X7_250},
-    {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
-    {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL},
-}};
-
-// OpenCV's names of the AprilTag families. DICT_APRILTAG_36h10 is not in the AprilTag library.
-struct Alias {
-  std::string_view name;
-  std::string_view family;
-};
-constexpr std::array<Alias, 3> kAliases = {{{"DICT_APRILTAG_16h5", "tag16h5"},
-                                            {"DICT_APRILTAG_25h9", "tag25h9"},
-                                            {"DICT_APRILTAG_36h11", "tag36h11"}}};
-
-std::string_view resolve_alias(std::string_view family) {
-  const auto* found = std::ranges::find(kAliases, family, &Alias::name);
-  return found == kAliases.end() ? family : found->family;
-}
-
-const ArucoDictionary* find_aruco(std::string_view family) {
-  const auto* found = std::ranges::find(kArucoDictionaries, family, &ArucoDictionary::name);
-  return found == kArucoDictionaries.end() ? nullptr : found;
-}
-
-Error unknown_family(const std::string& family) {
-  return bad_request(family, "no such marker family",
-                     fmt::format("known: {}", fmt::join(known_families(), ", ")));
-}
 
 struct FreeDetector {
   void operator()(apriltag_detector_t* p) const { apriltag_detector_destroy(p); }
@@ -138,9 +90,8 @@ constexpr int kFarApart = 4;
 
 class ArucoDetector final : public TagDetector {
  public:
-  ArucoDetector(const ArucoDictionary& dictionary, const DetectorOptions& options)
-      : dictionary_(cv::aruco::getPredefinedDictionary(dictionary.value)),
-        parameters_(cv::aruco::DetectorParameters::create()) {
+  ArucoDetector(cv::Ptr<cv::aruco::Dictionary> dictionary, const DetectorOptions& options)
+      : dictionary_(std::move(dictionary)), parameters_(cv::aruco::DetectorParameters::create()) {
     use_one_thread();
     // OpenCV's refinements are no better than its raw corners (about 0.8 px; SUBPIX jumps to the
     // outer rim of narrow white margins): refine_corners() does it.
@@ -196,17 +147,19 @@ void sort_detections(std::vector<TagObservation>& tags) {
 
 std::vector<std::string> known_families() {
   std::vector<std::string> names = apriltag_family_names();
-  for (const Alias& alias : kAliases) names.emplace_back(alias.name);
-  for (const ArucoDictionary& dictionary : kArucoDictionaries) names.emplace_back(dictionary.name);
+  std::ranges::copy(aruco_dictionary_names(), std::back_inserter(names));
   return names;
 }
 
+Error unknown_family(const std::string& family) {
+  return bad_request(family, "no such marker family",
+                     fmt::format("known: {}", fmt::join(known_families(), ", ")));
+}
+
 TagLayout tag_layout(const std::string& family) {
-  if (const ArucoDictionary* aruco = find_aruco(family)) {
-    const int bits = cv::aruco::getPredefinedDictionary(aruco->value)->markerSize;
-    return {.cells = bits + 2, .dark_inside = true};
-  }
-  const AprilTagFamily april = make_apriltag_family(resolve_alias(family));
+  if (const auto aruco = aruco_dictionary(family))
+    return {.cells = aruco->markerSize + 2, .dark_inside = true};
+  const AprilTagFamily april = make_apriltag_family(family);
   if (!april) throw unknown_family(family);
   return {.cells = april->width_at_border, .dark_inside = !april->reversed_border};
 }
@@ -218,12 +171,10 @@ std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
     throw bad_request("detector", "decimate below 1, negative blur or max_hamming outside 0..2",
                       "use decimate 1 or 2, blur 0, max_hamming 1");
   }
-  if (const ArucoDictionary* aruco = find_aruco(family)) {
-    return std::make_unique<ArucoDetector>(*aruco, options);
-  }
-  const std::string_view april = resolve_alias(family);
-  if (!is_apriltag_family(april)) throw unknown_family(family);
-  return std::make_unique<AprilTagDetector>(april, options);
+  if (const auto aruco = aruco_dictionary(family))
+    return std::make_unique<ArucoDetector>(aruco, options);
+  if (!is_apriltag_family(family)) throw unknown_family(family);
+  return std::make_unique<AprilTagDetector>(family, options);
 }
 
 std::vector<TagObservation> detect_with_both(TagDetector& fine, TagDetector& coarse,

@@ -13,6 +13,7 @@
 
 #include "calib/camera/tag_observations.h"
 #include "calib/vision/image_view.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope {
 
@@ -43,13 +44,16 @@ struct TagLayout {
   bool dark_inside = true;  ///< the border is dark inside and bright outside
 };
 
-/// Throws bad_request for a family we do not know.
+/// Names those that this build knows.
+[[nodiscard]] Error unknown_family(const std::string& family);
+
+/// Throws unknown_family().
 [[nodiscard]] TagLayout tag_layout(const std::string& family);
 
 /// Puts detections into the one order results have: frame, id, place of the first corner.
 void sort_detections(std::vector<TagObservation>& tags);
 
-/// Throws bad_request for a family we do not know (and names those we do).
+/// Throws unknown_family().
 [[nodiscard]] std::unique_ptr<TagDetector> make_tag_detector(const std::string& family,
                                                              const DetectorOptions& options = {});
 

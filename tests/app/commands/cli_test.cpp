@@ -21,7 +21,7 @@ TEST(Cli, VersionAndHelp) {
   const Outcome version = run({"--version"});
   EXPECT_EQ(version.code, 0);
   EXPECT_TRUE(version.out.starts_with("kinescope ")) << version.out;
-  for (const std::string command : {"run", "dynamics", "contact", "inspect", "camera"}) {
+  for (const std::string command : {"run", "dynamics", "contact", "inspect", "camera", "markers"}) {
     const Outcome help = run({command, "--help"});
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find(":\n  kinescope " + command), std::string::npos) << help.out;
@@ -65,6 +65,14 @@ TEST(Cli, WrongCommandLines) {
   expect_refusal({"run", "x", "--decimate", "nan"}, code, "'nan' is not a number");
   expect_refusal({"run", "x", "--folds", "many"}, code, "'many'");
   expect_refusal({"camera", "x"}, code, "--board");
+  expect_refusal({"markers", "--ids", "0-3"}, code, "--size");
+  expect_refusal({"markers", "--ids", "3-0", "--size", "0.04"}, code, "names no markers");
+  expect_refusal({"markers", "--ids", "0-9999999", "--size", "0.04"}, code, "names no markers");
+  expect_refusal({"markers", "--ids", "0", "--size", "40"}, code, "no length in m");
+  expect_refusal({"markers", "--ids", "0", "--size", "0.4"}, code, "does not fit on A4");
+  expect_refusal({"markers", "--ids", "587", "--size", "0.04"}, code, "has no marker 587");
+  expect_refusal({"markers", "--ids", "0", "--size", "0.04", "--family", "tag"}, code,
+                 "no such marker family");
   expect_refusal(
       {"camera", "x", "--board", "chessboard", "--columns", "9", "--rows", "6", "--square", "25"},
       code, "'25' is no length in m");

@@ -457,6 +457,7 @@ void expect_coupling(const CalibrationTrace& found, double truth) {
 TEST(TraceCalibration, ACouplingByDesignIsAnEffectWithItsErrorBefore) {
   const CalibrationTrace found = trace_of_coupled(-1.0, -1.0);
   expect_coupling(found, -1.0);
+  EXPECT_TRUE(found.trace.design_comes_first);
   EXPECT_TRUE(found.corrections.empty());
 }
 
@@ -469,6 +470,7 @@ TEST(TraceCalibration, ACouplingByDesignThatIsNothingIsNotNamed) {
       trace_calibration(world.measurements, world.markers, world.log, start, {}).trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
   EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  EXPECT_FALSE(trace.design_comes_first);
 }
 
 TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {

@@ -184,6 +184,20 @@ TEST(TraceTest, TwoEffectsAtOnceAreBothFound) {
   EXPECT_GE(right, 2 * kRuns - 2);
 }
 
+TEST(TraceTest, TheFirstEffectIsTheOneThatExplainsMost) {
+  LinearWorldOptions options;
+  const LinearWorld world(options, {{0, "scale", 0.5}, {1, "direction", 0.5}});
+  TraceOptions known;
+  std::vector<EffectId> found;
+  while (const auto first = first_effect(world, known)) {
+    found.push_back(first->id);
+    known.start.push_back(*first);
+  }
+  std::ranges::sort(found);
+  EXPECT_EQ(found, (std::vector<EffectId>{{"direction", "joint2"}, {"scale", "joint1"}}));
+  EXPECT_FALSE(first_effect(LinearWorld(options, {})));
+}
+
 // Below what the sensor itself errs by it is not looked for, nor is it told by the names of two
 // effects that look like it together.
 TEST(TraceTest, WhatIsBelowItsFloorHasNoOtherNames) {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/tag_detector.h"
 
+#include <algorithm>
+#include <array>
+
 #include <gtest/gtest.h>
 #include <opencv2/aruco.hpp>
 
 #include "calib/vision/refine_corners.h"
+#include "calib/vision/tag_pattern.h"
 #include "kinematics/core/error.h"
 #include "tests/truth/render.h"
 
@@ -156,6 +160,42 @@ TEST(TagDetector, KnowsItsFamiliesAndRefusesOthers) {
   EXPECT_THROW((void)make_tag_detector("tag36h11", {.decimate = 0.5}), Error);
   EXPECT_THROW((void)make_tag_detector("tag36h11", {.decimate = std::nan("")}), Error);
   EXPECT_THROW((void)make_tag_detector("tagCircle49h12", {.max_hamming = 2}), Error);
+}
+
+// A marker as it is printed, on white paper: 16 px a cell.
+TEST(TagDetector, EveryPatternIsReadBackWithItsCornersWhereItsEdgeEnds) {
+  constexpr int kPxPerCell = 16;
+  constexpr int kPaper = 3;  // cells around it
+  constexpr int kId = 5;
+  for (const std::string& family : known_families()) {
+    const TagPattern pattern = tag_pattern(family, kId);
+    EXPECT_EQ(pattern.edge, tag_layout(family).cells) << family;
+    const int side = kPxPerCell * (pattern.cells + 2 * kPaper);
+    GreyImage image{side, side,
+                    std::vector<std::uint8_t>(static_cast<std::size_t>(side * side), 255)};
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const int row = y / kPxPerCell - kPaper;
+        const int column = x / kPxPerCell - kPaper;
+        if (std::min(row, column) < 0 || std::max(row, column) >= pattern.cells) continue;
+        const auto cell = static_cast<std::size_t>(row * pattern.cells + column);
+        image.pixels[static_cast<std::size_t>(y * side + x)] = pattern.bright[cell] ? 255 : 0;
+      }
+    }
+    const auto found = make_tag_detector(family)->detect(image.view());
+    ASSERT_EQ(found.size(), 1U) << family;
+    EXPECT_EQ(found[0].id, TagId{kId}) << family;
+    const double first = kPxPerCell * (kPaper + pattern.margin()) - 0.5;
+    const double last = first + kPxPerCell * pattern.edge;
+    const std::array<Eigen::Vector2d, 4> corners{
+        Eigen::Vector2d(first, last), {last, last}, {last, first}, {first, first}};
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      EXPECT_LT((found[0].corners_px[i] - corners[i]).norm(), kCoarse) << family << " " << i;
+  }
+  EXPECT_THROW((void)tag_pattern("tag36h11", 587), Error);
+  EXPECT_THROW((void)tag_pattern("DICT_4X4_50", 50), Error);
+  EXPECT_THROW((void)tag_pattern("tag36h11", -1), Error);
+  EXPECT_THROW((void)tag_pattern("tag36h12", 1), Error);
 }
 
 TEST(TagDetector, NothingInAnEmptyImage) {
