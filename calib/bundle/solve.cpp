@@ -32,6 +32,7 @@ constexpr double kFirstRadius = 1e6;
 constexpr double kUndescribed = 0.25;
 // A robust solution only tells the noise level and what stands out.
 constexpr double kRobustTolerance = 1e-6;
+// Of the cost: 1e-4 where it is 10 000, and Gauss-Newton steps leave less than what they took.
 constexpr double kPlainTolerance = 1e-8;
 
 struct Misfit {

@@ -130,7 +130,7 @@ std::vector<AddedEffect> sized(std::vector<AddedEffect> effects) {
 
 // Both do the same at every instant, nearly.
 bool are_alike(const Correction& one, const Correction& other) {
-  // Of what the effect does: less than any interval of a size.
+  // Of what the effect does; the narrowest interval of a sag was 0.4 % (`undeclared`, 10004).
   constexpr double kAlike = 1e-4;
   const auto near = [](const auto& a, const auto& b) {
     return a.size() == b.size() && (a - b).norm() <= kAlike * b.norm();

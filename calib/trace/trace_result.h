@@ -173,7 +173,7 @@ struct Trace {
   bool converged = true;               ///< the model without any effect did
   std::vector<TracedEffect> accepted;  ///< in the order in which they were found
   std::vector<AddedEffect> added;      ///< what the search found, as TracedModel::fit takes it
-  /// Couplings by design that the search would name first if the model lacked them.
+  /// There are couplings by design, and a search that knows none names them before anything else.
   bool design_comes_first = false;
   std::vector<Ambiguity> ambiguities;
   std::vector<Rest> rest;
