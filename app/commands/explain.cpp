@@ -53,6 +53,11 @@ bool is_structure_clear(const Explanation& of) {
          (of.structure->status == StructureStatus::kDetermined && !has_model_doubt(*of.structure));
 }
 
+/// Certain of itself, and a fit of its parameters settled.
+bool is_structure_sound(const Explanation& of) {
+  return is_structure_clear(of) && (!of.fitted || is_converged(of.fitted->calibration));
+}
+
 bool is_all_explained(const Trace& trace) {
   return trace.verdict != TraceVerdict::kUnknown && trace.verdict != TraceVerdict::kNothingToSay;
 }
@@ -95,6 +100,24 @@ Trace without_effects(const Trace& traced, const FreedomLevel& exported) {
   return out;
 }
 
+// Which frames it had unseen together: those are what its rivals are to predict, too. Cuts of the
+// space of their own joints leave out other frames, and are worth as much as an effect (80 of log
+// odds: `undeclared`, 10097).
+std::vector<int> folds_of(const Calibration& calibration) {
+  if (calibration.folds < 2) return {};
+  std::vector<int> out(calibration.times_s.size(), -1);
+  for (const SightingResidual& residual : calibration.residuals)
+    out[static_cast<std::size_t>(residual.frame)] = residual.fold;
+  // A frame that it could not use goes with the one before.
+  const auto known = std::ranges::find_if(out, [](int fold) { return fold >= 0; });
+  int last = known == out.end() ? 0 : *known;
+  for (int& fold : out) {
+    if (fold < 0) fold = last;
+    last = fold;
+  }
+  return out;
+}
+
 /// A structure, and effects to begin with beside it.
 struct Proposal {
   Structure structure;
@@ -103,17 +126,18 @@ struct Proposal {
 
 class Explainer {
  public:
-  /// Both must outlive it.
-  Explainer(const Evidence& evidence, const ExplainOptions& options)
-      : evidence_(evidence), options_(options) {}
+  /// `evidence` must outlive it.
+  Explainer(const Evidence& evidence, ExplainOptions options)
+      : evidence_(evidence), options_(std::move(options)) {}
 
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first = with_base_at_rest(
-        with_couplings_doubted(asked_again(of_structure(structure_of(evidence_.tracks), {}))));
-    return with_free_markers_attached(is_settled(first) ? std::move(first)
-                                                        : improved(std::move(first)));
+    Explanation first = of_structure(structure_of(evidence_.tracks), {});
+    ExplainOptions options = options_;
+    if (first.fitted && options.calibrate.fold_of_frame.empty())
+      options.calibrate.fold_of_frame = folds_of(first.fitted->calibration);
+    return Explainer(evidence_, std::move(options)).best_beside(std::move(first));
   }
 
   /// Clearly more probable, over all measurements that there are; of two that are about as
@@ -130,6 +154,15 @@ class Explainer {
   }
 
  private:
+  [[nodiscard]] Explanation best_beside(Explanation first) const {
+    std::set<Shape> tried;
+    Explanation now = asked_again(std::move(first));
+    // Beside joints that no fit settles for, doubts about some of them are not worth their time.
+    if (now.fitted && !is_converged(now.fitted->calibration)) now = improved(std::move(now), tried);
+    now = with_base_at_rest(with_couplings_doubted(std::move(now)));
+    return with_free_markers_attached(improved(std::move(now), tried));
+  }
+
   [[nodiscard]] Explanation begun() const {
     Explanation out;
     out.log = recording().log;
@@ -234,15 +267,16 @@ class Explainer {
     }
   }
 
-  /// The best of what the moves propose, one after the other until one is of one piece.
-  [[nodiscard]] Explanation improved(Explanation now) const {
-    std::set<Shape> tried;
+  /// The best of what the moves propose, one after the other until one is of one piece. `tried`:
+  /// structures that were fitted without effects to begin with.
+  [[nodiscard]] Explanation improved(Explanation now, std::set<Shape>& tried) const {
     if (now.structure) tried.insert(shape_of(*now.structure));
     for (const auto& propose :
          {&Explainer::with_slides_for_slight_turns, &Explainer::with_half_the_recording,
           &Explainer::with_errors_allowed, &Explainer::with_camera_doubted}) {
       if (is_settled(now)) break;
       for (const Proposal& proposal : (this->*propose)(now)) {
+        if (is_settled(now)) break;
         // A structure alone is no news where it was fitted before.
         if (proposal.known.empty() && !tried.insert(shape_of(proposal.structure)).second) continue;
         Explanation other = asked_again(of_structure(proposal.structure, proposal.known));
@@ -323,7 +357,7 @@ class Explainer {
       joint.couplings.clear();
     }
     if (!any) return now;
-    Explanation other = of_structure(std::move(free), {});
+    Explanation other = asked_again(of_structure(std::move(free), {}));
     return is_better(other, now) ? other : now;
   }
 
@@ -382,7 +416,7 @@ class Explainer {
   // robot as it is.
   [[nodiscard]] std::vector<Proposal> with_half_the_recording(const Explanation& now) const {
     std::vector<Proposal> out;
-    if (is_structure_clear(now) || evidence_.tracks.times_s.size() < 2) return out;
+    if (is_structure_sound(now) || evidence_.tracks.times_s.size() < 2) return out;
     const int middle = static_cast<int>(evidence_.tracks.times_s.size()) / 2;
     for (const bool first : {true, false}) {
       PoseTracks half = evidence_.tracks;
@@ -402,7 +436,7 @@ class Explainer {
     // Of the distance, and rad: the bump of 1.2 deg and the misprint of 3 % of `undeclared --first
     // 325`, which the search's own allowances (up to 0.01) do not hold.
     constexpr double kLargeErrors = 0.03;
-    if (is_structure_clear(now) || !now.fitted || recording().log.channels.empty()) return {};
+    if (is_structure_sound(now) || !now.fitted || recording().log.channels.empty()) return {};
     std::optional<Structure> structure = proposed_structure(evidence_.tracks, kLargeErrors);
     if (!structure) return {};
     return {{std::move(*structure), {}}};
@@ -442,7 +476,7 @@ class Explainer {
   }
 
   const Evidence& evidence_;
-  const ExplainOptions& options_;
+  const ExplainOptions options_;
 };
 
 // Evidence that owns what it changed.
@@ -492,9 +526,8 @@ std::string words_of(const ReadingApart& reading, const Explanation& of, const E
 
 Explanation explain(const Evidence& evidence, const ExplainOptions& options,
                     std::vector<std::string>& warnings) {
-  const Explainer explainer(evidence, options);
   const std::vector<ReadingApart> apart = readings_apart(evidence.recording.log);
-  if (apart.empty()) return explainer.explained(warnings);
+  if (apart.empty()) return Explainer(evidence, options).explained(warnings);
   const ChangedEvidence changed = without(evidence, apart);
   const Evidence rest{changed.recording, changed.observed, changed.tracks, evidence.camera};
   std::vector<std::string> said;
@@ -509,7 +542,10 @@ Explanation explain(const Evidence& evidence, const ExplainOptions& options,
   const bool cost_nothing =
       sightings_in(changed.observed.measurements) == sightings_in(evidence.observed.measurements);
   if (!cost_nothing || !is_settled(without_them)) {
-    Explanation with_them = explainer.explained(said_with_them);
+    ExplainOptions alike = options;
+    if (without_them.fitted)
+      alike.calibrate.fold_of_frame = folds_of(without_them.fitted->calibration);
+    Explanation with_them = Explainer(evidence, std::move(alike)).explained(said_with_them);
     if (!Explainer::is_better(without_them, with_them, evidence.observed.measurements)) {
       warnings.insert(warnings.end(), said_with_them.begin(), said_with_them.end());
       return with_them;

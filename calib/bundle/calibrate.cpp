@@ -338,9 +338,14 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   out.sigma_scale = robust.sigma_scale;
 
   const int frames_used = bundle::count_frames(spec, robust.used);
-  const int folds = options.folds < 2 || frames_used < 4 ? 0 : std::min(options.folds, frames_used);
+  const bool folds_given = !options.fold_of_frame.empty();
+  const int most_folds = folds_given ? options.folds : std::min(options.folds, frames_used);
+  const int folds = options.folds < 2 || frames_used < 4 ? 0 : most_folds;
   const std::vector<int> fold_of_frame =
-      folds_of(spec, state, usable, std::max(1, folds), options.folds_by_lot);
+      folds > 0 && folds_given
+          ? options.fold_of_frame
+          : folds_of(spec, state, usable, std::max(1, folds), options.folds_by_lot);
+  KINESCOPE_CHECK(fold_of_frame.size() == spec.times_s.size(), "a fold for every frame");
   std::map<int, std::size_t> slot;
   const auto now = predict_all(spec, state, usable);
   const auto then = predict_all(spec, before, usable);

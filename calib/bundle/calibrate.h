@@ -54,6 +54,8 @@ struct CalibrateOptions {
   NominalSigmas nominal = {};
   double reject_sigma = 4.5;  ///< sightings beyond this many standard deviations are left out
   int folds = 5;              ///< of the cross-validation; 0: none
+  std::vector<int> fold_of_frame = {};  ///< below `folds`, as another calibration of the same
+                                        ///< measurements had them; empty: by posture
   bool folds_by_lot = false;  ///< frames dealt out at random instead of by posture: an easier test,
                               ///< as others report it
   int max_iterations = 100;

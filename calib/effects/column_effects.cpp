@@ -64,6 +64,7 @@ Candidate TracedColumns::dead_band(const SharesPtr& shares) const {
     return width[0] > 0.0 && width[0] < limit;
   };
   out.scan = widths_;
+  out.scan_is_size = true;
   out.scan_name = "band";
   out.scan_unit = unit_;
   out.check = "dead band of the controller, friction that it has no integrator against";

@@ -225,6 +225,7 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
     out.candidate.scan.push_back(gap);
     gap *= 1.8;
   }
+  out.candidate.scan_is_size = true;
   out.candidate.scan_name = "gap";
   out.candidate.scan_unit = s.unit;
   out.candidate.check = "gear mesh, keys, belt tension";

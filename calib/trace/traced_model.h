@@ -99,6 +99,8 @@ struct Candidate {
   std::vector<double> scan;
   bool scan_listed = false;  ///< only the listed values make sense; else those between them too
   double scan_step = 0.0;  ///< values between them are tried in such steps; 0: they are continuous
+  /// The size of the effect is the value of its scan, by what it is: play is as wide as its gap.
+  bool scan_is_size = false;
   std::string scan_name;
   std::string scan_unit;
   std::function<std::string(double scan)> scan_words;  ///< "joint2"; empty: the number says it

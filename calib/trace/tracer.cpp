@@ -158,7 +158,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   for (const TestedMember* hint : hints) {
     std::vector<AddedEffect> effects = now->added;
     effects.push_back({now->fit.candidates[hint->index].id, hint->scan});
-    now_ = stage_of(effects);
+    now_ = with_sizes_for_scans(stage_of(effects));
     StagePtr both;
     if (now_->fit.converged)
       both = refit_best(contenders(*now_, test_family(now_->system, now_->fit.candidates)), round_);
@@ -253,7 +253,7 @@ StagePtr Tracer::chain(const AddedEffect& first) {
   StagePtr found;
   double last = now->held_out_sum();
   for (int step = 0; step < kLongestChain; ++step) {
-    StagePtr stage = stage_of(effects);
+    StagePtr stage = with_sizes_for_scans(stage_of(effects));
     if (!stage->fit.converged || stage->held_out_sum() >= last) break;
     stage = without_idle(std::move(stage), known);
     effects = stage->added;
@@ -291,13 +291,38 @@ bool Tracer::search_again(const std::optional<std::string>& place) {
     if (gain_of(stage->system, candidate->columns(scan)) <= (1.0 + kNoticeable) * gain) continue;
     std::vector<AddedEffect> effects = now_->added;
     effects[i].scan = scan;
-    StagePtr moved = stage_of(std::move(effects));
+    StagePtr moved = with_sizes_for_scans(stage_of(std::move(effects)));
     if (moved->fit.converged && moved->held_out_sum() < now_->held_out_sum()) {
       now_ = std::move(moved);
     }
   }
   for (std::size_t i = 0; i < now_->added.size(); ++i) sharpen(i);
-  return now_ != before;
+  return now_->held_out_sum() < before->held_out_sum();
+}
+
+// Play turns round at once: what is left has a kink wherever the gap is as wide as a reversal, and
+// the search along it ends in one of many lesser minima (1.6 % from the width, `undeclared`, 9725).
+// What the model says there and nowhere else, a jump seems to explain.
+StagePtr Tracer::with_sizes_for_scans(StagePtr stage) {
+  constexpr int kMostSteps = 3;
+  constexpr double kSmallStep = 3e-4;  // of the value
+  for (std::size_t i = 0; i < stage->added.size(); ++i) {
+    const Candidate* candidate = find_candidate(stage->fit, stage->added[i].id);
+    if (candidate == nullptr || !candidate->scan_is_size) continue;
+    for (int k = 0; k < kMostSteps && stage->fit.converged; ++k) {
+      const double size = size_of(*candidate, stage->fit.values[i]);
+      if (!(size > 0.0) || std::abs(size - stage->added[i].scan) < kSmallStep * size) break;
+      std::vector<AddedEffect> effects = stage->added;
+      effects[i].scan = size;
+      StagePtr moved = stage_of(std::move(effects));
+      if (!moved->fit.converged ||
+          predicts_clearly_worse(moved->held_out.whitened, stage->held_out.whitened))
+        break;
+      stage = std::move(moved);
+      candidate = find_candidate(stage->fit, stage->added[i].id);
+    }
+  }
+  return stage;
 }
 
 // Without a large effect the model has bent itself, and its linearisation is not where the scan's
@@ -309,15 +334,16 @@ void Tracer::sharpen(std::size_t index) {
   for (int k = 0; k < kMostSteps; ++k) {
     const std::optional<Eigen::VectorXd> slope = scan_slope(*now_, index);
     const auto step = slope ? scan_step(now_->system, *slope) : std::nullopt;
-    if (!step || std::abs(step->step) < kSmallStep * step->sigma) return;
+    if (!step || std::abs(step->step) < kSmallStep * step->sigma) break;
     std::vector<AddedEffect> effects = now_->added;
     double& scan = effects[index].scan;
     const double most = kLargestStep * std::abs(scan);
     scan += std::clamp(step->step, -most, most);
     StagePtr moved = stage_of(std::move(effects));
-    if (!moved->fit.converged || moved->system.total().rr >= now_->system.total().rr) return;
+    if (!moved->fit.converged || moved->system.total().rr >= now_->system.total().rr) break;
     now_ = std::move(moved);
   }
+  now_ = with_sizes_for_scans(now_);
 }
 
 bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
@@ -362,7 +388,7 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
     ++refits;
     std::vector<AddedEffect> effects = now_->added;
     effects.push_back({contender.id, contender.member.scan});
-    StagePtr stage = stage_of(std::move(effects));
+    StagePtr stage = with_sizes_for_scans(stage_of(std::move(effects)));
     mark(round, contender.id, CandidateState::kRefitted, stage->error.value);
     const double bar = best ? best->held_out_sum() : now_->held_out_sum();
     if (stage->fit.converged && stage->held_out_sum() < bar) best = std::move(stage);

@@ -83,6 +83,8 @@ class Tracer {
   /// True where a value was found that predicts better.
   [[nodiscard]] bool search_again(const std::optional<std::string>& place);
   void sharpen(std::size_t index);
+  /// Where the size of an effect is the value of its scan, and predicts as well there.
+  [[nodiscard]] StagePtr with_sizes_for_scans(StagePtr stage);
   [[nodiscard]] bool simplify();
   [[nodiscard]] bool backward();
   [[nodiscard]] bool drop_without_size();

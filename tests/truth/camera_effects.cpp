@@ -48,10 +48,10 @@ struct Drift {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rad, at the last frame
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   double time_constant_s = 1.0;
-  double duration_s = 1.0;
+  double last_s = 1.0;  // of the frames
   [[nodiscard]] Pose at(double t_s) const {
     Pose T;
-    T.rotation = exp_rotation(rotation * creep(t_s, time_constant_s, duration_s));
+    T.rotation = exp_rotation(rotation * creep(t_s, time_constant_s, last_s));
     T.translation = pivot - T.rotation * pivot;
     return T;
   }
@@ -60,9 +60,9 @@ struct Drift {
 struct Growth {
   double relative = 0.0;  ///< at the last frame
   double time_constant_s = 1.0;
-  double duration_s = 1.0;
+  double last_s = 1.0;  // of the frames
   [[nodiscard]] double factor(double t_s) const {
-    return 1.0 + relative * creep(t_s, time_constant_s, duration_s);
+    return 1.0 + relative * creep(t_s, time_constant_s, last_s);
   }
 };
 
@@ -131,9 +131,9 @@ Bump bump_of(const InjectedEffect& effect, double time_s, Rng& rng) {
   return {time_s, T};
 }
 
-Drift drift_of(const InjectedEffect& effect, double time_constant_s, double duration_s, Rng& rng) {
+Drift drift_of(const InjectedEffect& effect, double time_constant_s, double last_s, Rng& rng) {
   const Eigen::Vector3d axis = axis_across(rng);
-  return {axis * effect.size, rng.unit3() * kBumpLever, time_constant_s, duration_s};
+  return {axis * effect.size, rng.unit3() * kBumpLever, time_constant_s, last_s};
 }
 
 Ripple ripple_of(const InjectedEffect& effect, Rng& rng) {
@@ -178,14 +178,14 @@ void add_lens(const InjectedEffect& effect, CameraModel& camera) {
   camera.distortion[first + 1] += effect.detail;
 }
 
-void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, Undeclared& out) {
+void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out) {
   Rng rng = Rng::from_name(fmt::format("injected {} {}", effect.effect, effect.place), robot.seed);
   const double time_s = effect.detail * robot.duration_s;
   if (effect.effect == "time_offset" && effect.place == "clock") {
     out.clock.offset_s += effect.size;
   } else if (effect.effect == "clock_drift") {
     out.clock.drift = effect.size;
-    out.clock.agree_s = effect.detail * last_s;
+    out.clock.agree_s = effect.detail * robot.last_frame_s;
   } else if (effect.effect == "clock_jump") {
     out.clock.jump_s = effect.size;
     out.clock.jumps_at_s = time_s;
@@ -202,9 +202,9 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, double last_s, 
   } else if (effect.effect == "camera_bump") {
     out.bump = bump_of(effect, time_s, rng);
   } else if (effect.effect == "camera_drift") {
-    out.drift = drift_of(effect, time_s, robot.duration_s, rng);
+    out.drift = drift_of(effect, time_s, robot.last_frame_s, rng);
   } else if (effect.effect == "thermal_growth") {
-    out.growth = {effect.size, time_s, robot.duration_s};
+    out.growth = {effect.size, time_s, robot.last_frame_s};
   } else if (effect.effect == "own_chequer") {
     const double direction = rng.uniform(0.0, kTwoPi);
     out.chequer = {effect.detail,
@@ -454,7 +454,9 @@ FilmedRobot robot_of(const EffectWorldOptions& options) {
   robot.tag_size_m = options.tag_size_m;
   robot.scale = options.scale;
   robot.down = options.down;
-  return draw_filmed_robot(robot);
+  FilmedRobot out = draw_filmed_robot(robot);
+  out.last_frame_s = (options.frames - 1) / options.frame_rate_hz;
+  return out;
 }
 
 World make_effect_world(const EffectWorldOptions& options) {
@@ -462,8 +464,7 @@ World make_effect_world(const EffectWorldOptions& options) {
   const Mechanics mechanics(robot, options.effects);
   Undeclared undeclared;
   undeclared.camera = robot.camera;
-  const double last_s = (options.frames - 1) / options.frame_rate_hz;
-  for (const InjectedEffect& effect : options.effects) add(effect, robot, last_s, undeclared);
+  for (const InjectedEffect& effect : options.effects) add(effect, robot, undeclared);
   World world;
   world.tree = robot.tree;
   world.T_camera_base = robot.T_camera_base;

@@ -260,6 +260,7 @@ FilmedRobot draw_filmed_robot(const FilmedRobotOptions& options) {
   Rng rng = Rng::from_name(fmt::format("filmed robot {}", to_string(options.kind)), options.seed);
   FilmedRobot robot;
   robot.duration_s = options.duration_s;
+  robot.last_frame_s = options.duration_s;
   robot.rest_s = options.rest_s;
   robot.prismatic_m_per_rad = options.scale * options.prismatic_m_per_rad;
   robot.seed = options.seed;

@@ -83,6 +83,7 @@ struct FilmedRobot {
   MarkerSet markers;
   std::vector<SmoothMotion> motions;  ///< of every joint's encoder, on the joint log's clock
   double duration_s = 0.0;
+  double last_frame_s = 0.0;
   double rest_s = 0.0;  ///< at the beginning and the end
   double prismatic_m_per_rad = 0.0;
   std::uint64_t seed = 0;

@@ -163,8 +163,8 @@ bool is_mechanical(const InjectedEffect& effect) {
   return sits_on_joint(effect.effect) || is_late_joint(effect);
 }
 
-double creep(double t_s, double time_constant_s, double duration_s) {
-  return std::expm1(-t_s / time_constant_s) / std::expm1(-duration_s / time_constant_s);
+double creep(double t_s, double time_constant_s, double last_s) {
+  return std::expm1(-t_s / time_constant_s) / std::expm1(-last_s / time_constant_s);
 }
 
 bool can_have(JointType type, std::string_view effect) {

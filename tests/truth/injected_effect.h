@@ -86,7 +86,7 @@ struct InjectedEffect {
 /// it.
 [[nodiscard]] bool is_mechanical(const InjectedEffect& effect);
 /// Share, 0 at 0 and 1 at the end, of what creeps towards rest with a time constant.
-[[nodiscard]] double creep(double t_s, double time_constant_s, double duration_s);
+[[nodiscard]] double creep(double t_s, double time_constant_s, double last_s);
 /// False where an effect makes no sense: a slide has no screw, a hinge no curvature.
 [[nodiscard]] bool can_have(JointType type, std::string_view effect);
 

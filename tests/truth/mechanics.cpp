@@ -98,17 +98,16 @@ Mechanics::Law encoder_law(const InjectedEffect& effect, bool turns, double phas
 }
 
 // Laws that need nothing but the time.
-Mechanics::Law law_of_time(const InjectedEffect& effect, double duration_s, double phase) {
+Mechanics::Law law_of_time(const InjectedEffect& effect, const FilmedRobot& robot, double phase) {
   const double size = effect.size;
   if (effect.effect == "zero_jump") {
-    return [size, at_s = effect.detail * duration_s](double q, const auto&, double t) {
+    return [size, at_s = effect.detail * robot.duration_s](double q, const auto&, double t) {
       return q + (t >= at_s ? size : 0.0);
     };
   }
   if (effect.effect == "zero_drift") {
-    return [=, constant_s = effect.detail * duration_s](double q, const auto&, double t) {
-      return q + size * creep(t, constant_s, duration_s);
-    };
+    return [size, constant_s = effect.detail * robot.duration_s, last_s = robot.last_frame_s](
+               double q, const auto&, double t) { return q + size * creep(t, constant_s, last_s); };
   }
   if (effect.effect == "own_vibration") {
     return [=, omega = kFullTurn * effect.detail](double q, const auto&, double t) {
@@ -121,7 +120,7 @@ Mechanics::Law law_of_time(const InjectedEffect& effect, double duration_s, doub
 Mechanics::Law law_of(const InjectedEffect& effect, const FilmedRobot& robot, std::size_t joint,
                       double phase) {
   const bool turns = robot.tree.joints[joint].type == JointType::kRevolute;
-  if (Mechanics::Law law = law_of_time(effect, robot.duration_s, phase)) return law;
+  if (Mechanics::Law law = law_of_time(effect, robot, phase)) return law;
   if (Mechanics::Law law = encoder_law(effect, turns, phase)) return law;
   const double size = effect.size;
   const std::size_t other = joint_named(robot.tree, effect.with);

@@ -114,6 +114,26 @@ TEST(Calibrate, NoiseComesBackAsNoise) {
   for (const JointEstimate& joint : found.joints) ASSERT_TRUE(joint.direction_sigma_rad);
 }
 
+// Two models of the same measurements can be asked to predict the same frames.
+TEST(Calibrate, FramesAreHeldOutAsTheyAreSaidToBe) {
+  constexpr int kFolds = 3;
+  const World world = make_world(mixed_chain());
+  const CalibrationStart start = perturbed_start(world, 0.02, 0.005, 3);
+  CalibrateOptions options;
+  options.folds = kFolds;
+  for (std::size_t f = 0; f < world.measurements.times_s.size(); ++f)
+    options.fold_of_frame.push_back(static_cast<int>(f % kFolds));
+  const Calibration found = calibrate(world.measurements, world.markers, world.log, start, options);
+  EXPECT_EQ(found.folds, kFolds);
+  for (const SightingResidual& residual : found.residuals)
+    ASSERT_EQ(residual.fold, residual.frame % kFolds);
+  options.fold_of_frame.clear();
+  const Calibration by_posture =
+      calibrate(world.measurements, world.markers, world.log, start, options);
+  EXPECT_EQ(found.final_rms, by_posture.final_rms);
+  EXPECT_NE(found.held_out_rms, by_posture.held_out_rms);
+}
+
 TEST(Calibrate, OutliersAreListedAndDoNotMove) {
   WorldOptions options = mixed_chain();
   options.outliers = 0.03;

@@ -70,6 +70,19 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+// What is left beside play has a kink wherever its gap is as wide as a reversal.
+TEST(TraceCalibration, PlayIsAsWideAsItsGap) {
+  constexpr double kSame = 5e-4;
+  for (const double width : {0.011, 0.017, 0.029, 0.043}) {
+    const Trace trace = trace_of(make_effect_world(filmed({{"backlash", "q3", width}}, 300))).trace;
+    ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+    const TracedEffect& play = trace.accepted.front();
+    EXPECT_EQ(play.id, (EffectId{"backlash", "q3"})) << answer(trace);
+    EXPECT_NEAR(play.scan, play.size, kSame * width);
+    EXPECT_TRUE(size_is_right(play, width)) << play.size << " for " << width;
+  }
+}
+
 // Of 24 mm, seen from sides that change: by more than the noise from frame to frame.
 TEST(TraceCalibration, ALargeSlipKeepsItsSightings) {
   EffectWorldOptions options = filmed({{"tag_slip", "tag_16", 0.024, 0.75}}, 480);
