@@ -31,6 +31,8 @@ struct EffectWorld {
   std::map<int, Eigen::VectorXd> sags;
   /// Likewise, of joints whose reading runs unevenly twice a turn: sine and cosine, rad.
   std::map<int, Eigen::Vector2d> bends;
+  /// Of joints with play, how far ahead of its drive the link begins, rad or m.
+  std::map<int, double> play_starts;
   JointMotion log;                              ///< finer in time; empty for postures
   std::map<int, UnsteadyReading> unsteady;      ///< joints whose reading in the log jumps
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
@@ -43,6 +45,9 @@ struct EffectWorld {
 
 /// px, what any detector's corners are off by.
 inline constexpr double kUsualShift = 0.02;
+
+/// Behind a joint's name, the nuisance that stands beside its play.
+inline constexpr std::string_view kPlayStart = "place in its gap at the start";
 
 /// Periods a turn of an eccentricity that is a bent coupling.
 inline constexpr double kBendPeriods = 2.0;
@@ -58,6 +63,7 @@ inline constexpr double kBendPeriods = 2.0;
   return id.effect == "quantisation" || id.effect == "reading_noise";
 }
 [[nodiscard]] inline bool is_sag(const EffectId& id) { return id.effect == "compliance"; }
+[[nodiscard]] inline bool is_play(const EffectId& id) { return id.effect == "backlash"; }
 [[nodiscard]] inline bool is_bend(const EffectId& id, double scan) {
   return id.effect == "eccentricity" && scan == kBendPeriods;
 }

@@ -231,21 +231,25 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   out.candidate.check = "gear mesh, keys, belt tension";
   out.candidate.record = fmt::format("move {} to the same places from both sides", s.name);
   const Eigen::VectorXd drive = world.log.value.col(s.joint);
-  out.corrections = [s, drive, log_s = world.log.times_s,
+  const auto known = world.play_starts.find(s.joint);
+  const std::optional<double> start =
+      known == world.play_starts.end() ? std::nullopt : std::optional(known->second);
+  out.corrections = [s, drive, start, log_s = world.log.times_s,
                      frames_s = read_times(world.frames, s.joint)](double width) {
-    return std::vector{
-        turn(s, "backlash", s.unit, read_at(log_s, play_state(drive, width), frames_s))};
+    Eigen::VectorXd state =
+        start ? play_from(drive, width, *start).state : play_state(drive, width);
+    return std::vector{turn(s, "backlash", s.unit, read_at(log_s, state, frames_s))};
   };
-  if (world.known) return out;
+  if (!start) return out;
   // A robot that rests at first rests anywhere in its gap.
-  out.nuisances = [s, drive, log_s = world.log.times_s,
+  out.nuisances = [s, drive, start = *start, log_s = world.log.times_s,
                    frames_s = read_times(world.frames, s.joint)](double width) {
-    std::vector<Correction> start;
-    Eigen::VectorXd share = read_at(log_s, share_of_start(drive, width), frames_s);
-    if (share.isZero(0.0)) return start;
-    start.push_back(turn(s, "place in its gap at the start", s.unit, std::move(share)));
-    start.back().is_nuisance = true;
-    return start;
+    std::vector<Correction> further;
+    Eigen::VectorXd share = read_at(log_s, play_from(drive, width, start).unmoved, frames_s);
+    if (share.isZero(0.0)) return further;
+    further.push_back(turn(s, std::string(kPlayStart), s.unit, std::move(share)));
+    further.back().is_nuisance = true;
+    return further;
   };
   return out;
 }

@@ -79,20 +79,31 @@ JointMotion motion_of(const JointLog& log, const KinematicTree& tree) {
 }
 
 Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width) {
-  Eigen::VectorXd out(drive.size());
-  if (drive.size() == 0) return out;
-  const double half = 0.5 * width;
   // Nothing is known of the past: the gap starts on the side that the first motion pushes to.
-  double link = drive[0];
+  double start = 0.0;
   for (Eigen::Index i = 1; i < drive.size(); ++i) {
     if (drive[i] != drive[0]) {
-      link = drive[0] + (drive[i] > drive[0] ? -half : half);
+      start = drive[i] > drive[0] ? -0.5 * width : 0.5 * width;
       break;
     }
   }
+  return play_from(drive, width, start).state;
+}
+
+StartedPlay play_from(const Eigen::VectorXd& drive, double width, double start) {
+  // A reading that trembles at rest pushes by less.
+  constexpr double kPushed = 0.01;  // of the width
+  StartedPlay out{Eigen::VectorXd(drive.size()), Eigen::VectorXd(drive.size())};
+  if (drive.size() == 0) return out;
+  const double half = 0.5 * width;
+  const double begin = drive[0] + start;
+  double link = begin;
+  bool unmoved = true;
   for (Eigen::Index i = 0; i < drive.size(); ++i) {
     link = std::clamp(link, drive[i] - half, drive[i] + half);
-    out[i] = (link - drive[i]) / width;
+    unmoved = unmoved && std::abs(link - begin) <= kPushed * width;
+    out.state[i] = (link - drive[i]) / width;
+    out.unmoved[i] = unmoved ? 1.0 : 0.0;
   }
   return out;
 }

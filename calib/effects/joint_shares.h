@@ -26,6 +26,14 @@ namespace kinescope::effects {
 /// unit of `drive`. Visintin 1994, section III.2 (the play operator).
 [[nodiscard]] Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width);
 
+/// The same of a link that began `start` ahead of its drive, which is what it is for as long as the
+/// drive has not pushed it.
+struct StartedPlay {
+  Eigen::VectorXd state;
+  Eigen::VectorXd unmoved;  ///< 1 until the drive pushes the link, then 0: d link / d start
+};
+[[nodiscard]] StartedPlay play_from(const Eigen::VectorXd& drive, double width, double start);
+
 /// What a link that began elsewhere in its gap than play_state() has it is further by, as a share
 /// of that at the beginning: until the drive has crossed the gap once. From the middle of the gap;
 /// from elsewhere nearly so.

@@ -139,6 +139,12 @@ bool are_alike(const Correction& one, const Correction& other) {
   return one.is_nuisance || (near(one.share, other.share) && near(one.twists, other.twists));
 }
 
+int joint_named(const KinematicTree& tree, const std::string& name) {
+  const auto joint = std::ranges::find(tree.joints, name, &Joint::name);
+  KINESCOPE_CHECK(joint != tree.joints.end(), "an effect of a joint sits on one");
+  return static_cast<int>(joint - tree.joints.begin());
+}
+
 // By its neighbours, in its unit per s.
 Eigen::VectorXd slope_of(const Eigen::VectorXd& values, const std::vector<double>& times_s) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(values.size());
@@ -400,6 +406,13 @@ TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
     out.world.sags = last_sizes_->sags;
     out.world.bends = last_sizes_->bends;
   }
+  // Of one that is asked for again, too: it is compared with others as it was found.
+  out.world.play_starts = last_play_starts_;
+  for (const AddedEffect& added : effects) {
+    // In the middle of its gap, as far as is known.
+    if (is_play(added.id))
+      out.world.play_starts.emplace(joint_named(out.world.tree, added.id.place), 0.0);
+  }
   out.library = all_effects(out.world);
   out.change = change_of(out.library, effects);
   return out;
@@ -432,6 +445,26 @@ void TracedBundle::keep_sizes(const std::vector<AddedEffect>& effects, const Rea
   last_sizes_ = std::move(out);
 }
 
+bool TracedBundle::keep_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
+                                    const BundleSolution& solution) const {
+  constexpr double kSameStart = 1e-3;  // of the gap
+  bool news = false;
+  for (const AddedEffect& added : effects) {
+    if (!is_play(added.id)) continue;
+    const int joint = joint_named(ready.world.tree, added.id.place);
+    const std::string name = fmt::format("{} {}", added.id.place, kPlayStart);
+    const std::vector<Correction>& corrections = ready.change.corrections;
+    const auto further = std::ranges::find(corrections, name, &Correction::name);
+    if (further == corrections.end()) continue;
+    const double before = ready.world.play_starts.at(joint);
+    const double start = std::clamp(before + solution.values[further - corrections.begin()],
+                                    -0.5 * added.scan, 0.5 * added.scan);
+    news = news || std::abs(start - before) > kSameStart * added.scan;
+    last_play_starts_.insert_or_assign(joint, start);
+  }
+  return news;
+}
+
 // Shares are taken where the joints are by the clock that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
 TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
@@ -441,15 +474,19 @@ TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effe
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
   Eigen::MatrixXd ahead_s = likely_clock(effects);
   Ready out = ready_at(ahead_s, effects);
-  const int rounds = by_size ? kRounds : clock ? 1 : 0;
+  const bool play = std::ranges::any_of(effects, is_play, &AddedEffect::id);
+  const int rounds = by_size || play ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
     BundleSolution solution = bundle_->solve(out.change);
     if (clock && solution.converged) last_ahead_s_ = solution.ahead_s;
     if (by_size && solution.converged) keep_sizes(effects, out, solution);
+    const bool starts_elsewhere =
+        play && solution.converged && keep_play_starts(effects, out, solution);
     const bool same_time = (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime;
     ahead_s = solution.ahead_s;
     std::optional<Ready> next;
-    if (solution.converged && (by_size || !same_time)) next = ready_at(ahead_s, effects);
+    if (solution.converged && (by_size || starts_elsewhere || !same_time))
+      next = ready_at(ahead_s, effects);
     if (!next || std::ranges::equal(next->change.corrections, out.change.corrections, are_alike)) {
       out.solved = std::move(solution);
       break;

@@ -55,6 +55,9 @@ class TracedBundle final : public TracedModel {
   /// Remembers the sizes of a solution of `ready`.
   void keep_sizes(const std::vector<AddedEffect>& effects, const Ready& ready,
                   const BundleSolution& solution) const;
+  /// Remembers where the links with play began. True where that is news.
+  bool keep_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
+                        const BundleSolution& solution) const;
   /// `ahead_s`: frames x joints, joint-log time minus frame time.
   [[nodiscard]] EffectWorld world_at(const Eigen::MatrixXd& ahead_s) const;
   [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
@@ -68,6 +71,7 @@ class TracedBundle final : public TracedModel {
   std::map<int, UnsteadyReading> unsteady_;
   mutable std::optional<Eigen::MatrixXd> last_ahead_s_;
   mutable std::optional<Sized> last_sizes_;
+  mutable std::map<int, double> last_play_starts_;  ///< as EffectWorld has them
 };
 
 }  // namespace kinescope::effects

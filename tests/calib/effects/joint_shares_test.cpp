@@ -83,6 +83,20 @@ TEST(PlayState, WithTheShareOfItsStartAPlayMayBeginInTheMiddle) {
   }
 }
 
+// Linear in where it began, until the drive comes to push.
+TEST(PlayState, ALinkStaysWhereItBeganUntilItIsPushed) {
+  constexpr double kWidth = 0.2;
+  constexpr double kStart = 0.06;
+  const Eigen::VectorXd drive = values({1.0, 1.0, 1.1, 1.15, 1.2, 1.0, 0.9});
+  const StartedPlay play = play_from(drive, kWidth, kStart);
+  const Eigen::VectorXd link = drive + kWidth * play.state;
+  EXPECT_LT((link - values({1.06, 1.06, 1.06, 1.06, 1.1, 1.1, 1.0})).norm(), kExact);
+  EXPECT_EQ(play.unmoved, values({1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}));
+  const StartedPlay pushed = play_from(drive, kWidth, -0.5 * kWidth);
+  EXPECT_EQ(pushed.unmoved, values({1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0}));
+  EXPECT_LT((pushed.state - play_state(drive, kWidth)).norm(), kExact);
+}
+
 TEST(PlayState, TheShareOfTheStartEndsOnceTheGapIsCrossed) {
   const Eigen::VectorXd start = share_of_start(values({1.0, 1.0, 1.05, 1.2, 1.0, 1.0}), 0.2);
   EXPECT_LT((start - values({1.0, 1.0, 0.5, 0.0, 0.0, 0.0})).norm(), kExact);

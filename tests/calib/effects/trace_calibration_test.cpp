@@ -83,6 +83,22 @@ TEST(TraceCalibration, PlayIsAsWideAsItsGap) {
   }
 }
 
+// It rests at first, somewhere in its gap, and the drive comes to push it by and by. That was told
+// as play and a jump of the zero, or as play or a late reading.
+TEST(TraceCalibration, WherePlayBeganIsPartOfIt) {
+  const InjectedEffect play{"backlash", "q2", 0.05};
+  for (const std::uint64_t seed : {1U, 2U}) {
+    EffectWorldOptions options = filmed({play}, 200);
+    options.rest_s = 1.5;
+    options.seed = seed;
+    const Trace trace = trace_of(make_effect_world(options)).trace;
+    EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
+    ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+    EXPECT_EQ(trace.accepted.front().id, (EffectId{play.effect, play.place})) << answer(trace);
+    EXPECT_TRUE(size_is_right(trace.accepted.front(), play.size)) << trace.accepted.front().size;
+  }
+}
+
 // Of 24 mm, seen from sides that change: by more than the noise from frame to frame.
 TEST(TraceCalibration, ALargeSlipKeepsItsSightings) {
   EffectWorldOptions options = filmed({{"tag_slip", "tag_16", 0.024, 0.75}}, 480);
