@@ -67,14 +67,11 @@ GravityBySag gravity_by_sag(const TracedBundle& bundle, const std::vector<AddedE
   std::vector<AddedEffect> with_sag = start;
   with_sag.push_back({sag, 0.0});
   const EffectWorld world = bundle.world_of(with_sag);
-  const auto joint = std::ranges::find(world.tree.joints, sag.place, &Joint::name);
+  const std::optional<JointId> joint = world.tree.joint(sag.place);
   const Candidate* one_mass = trace::find_candidate(stage->fit, sag);
-  KINESCOPE_CHECK(joint != world.tree.joints.end() && one_mass != nullptr,
-                  "a joint of the tree sags");
+  KINESCOPE_CHECK(joint && one_mass != nullptr, "a joint of the tree sags");
   const std::vector<EffectColumn> lumped = one_mass->columns(0.0);
-  const SagColumns columns(world, stage->fit.linear,
-                           static_cast<int>(joint - world.tree.joints.begin()),
-                           lumped.front().carrier);
+  const SagColumns columns(world, stage->fit.linear, joint->value, lumped.front().carrier);
   const auto gain = [&](const Eigen::Vector3d& gravity) {
     return trace::gain_of(stage->system, columns.under(gravity));
   };

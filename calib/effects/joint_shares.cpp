@@ -91,7 +91,7 @@ Eigen::VectorXd play_state(const Eigen::VectorXd& drive, double width) {
 }
 
 StartedPlay play_from(const Eigen::VectorXd& drive, double width, double start) {
-  // A reading that trembles at rest pushes by less.
+  // A reading that trembles at rest pushes by less. Chosen, not measured.
   constexpr double kPushed = 0.01;  // of the width
   StartedPlay out{Eigen::VectorXd(drive.size()), Eigen::VectorXd(drive.size())};
   if (drive.size() == 0) return out;

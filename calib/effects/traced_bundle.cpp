@@ -139,12 +139,6 @@ bool are_alike(const Correction& one, const Correction& other) {
   return one.is_nuisance || (near(one.share, other.share) && near(one.twists, other.twists));
 }
 
-int joint_named(const KinematicTree& tree, const std::string& name) {
-  const auto joint = std::ranges::find(tree.joints, name, &Joint::name);
-  KINESCOPE_CHECK(joint != tree.joints.end(), "an effect of a joint sits on one");
-  return static_cast<int>(joint - tree.joints.begin());
-}
-
 // By its neighbours, in its unit per s.
 Eigen::VectorXd slope_of(const Eigen::VectorXd& values, const std::vector<double>& times_s) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(values.size());
@@ -409,9 +403,11 @@ TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
   // Of one that is asked for again, too: it is compared with others as it was found.
   out.world.play_starts = last_play_starts_;
   for (const AddedEffect& added : effects) {
+    if (!is_play(added.id)) continue;
+    const std::optional<JointId> joint = out.world.tree.joint(added.id.place);
+    KINESCOPE_CHECK(joint.has_value(), "an effect of a joint sits on one");
     // In the middle of its gap, as far as is known.
-    if (is_play(added.id))
-      out.world.play_starts.emplace(joint_named(out.world.tree, added.id.place), 0.0);
+    out.world.play_starts.emplace(joint->value, 0.0);
   }
   out.library = all_effects(out.world);
   out.change = change_of(out.library, effects);
@@ -447,20 +443,19 @@ void TracedBundle::keep_sizes(const std::vector<AddedEffect>& effects, const Rea
 
 bool TracedBundle::keep_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
                                     const BundleSolution& solution) const {
-  constexpr double kSameStart = 1e-3;  // of the gap
+  constexpr double kSameStart = 1e-3;  // of the gap; chosen, not measured
   bool news = false;
   for (const AddedEffect& added : effects) {
     if (!is_play(added.id)) continue;
-    const int joint = joint_named(ready.world.tree, added.id.place);
     const std::string name = fmt::format("{} {}", added.id.place, kPlayStart);
     const std::vector<Correction>& corrections = ready.change.corrections;
     const auto further = std::ranges::find(corrections, name, &Correction::name);
     if (further == corrections.end()) continue;
-    const double before = ready.world.play_starts.at(joint);
+    const double before = ready.world.play_starts.at(further->index);
     const double start = std::clamp(before + solution.values[further - corrections.begin()],
                                     -0.5 * added.scan, 0.5 * added.scan);
     news = news || std::abs(start - before) > kSameStart * added.scan;
-    last_play_starts_.insert_or_assign(joint, start);
+    last_play_starts_.insert_or_assign(further->index, start);
   }
   return news;
 }
