@@ -144,6 +144,10 @@ State solve_without(const Spec& spec, const State& solution, const Split& split,
   return state;
 }
 
+// A fold starts at the whole's solution and is there in three to eight steps, unless the whole had
+// none: then every fold would creep on to the limit of the fit, for an answer that is refused.
+constexpr int kStepsWithoutMinimum = 10;
+
 // Cross-validation: each fold's frames are predicted by a model that has not seen them. Outliers
 // are predicted too, and counted nowhere.
 void validate(const Spec& spec, const State& solution, const RobustSolution& robust, int folds,
@@ -377,7 +381,10 @@ Calibration calibrate(const Measurements& measurements, const MarkerSet& markers
   out.training_rotation_rms_rad = rms_now.rotation();
   out.before_rotation_rms_rad = rms_before.rotation();
   if (folds > 0) {
-    validate(spec, state, robust, folds, slot, out, options.max_iterations, progress);
+    const int most_steps = robust.summary.converged
+                               ? options.max_iterations
+                               : std::min(options.max_iterations, kStepsWithoutMinimum);
+    validate(spec, state, robust, folds, slot, out, most_steps, progress);
   }
   bundle::read_back(spec, state, robust, bundle::estimate_uncertainty(spec, state, robust.used),
                     out);

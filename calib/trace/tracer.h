@@ -96,6 +96,7 @@ class Tracer {
                                                        const TestedMember& own) const;
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool likelier, bool plainer);
+  [[nodiscard]] bool is_ruled_out(std::size_t index, const AddedEffect& rival);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   [[nodiscard]] std::vector<AddedEffect> curves_for_rests() const;

@@ -237,6 +237,16 @@ bool Tracer::swap(std::size_t index, const AddedEffect& other, bool likelier, bo
   return true;
 }
 
+// Whether another effect, fitted in the place of one, clearly predicts worse. Rivals are compared
+// in the linear model of a fit that has bent itself to do without either.
+bool Tracer::is_ruled_out(std::size_t index, const AddedEffect& rival) {
+  std::vector<AddedEffect> effects = now_->added;
+  effects[index] = rival;
+  const StagePtr refitted = stage_of(std::move(effects));
+  return refitted->fit.converged &&
+         predicts_clearly_worse(refitted->held_out.whitened, now_->held_out.whitened);
+}
+
 bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
   const AddedEffect effect = now_->added[index];
   std::vector<TestedMember> rivals;
@@ -267,7 +277,7 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const bool likelier = comparison == Comparison::kSecond;
     if ((likelier || plainer) && swap(index, {candidate.id, rival.scan}, likelier, plainer))
       return true;
-    if (likelier) continue;
+    if (likelier || is_ruled_out(index, {candidate.id, rival.scan})) continue;
     ambiguity.effects.push_back(candidate.id);
     ambiguity.words.push_back(candidate.words);
     if (ambiguity.record.empty()) ambiguity.record = candidate.record;
