@@ -8,6 +8,7 @@ cmake_minimum_required(VERSION 3.25)
 set(rooms
     "kinematics/core:"
     "kinematics/log: kinematics/core"
+    "kinematics/bags: kinematics/core kinematics/log"
     "kinematics/model: kinematics/core"
     "kinematics/structure: kinematics/core kinematics/log kinematics/model"
     "kinematics/urdf: kinematics/core kinematics/log kinematics/model"
@@ -52,9 +53,13 @@ set(third_parties
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"
     "tinyxml: kinematics/urdf calib/camera"
-    "yaml-cpp/: calib/camera app/io"
+    "yaml-cpp/: kinematics/bags calib/camera app/io"
     "openssl/: app/io"
-    "zlib.h: kinematics/core"
+    "zlib.h: kinematics/core kinematics/bags"
+    "zstd.h: kinematics/bags"
+    "lz4frame.h: kinematics/bags"
+    "bzlib.h: kinematics/bags"
+    "sqlite3.h: kinematics/bags"
     "nlohmann/: app/io app/report app/commands dynamics/models"
     "CLI/: app/commands app/manual"
     "gtest/: none")

@@ -13,6 +13,7 @@
 #include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
 #include "dynamics/gp/blas.h"
+#include "kinematics/bags/bag.h"
 
 namespace kinescope {
 namespace {
@@ -85,7 +86,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
 // What the settings file says of the log, the command line's words first.
 TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::path& log,
                                const TorqueDataOptions& words) {
-  const std::filesystem::path beside = log.parent_path() / "recording.yaml";
+  const auto bag = bags::bag_source(log);
+  const std::filesystem::path beside = (bag ? bag->bag : log).parent_path() / "recording.yaml";
   TorqueDataOptions out;
   if (line.settings) {
     out = read_dynamics_settings(*line.settings);
@@ -113,7 +115,8 @@ TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::p
 
 // "log" of "folder/log.csv.gz".
 std::string log_name(const std::filesystem::path& log) {
-  const std::string name = log.filename().string();
+  const auto bag = bags::bag_source(log);
+  const std::string name = (bag ? bag->bag : log).filename().string();
   return name.substr(0, name.find('.'));
 }
 
@@ -200,7 +203,8 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     return policy_command(policy, console);
   }
   if (app.got_subcommand("inspect")) {
-    if (std::filesystem::is_regular_file(line.inspect.recording.folder))
+    const std::filesystem::path& log = line.inspect.recording.folder;
+    if (std::filesystem::is_regular_file(log) || bags::is_bag(log))
       line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
     return inspect_command(line.inspect, console);
   }

@@ -15,6 +15,7 @@
 #include "app/commands/progress_line.h"
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
+#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/file.h"
 #include "kinematics/log/header_units.h"
 #include "kinematics/log/joint_log_table.h"
@@ -141,7 +142,7 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
                    {options.log, calibration, options.run_folder / "robot.urdf"}, options.force);
   const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
-  const CsvTable table = read_csv(options.log, RaggedRows::kSetAside);
+  const CsvTable table = bags::read_log_table(options.log).table;
   const TableLog read = joint_log_of(columns_of_run(table, found));
   const JointLog& log = read.log;
   // Beforehand: what was left out of the log may be why it is refused.

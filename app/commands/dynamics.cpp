@@ -27,6 +27,7 @@
 #include "app/report/trace_lines.h"
 #include "dynamics/identify/gravity_from_torques.h"
 #include "dynamics/identify/torque_terms.h"
+#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
@@ -335,7 +336,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   summary.joints = robot.joints;
   summary.types = robot.types;
   const TorqueLogReport log =
-      read_checked_log(options.logs, wanted_joints(model.tree), options.data);
+      read_checked_log(bags::read_channel_tables(options.logs), wanted_joints(model.tree), options.data);
   if (asks_for_payload(options)) require_payload_question(options, model, log.log.torque_unit);
   summary.data = filtered_data(log, options.data.motion);
   if (options.gravity_from_torques && !options.gravity_m_s2) {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/inspect_bag.h"
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
 
@@ -225,10 +226,20 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
 }
 
 ExitCode inspect_command(const InspectOptions& options, const Console& console) {
-  if (std::filesystem::is_regular_file(options.recording.folder)) {
+  const auto bag = bags::bag_source(options.recording.folder);
+  const bags::Contents* contents = bag ? &bags::look_into(bag->bag) : nullptr;
+  if (contents != nullptr && !console.json) print_topics(*contents);
+  const bool is_log = contents != nullptr
+                          ? !shows_robot(*contents)
+                          : std::filesystem::is_regular_file(options.recording.folder);
+  const auto print_json = [&](nlohmann::json document) {
+    if (contents != nullptr) document["topics"] = topics_json(*contents);
+    fmt::print("{}\n", document.dump(2));
+  };
+  if (is_log) {
     const TorqueLogFacts facts = look_at_torques(options);
     if (console.json) {
-      fmt::print("{}\n", torque_log_json(facts).dump(2));
+      print_json(torque_log_json(facts));
     } else {
       print_torque_log(facts);
     }
@@ -236,7 +247,7 @@ ExitCode inspect_command(const InspectOptions& options, const Console& console) 
   }
   const Inspection inspection = inspect_recording(options.recording, console.progress);
   if (console.json) {
-    fmt::print("{}\n", inspection_json(inspection).dump(2));
+    print_json(inspection_json(inspection));
   } else {
     print_inspection(inspection);
   }

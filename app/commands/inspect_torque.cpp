@@ -11,6 +11,7 @@
 #include "app/commands/inspection.h"
 #include "app/commands/torque_inputs.h"
 #include "dynamics/data/statistics.h"
+#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
 
@@ -98,7 +99,7 @@ TorqueLogFacts look_at_torques(const InspectOptions& options) {
   try {
     const std::optional<TorqueRobot> robot = robot_of(options, facts);
     const TorqueLogReport report = look_at_torque_log(
-        {file}, robot ? wanted_joints(robot->model.tree) : std::vector<WantedJoint>{},
+        bags::read_channel_tables({file}), robot ? wanted_joints(robot->model.tree) : std::vector<WantedJoint>{},
         options.data);
     facts.rows = static_cast<int>(report.rows_read);
     facts.rows_used = static_cast<int>(report.log.rows());

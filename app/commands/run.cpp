@@ -41,7 +41,7 @@ constexpr std::string_view kFailedReport = "failed_report.html";
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   run.robot = recording.settings.name;
-  run.recording = recording_name(recording.folder);
+  run.recording = recording.name;
   run.entry = to_string(recording.entry);
   run.version = program_version();
   run.command = options.command_line;

@@ -9,6 +9,7 @@
 
 #include "app/io/products.h"
 #include "app/io/sha256.h"
+#include "kinematics/bags/bag.h"
 #include "kinematics/core/file.h"
 
 namespace kinescope {
@@ -53,7 +54,7 @@ bool is_measured(const fs::path& input) {
 // A recording that was renamed or is worked on keeps its name or one of its measured files.
 bool is_another_recording(const json& run, const Recording& recording) {
   const json name = run.value("recording", json());
-  if (!name.is_string() || name == recording_name(recording.folder)) return false;
+  if (!name.is_string() || name == recording.name) return false;
   std::set<std::string> measured;
   for (const InputFile& input : inputs_of(run)) {
     if (is_measured(input.name)) measured.insert(input.sha256);
@@ -66,7 +67,7 @@ bool is_another_recording(const json& run, const Recording& recording) {
 // The run's folder, if it may be written into.
 fs::path checked_output(const RunOptions& options, const Recording& recording) {
   const fs::path folder =
-      options.output.empty() ? fs::path(recording_name(recording.folder) + "_run") : options.output;
+      options.output.empty() ? fs::path(recording.name + "_run") : options.output;
   if (same_place(folder, recording.folder)) {
     throw bad_request(folder.string(), "is the recording's own folder",
                       "name another folder with --output, such as one inside it");
@@ -95,8 +96,11 @@ std::string describe_geometry(const std::optional<FreeGeometry>& free) {
   return "unknown";
 }
 
-// Of a file, or of the list of a folder's files with their hashes (as `sha256sum * | sha256sum`).
+// Of a file, or of the list of a folder's files with their hashes (as `sha256sum * | sha256sum`);
+// of a bag with its topic.
 std::string sha256_of_path(const fs::path& path) {
+  if (const auto bag = bags::bag_source(path); bag && !bag->topic.empty())
+    return sha256_of_text(sha256_of_path(bag->bag) + bag->topic);
   if (!fs::is_directory(path)) return sha256_of_file(path);
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(path)) {

@@ -18,6 +18,7 @@ set(kinescope_packages
     "OpenSSL COMPONENTS Crypto"
     Threads
     ZLIB
+    BZip2
     PkgConfig)
 
 # The same of kinescope::torque and the rooms below it.
@@ -58,5 +59,9 @@ macro(kinescope_find_third_parties)
   pkg_check_modules(KINESCOPE_LIBAV QUIET IMPORTED_TARGET libavformat libavcodec libavutil libswscale)
   if(NOT KINESCOPE_LIBAV_FOUND)
     list(APPEND kinescope_missing libavformat libavcodec libavutil libswscale)
+  endif()
+  pkg_check_modules(KINESCOPE_BAGS QUIET IMPORTED_TARGET libzstd liblz4 sqlite3)
+  if(NOT KINESCOPE_BAGS_FOUND)
+    list(APPEND kinescope_missing libzstd liblz4 libsqlite3)
   endif()
 endmacro()

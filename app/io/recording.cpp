@@ -10,9 +10,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/io/bag_files.h"
 #include "app/io/nearest_name.h"
 #include "app/io/recording_files.h"
 #include "calib/camera/camera_file.h"
+#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/urdf.h"
@@ -110,11 +112,11 @@ void read_log(Recording& recording, const RecordingFiles& files) {
     return;
   }
   RecordingSettings& settings = recording.settings;
-  recording.log = read_joint_log(*files.joints, settings.torque_channels);
+  recording.log = bags::read_joint_log(*files.joints, settings.torque_channels);
   recording.warnings.insert(recording.warnings.end(), recording.log.warnings.begin(),
                             recording.log.warnings.end());
   if (!settings.torque_channels.empty()) {
-    const JointLog all = read_joint_log(*files.joints);
+    const JointLog all = bags::read_joint_log(*files.joints);
     for (const std::string& name : settings.torque_channels) {
       if (name.starts_with("tau") || all.channel(name)) continue;
       throw bad_input(value_of(files.settings).string(),
@@ -408,15 +410,19 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
 }
 
 std::string recording_name(const fs::path& folder) {
-  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const auto bag = bags::bag_source(folder);
+  const fs::path whole = fs::absolute(bag ? bag->bag : folder).lexically_normal();
   const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  return name.empty() ? "robot" : name.string();
+  if (name.empty()) return "robot";
+  return bag && !fs::is_directory(bag->bag) ? name.stem().string() : name.string();
 }
 
 ReadAttempt try_read_recording(const RecordingPaths& paths) {
   ReadAttempt attempt;
   Recording& recording = attempt.recording;
   recording.folder = paths.folder;
+  recording.name = recording_name(paths.folder);
+  recording.settings.name = recording.name;
   const auto step = [&](const auto& read) {
     try {
       read();
@@ -427,18 +433,21 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
   RecordingFiles files;
   step([&] { files = find_recording_files(paths); });
   if (!attempt.errors.empty()) return attempt;
+  recording.folder = files.folder;
   recording.entry = files.entry;
   recording.warnings = files.warnings;
   recording.files = files.all();
   step([&] {
     if (files.settings) recording.settings = read_recording_settings(*files.settings);
   });
-  if (recording.settings.name.empty()) recording.settings.name = recording_name(paths.folder);
+  if (recording.settings.name.empty()) recording.settings.name = recording.name;
   step([&] { read_markers(recording, files); });
   step([&] { check_fixed_tags(recording, files); });
   step([&] {
     if (!files.camera) return;
-    recording.camera = read_camera(*files.camera);
+    const auto bag = bags::bag_source(*files.camera);
+    recording.camera = bag ? camera_of_bag(*bag) : read_camera(*files.camera);
+    if (!recording.camera) return;
     recording.camera_file = *files.camera;
     warn_of_pixels(*recording.camera, *files.camera, recording.warnings);
   });

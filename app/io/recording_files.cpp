@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "kinematics/bags/bag.h"
+#include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -42,8 +44,9 @@ void check_folder(const fs::path& folder) {
   if (!fs::exists(folder, error))
     throw bad_input(folder.string(), "no such folder", "check the path");
   if (fs::is_directory(folder, error)) return;
-  throw bad_input(folder.string(), "is a file, not a recording's folder",
-                  "name the folder that holds the video, tags.yaml and joints.csv");
+  throw bad_input(folder.string(), "is a file, neither a recording's folder nor a bag",
+                  "name the folder that holds the video, tags.yaml and joints.csv, or a .mcap, .db3 "
+                  "or .bag file");
 }
 
 /// Something of a file's name that cannot be read as one is not the same as nothing.
@@ -88,7 +91,8 @@ MaybePath find_file(const MaybePath& declared, const fs::path& folder, const cha
                     const char* option) {
   std::error_code error;
   if (declared) {
-    if (fs::exists(*declared, error)) return declared;
+    const auto bag = bags::bag_source(*declared);
+    if (fs::exists(bag ? bag->bag : *declared, error)) return declared;
     throw bad_input(declared->string(), "no such file", fmt::format("correct {}", option));
   }
   if (fs::is_regular_file(folder / name, error)) return folder / name;
@@ -128,8 +132,64 @@ RecordingEntry choose_entry(const RecordingPaths& paths, RecordingFiles& files) 
     }
   }
   if (entry) return *entry;
-  throw bad_input(paths.folder.string(), "holds no video, corners.csv, poses.csv or points.csv",
+  throw bad_input(paths.folder.string(),
+                  "holds no video, bag, corners.csv, poses.csv or points.csv",
                   "add one of them, or name it with --video, --corners, --poses or --points");
+}
+
+/// The only bag of a folder, a file or a folder of ROS 2. Throws where there are several.
+MaybePath bag_in(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (bags::is_bag(entry.path())) found.push_back(entry.path());
+  std::ranges::sort(found);
+  if (found.empty()) return std::nullopt;
+  if (found.size() == 1) return found.front();
+  std::vector<std::string> names;
+  for (const fs::path& path : found) names.push_back(path.filename().string());
+  throw bad_input(folder.string(), fmt::format("holds several bags: {}", fmt::join(names, ", ")),
+                  "name one in place of the folder");
+}
+
+fs::path with_topic(const fs::path& bag, const std::string& topic) {
+  return bag.string() + ":" + topic;
+}
+
+/// What a bag gives in place of files that are not there: images, else corners; joints; a camera.
+void take_from_bag(const bags::Source& source, RecordingFiles& files) {
+  const bags::Contents& contents = bags::look_into(source.bag);
+  const auto is_named = [&](const auto& series) { return series.topic == source.topic; };
+  const auto topic_for = [&](const auto& all) {
+    return std::ranges::any_of(all, is_named) ? source.topic : std::string();
+  };
+  const bool known = source.topic.empty() || std::ranges::any_of(contents.images, is_named) ||
+                     std::ranges::any_of(contents.detections, is_named) ||
+                     std::ranges::any_of(contents.joints, is_named);
+  const bool seen = files.video || files.corners || files.poses || files.points;
+  if (!seen && (!contents.detections.empty() && contents.images.empty())) {
+    files.corners = with_topic(
+        source.bag, bags::choose_detections(contents, topic_for(contents.detections)).topic);
+  } else if (!seen || !known) {
+    const std::string topic = known ? topic_for(contents.images) : source.topic;
+    files.video = with_topic(source.bag, bags::choose_images(contents, topic).topic);
+  }
+  if (!files.joints && !contents.joints.empty()) {
+    files.joints =
+        with_topic(source.bag, bags::choose_joints(contents, topic_for(contents.joints)).topic);
+  }
+  const MaybePath& images = files.video ? files.video : files.corners;
+  const auto shown = images ? bags::bag_source(*images) : std::nullopt;
+  if (!files.camera && shown && bags::camera_of(contents, shown->topic)) files.camera = images;
+}
+
+/// Beside a bag that is a file stand the recording's other files.
+fs::path folder_of(const fs::path& given, const std::optional<bags::Source>& bag) {
+  if (!bag) return given;
+  std::error_code error;
+  if (fs::is_directory(bag->bag, error)) return bag->bag;
+  const fs::path parent = bag->bag.parent_path();
+  return parent.empty() ? fs::path(".") : parent;
 }
 
 }  // namespace
@@ -141,34 +201,53 @@ std::vector<fs::path> RecordingFiles::all() const {
   for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
     if (!*file) continue;
     std::error_code error;
-    if (!fs::is_directory(**file, error)) {
+    if (const auto bag = bags::bag_source(**file)) {
+      for (const fs::path& part : bags::files_of(bag->bag)) out.push_back(part);
+    } else if (fs::is_directory(**file, error)) {
+      for (const fs::path& image : sorted_files(**file)) out.push_back(image);
+    } else {
       out.push_back(**file);
-      continue;
     }
-    for (const fs::path& image : sorted_files(**file)) out.push_back(image);
   }
   std::ranges::sort(out);
+  const auto again = std::ranges::unique(out);  // a bag holds several of them
+  out.erase(again.begin(), again.end());
   return out;
 }
 
 RecordingFiles find_recording_files(const RecordingPaths& paths) {
-  const fs::path& folder = paths.folder;
+  std::optional<bags::Source> bag = bags::bag_source(paths.folder);
+  const bool bag_alone = bag.has_value();
+  if (bag && !fs::exists(bag->bag))
+    throw bad_input(bag->bag.string(), "no such file", "check the path");
+  const fs::path folder = folder_of(paths.folder, bag);
   check_folder(folder);
   RecordingFiles files;
+  files.folder = folder;
   const bool seen_otherwise = paths.corners || paths.poses || paths.points;
   if (paths.video) {
     files.video = find_file(paths.video, folder, "", "--video");
-  } else if (!seen_otherwise) {
+  } else if (!seen_otherwise && !bag_alone) {
     files.video = find_video(folder);
   }
-  files.joints = find_file(paths.joints, folder, "joints.csv", "--joints");
+  // Of the files beside a bag those that it does not hold itself.
+  const auto find = [&](const MaybePath& declared, const char* name, const char* option) {
+    if (bag_alone && !declared) return MaybePath();
+    return find_file(declared, folder, name, option);
+  };
+  files.joints = find(paths.joints, "joints.csv", "--joints");
   files.camera = find_file(paths.camera, folder, "camera.yaml", "--camera");
   files.tags = find_file(paths.tags, folder, "tags.yaml", "--tags");
   files.settings = find_file(std::nullopt, folder, "recording.yaml", "");
-  files.corners = find_file(paths.corners, folder, "corners.csv", "--corners");
-  files.poses = find_file(paths.poses, folder, "poses.csv", "--poses");
-  files.points = find_file(paths.points, folder, "points.csv", "--points");
+  files.corners = find(paths.corners, "corners.csv", "--corners");
+  files.poses = find(paths.poses, "poses.csv", "--poses");
+  files.points = find(paths.points, "points.csv", "--points");
   files.nominal = find_file(paths.nominal, folder, "nominal.urdf", "--nominal");
+  const bool seen = files.video || files.corners || files.poses || files.points;
+  if (!bag && !seen) {
+    if (const MaybePath alone = bag_in(folder)) bag = bags::Source{*alone, {}};
+  }
+  if (bag) take_from_bag(*bag, files);
   files.entry = choose_entry(paths, files);
   return files;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which files a recording consists of. Nothing is opened here.
+// Which files a recording consists of. Only bags are opened here.
 #pragma once
 
 #include <filesystem>
@@ -13,12 +13,13 @@
 namespace kinescope {
 
 struct RecordingFiles {
+  std::filesystem::path folder;  ///< the recording's, or that of its bag
   RecordingEntry entry = RecordingEntry::kVideo;
   std::optional<std::filesystem::path> video, joints, camera, tags, settings, corners, poses,
       points, nominal;
   std::vector<std::string> warnings;  ///< files that are there and not used
 
-  /// All of them, sorted; a folder of images as its files.
+  /// All of them, sorted; a folder of images or of a bag as its files.
   [[nodiscard]] std::vector<std::filesystem::path> all() const;
 };
 

@@ -8,7 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "app/io/bag_files.h"
 #include "app/io/recording.h"
+#include "kinematics/bags/bag.h"
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
@@ -315,7 +317,8 @@ void append(std::vector<std::string>& warnings, const BadRows& bad) {
 }  // namespace
 
 TagObservations read_corners(const std::filesystem::path& path, const MarkerSet& markers) {
-  const CsvTable table = read_sighting_table(path);
+  const auto bag = bags::bag_source(path);
+  const CsvTable table = bag ? corners_of_bag(*bag, markers.family) : read_sighting_table(path);
   for (const char* name : {"corner", "u", "v"}) static_cast<void>(table.require_column(name));
   BadRows bad_rows(table);
   const std::vector<KeyedRow> keys = read_keys(table, "tag", bad_rows);

@@ -106,10 +106,7 @@ bool is_opencv_yaml(const std::string& text) {
   return text.starts_with("%YAML:") || text.find("!!opencv-matrix") != std::string::npos;
 }
 
-CameraModel read_any_format(const std::filesystem::path& path) {
-  constexpr std::uintmax_t kLargest = 1U << 24U;
-  const std::string text = read_text_file(path, kLargest);
-  const Source source{path.string()};
+CameraModel parse_any_format(const std::string& text, const Source& source) {
   const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
   if (first == std::string::npos)
     throw bad_input(source.file, "is empty", std::string(kKnownFiles));
@@ -133,7 +130,12 @@ CameraModel read_any_format(const std::filesystem::path& path) {
 }  // namespace
 
 CameraModel read_camera(const std::filesystem::path& path) {
-  return require_plausible(read_any_format(path), path.string());
+  constexpr std::uintmax_t kLargest = 1U << 24U;
+  return parse_camera(read_text_file(path, kLargest), path.string());
+}
+
+CameraModel parse_camera(const std::string& text, const std::string& source) {
+  return require_plausible(parse_any_format(text, Source{source}), source);
 }
 
 CameraModel with_image_size(CameraModel camera, int width, int height, const std::string& source) {

@@ -18,6 +18,9 @@ namespace kinescope {
 /// found.
 [[nodiscard]] CameraModel read_camera(const std::filesystem::path& path);
 
+/// The same from text; `source` stands for the file in messages.
+[[nodiscard]] CameraModel parse_camera(const std::string& text, const std::string& source);
+
 /// Throws bad_input when the image size differs from the camera's; a camera without a size takes
 /// this one.
 [[nodiscard]] CameraModel with_image_size(CameraModel camera, int width, int height,

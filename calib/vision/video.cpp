@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/video.h"
 
+#include "calib/vision/bag_video.h"
 #include "calib/vision/image_folder.h"
 #include "calib/vision/video_file.h"
 #include "kinematics/core/error.h"
@@ -8,6 +9,7 @@
 namespace kinescope {
 
 std::unique_ptr<VideoReader> open_video(const std::filesystem::path& path) {
+  if (const auto bag = bags::bag_source(path)) return open_bag_video(*bag);
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) {

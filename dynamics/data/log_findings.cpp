@@ -65,6 +65,8 @@ std::string_view to_string(LogFault fault) {
       return "repeated_path";
     case kTooShort:
       return "too_short";
+    case kReading:
+      return "reading";
   }
   return "unknown";
 }

@@ -36,7 +36,8 @@ enum class LogFault {
   kCommanded,         ///< the torque is the controller's command, no measurement
   kAssignment,        ///< how columns were taken for joints
   kRepeatedPath,      ///< two trajectories follow one path
-  kTooShort           ///< a trajectory too short to filter; left out
+  kTooShort,          ///< a trajectory too short to filter; left out
+  kReading            ///< what the reader of the file left out
 };
 
 /// The name in reports and JSON, such as "stale_rows".

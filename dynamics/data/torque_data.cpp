@@ -50,15 +50,33 @@ std::vector<LogFinding> look_at_rest(const ChannelTable& table, const TorqueLog&
   return findings;
 }
 
+std::vector<LogFinding> said_by_reader(const ChannelTable& table) {
+  std::vector<LogFinding> findings;
+  for (const std::string& warning : table.warnings) {
+    const std::size_t colon = warning.find(": ");  // "file: what"
+    const std::size_t what = colon == std::string::npos ? 0 : colon + 2;
+    findings.push_back({LogFault::kReading, FaultWeight::kWarning, "", 0.0, 0.0,
+                        what == 0 ? table.source : warning.substr(0, colon), warning.substr(what),
+                        "the rest is used"});
+  }
+  return findings;
+}
+
+std::vector<ChannelTable> read_tables(const std::vector<std::filesystem::path>& files) {
+  std::vector<ChannelTable> tables;
+  for (const std::filesystem::path& file : files) tables.push_back(read_channel_table(file));
+  return tables;
+}
+
 /// Which fault: sampling faults are the same for every file, so files are checked together.
-TorqueLogReport read_and_check(const std::vector<std::filesystem::path>& files,
+TorqueLogReport read_and_check(const std::vector<ChannelTable>& tables,
                                const std::vector<WantedJoint>& joints,
                                const TorqueDataOptions& options, bool torque_required) {
-  if (files.empty()) throw bad_request("dynamics", "no torque log is named", "name one or more");
+  if (tables.empty()) throw bad_request("dynamics", "no torque log is named", "name one or more");
   TorqueLogReport out;
   std::vector<TorqueLog> logs;
-  for (const std::filesystem::path& file : files) {
-    const ChannelTable table = read_channel_table(file);
+  for (const ChannelTable& table : tables) {
+    append(out.findings, said_by_reader(table));
     ReadTorqueLog read = to_torque_log(table, options.mapping, joints, torque_required);
     append(out.findings, read.findings);
     append(out.findings, look_at_rest(table, read.log));
@@ -84,24 +102,42 @@ std::vector<WantedJoint> wanted_joints(const KinematicTree& tree) {
   return out;
 }
 
+TorqueLogReport look_at_torque_log(const std::vector<ChannelTable>& tables,
+                                   const std::vector<WantedJoint>& joints,
+                                   const TorqueDataOptions& options) {
+  return read_and_check(tables, joints, options, false);
+}
+
+TorqueLogReport read_checked_log(const std::vector<ChannelTable>& tables,
+                                 const std::vector<WantedJoint>& joints,
+                                 const TorqueDataOptions& options) {
+  TorqueLogReport report = read_and_check(tables, joints, options, true);
+  throw_refusals(report.findings);
+  return report;
+}
+
+TorqueData read_torque_data(const std::vector<ChannelTable>& tables,
+                            const std::vector<WantedJoint>& joints,
+                            const TorqueDataOptions& options) {
+  return filtered_data(read_checked_log(tables, joints, options), options.motion);
+}
+
 TorqueLogReport look_at_torque_log(const std::vector<std::filesystem::path>& files,
                                    const std::vector<WantedJoint>& joints,
                                    const TorqueDataOptions& options) {
-  return read_and_check(files, joints, options, false);
+  return look_at_torque_log(read_tables(files), joints, options);
 }
 
 TorqueLogReport read_checked_log(const std::vector<std::filesystem::path>& files,
                                  const std::vector<WantedJoint>& joints,
                                  const TorqueDataOptions& options) {
-  TorqueLogReport report = read_and_check(files, joints, options, true);
-  throw_refusals(report.findings);
-  return report;
+  return read_checked_log(read_tables(files), joints, options);
 }
 
 TorqueData read_torque_data(const std::vector<std::filesystem::path>& files,
                             const std::vector<WantedJoint>& joints,
                             const TorqueDataOptions& options) {
-  return filtered_data(read_checked_log(files, joints, options), options.motion);
+  return read_torque_data(read_tables(files), joints, options);
 }
 
 TorqueData filtered_data(const TorqueLogReport& report, const MotionOptions& options) {

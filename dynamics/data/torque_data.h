@@ -19,6 +19,7 @@
 #include "dynamics/data/motion.h"
 #include "dynamics/data/torque_log.h"
 #include "dynamics/data/torque_samples.h"
+#include "kinematics/log/channel_table.h"
 #include "kinematics/model/kinematic_tree.h"
 
 namespace kinescope {
@@ -66,6 +67,17 @@ struct TorqueLogReport {
 
 /// The same checks without throwing refusals: for looking at a log. Torques may be missing.
 [[nodiscard]] TorqueLogReport look_at_torque_log(const std::vector<std::filesystem::path>& files,
+                                                 const std::vector<WantedJoint>& joints,
+                                                 const TorqueDataOptions& options = {});
+
+/// All three from tables that somebody else has read (kinematics/bags); their warnings are findings.
+[[nodiscard]] TorqueData read_torque_data(const std::vector<ChannelTable>& tables,
+                                          const std::vector<WantedJoint>& joints,
+                                          const TorqueDataOptions& options = {});
+[[nodiscard]] TorqueLogReport read_checked_log(const std::vector<ChannelTable>& tables,
+                                               const std::vector<WantedJoint>& joints,
+                                               const TorqueDataOptions& options = {});
+[[nodiscard]] TorqueLogReport look_at_torque_log(const std::vector<ChannelTable>& tables,
                                                  const std::vector<WantedJoint>& joints,
                                                  const TorqueDataOptions& options = {});
 

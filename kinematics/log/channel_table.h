@@ -27,6 +27,7 @@ struct ChannelTable {
   std::map<std::string, std::vector<std::string>> labels;  ///< the columns of words
   std::size_t header_line = 1;                             ///< line in the file, from 1
   std::vector<std::size_t> lines;                          ///< line in the file of each row, from 1
+  std::vector<std::string> warnings = {};                  ///< of who read it, one line each
 
   [[nodiscard]] Eigen::Index rows() const { return values.rows(); }
   /// The column of that name, else the one whose name with a unit in brackets it is.

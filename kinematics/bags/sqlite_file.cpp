@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include "kinematics/bags/bag_files.h"
+#include "kinematics/bags/unpack.h"
+#include "kinematics/core/error.h"
+
+namespace kinescope::bags {
+namespace {
+
+struct CloseSqlite {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+
+std::string_view bytes_of(sqlite3_stmt* row, int column) {
+  const void* data = sqlite3_column_blob(row, column);
+  const int size = sqlite3_column_bytes(row, column);
+  if (data == nullptr || size <= 0) return {};
+  return {static_cast<const char*>(data), static_cast<std::size_t>(size)};
+}
+
+class SqliteFile final : public Reader {
+ public:
+  SqliteFile(const std::filesystem::path& path, RowPacking packing)
+      : name_(path.string()), packing_(packing) {
+    static_cast<void>(InputFile(path));  // missing, empty, may not be read
+    sqlite3* opened = nullptr;
+    const int status = sqlite3_open_v2(name_.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
+    database_.reset(opened);
+    if (status != SQLITE_OK) refuse();
+    // A schema from elsewhere must not run anything.
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+    read_topics();
+    messages_ =
+        prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, messages.id");
+  }
+
+  const std::vector<Topic>& topics() const override { return table_.topics(); }
+  const std::vector<std::string>& warnings() const override { return warnings_; }
+
+  std::optional<Message> next() override {
+    while (messages_) {
+      const int status = sqlite3_step(messages_.get());
+      if (status != SQLITE_ROW) {
+        if (status != SQLITE_DONE) {
+          warnings_.push_back(fmt::format("{}: the file is damaged ({}): what stands before is read",
+                                          name_, sqlite3_errmsg(database_.get())));
+        }
+        messages_.reset();
+        break;
+      }
+      const auto number = static_cast<std::uint32_t>(sqlite3_column_int64(messages_.get(), 0));
+      const auto topic = table_.index_of(number);
+      if (!topic) continue;
+      const std::int64_t received_ns = sqlite3_column_int64(messages_.get(), 1);
+      const std::string_view data = bytes_of(messages_.get(), 2);
+      if (packing_ == RowPacking::kNone) return Message{*topic, received_ns, data};
+      Unpacked unpacked = unpack(Packing::kZstd, data);
+      if (!unpacked.whole) {
+        ++damaged_;
+        if (damaged_ == 1) {
+          warnings_.push_back(fmt::format(
+              "{}: messages that cannot be unpacked are left out, the first of {}", name_,
+              table_.topics()[*topic].name));
+        }
+        continue;
+      }
+      unpacked_ = std::move(unpacked.bytes);
+      return Message{*topic, received_ns, unpacked_};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  using Statement = std::unique_ptr<sqlite3_stmt, CloseSqlite>;
+
+  [[noreturn]] void refuse() const {
+    throw bad_input(name_,
+                    fmt::format("is no bag of ROS 2 in sqlite3 ({})",
+                                database_ ? sqlite3_errmsg(database_.get()) : "no memory"),
+                    "check what it is, or copy it again");
+  }
+
+  Statement prepare(const char* query) {
+    sqlite3_stmt* made = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), query, -1, &made, nullptr) != SQLITE_OK) refuse();
+    return Statement(made);
+  }
+
+  void read_topics() {
+    const Statement rows =
+        prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
+    int status = sqlite3_step(rows.get());
+    for (; status == SQLITE_ROW; status = sqlite3_step(rows.get())) {
+      const auto text = [&](int column) { return std::string(bytes_of(rows.get(), column)); };
+      const std::string encoding = text(3);
+      table_.add(static_cast<std::uint32_t>(sqlite3_column_int64(rows.get(), 0)),
+                 {text(1), plain_type(text(2)), encoding, encoding_of(encoding)});
+    }
+    if (status != SQLITE_DONE) refuse();
+  }
+
+  std::string name_;
+  RowPacking packing_;
+  std::unique_ptr<sqlite3, CloseSqlite> database_;
+  Statement messages_;
+  TopicTable table_;
+  std::string unpacked_;
+  int damaged_ = 0;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> open_sqlite(const std::filesystem::path& file, RowPacking packing) {
+  return std::make_unique<SqliteFile>(file, packing);
+}
+
+}  // namespace kinescope::bags
