@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calib/vision/packet_decoder.h"
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -24,15 +25,16 @@ using bags::MessageFault;
 struct Encoding {
   const char* name;
   int type;        ///< of OpenCV
-  int conversion;  ///< of cv::cvtColor; kNone: it is grey
+  int conversion;  ///< of cv::cvtColor, or one of these
 };
-constexpr int kNone = -1;
+constexpr int kIsGrey = -1;
+constexpr int kUpperByte = -2;  ///< sensors of 10 or 12 bits are published shifted up
 
 // OpenCV names a Bayer pattern by its second row, ROS by its first.
 constexpr std::array kEncodings = {
-    Encoding{"mono8", CV_8UC1, kNone},
-    Encoding{"8UC1", CV_8UC1, kNone},
-    Encoding{"mono16", CV_16UC1, kNone},
+    Encoding{"mono8", CV_8UC1, kIsGrey},
+    Encoding{"8UC1", CV_8UC1, kIsGrey},
+    Encoding{"mono16", CV_8UC2, kUpperByte},
     Encoding{"rgb8", CV_8UC3, cv::COLOR_RGB2GRAY},
     Encoding{"bgr8", CV_8UC3, cv::COLOR_BGR2GRAY},
     Encoding{"8UC3", CV_8UC3, cv::COLOR_BGR2GRAY},
@@ -76,17 +78,13 @@ GreyImage grey_of(const bags::Image& image, const Encoding& encoding) {
   const cv::Mat pixels(static_cast<int>(image.height), static_cast<int>(image.width), encoding.type,
                        const_cast<char*>(image.pixels.data()),  // NOLINT(*-const-cast): read only
                        image.step);
-  if (encoding.type == CV_16UC1) {
-    // The upper byte; sensors of 10 or 12 bits are published shifted up.
-    cv::Mat high;
-    cv::extractChannel(
-        cv::Mat(pixels.rows, pixels.cols, CV_8UC2, pixels.data, image.step),  // low, high
-        high, image.big_endian ? 0 : 1);
-    return copy_of(high);
-  }
-  if (encoding.conversion == kNone) return copy_of(pixels);
+  if (encoding.conversion == kIsGrey) return copy_of(pixels);
   cv::Mat grey;
-  cv::cvtColor(pixels, grey, encoding.conversion);
+  if (encoding.conversion == kUpperByte) {
+    cv::extractChannel(pixels, grey, image.big_endian ? 0 : 1);
+  } else {
+    cv::cvtColor(pixels, grey, encoding.conversion);
+  }
   return copy_of(grey);
 }
 
@@ -137,10 +135,7 @@ class BagVideoReader final : public VideoReader {
 
  private:
   void require_known_encoding() {
-    if (series_.type == bags::kCompressedVideoType) {
-      throw bad_input(name_, fmt::format("a stream of {}", series_.encoding),
-                      "raw images, JPEG and PNG are read: record sensor_msgs/CompressedImage");
-    }
+    if (series_.type == bags::kCompressedVideoType) stream_.emplace(series_.encoding, name_);
     if (series_.type != bags::kImageType) return;
     encoding_ = find_encoding(series_.encoding);
     if (encoding_ != nullptr) return;
@@ -155,38 +150,73 @@ class BagVideoReader final : public VideoReader {
     if (encoding_ == nullptr || image.encoding != encoding_->name)
       encoding_ = find_encoding(image.encoding);
     if (encoding_ == nullptr) throw MessageFault{};
-    return grey_of(image, *encoding_);
+    try {
+      return grey_of(image, *encoding_);
+    } catch (const cv::Exception&) {  // a Bayer pattern or YUV of an odd or tiny size
+      throw MessageFault{};
+    }
   }
 
-  /// The next image with a stamp after its predecessor's.
-  std::optional<VideoFrame> decode_next() {
+  /// The next message that has a time in the series.
+  std::optional<bags::Message> next_message() {
     while (const auto message = bag_->next()) {
       const bags::Topic& topic = bag_->topics()[message->topic];
       if (topic.name != series_.topic || topic.type != series_.type) continue;
       try {
         static_cast<void>(bags::image_stamp_ns(topic, message->data));
+        return message;
       } catch (const MessageFault&) {
-        continue;  // has no time in the series
-      }
-      const double time_s = series_.times_s[read_++];
-      if (index_ > 0 && !(time_s > last_s_)) {
-        ++unordered_;
         continue;
       }
+    }
+    return std::nullopt;
+  }
+
+  /// The next picture, and the number of its message.
+  std::optional<DecodedPicture> next_picture() {
+    while (true) {
+      if (stream_) {
+        if (auto picture = stream_->next()) return picture;
+      }
+      const auto message = next_message();
+      if (!message) {
+        if (!stream_ || drained_) return std::nullopt;
+        drained_ = true;
+        stream_->finish();
+        continue;
+      }
+      const std::size_t number = read_++;
+      const bags::Topic& topic = bag_->topics()[message->topic];
       try {
-        GreyImage image = decode(*message, topic);
-        if (info_.width > 0 && (image.width != info_.width || image.height != info_.height)) {
-          warnings_.push_back(fmt::format(
-              "{}: the picture changes its size at {:.3f} s; reading stops", name_, time_s));
-          return std::nullopt;
-        }
-        if (index_ > 0) steps_.push_back(time_s - last_s_);
-        last_s_ = time_s;
-        return VideoFrame{index_++, time_s, std::move(image)};
+        if (!stream_) return DecodedPicture{number, decode(*message, topic)};
+        stream_->feed(number, bags::read_compressed_video(message->data, topic.encoding).data);
       } catch (const MessageFault&) {
         ++damaged_;
       }
     }
+  }
+
+  /// The next image with a stamp after its predecessor's.
+  std::optional<VideoFrame> decode_next() {
+    while (auto picture = next_picture()) {
+      if (picture->number >= series_.times_s.size()) continue;
+      const double time_s = series_.times_s[picture->number];
+      ++decoded_;
+      if (index_ > 0 && !(time_s > last_s_)) {
+        ++unordered_;
+        continue;
+      }
+      const GreyImage& image = picture->image;
+      if (info_.width > 0 && (image.width != info_.width || image.height != info_.height)) {
+        warnings_.push_back(fmt::format("{}: the picture changes its size at {:.3f} s; reading stops",
+                                        name_, time_s));
+        return std::nullopt;
+      }
+      if (index_ > 0) steps_.push_back(time_s - last_s_);
+      last_s_ = time_s;
+      return VideoFrame{index_++, time_s, std::move(picture->image)};
+    }
+    if (stream_) damaged_ = static_cast<int>(read_) - decoded_;
     return std::nullopt;
   }
 
@@ -216,7 +246,10 @@ class BagVideoReader final : public VideoReader {
   std::string name_;
   std::unique_ptr<bags::Reader> bag_;
   const Encoding* encoding_ = nullptr;
+  std::optional<PacketDecoder> stream_;  // of H.264 and its like
+  bool drained_ = false;
   std::size_t read_ = 0;  // messages of the series
+  int decoded_ = 0;
   int index_ = 0;
   double last_s_ = 0.0;
   bool finished_ = false;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Images of a bag as a video: raw (mono, rgb, bgr, Bayer, YUV 4:2:2, 16 bits) or packed as JPEG or PNG. Times are
-// those of bags::look_into().
+// Images of a bag as a video: raw (mono, rgb, bgr, Bayer, YUV 4:2:2, 16 bits), packed as JPEG or
+// PNG, or a stream of H.264 and its like. Times are those of bags::look_into().
 #pragma once
 
 #include <memory>

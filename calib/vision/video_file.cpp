@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -12,27 +11,16 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
-#include <libavutil/pixdesc.h>
-#include <libswscale/swscale.h>
 }
 
 #include <fmt/format.h>
 
+#include "calib/vision/av_frame.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
-
-struct FreeAv {
-  void operator()(AVFormatContext* p) const { avformat_close_input(&p); }
-  void operator()(AVCodecContext* p) const { avcodec_free_context(&p); }
-  void operator()(AVPacket* p) const { av_packet_free(&p); }
-  void operator()(AVFrame* p) const { av_frame_free(&p); }
-  void operator()(SwsContext* p) const { sws_freeContext(p); }
-};
-template <typename T>
-using Av = std::unique_ptr<T, FreeAv>;
 
 // FFmpeg 6.1 moved these.
 const std::int32_t* display_matrix(const AVStream& stream) {
@@ -55,29 +43,7 @@ bool is_key(const AVFrame& frame) {
 #endif
 }
 
-// The first plane holds 8-bit brightness, one byte a pixel.
-bool has_luma_plane(AVPixelFormat format) {
-  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(format);
-  if (d == nullptr) return false;
-  constexpr std::uint64_t kOther = AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL |
-                                   AV_PIX_FMT_FLAG_BITSTREAM | AV_PIX_FMT_FLAG_HWACCEL |
-                                   AV_PIX_FMT_FLAG_BAYER;
-  return (d->flags & kOther) == 0 && d->comp[0].depth == 8 && d->comp[0].step == 1 &&
-         d->comp[0].plane == 0 && d->comp[0].offset == 0;
-}
-
 constexpr double kLeastTicks = 4.0;  // a frame, for its stamp's rounding to be seen as such
-
-GreyImage copy_plane(const std::uint8_t* data, int stride, int width, int height) {
-  GreyImage grey{width, height, {}};
-  const std::size_t row_bytes = static_cast<std::size_t>(width);
-  grey.pixels.resize(row_bytes * static_cast<std::size_t>(height));
-  for (int row = 0; row < height; ++row) {
-    std::memcpy(grey.pixels.data() + row_bytes * static_cast<std::size_t>(row),
-                data + static_cast<std::ptrdiff_t>(stride) * row, row_bytes);
-  }
-  return grey;
-}
 
 // Turns by quarter turns, counterclockwise as the display matrix counts.
 GreyImage turned(GreyImage in, int quarters) {
@@ -307,28 +273,7 @@ class VideoFileReader final : public VideoReader {
     return std::abs(time - even) <= tick ? even : time;
   }
 
-  GreyImage grey() {
-    const auto format = static_cast<AVPixelFormat>(frame_->format);
-    if (has_luma_plane(format)) {
-      return turned(copy_plane(frame_->data[0], frame_->linesize[0], frame_->width, frame_->height),
-                    quarters_);
-    }
-    scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height, format,
-                                       frame_->width, frame_->height, AV_PIX_FMT_GRAY8, SWS_POINT,
-                                       nullptr, nullptr, nullptr));
-    if (!scaler_) {
-      throw bad_input(path_, "the video's pixel format cannot be turned to grey",
-                      "convert the video to H.264 with 4:2:0 colour");
-    }
-    Av<AVFrame> out(av_frame_alloc());
-    out->width = frame_->width;
-    out->height = frame_->height;
-    out->format = AV_PIX_FMT_GRAY8;
-    KINESCOPE_CHECK(av_frame_get_buffer(out.get(), 0) == 0, "no memory for a frame");
-    sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, frame_->height, out->data,
-              out->linesize);
-    return turned(copy_plane(out->data[0], out->linesize[0], out->width, out->height), quarters_);
-  }
+  GreyImage grey() { return turned(grey_of(*frame_, scaler_, path_), quarters_); }
 
   double median_step() const { return median_of(steps_); }
 

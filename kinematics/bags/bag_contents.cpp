@@ -262,9 +262,7 @@ std::int64_t image_stamp_ns(const Topic& topic, std::string_view data) {
   return read_compressed_image(data, topic.encoding).stamp_ns;
 }
 
-namespace {
-
-Contents read_whole(const std::filesystem::path& bag) {
+Contents read_contents(const std::filesystem::path& bag) {
   const std::unique_ptr<Reader> reader = open(bag);
   Contents out;
   out.source = bag.string();
@@ -287,6 +285,8 @@ Contents read_whole(const std::filesystem::path& bag) {
   return out;
 }
 
+namespace {
+
 /// Changes with the files.
 std::string key_of(const std::filesystem::path& bag) {
   std::string key = bag.string();
@@ -303,7 +303,7 @@ std::string key_of(const std::filesystem::path& bag) {
 
 const Contents& look_into(const std::filesystem::path& bag) {
   static const Memo<std::string, Contents> read;  // a bag is asked for joints, camera and images
-  return read.get(key_of(bag), [&] { return read_whole(bag); });
+  return read.get(key_of(bag), [&] { return read_contents(bag); });
 }
 
 std::vector<std::string> topic_lines(const Contents& contents) {

@@ -80,7 +80,9 @@ struct Contents {
   std::vector<std::string> warnings;
 };
 
-/// Reads the whole bag, the first time that it is asked for. Throws as open().
+/// Reads the whole bag. Throws as open().
+[[nodiscard]] Contents read_contents(const std::filesystem::path& bag);
+/// The same, read once for all who ask.
 [[nodiscard]] const Contents& look_into(const std::filesystem::path& bag);
 
 /// True for a type of image that can be decoded.
