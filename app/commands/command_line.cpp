@@ -69,11 +69,11 @@ void add_recording_options(CLI::App& command, RecordingPaths& paths, const char*
       ->check(refuse_empty)
       ->required()
       ->type_name(type);
-  add_path(command, "--video", paths.video, "Video file, or folder of images with times.csv");
-  add_path(command, "--joints", paths.joints, "Joint log: t in s, one column a channel");
+  add_path(command, "--video", paths.video, "Video file, folder of images with times.csv, or bag");
+  add_path(command, "--joints", paths.joints, "Joint log: t in s, one column a channel; or bag");
   add_path(command, "--camera", paths.camera, "Intrinsics (ROS camera_info, Kalibr or OpenCV)");
   add_path(command, "--tags", paths.tags, "Marker family and sizes");
-  add_path(command, "--corners", paths.corners, "Detected corners in place of a video");
+  add_path(command, "--corners", paths.corners, "Detected corners in place of a video; or bag");
   add_path(command, "--poses", paths.poses, "Marker poses in place of a video");
   add_path(command, "--points", paths.points, "3-D points in place of a video (needs --nominal)");
   add_path(command, "--nominal", paths.nominal,
@@ -131,8 +131,9 @@ void add_detection_options(CLI::App& run, DetectOptions& detect) {
 
 void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
-  add_recording_options(run, line.run.recording,
-                        "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml", "FOLDER");
+  add_recording_options(
+      run, line.run.recording,
+      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; or a bag of ROS", "PATH");
   run.add_option_function<std::string>(
          "-o,--output", [&line](const std::string& text) { line.run.output = text; },
          "Folder for the results (default: <recording>_run here)")
@@ -197,7 +198,8 @@ void add_inspect(CLI::App& app, CommandLine& line) {
       "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
   add_recording_options(
       inspect, line.inspect.recording,
-      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; or a torque log", "PATH");
+      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a torque log",
+      "PATH");
   add_inspect_log_options(inspect, line);
   add_output_options(inspect, line.output);
   inspect.footer(

@@ -27,7 +27,8 @@ constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
 
 TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel& model,
                          const TorqueDataOptions& options) {
-  TorqueLogReport log = look_at_torque_log(bags::read_channel_tables(files), wanted_joints(model.tree), options);
+  TorqueLogReport log =
+      look_at_torque_log(bags::read_channel_tables(files), wanted_joints(model.tree), options);
   throw_refusals(log.findings);
   if (log.log.torque.cols() == 0) {
     throw bad_input(files.front().string(), "has no torque columns",

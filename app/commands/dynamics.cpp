@@ -335,8 +335,8 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
       hashed_inputs({options.logs, options.test_logs, options.unloaded_logs, {options.robot}});
   summary.joints = robot.joints;
   summary.types = robot.types;
-  const TorqueLogReport log =
-      read_checked_log(bags::read_channel_tables(options.logs), wanted_joints(model.tree), options.data);
+  const TorqueLogReport log = read_checked_log(bags::read_channel_tables(options.logs),
+                                               wanted_joints(model.tree), options.data);
   if (asks_for_payload(options)) require_payload_question(options, model, log.log.torque_unit);
   summary.data = filtered_data(log, options.data.motion);
   if (options.gravity_from_torques && !options.gravity_m_s2) {

@@ -65,7 +65,8 @@ ExperimentLog read_log(const ExperimentOptions& options) {
   for (const RigidBody& body : make_rigid_model(robot.model).bodies) {
     wanted.push_back({body.joint, body.type == JointType::kPrismatic});
   }
-  TorqueData data = read_torque_data(bags::read_channel_tables({options.log}), wanted, options.data);
+  TorqueData data =
+      read_torque_data(bags::read_channel_tables({options.log}), wanted, options.data);
   put_into_place({options.log}, data.findings);
   throw_refusals(data.findings);
   for (const LogFinding& finding : data.findings) {

@@ -11,6 +11,7 @@
 #include "app/commands/inspect_bag.h"
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
+#include "kinematics/bags/bag.h"
 
 namespace kinescope {
 namespace {
@@ -28,7 +29,7 @@ std::vector<std::string> file_names(const Recording& recording) {
 }
 
 void print_video(const Recording& recording, const VideoFacts& video) {
-  fmt::print("video     {}: {} x {}, {}, {:.3f} frames/s\n", recording.video.filename().string(),
+  fmt::print("video     {}: {} x {}, {}, {:.3f} frames/s\n", bags::short_name(recording.video),
              video.info.width, video.info.height,
              video.info.codec.empty() ? "codec unknown" : video.info.codec, video.frame_rate_hz);
   const double last_s = video.times_s.empty() ? 0.0 : video.times_s.back();

@@ -58,8 +58,9 @@ double rate_hz(const bags::TopicCount& count) {
 std::string stamp_words(const bags::Stamps& stamps) {
   if (!stamps.of_header) return "without stamps of its own";
   const std::string moved =
-      stamps.moved_s == 0.0 ? ""
-                            : fmt::format(", its clock {:.3f} s from the recorder's", -stamps.moved_s);
+      stamps.moved_s == 0.0
+          ? ""
+          : fmt::format(", its clock {:.3f} s from the recorder's", -stamps.moved_s);
   return fmt::format("recorded {:.1f} ms after its stamp (scatter {:.1f} ms){}",
                      1e3 * stamps.delay_s, 1e3 * stamps.jitter_s, moved);
 }
@@ -81,8 +82,9 @@ bool shows_robot(const bags::Contents& contents) {
 void print_topics(const bags::Contents& contents) {
   for (const bags::TopicCount& count : contents.topics) {
     const TopicFacts facts = facts_of(contents, count.topic.name);
-    std::string line = fmt::format("topic     {} ({}): {} message{}", count.topic.name,
-                                   count.topic.type, count.messages, count.messages == 1 ? "" : "s");
+    std::string line =
+        fmt::format("topic     {} ({}): {} message{}", count.topic.name, count.topic.type,
+                    count.messages, count.messages == 1 ? "" : "s");
     if (const double rate = rate_hz(count); rate > 0.0) line += fmt::format(", {:.1f} Hz", rate);
     if (!facts.words.empty()) line += "; " + facts.words;
     if (facts.stamps && count.messages > 1) line += "; " + stamp_words(*facts.stamps);
@@ -93,9 +95,9 @@ void print_topics(const bags::Contents& contents) {
 nlohmann::json topics_json(const bags::Contents& contents) {
   nlohmann::json out = nlohmann::json::array();
   for (const bags::TopicCount& count : contents.topics) {
-    nlohmann::json topic = {{"name", count.topic.name},       {"type", count.topic.type},
-                            {"messages", count.messages},     {"unreadable", count.unreadable},
-                            {"rate_hz", rate_hz(count)},      {"first_s", count.first_s},
+    nlohmann::json topic = {{"name", count.topic.name},   {"type", count.topic.type},
+                            {"messages", count.messages}, {"unreadable", count.unreadable},
+                            {"rate_hz", rate_hz(count)},  {"first_s", count.first_s},
                             {"last_s", count.last_s}};
     if (const auto stamps = facts_of(contents, count.topic.name).stamps) {
       topic["stamps"] = {{"of_header", stamps->of_header},

@@ -71,7 +71,8 @@ JudgedPrediction predict(const PredictOptions& options, const TorqueModelFile& f
   data.motion.filter = filter.kind;
   data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
   JudgedPrediction out;
-  TorqueData read = read_torque_data(bags::read_channel_tables(options.logs), wanted(file.model.rigid), data);
+  TorqueData read =
+      read_torque_data(bags::read_channel_tables(options.logs), wanted(file.model.rigid), data);
   out.warnings = warnings_of(read.findings);
   out.samples = std::move(read.samples);
   if (out.samples.torque_unit != file.model.torque_unit) {

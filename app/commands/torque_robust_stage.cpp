@@ -95,7 +95,9 @@ std::optional<TorqueSamples> add_payload(const DynamicsOptions& options, const D
   if (!options.unloaded_logs.empty()) {
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;
-    unloaded = read_torque_data(bags::read_channel_tables(options.unloaded_logs), wanted_joints(model.tree), data).samples;
+    unloaded = read_torque_data(bags::read_channel_tables(options.unloaded_logs),
+                                wanted_joints(model.tree), data)
+                   .samples;
     out.against = "the log without load " + file_list(options.unloaded_logs);
     out.motion = estimate_payload(model, loaded, *unloaded, payload);
   } else {

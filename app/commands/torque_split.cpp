@@ -40,7 +40,9 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
     summary.train = summary.data.samples;
-    summary.test = read_torque_data(bags::read_channel_tables(options.test_logs), wanted_joints(model.tree), data).samples;
+    summary.test = read_torque_data(bags::read_channel_tables(options.test_logs),
+                                    wanted_joints(model.tree), data)
+                       .samples;
     summary.split = "the unseen log " + file_list(options.test_logs);
   }
   const RigidModel rigid = make_rigid_model(model);

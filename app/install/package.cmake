@@ -50,6 +50,10 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     libavcodec-dev
     libavutil-dev
     libswscale-dev
+    libzstd-dev
+    liblz4-dev
+    libbz2-dev
+    libsqlite3-dev
     pkg-config)
 list(JOIN CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION

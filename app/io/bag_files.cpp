@@ -40,8 +40,8 @@ std::string camera_text(const bags::CameraInfo& info, const std::string& image_t
   const auto binned = [](double centre, double offset, double bin) {
     return (centre - offset + 0.5) / bin - 0.5;  // centres of pixels are whole numbers
   };
-  std::string model = rectified || info.distortion_model.empty() ? "plumb_bob"
-                                                                  : info.distortion_model;
+  std::string model =
+      rectified || info.distortion_model.empty() ? "plumb_bob" : info.distortion_model;
   std::vector<double> d = rectified ? std::vector<double>{} : info.d;
   if (d.empty()) d.assign(5, 0.0);
   return fmt::format(
@@ -75,21 +75,20 @@ CsvTable corners_of_bag(const bags::Source& source, const std::string& family) {
       }
       for (std::size_t corner = 0; corner < tag.corners.size(); ++corner) {
         // The detector counts from the edge of the first pixel.
-        table.rows.push_back({fmt::format("{}", series.times_s[frame]), fmt::format("{}", tag.id),
-                              fmt::format("{}", corner),
-                              fmt::format("{}", tag.corners[corner][0] - 0.5),
-                              fmt::format("{}", tag.corners[corner][1] - 0.5),
-                              fmt::format("{}", tag.hamming),
-                              fmt::format("{}", tag.decision_margin)});
+        table.rows.push_back(
+            {fmt::format("{}", series.times_s[frame]), fmt::format("{}", tag.id),
+             fmt::format("{}", corner), fmt::format("{}", tag.corners[corner][0] - 0.5),
+             fmt::format("{}", tag.corners[corner][1] - 0.5), fmt::format("{}", tag.hamming),
+             fmt::format("{}", tag.decision_margin)});
         table.lines.push_back(frame + 1);
       }
     }
   }
   if (!table.rows.empty()) return table;
   throw bad_input(table.source,
-                  others.empty() ? std::string("no marker is seen")
-                                 : fmt::format("no marker of {}, only of {}", family,
-                                               fmt::join(others, ", ")),
+                  others.empty()
+                      ? std::string("no marker is seen")
+                      : fmt::format("no marker of {}, only of {}", family, fmt::join(others, ", ")),
                   "correct family in tags.yaml");
 }
 

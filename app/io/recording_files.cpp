@@ -44,9 +44,10 @@ void check_folder(const fs::path& folder) {
   if (!fs::exists(folder, error))
     throw bad_input(folder.string(), "no such folder", "check the path");
   if (fs::is_directory(folder, error)) return;
-  throw bad_input(folder.string(), "is a file, neither a recording's folder nor a bag",
-                  "name the folder that holds the video, tags.yaml and joints.csv, or a .mcap, .db3 "
-                  "or .bag file");
+  throw bad_input(
+      folder.string(), "is a file, neither a recording's folder nor a bag",
+      "name the folder that holds the video, tags.yaml and joints.csv, or a .mcap, .db3 "
+      "or .bag file");
 }
 
 /// Something of a file's name that cannot be read as one is not the same as nothing.
@@ -201,13 +202,9 @@ std::vector<fs::path> RecordingFiles::all() const {
   for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
     if (!*file) continue;
     std::error_code error;
-    if (const auto bag = bags::bag_source(**file)) {
-      for (const fs::path& part : bags::files_of(bag->bag)) out.push_back(part);
-    } else if (fs::is_directory(**file, error)) {
-      for (const fs::path& image : sorted_files(**file)) out.push_back(image);
-    } else {
-      out.push_back(**file);
-    }
+    const bool images = !bags::is_bag(**file) && fs::is_directory(**file, error);
+    const std::vector<fs::path> parts = images ? sorted_files(**file) : bags::parts_of(**file);
+    out.insert(out.end(), parts.begin(), parts.end());
   }
   std::ranges::sort(out);
   const auto again = std::ranges::unique(out);  // a bag holds several of them

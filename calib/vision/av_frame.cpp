@@ -41,8 +41,8 @@ GreyImage grey_of(const AVFrame& frame, Av<SwsContext>& scaler, const std::strin
   if (has_luma_plane(format))
     return copy_plane(frame.data[0], frame.linesize[0], frame.width, frame.height);
   scaler.reset(sws_getCachedContext(scaler.release(), frame.width, frame.height, format,
-                                    frame.width, frame.height, AV_PIX_FMT_GRAY8, SWS_POINT,
-                                    nullptr, nullptr, nullptr));
+                                    frame.width, frame.height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr,
+                                    nullptr, nullptr));
   if (!scaler) {
     throw bad_input(source, "the video's pixel format cannot be turned to grey",
                     "convert the video to H.264 with 4:2:0 colour");

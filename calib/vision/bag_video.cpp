@@ -31,24 +31,23 @@ constexpr int kIsGrey = -1;
 constexpr int kUpperByte = -2;  ///< sensors of 10 or 12 bits are published shifted up
 
 // OpenCV names a Bayer pattern by its second row, ROS by its first.
-constexpr std::array kEncodings = {
-    Encoding{"mono8", CV_8UC1, kIsGrey},
-    Encoding{"8UC1", CV_8UC1, kIsGrey},
-    Encoding{"mono16", CV_8UC2, kUpperByte},
-    Encoding{"rgb8", CV_8UC3, cv::COLOR_RGB2GRAY},
-    Encoding{"bgr8", CV_8UC3, cv::COLOR_BGR2GRAY},
-    Encoding{"8UC3", CV_8UC3, cv::COLOR_BGR2GRAY},
-    Encoding{"rgba8", CV_8UC4, cv::COLOR_RGBA2GRAY},
-    Encoding{"bgra8", CV_8UC4, cv::COLOR_BGRA2GRAY},
-    Encoding{"8UC4", CV_8UC4, cv::COLOR_BGRA2GRAY},
-    Encoding{"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2GRAY},
-    Encoding{"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2GRAY},
-    Encoding{"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2GRAY},
-    Encoding{"bayer_grbg8", CV_8UC1, cv::COLOR_BayerGB2GRAY},
-    Encoding{"uyvy", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY},
-    Encoding{"yuv422", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY},
-    Encoding{"yuyv", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2},
-    Encoding{"yuv422_yuy2", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2}};
+constexpr std::array kEncodings = {Encoding{"mono8", CV_8UC1, kIsGrey},
+                                   Encoding{"8UC1", CV_8UC1, kIsGrey},
+                                   Encoding{"mono16", CV_8UC2, kUpperByte},
+                                   Encoding{"rgb8", CV_8UC3, cv::COLOR_RGB2GRAY},
+                                   Encoding{"bgr8", CV_8UC3, cv::COLOR_BGR2GRAY},
+                                   Encoding{"8UC3", CV_8UC3, cv::COLOR_BGR2GRAY},
+                                   Encoding{"rgba8", CV_8UC4, cv::COLOR_RGBA2GRAY},
+                                   Encoding{"bgra8", CV_8UC4, cv::COLOR_BGRA2GRAY},
+                                   Encoding{"8UC4", CV_8UC4, cv::COLOR_BGRA2GRAY},
+                                   Encoding{"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2GRAY},
+                                   Encoding{"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2GRAY},
+                                   Encoding{"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2GRAY},
+                                   Encoding{"bayer_grbg8", CV_8UC1, cv::COLOR_BayerGB2GRAY},
+                                   Encoding{"uyvy", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY},
+                                   Encoding{"yuv422", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY},
+                                   Encoding{"yuyv", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2},
+                                   Encoding{"yuv422_yuy2", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2}};
 
 const Encoding* find_encoding(const std::string& name) {
   const auto found =
@@ -208,8 +207,8 @@ class BagVideoReader final : public VideoReader {
       }
       const GreyImage& image = picture->image;
       if (info_.width > 0 && (image.width != info_.width || image.height != info_.height)) {
-        warnings_.push_back(fmt::format("{}: the picture changes its size at {:.3f} s; reading stops",
-                                        name_, time_s));
+        warnings_.push_back(fmt::format(
+            "{}: the picture changes its size at {:.3f} s; reading stops", name_, time_s));
         return std::nullopt;
       }
       if (index_ > 0) steps_.push_back(time_s - last_s_);

@@ -11,7 +11,8 @@
 
 namespace kinescope {
 
-/// Throws bad_input as open_video() and bags::choose_images(), and for an encoding that is not read.
+/// Throws bad_input as open_video() and bags::choose_images(), and for an encoding that is not
+/// read.
 [[nodiscard]] std::unique_ptr<VideoReader> open_bag_video(const bags::Source& source);
 
 }  // namespace kinescope

@@ -68,7 +68,8 @@ void PacketDecoder::finish() { avcodec_send_packet(impl_->decoder.get(), nullptr
 std::optional<DecodedPicture> PacketDecoder::next() {
   while (avcodec_receive_frame(impl_->decoder.get(), impl_->frame.get()) == 0) {
     const AVFrame& frame = *impl_->frame;
-    const bool damaged = (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
+    const bool damaged =
+        (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
     if (damaged || frame.pts == AV_NOPTS_VALUE) continue;
     return DecodedPicture{static_cast<std::size_t>(frame.pts),
                           grey_of(frame, impl_->scaler, impl_->source)};

@@ -70,7 +70,8 @@ struct TorqueLogReport {
                                                  const std::vector<WantedJoint>& joints,
                                                  const TorqueDataOptions& options = {});
 
-/// All three from tables that somebody else has read (kinematics/bags); their warnings are findings.
+/// All three from tables that somebody else has read (kinematics/bags); their warnings are
+/// findings.
 [[nodiscard]] TorqueData read_torque_data(const std::vector<ChannelTable>& tables,
                                           const std::vector<WantedJoint>& joints,
                                           const TorqueDataOptions& options = {});

@@ -17,7 +17,8 @@ namespace {
 bool names_a_wish(std::string topic) {
   std::ranges::transform(topic, topic.begin(), [](unsigned char c) { return std::tolower(c); });
   constexpr std::array kWishes = {"command", "cmd", "desired", "target", "goal", "reference"};
-  return std::ranges::any_of(kWishes, [&](const char* wish) { return topic.find(wish) != std::string::npos; });
+  return std::ranges::any_of(
+      kWishes, [&](const char* wish) { return topic.find(wish) != std::string::npos; });
 }
 
 std::string list_of_topics(const Contents& contents) {
@@ -40,10 +41,10 @@ std::string list_of_topics(const Contents& contents) {
 
 [[noreturn]] void refuse_several(const Contents& contents, const std::string& kind,
                                  const std::vector<std::string>& topics) {
-  throw bad_input(contents.source,
-                  fmt::format("holds {} of {} topics: {}", kind, topics.size(),
-                              fmt::join(topics, ", ")),
-                  fmt::format("name one: {}:{}", contents.source, topics.front()));
+  throw bad_input(
+      contents.source,
+      fmt::format("holds {} of {} topics: {}", kind, topics.size(), fmt::join(topics, ", ")),
+      fmt::format("name one: {}:{}", contents.source, topics.front()));
 }
 
 /// The series of the topic, or all of them.
@@ -106,9 +107,9 @@ const JointSeries& choose_joints(const Contents& contents, const std::string& to
   std::vector<std::string> rivals{best.topic};
   for (std::size_t i = 1; i < found.size(); ++i) {
     const JointSeries& other = *found[i];
-    const bool as_good = !names_a_wish(other.topic) && other.names.size() == best.names.size() &&
-                         other.topic.ends_with("joint_states") ==
-                             best.topic.ends_with("joint_states");
+    const bool as_good =
+        !names_a_wish(other.topic) && other.names.size() == best.names.size() &&
+        other.topic.ends_with("joint_states") == best.topic.ends_with("joint_states");
     if (as_good && other.topic != best.topic) rivals.push_back(other.topic);
   }
   if (topic.empty() && rivals.size() > 1) refuse_several(contents, "joint states", rivals);
@@ -130,8 +131,8 @@ const ImageSeries& choose_images(const Contents& contents, const std::string& to
 }
 
 const DetectionSeries& choose_detections(const Contents& contents, const std::string& topic) {
-  return the_only_one(contents, of_topic(contents.detections, topic), topic, "detections of markers",
-                      "detections (apriltag_msgs/AprilTagDetectionArray)");
+  return the_only_one(contents, of_topic(contents.detections, topic), topic,
+                      "detections of markers", "detections (apriltag_msgs/AprilTagDetectionArray)");
 }
 
 std::optional<CameraSeries> camera_of(const Contents& contents, const std::string& image_topic) {

@@ -90,8 +90,7 @@ std::vector<std::size_t> in_order_of_time(const std::vector<double>& times_s) {
   std::vector<std::size_t> rows(times_s.size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
   std::ranges::stable_sort(rows, {}, [&](std::size_t row) { return times_s[row]; });
-  const auto same =
-      std::ranges::unique(rows, {}, [&](std::size_t row) { return times_s[row]; });
+  const auto same = std::ranges::unique(rows, {}, [&](std::size_t row) { return times_s[row]; });
   rows.erase(same.begin(), same.end());
   return rows;
 }
@@ -103,8 +102,7 @@ JointSeries series_of(const std::string& topic, const JointRows& group, std::int
   out.stamps = how_stamped(group.stamps);
   std::vector<double> times_s;
   times_s.reserve(group.stamps.size());
-  for (const StampPair& pair : group.stamps)
-    times_s.push_back(time_of(pair, out.stamps, start_ns));
+  for (const StampPair& pair : group.stamps) times_s.push_back(time_of(pair, out.stamps, start_ns));
   const std::vector<std::size_t> rows = in_order_of_time(times_s);
   for (const std::size_t row : rows) out.times_s.push_back(times_s[row]);
   out.position = matrix_of(group, rows, 0);
@@ -222,8 +220,9 @@ void warn_of(const TopicRecord& record, Contents& out) {
   const bool wanted = count.topic.type == kJointStateType || count.topic.type == kDetectionsType ||
                       count.topic.type == kCameraInfoType || is_image_type(count.topic.type);
   if (wanted && count.topic.encoding == Encoding::kOther) {
-    out.warnings.push_back(fmt::format("{}: {} is encoded as '{}', which is not read (cdr and ros1 are)",
-                                       out.source, count.topic.name, count.topic.encoding_name));
+    out.warnings.push_back(
+        fmt::format("{}: {} is encoded as '{}', which is not read (cdr and ros1 are)", out.source,
+                    count.topic.name, count.topic.encoding_name));
   }
 }
 
@@ -242,8 +241,7 @@ void take(TopicRecord record, Contents& out) {
       record.images->stamps = stamps;
       out.images.push_back(std::move(*record.images));
     } else {
-      out.detections.push_back(
-          {topic, std::move(times_s), std::move(record.detections), stamps});
+      out.detections.push_back({topic, std::move(times_s), std::move(record.detections), stamps});
     }
   }
   out.topics.push_back(std::move(record.count));
@@ -276,8 +274,8 @@ Contents read_contents(const std::filesystem::path& bag) {
   }
   while (records.size() < reader->topics().size())
     records.push_back({{reader->topics()[records.size()]}, {}, {}, {}, {}, {}});
-  std::ranges::stable_sort(
-      records, {}, [](const TopicRecord& record) { return record.count.topic.name; });
+  std::ranges::stable_sort(records, {},
+                           [](const TopicRecord& record) { return record.count.topic.name; });
   out.warnings = reader->warnings();
   for (TopicRecord& record : records) take(std::move(record), out);
   std::ranges::stable_sort(out.joints, std::greater{},

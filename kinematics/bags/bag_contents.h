@@ -24,10 +24,10 @@ namespace kinescope::bags {
 
 /// How the stamps of a topic were taken.
 struct Stamps {
-  bool of_header = false;     ///< false: those of the recorder
-  double moved_s = 0.0;       ///< what was added to the headers' to be on the recorder's clock
-  double delay_s = 0.0;       ///< median of recorder's minus header's, after that
-  double jitter_s = 0.0;      ///< 5 to 95 % of the same
+  bool of_header = false;  ///< false: those of the recorder
+  double moved_s = 0.0;    ///< what was added to the headers' to be on the recorder's clock
+  double delay_s = 0.0;    ///< median of recorder's minus header's, after that
+  double jitter_s = 0.0;   ///< 5 to 95 % of the same
 };
 
 /// The messages of one topic that name the same joints, in the order of their stamps.
@@ -49,7 +49,7 @@ struct CameraSeries {
 struct ImageSeries {
   std::string topic;
   std::string type;
-  std::string encoding;  ///< or format, of the first
+  std::string encoding;                 ///< or format, of the first
   std::uint32_t width = 0, height = 0;  ///< of the first; 0 where it is packed
   std::vector<double> times_s;          ///< in the order of the messages
   Stamps stamps;
@@ -71,11 +71,11 @@ struct TopicCount {
 
 struct Contents {
   std::string source;
-  std::int64_t start_ns = 0;           ///< the recorder's stamp of the first message
-  std::vector<TopicCount> topics;      ///< by name
-  std::vector<JointSeries> joints;     ///< by topic, those with most joints first
-  std::vector<CameraSeries> cameras;   ///< by topic
-  std::vector<ImageSeries> images;     ///< by topic
+  std::int64_t start_ns = 0;                ///< the recorder's stamp of the first message
+  std::vector<TopicCount> topics;           ///< by name
+  std::vector<JointSeries> joints;          ///< by topic, those with most joints first
+  std::vector<CameraSeries> cameras;        ///< by topic
+  std::vector<ImageSeries> images;          ///< by topic
   std::vector<DetectionSeries> detections;  ///< by topic
   std::vector<std::string> warnings;
 };

@@ -17,8 +17,7 @@ namespace {
 
 /// Something is said in it: a driver without a sensor publishes zeros, or nothing.
 bool says_something(const Eigen::MatrixXd& values) {
-  return values.size() > 0 &&
-         (values.array().isFinite() && values.array() != 0.0).any();
+  return values.size() > 0 && (values.array().isFinite() && values.array() != 0.0).any();
 }
 
 /// The values of a series at other times; rows that it does not cover are NaN.
@@ -88,13 +87,15 @@ bool add_series(JointSeries& log, const JointSeries& other) {
 void warn_of_stamps(const JointSeries& series, const std::string& source,
                     std::vector<std::string>& warnings) {
   if (!series.stamps.of_header) {
-    warnings.push_back(fmt::format("{}: {} has no stamps of its own: those of the recorder are "
-                                   "used, which come late and unevenly",
-                                   source, series.topic));
+    warnings.push_back(
+        fmt::format("{}: {} has no stamps of its own: those of the recorder are "
+                    "used, which come late and unevenly",
+                    source, series.topic));
   } else if (series.stamps.moved_s != 0.0) {
-    warnings.push_back(fmt::format("{}: the stamps of {} are {:.3f} s from the recorder's clock, "
-                                   "and are moved to it",
-                                   source, series.topic, -series.stamps.moved_s));
+    warnings.push_back(
+        fmt::format("{}: the stamps of {} are {:.3f} s from the recorder's clock, "
+                    "and are moved to it",
+                    source, series.topic, -series.stamps.moved_s));
   }
 }
 
@@ -120,13 +121,13 @@ Chosen choose(const Source& source, Needs needs) {
         add_series(out.series, other)) {
       continue;
     }
-    out.warnings.push_back(fmt::format(
-        "{}: {} message{} of {} with {} {} not used beside {}{}", contents.source,
-        other.times_s.size(), other.times_s.size() == 1 ? "" : "s", other.topic,
-        fmt::join(other.names, ", "), other.times_s.size() == 1 ? "is" : "are", topic,
-        other.topic == topic ? ""
-                             : fmt::format(" (name {}:{} to use them)", contents.source,
-                                           other.topic)));
+    out.warnings.push_back(
+        fmt::format("{}: {} message{} of {} with {} {} not used beside {}{}", contents.source,
+                    other.times_s.size(), other.times_s.size() == 1 ? "" : "s", other.topic,
+                    fmt::join(other.names, ", "), other.times_s.size() == 1 ? "is" : "are", topic,
+                    other.topic == topic
+                        ? ""
+                        : fmt::format(" (name {}:{} to use them)", contents.source, other.topic)));
   }
   return out;
 }

@@ -168,9 +168,9 @@ class McapFile final : public Reader {
   InputFile file_;
   TopicTable table_;
   std::map<std::uint16_t, std::string> schemas_;
-  std::string record_;         // of the file
-  std::string chunk_;          // unpacked
-  std::string_view records_;   // of the chunk, those to come
+  std::string record_;        // of the file
+  std::string chunk_;         // unpacked
+  std::string_view records_;  // of the chunk, those to come
   std::uint64_t chunk_at_ = 0;
   bool chunk_cut_ = false;
   // Of the chunk only what names topics is believed: it is written once, and all that follows needs

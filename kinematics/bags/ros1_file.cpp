@@ -107,7 +107,8 @@ class Ros1File final : public Reader {
       const Fields fields = read_fields(head);
       const std::uint32_t size = length();
       const BagRecord kind = kind_of(fields);
-      if (kind == BagRecord::kBagHeader || kind == BagRecord::kIndex || kind == BagRecord::kChunkInfo) {
+      if (kind == BagRecord::kBagHeader || kind == BagRecord::kIndex ||
+          kind == BagRecord::kChunkInfo) {
         file_.skip(size);
         return std::nullopt;
       }

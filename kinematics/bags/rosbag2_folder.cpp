@@ -22,8 +22,7 @@ constexpr std::string_view kPacked = ".zstd";
 
 /// The ending without that of a file that is packed as a whole.
 std::string format_ending(const fs::path& path) {
-  return path.extension() == kPacked ? path.stem().extension().string()
-                                     : path.extension().string();
+  return path.extension() == kPacked ? path.stem().extension().string() : path.extension().string();
 }
 
 struct Folder {

@@ -49,8 +49,9 @@ class SqliteFile final : public Reader {
       const int status = sqlite3_step(messages_.get());
       if (status != SQLITE_ROW) {
         if (status != SQLITE_DONE) {
-          warnings_.push_back(fmt::format("{}: the file is damaged ({}): what stands before is read",
-                                          name_, sqlite3_errmsg(database_.get())));
+          warnings_.push_back(
+              fmt::format("{}: the file is damaged ({}): what stands before is read", name_,
+                          sqlite3_errmsg(database_.get())));
         }
         messages_.reset();
         break;
@@ -65,9 +66,9 @@ class SqliteFile final : public Reader {
       if (!unpacked.whole) {
         ++damaged_;
         if (damaged_ == 1) {
-          warnings_.push_back(fmt::format(
-              "{}: messages that cannot be unpacked are left out, the first of {}", name_,
-              table_.topics()[*topic].name));
+          warnings_.push_back(
+              fmt::format("{}: messages that cannot be unpacked are left out, the first of {}",
+                          name_, table_.topics()[*topic].name));
         }
         continue;
       }

@@ -175,7 +175,8 @@ void unpack_zstd_file(const std::filesystem::path& packed, const std::filesystem
     throw bad_input(packed.string(), "the zstd file is cut off", "copy or record it again");
   }
   if (!to.flush()) {
-    throw bad_input(packed.string(), "does not fit beside the temporary files when unpacked", "make space, or unpack it (zstd -d)");
+    throw bad_input(packed.string(), "does not fit beside the temporary files when unpacked",
+                    "make space, or unpack it (zstd -d)");
   }
 }
 

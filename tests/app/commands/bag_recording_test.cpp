@@ -125,8 +125,8 @@ TEST(BagRecording, OfDetectionsIsARecordingOfCorners) {
   const std::string from_bag = (folder.path() / "from_bag").string();
   const std::string from_files = (folder.path() / "from_files").string();
   ASSERT_EQ(run({"run", path.string(), "--output", from_bag, "--quiet"}).code, 0);
-  ASSERT_EQ(run({"run", (folder.path() / "files").string(), "--output", from_files, "--quiet"}).code,
-            0);
+  ASSERT_EQ(
+      run({"run", (folder.path() / "files").string(), "--output", from_files, "--quiet"}).code, 0);
   expect_same_robot(from_bag, from_files);
   EXPECT_EQ(Document::parse(read_text_file(folder.path() / "from_bag/run.json")).at("recording"),
             "robot");
@@ -160,11 +160,10 @@ TEST(BagRecording, OfImagesIsARecordingOfAVideo) {
   bag.finish();
   const std::string from_bag = (folder.path() / "from_bag").string();
   const std::string from_files = (folder.path() / "from_files").string();
-  const Outcome first = run({"run", (folder.path() / "robot").string(), "--output", from_bag,
-                             "--quiet", "--no-trace"});
+  const Outcome first = run(
+      {"run", (folder.path() / "robot").string(), "--output", from_bag, "--quiet", "--no-trace"});
   ASSERT_EQ(first.code, 0) << first.err;
-  ASSERT_EQ(
-      run({"run", sample.string(), "--output", from_files, "--quiet", "--no-trace"}).code, 0);
+  ASSERT_EQ(run({"run", sample.string(), "--output", from_files, "--quiet", "--no-trace"}).code, 0);
   expect_same_robot(from_bag, from_files);
 
   // What was found in the images is kept, and found again.
@@ -216,8 +215,7 @@ TEST(BagRecording, OfTorquesIsATorqueLog) {
   for (std::size_t j = 0; j < from_bag.size(); ++j)
     EXPECT_NEAR(from_bag[j], from_table[j], 1e-3 * from_table[j]);
 
-  const Outcome inspected =
-      run({"inspect", (folder.path() / "log.mcap").string(), "--json"});
+  const Outcome inspected = run({"inspect", (folder.path() / "log.mcap").string(), "--json"});
   EXPECT_EQ(inspected.code, 0) << inspected.err;
   EXPECT_EQ(Document::parse(inspected.out).at("topics")[0].at("messages"), 1500);
   expect_refusal({"run", (folder.path() / "log.mcap").string()}, ExitCode::kBadInput,

@@ -45,7 +45,8 @@ fs::path bag_of(const std::string& name, const std::string& type,
   const fs::path path = truth::temporary_path(name);
   truth::BagWriter bag(path);
   for (std::size_t i = 0; i < messages.size(); ++i)
-    bag.write("/image_raw", type, kBagStart + static_cast<std::int64_t>(i) * 100'000'000, messages[i]);
+    bag.write("/image_raw", type, kBagStart + static_cast<std::int64_t>(i) * 100'000'000,
+              messages[i]);
   bag.finish();
   return path;
 }
@@ -61,8 +62,9 @@ class Layouts : public testing::TestWithParam<Layout> {};
 
 TEST_P(Layouts, AreReadAsBrightness) {
   const Layout& layout = GetParam();
-  const fs::path bag = bag_of(std::string(layout.encoding) + ".mcap", "sensor_msgs/msg/Image",
-                              {raw_image(kBagStart, layout.encoding, layout.bytes, layout.pixel, 5)});
+  const fs::path bag =
+      bag_of(std::string(layout.encoding) + ".mcap", "sensor_msgs/msg/Image",
+             {raw_image(kBagStart, layout.encoding, layout.bytes, layout.pixel, 5)});
   const auto video = open_video(bag);
   EXPECT_EQ(video->info().width, kBagWidth);
   const auto frame = video->next();
@@ -75,8 +77,8 @@ TEST_P(Layouts, AreReadAsBrightness) {
 INSTANTIATE_TEST_SUITE_P(
     OfSensorMsgs, Layouts,
     testing::Values(Layout{"mono8", {90}, 1, 90}, Layout{"8UC1", {90}, 1, 90},
-                    Layout{"rgb8", {200, 0, 0}, 3, 60},   // 0.299 of red
-                    Layout{"bgr8", {200, 0, 0}, 3, 23},   // 0.114 of blue
+                    Layout{"rgb8", {200, 0, 0}, 3, 60},  // 0.299 of red
+                    Layout{"bgr8", {200, 0, 0}, 3, 23},  // 0.114 of blue
                     Layout{"bgra8", {0, 0, 200, 9}, 4, 60}, Layout{"rgba8", {0, 200, 0, 9}, 4, 117},
                     Layout{"mono16", {250, 70}, 2, 70}, Layout{"bayer_rggb8", {80}, 1, 80},
                     Layout{"yuv422", {128, 66}, 2, 66}, Layout{"yuv422_yuy2", {66, 128}, 2, 66}));
@@ -110,8 +112,8 @@ TEST(BagVideo, BayerPatternsTellRedFromBlue) {
     const auto video = open_video(
         bag_of("lit_" + encoding + ".mcap", "sensor_msgs/msg/Image",
                {truth::image(kBagStart, kBagWidth, kBagHeight, encoding, kBagWidth, pixels)}));
-    return static_cast<int>(video->next()->image.pixels[static_cast<std::size_t>(
-        kBagWidth * (2 + y0) + 2 + x0)]);
+    return static_cast<int>(
+        video->next()->image.pixels[static_cast<std::size_t>(kBagWidth * (2 + y0) + 2 + x0)]);
   };
   constexpr int kRed = 60;   // 0.299 of 200
   constexpr int kBlue = 23;  // 0.114 of 200
@@ -130,9 +132,9 @@ TEST(BagVideo, PackedPicturesAndStamps) {
                                                {reinterpret_cast<char*>(png.data()), png.size()}));
   }
   messages.insert(messages.begin() + 1, messages[0]);  // recorded twice
-  messages.insert(messages.begin() + 2, truth::compressed_image(kBagStart + 50'000'000, "png", "no"));
-  const auto video =
-      open_video(bag_of("packed.mcap", "sensor_msgs/msg/CompressedImage", messages));
+  messages.insert(messages.begin() + 2,
+                  truth::compressed_image(kBagStart + 50'000'000, "png", "no"));
+  const auto video = open_video(bag_of("packed.mcap", "sensor_msgs/msg/CompressedImage", messages));
   for (int i = 0; i < 3; ++i) {
     const auto frame = video->next();
     ASSERT_TRUE(frame);
@@ -201,8 +203,7 @@ std::vector<std::pair<double, std::string>> packets_of(const fs::path& file) {
 }
 
 TEST(BagVideo, StreamOfH264IsTheVideoItCameFrom) {
-  const fs::path file =
-      fs::path(KINESCOPE_SOURCE_DIR) / "sample_videos/gantry_time_lag/video.mp4";
+  const fs::path file = fs::path(KINESCOPE_SOURCE_DIR) / "sample_videos/gantry_time_lag/video.mp4";
   const auto packets = packets_of(file);
   ASSERT_GT(packets.size(), 300U);
   const fs::path path = truth::temporary_path("h264.mcap");

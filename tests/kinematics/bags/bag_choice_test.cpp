@@ -51,8 +51,7 @@ TEST(ChooseJoints, MostJointsOfWhatWasMeasured) {
   EXPECT_EQ(refusal(contents_of({joints("/gripper", 1), joints("/arm", 6)})), "/arm");
   EXPECT_EQ(refusal(contents_of({joints("/joint_commands", 6), joints("/arm", 6)})), "/arm");
   EXPECT_EQ(refusal(contents_of({joints("/desired_state", 7), joints("/arm", 6)})), "/arm");
-  EXPECT_EQ(refusal(contents_of({joints("/raw", 6), joints("/joint_states", 6)})),
-            "/joint_states");
+  EXPECT_EQ(refusal(contents_of({joints("/raw", 6), joints("/joint_states", 6)})), "/joint_states");
 }
 
 TEST(ChooseJoints, NamesRivalsAndTakesTheOneThatIsNamed) {
@@ -76,12 +75,13 @@ TEST(ChooseImages, OfOneCameraTheRawOnes) {
   EXPECT_EQ(
       choose_images(contents_of({images("/cam/image_rect"), images("/cam/image_raw")}), {}).topic,
       "/cam/image_raw");
-  EXPECT_EQ(choose_images(contents_of({images("/cam/color/image_raw"),
-                                       images("/cam/depth/image_rect_raw", std::string(kImageType),
-                                              "16UC1")}),
-                          {})
-                .topic,
-            "/cam/color/image_raw");
+  EXPECT_EQ(
+      choose_images(
+          contents_of({images("/cam/color/image_raw"),
+                       images("/cam/depth/image_rect_raw", std::string(kImageType), "16UC1")}),
+          {})
+          .topic,
+      "/cam/color/image_raw");
 }
 
 TEST(ChooseImages, OfTwoCamerasNone) {

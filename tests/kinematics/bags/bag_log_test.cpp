@@ -72,7 +72,8 @@ TEST(BagLog, IsATorqueLog) {
 }
 
 TEST(BagLog, ClocksThatDifferAreMovedToTheRecorders) {
-  const JointLog log = read_joint_log(bag("simulated.mcap", {.header_clock_ns = 40 * kMillisecond}));
+  const JointLog log =
+      read_joint_log(bag("simulated.mcap", {.header_clock_ns = 40 * kMillisecond}));
   EXPECT_NEAR(log.times_s.front(), 0.0, 1e-6);
   EXPECT_NEAR(log.times_s[100] - log.times_s[0], 1.0, 1e-9);
   ASSERT_EQ(log.warnings.size(), 1U);

@@ -148,14 +148,14 @@ TEST_P(DamagedBag, IsReadAsFarAsItCanBe) {
 }
 
 // What is readable: damaged.json; of cut.bag also what stands in the chunk before the cut.
-INSTANTIATE_TEST_SUITE_P(
-    Ways, DamagedBag,
-    testing::Values(Damaged{"cut_in_chunk.mcap", 16, "ends early"},
-                    Damaged{"bad_crc.mcap", 6, "checksum"},
-                    Damaged{"huge_length.mcap", 3, "ends early"},
-                    Damaged{"zstd_bomb.mcap", 5, "damaged"},
-                    Damaged{"deep_names.mcap", 2, "1 of 3 messages of /joint_states"},
-                    Damaged{"cut.bag", 11, "ends early"}));
+INSTANTIATE_TEST_SUITE_P(Ways, DamagedBag,
+                         testing::Values(Damaged{"cut_in_chunk.mcap", 16, "ends early"},
+                                         Damaged{"bad_crc.mcap", 6, "checksum"},
+                                         Damaged{"huge_length.mcap", 3, "ends early"},
+                                         Damaged{"zstd_bomb.mcap", 5, "damaged"},
+                                         Damaged{"deep_names.mcap", 2,
+                                                 "1 of 3 messages of /joint_states"},
+                                         Damaged{"cut.bag", 11, "ends early"}));
 
 TEST(Bag, EveryCutIsRead) {
   const fs::path whole = kData / "joints_zstd.mcap";
