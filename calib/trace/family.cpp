@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "calib/trace/distribution.h"
-#include "calib/trace/golden_section.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/golden_section.h"
 #include "kinematics/core/parallel_for.h"
 
 namespace kinescope::trace {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
-#include "calib/trace/golden_section.h"
+#include "kinematics/core/golden_section.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/parallel_for.h"
 

@@ -11,6 +11,7 @@
 
 #include "dynamics/identify/weighted_fit.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/golden_section.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
@@ -38,7 +39,12 @@ constexpr double kRateWindow_s = 0.05;
 constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
 /// And up to this times what 99 % of the samples do not pass: a margin for the noise of speeds.
 constexpr double kBeyond = 1.2;
-constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};  // rad/s
+/// Where the search for the speed begins, rad/s: the best of them, and from there to its
+/// neighbours.
+constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};
+constexpr double kNeighbour = 2.0;
+/// To 1 % of the speed: what remains is a thousandth of the friction.
+constexpr int kSpeedSteps = 10;
 constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
 
 struct MotionTerms {
@@ -174,10 +180,18 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
   if (!shape.known()) return shape;
   std::optional<Fit> best = fit_friction(slid, shape, 0.0);
   const double sigma = best->sigma;
-  for (const double speed : kStribeckSpeeds) {
-    shape.stribeck_speed = turns ? speed : kLinearShare * speed;
+  const auto try_speed = [&](double speed) {
+    shape.stribeck_speed = speed;
     const std::optional<Fit> fit = fit_friction(slid, shape, sigma);
     if (fit && fit->cost < best->cost) best = fit;
+    return fit ? -fit->cost : -std::numeric_limits<double>::infinity();
+  };
+  for (const double speed : kStribeckSpeeds) try_speed(turns ? speed : kLinearShare * speed);
+  if (const double speed = best->friction.stribeck_speed; speed > 0.0) {
+    const Maximum found =
+        golden_section([&](double log_speed) { return try_speed(std::exp(log_speed)); },
+                       std::log(speed / kNeighbour), std::log(speed * kNeighbour), kSpeedSteps);
+    try_speed(std::exp(found.at));
   }
   best->friction.sigma = best->sigma;
   best->friction.slid_s = slid.length_s;

@@ -27,6 +27,9 @@ struct StampPair {
   std::int64_t received = 0;
 };
 
+/// Beyond all clocks, and so that differences of stamps fit.
+constexpr std::int64_t kFarthestStamp = std::int64_t{1} << 61U;
+
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * kNanosecond; }
 
 double quantile(std::vector<double> values, double share) {
@@ -266,7 +269,8 @@ Contents read_contents(const std::filesystem::path& bag) {
   out.source = bag.string();
   std::vector<TopicRecord> records;
   bool first = true;
-  while (const auto message = reader->next()) {
+  while (auto message = reader->next()) {
+    message->received_ns = std::clamp(message->received_ns, -kFarthestStamp, kFarthestStamp);
     if (std::exchange(first, false)) out.start_ns = message->received_ns;
     while (records.size() < reader->topics().size())
       records.push_back({{reader->topics()[records.size()]}, {}, {}, {}, {}, {}});

@@ -77,6 +77,31 @@ TEST(Sliding, FrictionIsThatOfTheLog) {
   }
 }
 
+// Between the speeds that the search begins with, half an octave from the next.
+TEST(Sliding, SpeedOfSlowFrictionIsFoundBetweenTheFirstGuesses) {
+  const RigidModel model = make_rigid_model(contact_arm(1));
+  constexpr double kSpeed = 0.0283;
+  const Eigen::Index rows = 8000;
+  TorqueSamples motion;
+  motion.t_s = Eigen::VectorXd::LinSpaced(rows, 0.0, kStep_s * static_cast<double>(rows - 1));
+  motion.q = (0.4 * motion.t_s.array()).sin().matrix() * 0.3;
+  motion.dq = (0.4 * motion.t_s.array()).cos().matrix() * 0.12;
+  motion.torque = Eigen::VectorXd::Zero(rows);
+  motion.trajectory = Eigen::VectorXi::Zero(rows);
+  Rng rng = Rng::from_name("sliding.stribeck");
+  Eigen::MatrixXd residual(rows, 1);
+  for (Eigen::Index k = 0; k < rows; ++k) {
+    const double dq = motion.dq(k, 0);
+    const double low = dq / kSpeed;
+    residual(k, 0) =
+        (dq > 0.0 ? 1.0 : -1.0) * (1.0 + 0.5 * std::exp(-low * low)) + 2.0 * dq + rng.normal(0.02);
+  }
+  const SlidingFriction own = sliding_friction(model, {motion}, {residual}).front();
+  EXPECT_NEAR(own.stribeck_speed, kSpeed, 0.03 * kSpeed);
+  EXPECT_NEAR(own.stribeck, 0.5, 0.01);
+  EXPECT_NEAR(own.coulomb, 1.0, 0.01);
+}
+
 TEST(Sliding, StickingIsNoEvidenceWithinItsInterval) {
   const Drives drives({.duration_s = 30.0, .speed_rad_s = 0.5});
   TorqueSamples held = drives.world.samples;

@@ -5,7 +5,7 @@
 
 #include <functional>
 
-namespace kinescope::trace {
+namespace kinescope {
 
 struct Maximum {
   double at = 0.0;
@@ -16,4 +16,4 @@ struct Maximum {
 [[nodiscard]] Maximum golden_section(const std::function<double(double)>& function, double low,
                                      double high, int steps);
 
-}  // namespace kinescope::trace
+}  // namespace kinescope

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/trace/golden_section.h"
+#include "kinematics/core/golden_section.h"
 
-namespace kinescope::trace {
+namespace kinescope {
 
 Maximum golden_section(const std::function<double(double)>& function, double low, double high,
                        int steps) {
@@ -28,4 +28,4 @@ Maximum golden_section(const std::function<double(double)>& function, double low
   return at_left > at_right ? Maximum{left, at_left} : Maximum{right, at_right};
 }
 
-}  // namespace kinescope::trace
+}  // namespace kinescope
