@@ -87,7 +87,10 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
 TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::path& log,
                                const TorqueDataOptions& words) {
   const auto bag = bags::bag_source(log);
-  const std::filesystem::path beside = (bag ? bag->bag : log).parent_path() / "recording.yaml";
+  const std::filesystem::path file = bag ? bag->bag : log;
+  const std::filesystem::path folder =
+      std::filesystem::is_directory(file) ? file : file.parent_path();
+  const std::filesystem::path beside = folder / "recording.yaml";
   TorqueDataOptions out;
   if (line.settings) {
     out = read_dynamics_settings(*line.settings);

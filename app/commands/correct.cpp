@@ -142,7 +142,9 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
                    {options.log, calibration, options.run_folder / "robot.urdf"}, options.force);
   const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
-  const CsvTable table = bags::read_log_table(options.log).table;
+  const bags::LogTable logged = bags::read_log_table(options.log);
+  for (const std::string& warning : logged.warnings) print_warning(warning);
+  const CsvTable& table = logged.table;
   const TableLog read = joint_log_of(columns_of_run(table, found));
   const JointLog& log = read.log;
   // Beforehand: what was left out of the log may be why it is refused.

@@ -11,6 +11,7 @@
 #include "app/commands/inspect_bag.h"
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
+#include "app/commands/progress_line.h"
 #include "kinematics/bags/bag.h"
 
 namespace kinescope {
@@ -230,6 +231,8 @@ ExitCode inspect_command(const InspectOptions& options, const Console& console) 
   const auto bag = bags::bag_source(options.recording.folder);
   const bags::Contents* contents = bag ? &bags::look_into(bag->bag) : nullptr;
   if (contents != nullptr && !console.json) print_topics(*contents);
+  if (contents != nullptr && contents->joints.empty())
+    for (const std::string& warning : contents->warnings) print_warning(warning);
   const bool is_log = contents != nullptr
                           ? !shows_robot(*contents)
                           : std::filesystem::is_regular_file(options.recording.folder);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "kinematics/bags/bag.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 
@@ -98,7 +99,11 @@ void remove_from_list(const fs::path& folder, std::string_view name) {
 void require_no_input(const fs::path& file, const std::vector<fs::path>& inputs,
                       std::string_view option) {
   std::error_code error;
-  const auto same = [&](const fs::path& input) { return fs::equivalent(file, input, error); };
+  const auto same = [&](const fs::path& input) {
+    return std::ranges::any_of(bags::parts_of(input), [&](const fs::path& part) {
+      return fs::equivalent(file, part, error);
+    });
+  };
   if (std::ranges::none_of(inputs, same)) return;
   throw bad_request(file.string(), "is an input, and would be written over",
                     fmt::format("name another place with {}", option));

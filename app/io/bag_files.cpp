@@ -20,14 +20,19 @@ std::string_view without_tag(std::string_view family) {
   return family;
 }
 
-bool is_rectified(const std::string& image_topic) {
-  return image_topic.find("rect") != std::string::npos;
+/// image_proc names rectified images so; detectors of markers look for markers in those
+/// (apriltag_ros).
+bool is_rectified(const bags::Contents& contents, const std::string& topic) {
+  const bool detected =
+      std::ranges::find(contents.detections, topic, &bags::DetectionSeries::topic) !=
+      contents.detections.end();
+  return detected || topic.find("/image_rect") != std::string::npos;
 }
 
 /// camera_info of ROS as the file has it (sensor_msgs/CameraInfo.msg: K and P are those of the
 /// whole image; what is published is cut out of it, then binned).
-std::string camera_text(const bags::CameraInfo& info, const std::string& image_topic) {
-  const bool rectified = is_rectified(image_topic) && info.p[0] > 0.0;
+std::string camera_text(const bags::CameraInfo& info, bool of_rectified) {
+  const bool rectified = of_rectified && info.p[0] > 0.0;
   const double fx = rectified ? info.p[0] : info.k[0];
   const double cx = rectified ? info.p[2] : info.k[2];
   const double fy = rectified ? info.p[5] : info.k[4];
@@ -54,9 +59,10 @@ std::string camera_text(const bags::CameraInfo& info, const std::string& image_t
 }  // namespace
 
 std::optional<CameraModel> camera_of_bag(const bags::Source& source) {
-  const auto camera = bags::camera_of(bags::look_into(source.bag), source.topic);
+  const bags::Contents& contents = bags::look_into(source.bag);
+  const auto camera = bags::camera_of(contents, source.topic);
   if (!camera) return std::nullopt;
-  return parse_camera(camera_text(camera->first, source.topic),
+  return parse_camera(camera_text(camera->first, is_rectified(contents, source.topic)),
                       source.bag.string() + ":" + camera->topic);
 }
 
@@ -85,11 +91,11 @@ CsvTable corners_of_bag(const bags::Source& source, const std::string& family) {
     }
   }
   if (!table.rows.empty()) return table;
-  throw bad_input(table.source,
-                  others.empty()
-                      ? std::string("no marker is seen")
-                      : fmt::format("no marker of {}, only of {}", family, fmt::join(others, ", ")),
-                  "correct family in tags.yaml");
+  throw bad_input(
+      table.source,
+      others.empty() ? std::string("no marker is seen")
+                     : fmt::format("no marker of {}, only of {}", family, fmt::join(others, ", ")),
+      others.empty() ? "check what the detector looks for" : "correct family in tags.yaml");
 }
 
 }  // namespace kinescope

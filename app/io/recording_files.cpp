@@ -160,24 +160,30 @@ fs::path with_topic(const fs::path& bag, const std::string& topic) {
 /// What a bag gives in place of files that are not there: images, else corners; joints; a camera.
 void take_from_bag(const bags::Source& source, RecordingFiles& files) {
   const bags::Contents& contents = bags::look_into(source.bag);
-  const auto is_named = [&](const auto& series) { return series.topic == source.topic; };
-  const auto topic_for = [&](const auto& all) {
-    return std::ranges::any_of(all, is_named) ? source.topic : std::string();
+  const auto names_one_of = [&](const auto& all) {
+    return std::ranges::any_of(all,
+                               [&](const auto& series) { return series.topic == source.topic; });
   };
-  const bool known = source.topic.empty() || std::ranges::any_of(contents.images, is_named) ||
-                     std::ranges::any_of(contents.detections, is_named) ||
-                     std::ranges::any_of(contents.joints, is_named);
+  const auto topic_for = [&](const auto& all) {
+    return names_one_of(all) ? source.topic : std::string();
+  };
+  const bool names_joints = names_one_of(contents.joints);
   const bool seen = files.video || files.corners || files.poses || files.points;
-  if (!seen && (!contents.detections.empty() && contents.images.empty())) {
-    files.corners = with_topic(
-        source.bag, bags::choose_detections(contents, topic_for(contents.detections)).topic);
-  } else if (!seen || !known) {
-    const std::string topic = known ? topic_for(contents.images) : source.topic;
-    files.video = with_topic(source.bag, bags::choose_images(contents, topic).topic);
+  if (!seen) {
+    const bool detected = names_one_of(contents.detections) ||
+                          (contents.images.empty() && !contents.detections.empty());
+    if (detected) {
+      files.corners = with_topic(
+          source.bag, bags::choose_detections(contents, topic_for(contents.detections)).topic);
+    } else {
+      const std::string topic = names_joints ? std::string() : source.topic;
+      files.video = with_topic(source.bag, bags::choose_images(contents, topic).topic);
+    }
   }
   if (!files.joints && !contents.joints.empty()) {
-    files.joints =
-        with_topic(source.bag, bags::choose_joints(contents, topic_for(contents.joints)).topic);
+    // Without a topic other publishers' joints join in.
+    static_cast<void>(bags::choose_joints(contents, topic_for(contents.joints)));
+    files.joints = names_joints ? with_topic(source.bag, source.topic) : source.bag;
   }
   const MaybePath& images = files.video ? files.video : files.corners;
   const auto shown = images ? bags::bag_source(*images) : std::nullopt;

@@ -14,6 +14,7 @@
 #include "calib/vision/packet_decoder.h"
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/longest_increasing.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
@@ -108,6 +109,12 @@ class BagVideoReader final : public VideoReader {
         bag_(bags::open(source.bag)) {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
     require_known_encoding();
+    // Packets of a stream come in the order in which they are decoded; pictures leave it in theirs.
+    in_order_.resize(series_.times_s.size(), stream_ ? 1 : 0);
+    if (!stream_) {
+      for (const Eigen::Index k : longest_increasing(series_.times_s))
+        in_order_[static_cast<std::size_t>(k)] = 1;
+    }
     first_ = decode_next();
     if (!first_) {
       throw bad_input(name_, "none of the images can be decoded",
@@ -201,15 +208,14 @@ class BagVideoReader final : public VideoReader {
       if (picture->number >= series_.times_s.size()) continue;
       const double time_s = series_.times_s[picture->number];
       ++decoded_;
-      if (index_ > 0 && !(time_s > last_s_)) {
+      if (in_order_[picture->number] == 0 || (index_ > 0 && !(time_s > last_s_))) {
         ++unordered_;
         continue;
       }
       const GreyImage& image = picture->image;
       if (info_.width > 0 && (image.width != info_.width || image.height != info_.height)) {
-        warnings_.push_back(fmt::format(
-            "{}: the picture changes its size at {:.3f} s; reading stops", name_, time_s));
-        return std::nullopt;
+        ++other_size_;
+        continue;
       }
       if (index_ > 0) steps_.push_back(time_s - last_s_);
       last_s_ = time_s;
@@ -225,6 +231,18 @@ class BagVideoReader final : public VideoReader {
     if (damaged_ > 0) {
       warnings_.push_back(
           fmt::format("{}: {} images cannot be decoded and are left out", name_, damaged_));
+    }
+    if (!series_.stamps.of_header) {
+      warnings_.push_back(fmt::format(
+          "{}: the images have no stamps of their own: those of the recorder are used", name_));
+    } else if (series_.stamps.moved_s != 0.0) {
+      warnings_.push_back(
+          fmt::format("{}: the stamps are {:.3f} s from the recorder's clock, and are moved to it",
+                      name_, -series_.stamps.moved_s));
+    }
+    if (other_size_ > 0) {
+      warnings_.push_back(fmt::format("{}: {} images are not of {} x {} px and are left out", name_,
+                                      other_size_, info_.width, info_.height));
     }
     if (unordered_ > 0) {
       warnings_.push_back(
@@ -256,7 +274,9 @@ class BagVideoReader final : public VideoReader {
   VideoInfo info_;
   std::vector<double> steps_;
   int damaged_ = 0;
+  std::vector<char> in_order_;  // one a message
   int unordered_ = 0;
+  int other_size_ = 0;
   std::vector<std::string> warnings_;
 };
 

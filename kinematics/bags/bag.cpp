@@ -11,15 +11,20 @@ namespace kinescope::bags {
 namespace fs = std::filesystem;
 
 std::optional<Source> bag_source(const fs::path& path) {
+  const auto is_one = [](const fs::path& bag) { return is_bag_file(bag) || is_bag_folder(bag); };
+  const auto without_slash = [](const fs::path& bag) {
+    return bag.has_filename() ? bag : bag.parent_path();
+  };
   const std::string text = path.string();
-  for (std::size_t colon = text.find(':'); colon != std::string::npos;
-       colon = text.find(':', colon + 1)) {
+  std::error_code error;
+  // What is there by this name needs no topic.
+  for (std::size_t colon = fs::exists(path, error) ? std::string::npos : text.find(':');
+       colon != std::string::npos; colon = text.find(':', colon + 1)) {
     const fs::path bag = text.substr(0, colon);
     const bool names_topic = colon + 1 < text.size();
-    if (names_topic && (is_bag_file(bag) || is_bag_folder(bag)))
-      return Source{bag, text.substr(colon + 1)};
+    if (names_topic && is_one(bag)) return Source{without_slash(bag), text.substr(colon + 1)};
   }
-  if (is_bag_file(path) || is_bag_folder(path)) return Source{path, {}};
+  if (is_one(path)) return Source{without_slash(path), {}};
   return std::nullopt;
 }
 
@@ -61,18 +66,15 @@ Encoding encoding_of(std::string_view name) {
 }
 
 void TopicTable::add(std::uint32_t number, Topic topic) {
-  if (index_of(number)) return;
-  const auto same = std::ranges::find_if(topics_, [&](const Topic& known) {
-    return known.name == topic.name && known.type == topic.type &&
-           known.encoding_name == topic.encoding_name;
-  });
-  const auto index = static_cast<std::size_t>(same - topics_.begin());
-  if (same == topics_.end()) topics_.push_back(std::move(topic));
-  numbers_.emplace_back(number, index);
+  if (numbers_.contains(number)) return;
+  const auto [known, is_new] =
+      names_.try_emplace(std::tuple(topic.name, topic.type, topic.encoding_name), topics_.size());
+  numbers_.emplace(number, known->second);
+  if (is_new) topics_.push_back(std::move(topic));
 }
 
 std::optional<std::size_t> TopicTable::index_of(std::uint32_t number) const {
-  const auto found = std::ranges::find(numbers_, number, &decltype(numbers_)::value_type::first);
+  const auto found = numbers_.find(number);
   if (found == numbers_.end()) return std::nullopt;
   return found->second;
 }
@@ -91,7 +93,8 @@ std::uint64_t ByteReader::number(std::size_t size) {
   return out;
 }
 
-InputFile::InputFile(const fs::path& path) : name_(path.string()) {
+InputFile::InputFile(const NamedFile& file) : name_(file.name) {
+  const fs::path& path = file.path;
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) throw bad_input(name_, "no such file", "check the path");

@@ -3,6 +3,7 @@
 #include <array>
 #include <cctype>
 #include <functional>
+#include <set>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -12,14 +13,15 @@
 #include "kinematics/core/error.h"
 
 namespace kinescope::bags {
-namespace {
 
-bool names_a_wish(std::string topic) {
+bool is_commanded(std::string topic) {
   std::ranges::transform(topic, topic.begin(), [](unsigned char c) { return std::tolower(c); });
-  constexpr std::array kWishes = {"command", "cmd", "desired", "target", "goal", "reference"};
+  constexpr std::array kCommanded = {"command", "cmd", "desired", "target", "goal", "reference"};
   return std::ranges::any_of(
-      kWishes, [&](const char* wish) { return topic.find(wish) != std::string::npos; });
+      kCommanded, [&](const char* word) { return topic.find(word) != std::string::npos; });
 }
+
+namespace {
 
 std::string list_of_topics(const Contents& contents) {
   constexpr std::size_t kMost = 12;
@@ -35,8 +37,14 @@ std::string list_of_topics(const Contents& contents) {
                               const std::string& kind, const std::string& types) {
   const std::string place = topic.empty() ? contents.source : contents.source + ":" + topic;
   const std::string what = topic.empty() ? "" : " there";
-  throw bad_input(place, fmt::format("no {}{}: {}", kind, what, list_of_topics(contents)),
-                  fmt::format("record {}", types));
+  const auto slash = std::ranges::find_if(
+      contents.topics, [&](const TopicCount& count) { return count.topic.name == "/" + topic; });
+  const std::string left_out =
+      contents.warnings.empty() ? "" : fmt::format("; {}", contents.warnings.front());
+  throw bad_input(
+      place, fmt::format("no {}{}: {}{}", kind, what, list_of_topics(contents), left_out),
+      slash == contents.topics.end() ? fmt::format("record {}", types)
+                                     : fmt::format("did you mean {}?", slash->topic.name));
 }
 
 [[noreturn]] void refuse_several(const Contents& contents, const std::string& kind,
@@ -68,8 +76,9 @@ const Series& the_only_one(const Contents& contents, const std::vector<const Ser
 }
 
 bool shows_depth(const ImageSeries& series) {
-  return series.encoding == "16UC1" || series.encoding == "32FC1" ||
-         series.encoding.find("compressedDepth") != std::string::npos;
+  constexpr std::array kDepths = {"16UC1", "32FC1", "compressedDepth"};
+  return std::ranges::any_of(
+      kDepths, [&](const char* name) { return series.encoding.find(name) != std::string::npos; });
 }
 
 std::string camera_path(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
@@ -83,13 +92,6 @@ bool is_made_from(const ImageSeries& series, const ImageSeries& raw) {
   return packed_of || (is_raw(raw) && camera_path(series.topic) == camera_path(raw.topic));
 }
 
-/// How far two topics have the same path: "/cam/image_raw", "/cam/camera_info".
-std::size_t common_path(const std::string& a, const std::string& b) {
-  const auto [end, other] = std::ranges::mismatch(a, b);
-  static_cast<void>(other);
-  return static_cast<std::size_t>(std::count(a.begin(), end, '/'));
-}
-
 }  // namespace
 
 const JointSeries& choose_joints(const Contents& contents, const std::string& topic) {
@@ -99,7 +101,7 @@ const JointSeries& choose_joints(const Contents& contents, const std::string& to
     refuse_none(contents, topic, "joint positions", "joint states (sensor_msgs/JointState)");
   // Best first: measured, with the most joints, by its usual name, with the most messages.
   const auto rank = [](const JointSeries* series) {
-    return std::tuple(!names_a_wish(series->topic), series->names.size(),
+    return std::tuple(!is_commanded(series->topic), series->names.size(),
                       series->topic.ends_with("joint_states"), series->times_s.size());
   };
   std::ranges::stable_sort(found, std::greater{}, rank);
@@ -108,7 +110,7 @@ const JointSeries& choose_joints(const Contents& contents, const std::string& to
   for (std::size_t i = 1; i < found.size(); ++i) {
     const JointSeries& other = *found[i];
     const bool as_good =
-        !names_a_wish(other.topic) && other.names.size() == best.names.size() &&
+        !is_commanded(other.topic) && other.names.size() == best.names.size() &&
         other.topic.ends_with("joint_states") == best.topic.ends_with("joint_states");
     if (as_good && other.topic != best.topic) rivals.push_back(other.topic);
   }
@@ -136,14 +138,19 @@ const DetectionSeries& choose_detections(const Contents& contents, const std::st
 }
 
 std::optional<CameraSeries> camera_of(const Contents& contents, const std::string& image_topic) {
-  const CameraSeries* best = nullptr;
+  const CameraSeries* own = nullptr;
   for (const CameraSeries& camera : contents.cameras) {
-    if (!(camera.first.k[0] > 0.0)) continue;
-    const std::size_t common = common_path(camera.topic, image_topic);
-    if (best == nullptr || common > common_path(best->topic, image_topic)) best = &camera;
+    const std::string path = camera_path(camera.topic);
+    if (!image_topic.starts_with(path + "/")) continue;
+    if (own == nullptr || path.size() > camera_path(own->topic).size()) own = &camera;
   }
-  if (best == nullptr) return std::nullopt;
-  return *best;
+  // Of a bag with one camera it is that one, whatever the topics are called.
+  std::set<std::string> paths;
+  for (const ImageSeries& series : contents.images) paths.insert(camera_path(series.topic));
+  if (own == nullptr && contents.cameras.size() == 1 && paths.size() <= 1)
+    own = &contents.cameras.front();
+  if (own == nullptr || !(own->first.k[0] > 0.0)) return std::nullopt;
+  return *own;
 }
 
 }  // namespace kinescope::bags

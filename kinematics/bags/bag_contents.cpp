@@ -39,28 +39,66 @@ double quantile(std::vector<double> values, double share) {
 
 /// Clocks that are further apart than any message travels are two clocks.
 constexpr double kOneClock = 5.0;  // s
+/// Topics of one other clock are as far from the recorder's, but for what their messages travel and
+/// how fast a simulation runs.
+constexpr double kSameOtherClock = 60.0;  // s
 
-Stamps how_stamped(const std::vector<StampPair>& pairs) {
-  Stamps out;
-  const auto told = [](const StampPair& pair) { return pair.header != 0; };
-  const bool constant = std::ranges::all_of(
-      pairs, [&](const StampPair& pair) { return pair.header == pairs.front().header; });
-  out.of_header = std::ranges::all_of(pairs, told) && (pairs.size() == 1 || !constant);
-  if (!out.of_header) return out;
+double lateness_s(const StampPair& pair) { return seconds(pair.received - pair.header); }
+
+/// How late messages were recorded by their headers' stamps, which most of them must have, and not
+/// all the same; else nothing.
+std::optional<double> median_lateness_s(const std::vector<StampPair>& pairs) {
   std::vector<double> late;
-  late.reserve(pairs.size());
-  for (const StampPair& pair : pairs) late.push_back(seconds(pair.received - pair.header));
-  const double middle = median_of(late);
-  if (std::abs(middle) > kOneClock) out.moved_s = middle;
-  out.delay_s = middle - out.moved_s;
+  bool differ = pairs.size() == 1;
+  for (const StampPair& pair : pairs) {
+    if (pair.header != 0) late.push_back(lateness_s(pair));
+    differ = differ || pair.header != pairs.front().header;
+  }
+  if (!differ || 2 * late.size() < pairs.size() || late.empty()) return std::nullopt;
+  return median_of(std::move(late));
+}
+
+/// What brings headers' stamps to the recorder's clock: one number for all topics of another clock,
+/// or images and joints would no longer fit together.
+class Clocks {
+ public:
+  explicit Clocks(std::vector<double> lateness_s) {
+    std::ranges::sort(lateness_s);
+    for (const double late : lateness_s) {
+      if (std::abs(late) <= kOneClock) continue;
+      if (shifts_.empty() || late - shifts_.back() > kSameOtherClock) shifts_.push_back(late);
+    }
+  }
+  [[nodiscard]] double shift_s(double lateness_s) const {
+    if (std::abs(lateness_s) <= kOneClock) return 0.0;
+    for (const double shift : shifts_)
+      if (lateness_s >= shift && lateness_s - shift <= kSameOtherClock) return shift;
+    return lateness_s;
+  }
+
+ private:
+  std::vector<double> shifts_;  // increasing
+};
+
+Stamps how_stamped(const std::vector<StampPair>& pairs, const Clocks& clocks) {
+  Stamps out;
+  const std::optional<double> late_s = median_lateness_s(pairs);
+  out.of_header = late_s.has_value();
+  if (!late_s) return out;
+  out.moved_s = clocks.shift_s(*late_s);
+  out.delay_s = *late_s - out.moved_s;
+  std::vector<double> late;
+  for (const StampPair& pair : pairs)
+    if (pair.header != 0) late.push_back(lateness_s(pair));
   constexpr double kTail = 0.05;
   out.jitter_s = quantile(late, 1.0 - kTail) - quantile(late, kTail);
   return out;
 }
 
 double time_of(const StampPair& pair, const Stamps& stamps, std::int64_t start_ns) {
-  return stamps.of_header ? seconds(pair.header - start_ns) + stamps.moved_s
-                          : seconds(pair.received - start_ns);
+  if (!stamps.of_header) return seconds(pair.received - start_ns);
+  if (pair.header == 0) return seconds(pair.received - start_ns) - stamps.delay_s;
+  return seconds(pair.header - start_ns) + stamps.moved_s;
 }
 
 constexpr std::size_t kQuantities = 3;
@@ -98,16 +136,18 @@ std::vector<std::size_t> in_order_of_time(const std::vector<double>& times_s) {
   return rows;
 }
 
-JointSeries series_of(const std::string& topic, const JointRows& group, std::int64_t start_ns) {
+JointSeries series_of(const std::string& topic, const JointRows& group, const Clocks& clocks,
+                      std::int64_t start_ns) {
   JointSeries out;
   out.topic = topic;
   out.names = group.names;
-  out.stamps = how_stamped(group.stamps);
+  out.stamps = how_stamped(group.stamps, clocks);
   std::vector<double> times_s;
   times_s.reserve(group.stamps.size());
   for (const StampPair& pair : group.stamps) times_s.push_back(time_of(pair, out.stamps, start_ns));
   const std::vector<std::size_t> rows = in_order_of_time(times_s);
   for (const std::size_t row : rows) out.times_s.push_back(times_s[row]);
+  out.repeated = times_s.size() - rows.size();
   out.position = matrix_of(group, rows, 0);
   out.velocity = matrix_of(group, rows, 1);
   out.effort = matrix_of(group, rows, 2);
@@ -134,6 +174,8 @@ void add_joints(TopicRecord& record, std::int64_t received_ns, std::string_view 
   if (names.empty() || std::ranges::adjacent_find(names) != names.end()) throw MessageFault{};
   auto group = std::ranges::find(record.joints, names, &JointRows::names);
   if (group == record.joints.end()) {
+    constexpr std::size_t kMostSets = 64;  // of joints, of as many publishers of one topic
+    if (record.joints.size() == kMostSets) throw MessageFault{};
     record.joints.push_back({std::move(names), {}, {}, {}});
     group = std::prev(record.joints.end());
   }
@@ -216,9 +258,12 @@ std::vector<double> times_of(const std::vector<StampPair>& pairs, const Stamps& 
 void warn_of(const TopicRecord& record, Contents& out) {
   const TopicCount& count = record.count;
   if (count.unreadable > 0) {
-    out.warnings.push_back(fmt::format("{}: {} of {} messages of {} are no {} and are left out",
-                                       out.source, count.unreadable, count.messages,
-                                       count.topic.name, count.topic.type));
+    out.warnings.push_back(
+        fmt::format("{}: {} of {} messages of {} are no valid {} and are left out{}", out.source,
+                    count.unreadable, count.messages, count.topic.name, count.topic.type,
+                    count.topic.type == kJointStateType
+                        ? " (no names, a name twice, or lists of other lengths than the names)"
+                        : ""));
   }
   const bool wanted = count.topic.type == kJointStateType || count.topic.type == kDetectionsType ||
                       count.topic.type == kCameraInfoType || is_image_type(count.topic.type);
@@ -229,15 +274,27 @@ void warn_of(const TopicRecord& record, Contents& out) {
   }
 }
 
-void take(TopicRecord record, Contents& out) {
+Clocks clocks_of(const std::vector<TopicRecord>& records) {
+  std::vector<double> late_s;
+  const auto add_series = [&](const std::vector<StampPair>& pairs) {
+    if (const auto late = median_lateness_s(pairs)) late_s.push_back(*late);
+  };
+  for (const TopicRecord& record : records) {
+    add_series(record.stamps);
+    for (const JointRows& group : record.joints) add_series(group.stamps);
+  }
+  return Clocks(std::move(late_s));
+}
+
+void take(TopicRecord record, const Clocks& clocks, Contents& out) {
   warn_of(record, out);
   const std::string& topic = record.count.topic.name;
   for (const JointRows& group : record.joints)
-    out.joints.push_back(series_of(topic, group, out.start_ns));
+    out.joints.push_back(series_of(topic, group, clocks, out.start_ns));
   if (!record.cameras.empty())
     out.cameras.push_back({topic, record.cameras.front(), record.cameras.size() > 1});
   if (!record.stamps.empty()) {
-    const Stamps stamps = how_stamped(record.stamps);
+    const Stamps stamps = how_stamped(record.stamps, clocks);
     std::vector<double> times_s = times_of(record.stamps, stamps, out.start_ns);
     if (record.images) {
       record.images->times_s = std::move(times_s);
@@ -281,7 +338,8 @@ Contents read_contents(const std::filesystem::path& bag) {
   std::ranges::stable_sort(records, {},
                            [](const TopicRecord& record) { return record.count.topic.name; });
   out.warnings = reader->warnings();
-  for (TopicRecord& record : records) take(std::move(record), out);
+  const Clocks clocks = clocks_of(records);
+  for (TopicRecord& record : records) take(std::move(record), clocks, out);
   std::ranges::stable_sort(out.joints, std::greater{},
                            [](const JointSeries& series) { return series.names.size(); });
   return out;

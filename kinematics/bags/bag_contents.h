@@ -5,8 +5,8 @@
 // Units   s after the bag's first message; values as published (rad, m, N m).
 // Method  Messages carry two stamps: that of the header, by the clock of who measured, and that of
 //         the recorder, when the message came. The first is used, moved to the recorder's clock
-//         where the two are not the same (simulated time, a computer whose clock was never set);
-//         where there is none, the second.
+//         where the two are not the same (simulated time, a computer whose clock was never set), by
+//         one number for all topics of that clock; where there is none, the second.
 #pragma once
 
 #include <cstdint>
@@ -37,6 +37,7 @@ struct JointSeries {
   std::vector<double> times_s;                 ///< increasing
   Eigen::MatrixXd position, velocity, effort;  ///< rows x names; no rows where never published
   Stamps stamps;
+  std::size_t repeated = 0;  ///< messages with a stamp that another one has, left out
 };
 
 struct CameraSeries {
@@ -103,8 +104,11 @@ struct Contents {
 [[nodiscard]] const ImageSeries& choose_images(const Contents& contents, const std::string& topic);
 [[nodiscard]] const DetectionSeries& choose_detections(const Contents& contents,
                                                        const std::string& topic);
-/// The camera of the images: the one whose topic shares most of its path. Nothing where none was
-/// published, or one that was never calibrated (a focal length of 0).
+/// True for topics that are named as commands, targets or references: no measurement.
+[[nodiscard]] bool is_commanded(std::string topic);
+/// The camera of the images (or of detections): the one in whose namespace they are, else the only
+/// one of the bag. Nothing where none was published, or it was never calibrated (a focal length of
+/// 0).
 [[nodiscard]] std::optional<CameraSeries> camera_of(const Contents& contents,
                                                     const std::string& image_topic);
 

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "kinematics/bags/bag.h"
@@ -19,10 +21,15 @@ namespace kinescope::bags {
 /// How every message of a sqlite3 bag is packed.
 enum class RowPacking { kNone, kZstd };
 
-[[nodiscard]] std::unique_ptr<Reader> open_mcap(const std::filesystem::path& file);
-[[nodiscard]] std::unique_ptr<Reader> open_ros1(const std::filesystem::path& file);
-[[nodiscard]] std::unique_ptr<Reader> open_sqlite(const std::filesystem::path& file,
-                                                  RowPacking packing);
+/// A file, and the name that messages have for it: that of the packed file it was unpacked from.
+struct NamedFile {
+  std::filesystem::path path;
+  std::string name;
+};
+
+[[nodiscard]] std::unique_ptr<Reader> open_mcap(const NamedFile& file);
+[[nodiscard]] std::unique_ptr<Reader> open_ros1(const NamedFile& file);
+[[nodiscard]] std::unique_ptr<Reader> open_sqlite(const NamedFile& file, RowPacking packing);
 /// A folder with metadata.yaml, or with bags alone: its files one after the other.
 [[nodiscard]] std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder);
 [[nodiscard]] std::vector<std::filesystem::path> files_of_folder(
@@ -47,7 +54,8 @@ class TopicTable {
 
  private:
   std::vector<Topic> topics_;
-  std::vector<std::pair<std::uint32_t, std::size_t>> numbers_;
+  std::map<std::uint32_t, std::size_t> numbers_;
+  std::map<std::tuple<std::string, std::string, std::string>, std::size_t> names_;
 };
 
 /// A record says that it is longer than what holds it.
@@ -76,7 +84,7 @@ class ByteReader {
 /// A file from front to back.
 class InputFile {
  public:
-  explicit InputFile(const std::filesystem::path& path);
+  explicit InputFile(const NamedFile& file);
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }
   [[nodiscard]] std::uint64_t left() const { return size_ - position_; }

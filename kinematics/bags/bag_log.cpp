@@ -86,6 +86,10 @@ bool add_series(JointSeries& log, const JointSeries& other) {
 
 void warn_of_stamps(const JointSeries& series, const std::string& source,
                     std::vector<std::string>& warnings) {
+  if (series.repeated > 0) {
+    warnings.push_back(fmt::format("{}: {} messages of {} repeat a stamp and are left out", source,
+                                   series.repeated, series.topic));
+  }
   if (!series.stamps.of_header) {
     warnings.push_back(
         fmt::format("{}: {} has no stamps of its own: those of the recorder are "
@@ -115,7 +119,7 @@ Chosen choose(const Source& source, Needs needs) {
   warn_of_stamps(out.series, contents.source, out.warnings);
   for (const JointSeries& other : contents.joints) {
     if (&other == &log) continue;
-    const bool here = source.topic.empty() || other.topic == source.topic;
+    const bool here = other.topic == topic || (source.topic.empty() && !is_commanded(other.topic));
     const bool enough = needs == Needs::kPositions || logs_as_much(other, log);
     if (here && enough && other.position.size() > 0 && !shares_a_joint(out.series, other) &&
         add_series(out.series, other)) {
@@ -175,10 +179,14 @@ ChannelTable channel_table(const Source& source) {
   out.names = {"t"};
   const auto rows = static_cast<Eigen::Index>(series.times_s.size());
   out.values = Eigen::Map<const Eigen::VectorXd>(series.times_s.data(), rows);
+  // A joint of which a quantity is never published has no column of it.
   const auto add = [&](const std::string& quantity, const Eigen::MatrixXd& values) {
-    for (const std::string& name : series.names) out.names.push_back(name + quantity);
-    out.values.conservativeResize(Eigen::NoChange, out.values.cols() + values.cols());
-    out.values.rightCols(values.cols()) = values;
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+      if (!values.col(column).array().isFinite().any()) continue;
+      out.names.push_back(series.names[static_cast<std::size_t>(column)] + quantity);
+      out.values.conservativeResize(Eigen::NoChange, out.values.cols() + 1);
+      out.values.rightCols(1) = values.col(column);
+    }
   };
   add(kPosition, series.position);
   if (says_something(series.velocity)) add("_velocity", series.velocity);

@@ -21,7 +21,7 @@ namespace kinescope::bags {
 
 /// The table of a joint log, and what was wrong with the bag that it is from.
 struct LogTable {
-  CsvTable table;  ///< of a bag: source "FILE:/topic", lines the numbers of the messages
+  CsvTable table;  ///< of a bag: source "FILE:/topic", lines the rows, from 1
   std::vector<std::string> warnings;
 };
 

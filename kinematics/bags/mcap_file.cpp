@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -36,7 +37,7 @@ std::uint32_t checksum(std::string_view bytes) {
 
 class McapFile final : public Reader {
  public:
-  explicit McapFile(const std::filesystem::path& path) : file_(path) {
+  explicit McapFile(const NamedFile& file) : file_(file) {
     if (file_.left() < kMagic.size() || file_.read(kMagic.size()) != kMagic) {
       throw bad_input(file_.name(), "is no MCAP file", "check what it is, or copy it again");
     }
@@ -83,6 +84,7 @@ class McapFile final : public Reader {
       const std::uint64_t size = reader.u64();
       if (kind == Record::kDataEnd || kind == Record::kFooter) {
         finished_ = true;
+        warn_of_unnamed();
         return std::nullopt;
       }
       if (!is_read(kind)) {
@@ -121,6 +123,7 @@ class McapFile final : public Reader {
       const auto received_ns = static_cast<std::int64_t>(reader.u64());
       static_cast<void>(reader.u64());  // when it was published
       if (topic) return Message{*topic, received_ns, reader.rest()};
+      ++unnamed_;
     }
     return std::nullopt;
   }
@@ -133,8 +136,9 @@ class McapFile final : public Reader {
     const std::uint32_t crc = reader.u32();
     const std::string packing(reader.string());
     const std::uint64_t packed_size = reader.u64();
+    // Of a cut chunk as much as there is, and no more than that of one with a wrong length.
     const std::string_view packed =
-        cut ? reader.rest() : reader.take(packed_size);  // cut: as much as there is
+        reader.take(std::min<std::uint64_t>(packed_size, reader.size()));
     const auto known = packing_named(packing);
     if (!known) {
       throw bad_input(file_.name(), fmt::format("chunks packed with '{}'", packing),
@@ -155,8 +159,14 @@ class McapFile final : public Reader {
     records_ = chunk_;
   }
 
+  void warn_of_unnamed() {
+    if (unnamed_ > 0)
+      warn(fmt::format("{} messages are left out whose topic stood in a damaged chunk", unnamed_));
+  }
+
   std::optional<Message> end(const std::string& where) {
     finished_ = true;
+    warn_of_unnamed();
     warn(fmt::format("the file ends early, {}", where));
     return std::nullopt;
   }
@@ -177,12 +187,13 @@ class McapFile final : public Reader {
   // it.
   bool doubtful_ = false;
   bool finished_ = false;
+  std::uint64_t unnamed_ = 0;  // messages of a channel that was not declared
   std::vector<std::string> warnings_;
 };
 
 }  // namespace
 
-std::unique_ptr<Reader> open_mcap(const std::filesystem::path& file) {
+std::unique_ptr<Reader> open_mcap(const NamedFile& file) {
   return std::make_unique<McapFile>(file);
 }
 

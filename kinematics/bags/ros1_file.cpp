@@ -57,7 +57,7 @@ std::int64_t time_ns(std::string_view bytes) {
 
 class Ros1File final : public Reader {
  public:
-  explicit Ros1File(const std::filesystem::path& path) : file_(path) {
+  explicit Ros1File(const NamedFile& file) : file_(file) {
     if (file_.left() < kBagMagic.size() || file_.read(kBagMagic.size()) != kBagMagic) {
       throw bad_input(file_.name(), "is no bag of ROS 1 (format 2.0)",
                       "check what it is; a bag of format 1.2 is brought to 2.0 by rosbag fix");
@@ -136,6 +136,7 @@ class Ros1File final : public Reader {
     } else if (kind == BagRecord::kMessage) {
       const auto topic = table_.index_of(ByteReader(field(fields, "conn")).u32());
       if (topic) return Message{*topic, time_ns(field(fields, "time")), data};
+      if (unnamed_++ == 0) warn("messages are left out whose connection stood in a damaged chunk");
     }
     return std::nullopt;
   }
@@ -171,12 +172,13 @@ class Ros1File final : public Reader {
   std::uint64_t chunk_at_ = 0;
   bool chunk_cut_ = false;
   bool finished_ = false;
+  std::uint64_t unnamed_ = 0;  // messages of a connection that was not declared
   std::vector<std::string> warnings_;
 };
 
 }  // namespace
 
-std::unique_ptr<Reader> open_ros1(const std::filesystem::path& file) {
+std::unique_ptr<Reader> open_ros1(const NamedFile& file) {
   return std::make_unique<Ros1File>(file);
 }
 

@@ -153,8 +153,10 @@ class FolderReader final : public Reader {
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& ending) {
-    name_ = (fs::temp_directory_path() / "kinescope-XXXXXX").string() + ending;
-    const int file = mkstemps(name_.data(), static_cast<int>(ending.size()));
+    std::error_code error;
+    const fs::path folder = fs::temp_directory_path(error);
+    name_ = (folder / "kinescope-XXXXXX").string() + ending;
+    const int file = error ? -1 : mkstemps(name_.data(), static_cast<int>(ending.size()));
     if (file < 0) {
       throw bad_input(name_, "cannot be made", "name a folder for temporary files in TMPDIR");
     }
@@ -192,6 +194,7 @@ bool is_bag_folder(const fs::path& path) {
   std::ifstream stream(file);
   std::string line;
   while (std::getline(stream, line)) {
+    if (line.ends_with('\r')) line.pop_back();
     if (line.starts_with("rosbag2_bagfile_information:")) return true;
     if (!line.empty() && line.front() != '#' && line.front() != '%' && line != "---") return false;
   }
@@ -207,12 +210,13 @@ std::unique_ptr<Reader> open_folder(const fs::path& folder) {
 std::unique_ptr<Reader> open_file(const fs::path& file, RowPacking packing) {
   const std::string ending = format_ending(file);
   const auto open_plain = [&](const fs::path& plain) {
-    if (ending == ".mcap") return open_mcap(plain);
-    if (ending == ".db3") return open_sqlite(plain, packing);
-    return open_ros1(plain);
+    const NamedFile named{plain, file.string()};
+    if (ending == ".mcap") return open_mcap(named);
+    if (ending == ".db3") return open_sqlite(named, packing);
+    return open_ros1(named);
   };
   if (file.extension() != kPacked) return open_plain(file);
-  static_cast<void>(InputFile(file));  // missing, empty, may not be read
+  static_cast<void>(InputFile({file, file.string()}));  // missing, empty, may not be read
   const TemporaryFile unpacked(ending);
   unpack_zstd_file(file, unpacked.name());
   return open_plain(unpacked.name());  // an open file stays when its name goes

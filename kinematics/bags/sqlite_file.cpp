@@ -25,11 +25,10 @@ std::string_view bytes_of(sqlite3_stmt* row, int column) {
 
 class SqliteFile final : public Reader {
  public:
-  SqliteFile(const std::filesystem::path& path, RowPacking packing)
-      : name_(path.string()), packing_(packing) {
-    static_cast<void>(InputFile(path));  // missing, empty, may not be read
+  SqliteFile(const NamedFile& file, RowPacking packing) : name_(file.name), packing_(packing) {
+    static_cast<void>(InputFile(file));  // missing, empty, may not be read
     sqlite3* opened = nullptr;
-    const int status = sqlite3_open_v2(name_.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
+    const int status = sqlite3_open_v2(file.path.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
     database_.reset(opened);
     if (status != SQLITE_OK) refuse();
     // A schema from elsewhere must not run anything.
@@ -119,7 +118,7 @@ class SqliteFile final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_sqlite(const std::filesystem::path& file, RowPacking packing) {
+std::unique_ptr<Reader> open_sqlite(const NamedFile& file, RowPacking packing) {
   return std::make_unique<SqliteFile>(file, packing);
 }
 

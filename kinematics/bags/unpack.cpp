@@ -155,7 +155,8 @@ void unpack_zstd_file(const std::filesystem::path& packed, const std::filesystem
   std::string made(kStep, '\0');
   ZstdStream stream;
   Step last = Step::kFault;
-  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+  while (to &&
+         (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0)) {
     std::string_view left(block.data(), static_cast<std::size_t>(in.gcount()));
     bool full = false;  // more may come out of what went in
     while (!left.empty() || full) {
@@ -165,13 +166,13 @@ void unpack_zstd_file(const std::filesystem::path& packed, const std::filesystem
         throw bad_input(packed.string(), "the zstd file is damaged",
                         "copy it again (zstd -t checks it)");
       }
-      to.write(made.data(), static_cast<std::streamsize>(progress.made));
+      if (!to.write(made.data(), static_cast<std::streamsize>(progress.made))) break;
       left.remove_prefix(progress.used);
       full = last == Step::kMore && progress.made == made.size();
       if (progress.used == 0 && progress.made == 0) break;
     }
   }
-  if (last != Step::kEnd) {
+  if (to && last != Step::kEnd) {
     throw bad_input(packed.string(), "the zstd file is cut off", "copy or record it again");
   }
   if (!to.flush()) {

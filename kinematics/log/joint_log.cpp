@@ -11,6 +11,7 @@
 
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/longest_increasing.h"
 #include "kinematics/log/header_units.h"
 #include "kinematics/log/joint_log_table.h"
 #include "kinematics/log/unwrap.h"
@@ -121,30 +122,6 @@ std::vector<std::size_t> read_samples(const CsvTable& table, std::size_t time, s
   return rows;
 }
 
-// The most samples whose stamps increase (longest increasing subsequence by patience sorting,
-// Fredman 1975): one stamp far ahead is left out, not all that follow it.
-std::vector<Eigen::Index> increasing(const std::vector<double>& times_s) {
-  std::vector<std::size_t> ends;  // of the best sequence of each length
-  std::vector<std::size_t> before(times_s.size());
-  for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const auto place = std::ranges::lower_bound(ends, times_s[i], {},
-                                                [&](std::size_t end) { return times_s[end]; });
-    before[i] = place == ends.begin() ? i : *std::prev(place);
-    if (place == ends.end()) {
-      ends.push_back(i);
-    } else if (times_s[i] < times_s[*place]) {  // of two alike the first stays
-      *place = i;
-    }
-  }
-  std::vector<Eigen::Index> out(ends.size());
-  std::size_t at = ends.empty() ? 0 : ends.back();
-  for (auto slot = out.rbegin(); slot != out.rend(); ++slot) {
-    *slot = static_cast<Eigen::Index>(at);
-    at = before[at];
-  }
-  return out;
-}
-
 Error stamp_error(const std::string& source, std::size_t line, const std::string& what) {
   return bad_input(fmt::format("{}:{}", source, line), what,
                    "sort the rows by time and remove repeated stamps");
@@ -162,7 +139,7 @@ Error stamp_error(const std::string& source, std::size_t line, const std::string
 
 void sort_out_stamps(const CsvTable& table, BadRows& bad, TableLog& read) {
   JointLog& log = read.log;
-  const std::vector<Eigen::Index> kept = increasing(log.times_s);
+  const std::vector<Eigen::Index> kept = longest_increasing(log.times_s);
   const std::size_t out_of_order = log.size() - kept.size();
   if (out_of_order == 0) return;
   if (bad.too_many(bad.size() + out_of_order)) throw_first_descent(log, table, read.rows);

@@ -88,6 +88,7 @@ TEST(BagRecording, OfDetectionsIsARecordingOfCorners) {
   folder.write("files/corners.csv", observations_csv(seen))
       .write("files/camera.yaml", write_camera_info(world.camera))
       .write("files/tags.yaml", tags)
+      .write("camera.yaml", write_camera_info(world.camera))  // the bag's is of rectified images
       .write("tags.yaml", tags);
   std::string joints = "t," + fmt::format("{}", fmt::join(world.log.channels, ",")) + "\n";
   for (Eigen::Index row = 0; row < world.log.values.rows(); ++row) {
@@ -236,6 +237,21 @@ TEST(BagRecording, WhatCannotBeReadIsNamedWithItsTopics) {
   EXPECT_NE(inspected.err.find("holds neither joint states nor images"), std::string::npos);
   expect_refusal({"run", (folder.path() / "none.mcap").string()}, ExitCode::kBadInput,
                  "no such file");
+}
+
+TEST(BagRecording, IsNotWrittenOver) {
+  const RecordingFolder folder;
+  const std::string path = (folder.path() / "motion.mcap").string();
+  truth::BagWriter bag(path);
+  bag.write("/joint_states", kJointStates, kStartNs,
+            truth::joint_state(kStartNs, {"joint1"}, {0.0}));
+  bag.finish();
+  const std::string before = read_text_file(path);
+  folder.write("robot.urdf", "<robot name='r'><link name='base'/></robot>");
+  expect_refusal({"simulate", (folder.path() / "robot.urdf").string(), "--trajectory",
+                  path + ":/joint_states", "-o", path, "--force"},
+                 ExitCode::kBadRequest, "is an input, and would be written over");
+  EXPECT_EQ(read_text_file(path), before);
 }
 
 }  // namespace

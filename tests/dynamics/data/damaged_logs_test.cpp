@@ -354,7 +354,9 @@ TEST(DamagedLog, CutOffAndCorruptFilesNameTheLine) {
   EXPECT_NE(read("bad.csv.gz", flipped).find("gzip file is"), std::string::npos);
   EXPECT_NE(read("plain.csv.gz", text).find("is no gzip file"), std::string::npos);
   EXPECT_EQ(read("whole.csv.gz", packed), "accepted");
-  EXPECT_NE(refusal_of([] { static_cast<void>(read_torque_data({}, {})); }).find("no torque log"),
+  EXPECT_NE(refusal_of([] {
+              static_cast<void>(read_torque_data(std::vector<std::filesystem::path>{}, {}));
+            }).find("no torque log"),
             std::string::npos);
 }
 

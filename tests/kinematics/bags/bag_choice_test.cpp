@@ -97,8 +97,15 @@ TEST(CameraOf, TheOneBesideTheImages) {
   contents.cameras = {{"/left/camera_info", calibrated, false},
                       {"/right/camera_info", calibrated, false}};
   EXPECT_EQ(camera_of(contents, "/right/image_raw")->topic, "/right/camera_info");
-  contents.cameras = {{"/left/camera_info", CameraInfo{}, false}};
+  // One that was never calibrated is none, and another camera's is not its own.
+  contents.images = {images("/left/image_raw"), images("/right/image_raw")};
+  contents.cameras = {{"/left/camera_info", CameraInfo{}, false},
+                      {"/right/camera_info", calibrated, false}};
   EXPECT_FALSE(camera_of(contents, "/left/image_raw"));
+  contents.cameras.erase(contents.cameras.begin());
+  EXPECT_FALSE(camera_of(contents, "/left/image_raw"));
+  contents.images.clear();
+  EXPECT_EQ(camera_of(contents, "/detections")->topic, "/right/camera_info");
 }
 
 }  // namespace

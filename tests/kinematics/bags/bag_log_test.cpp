@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kinematics/bags/bag_contents.h"
 #include "tests/truth/bag_writer.h"
 #include "tests/truth/temporary_path.h"
 
@@ -93,6 +94,54 @@ TEST(BagLog, JointsOfAnotherPublisherJoinInBetweenTheirMessages) {
   ASSERT_EQ(log.size(), 197U);  // the gripper's last message is three before the arm's
   for (const Eigen::Index row : {0, 41, 190})
     EXPECT_NEAR(log.values(row, 2), 0.002 * static_cast<double>(row), 1e-9);
+}
+
+// Two topics stamped by one simulated clock, of which one takes longer to the recorder.
+TEST(BagLog, TopicsOfAnotherClockStayTogether) {
+  const fs::path path = truth::temporary_path("two_topics.mcap");
+  truth::BagWriter writer(path);
+  for (int k = 0; k < 100; ++k) {
+    const std::int64_t t = 10 * kMillisecond * k;
+    writer.write("/joint_states", kType, kStart + t + 2 * kMillisecond,
+                 truth::joint_state(t + 1, {"a"}, {0.01 * k}));
+    writer.write("/image_raw", "sensor_msgs/msg/Image", kStart + t + 80 * kMillisecond,
+                 truth::image(t + 1, 2, 2, "mono8", 2, "grey"));
+  }
+  writer.finish();
+  const Contents contents = read_contents(path);
+  ASSERT_EQ(contents.images.size(), 1U);
+  EXPECT_NEAR(contents.images[0].times_s[50], contents.joints[0].times_s[50], 1e-6);
+  EXPECT_NEAR(contents.images[0].stamps.delay_s, 0.078, 1e-6);
+}
+
+TEST(BagLog, OneMessageWithoutAStampIsOne) {
+  const fs::path path = truth::temporary_path("first_zero.mcap");
+  truth::BagWriter writer(path);
+  for (int k = 0; k < 100; ++k) {
+    const std::int64_t t = kStart + 10 * kMillisecond * k;
+    writer.write("/joint_states", kType, t + 5 * kMillisecond,
+                 truth::joint_state(k == 0 ? 0 : t, {"a"}, {0.01 * k}));
+  }
+  writer.finish();
+  const JointLog log = read_joint_log(path);
+  ASSERT_EQ(log.size(), 100U);
+  EXPECT_NEAR(log.times_s[1] - log.times_s[0], 0.01, 1e-9);
+  EXPECT_TRUE(log.warnings.empty());
+}
+
+TEST(BagLog, CommandsDoNotJoinMeasurements) {
+  const fs::path path = truth::temporary_path("commands.mcap");
+  truth::BagWriter writer(path);
+  for (int k = 0; k < 100; ++k) {
+    const std::int64_t t = kStart + 10 * kMillisecond * k;
+    writer.write("/joint_states", kType, t, truth::joint_state(t, {"a"}, {0.01 * k}));
+    writer.write("/gripper/joint_commands", kType, t, truth::joint_state(t, {"g"}, {0.02 * k}));
+  }
+  writer.finish();
+  const JointLog log = read_joint_log(path);
+  EXPECT_EQ(log.channels, (std::vector<std::string>{"a"}));
+  ASSERT_EQ(log.warnings.size(), 1U);
+  EXPECT_NE(log.warnings[0].find("/gripper/joint_commands"), std::string::npos);
 }
 
 TEST(BagLog, OrderOfArrivalDoesNotMatter) {

@@ -121,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Writers, WholeBag,
                                          "joints_sqlite3", "joints_sqlite3_zstd_file",
                                          "joints_sqlite3_zstd_message"));
 
-TEST(Bag, WithoutASummaryIsReadAndSaidToBe) {
+TEST(Bag, WithoutASummaryIsRead) {
   const auto reader = open(kData / "joints_no_index.mcap");
   int messages = 0;
   while (reader->next()) ++messages;
@@ -184,6 +184,19 @@ TEST(Bag, RefusesWhatIsNone) {
     std::ofstream(path) << "t,q1\n0,0\n";
     EXPECT_THROW(static_cast<void>(open(path)), Error) << "a table";
   }
+}
+
+TEST(Bag, DamageThatHidesTopicsIsSaid) {
+  std::ifstream stream(kData / "joints_zstd.mcap", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+  const std::size_t frame = bytes.find("\x28\xB5\x2F\xFD");  // of the first chunk
+  ASSERT_NE(frame, std::string::npos);
+  bytes[frame + 9] = static_cast<char>(bytes[frame + 9] ^ 0x40);
+  const fs::path path = truth::temporary_path("first_chunk.mcap");
+  std::ofstream(path, std::ios::binary) << bytes;
+  const Contents contents = read_contents(path);
+  ASSERT_EQ(contents.warnings.size(), 2U);
+  EXPECT_NE(contents.warnings[1].find("topic stood in a damaged chunk"), std::string::npos);
 }
 
 TEST(Bag, SourceNamesATopic) {
