@@ -304,6 +304,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   FoundRest out;
   out.columns = hats(best->place.carrier, best->over.value, knots);
   const Posterior curve = best_posterior(gather(system, out.columns, best->score), knots);
+  if (curve.mean.size() == 0) return std::nullopt;  // beside the others it says nothing of its own
   out.prior = curve.prior_information;
   out.rest = describe(system, best->place, best->over, knots, curve);
   out.rest.p_value = std::min(1.0, best->p_value);

@@ -117,6 +117,8 @@ Chosen choose(const Source& source, Needs needs) {
   Chosen out{log, contents.warnings};
   const std::string& topic = log.topic;
   warn_of_stamps(out.series, contents.source, out.warnings);
+  constexpr std::size_t kMostNamed = 4;
+  std::size_t unused = 0;
   for (const JointSeries& other : contents.joints) {
     if (&other == &log) continue;
     const bool here = other.topic == topic || (source.topic.empty() && !is_commanded(other.topic));
@@ -125,6 +127,7 @@ Chosen choose(const Source& source, Needs needs) {
         add_series(out.series, other)) {
       continue;
     }
+    if (unused++ >= kMostNamed) continue;
     out.warnings.push_back(
         fmt::format("{}: {} message{} of {} with {} {} not used beside {}{}", contents.source,
                     other.times_s.size(), other.times_s.size() == 1 ? "" : "s", other.topic,
@@ -132,6 +135,10 @@ Chosen choose(const Source& source, Needs needs) {
                     other.topic == topic
                         ? ""
                         : fmt::format(" (name {}:{} to use them)", contents.source, other.topic)));
+  }
+  if (unused > kMostNamed) {
+    out.warnings.push_back(fmt::format("{}: neither are {} more sets of joints", contents.source,
+                                       unused - kMostNamed));
   }
   return out;
 }
@@ -179,18 +186,33 @@ ChannelTable channel_table(const Source& source) {
   out.names = {"t"};
   const auto rows = static_cast<Eigen::Index>(series.times_s.size());
   out.values = Eigen::Map<const Eigen::VectorXd>(series.times_s.data(), rows);
-  // A joint of which a quantity is never published has no column of it.
+  const bool velocities = says_something(series.velocity);
+  const bool efforts = says_something(series.effort);
+  // A joint that lacks what the others have (a wheel, a gripper) would make all rows incomplete.
+  std::vector<Eigen::Index> whole;
+  for (Eigen::Index joint = 0; joint < series.position.cols(); ++joint) {
+    const auto has = [&](const Eigen::MatrixXd& values) {
+      return values.col(joint).array().isFinite().any();
+    };
+    const std::string& name = series.names[static_cast<std::size_t>(joint)];
+    if (has(series.position) && (!efforts || has(series.effort))) {
+      whole.push_back(joint);
+    } else {
+      out.warnings.push_back(fmt::format("{}: joint '{}' is left out: it has no {}", out.source,
+                                         name, has(series.position) ? "effort" : "position"));
+    }
+  }
   const auto add = [&](const std::string& quantity, const Eigen::MatrixXd& values) {
-    for (Eigen::Index column = 0; column < values.cols(); ++column) {
-      if (!values.col(column).array().isFinite().any()) continue;
-      out.names.push_back(series.names[static_cast<std::size_t>(column)] + quantity);
+    for (const Eigen::Index joint : whole) {
+      if (!values.col(joint).array().isFinite().any()) continue;
+      out.names.push_back(series.names[static_cast<std::size_t>(joint)] + quantity);
       out.values.conservativeResize(Eigen::NoChange, out.values.cols() + 1);
-      out.values.rightCols(1) = values.col(column);
+      out.values.rightCols(1) = values.col(joint);
     }
   };
   add(kPosition, series.position);
-  if (says_something(series.velocity)) add("_velocity", series.velocity);
-  if (says_something(series.effort)) add(kEffort, series.effort);
+  if (velocities) add("_velocity", series.velocity);
+  if (efforts) add(kEffort, series.effort);
   for (std::size_t row = 0; row < series.times_s.size(); ++row) out.lines.push_back(row + 1);
   return out;
 }

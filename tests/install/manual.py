@@ -59,7 +59,8 @@ def check_words():
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "recording").mkdir()
         (Path(folder) / "robot.urdf").touch()
-        assert completed_by_bash("run", folder + "/") == {folder + "/recording"}
+        # A recording is a folder, or a bag.
+        assert completed_by_bash("run", folder + "/") == {folder + "/recording", folder + "/robot.urdf"}
         assert completed_by_bash("run", "--nominal", folder + "/rob") == {folder + "/robot.urdf"}
 
 

@@ -259,10 +259,10 @@ TEST_F(ReadRecording, FolderRefused) {
             "none: no such folder (check the path)");
   paths.folder = folder_.path() / "joints.csv";
   EXPECT_NE(folder_.refusal_of([&] { static_cast<void>(read_recording(paths)); })
-                .find("is a file, not a recording's folder"),
+                .find("is a file, neither a recording's folder nor a bag"),
             std::string::npos);
   folder_.remove("poses.csv");
-  EXPECT_NE(folder_.refusal().find("holds no video, corners.csv, poses.csv or points.csv"),
+  EXPECT_NE(folder_.refusal().find("holds no video, bag, corners.csv, poses.csv or points.csv"),
             std::string::npos);
 }
 
