@@ -23,12 +23,26 @@ std::string_view bytes_of(sqlite3_stmt* row, int column) {
   return {static_cast<const char*>(data), static_cast<std::size_t>(size)};
 }
 
+/// SQLite makes files beside one that it may have to share. Where nobody writes (no log of changes
+/// lies beside it) it is told that the file does not change.
+std::string uri_of(const std::filesystem::path& file) {
+  std::string out = "file:";
+  for (const char c : file.string()) {
+    const bool reserved = c == '%' || c == '?' || c == '#';
+    out += reserved ? fmt::format("%{:02X}", static_cast<unsigned char>(c)) : std::string(1, c);
+  }
+  std::error_code error;
+  const std::filesystem::path changes = file.string() + "-wal";
+  return std::filesystem::exists(changes, error) ? out : out + "?immutable=1";
+}
+
 class SqliteFile final : public Reader {
  public:
   SqliteFile(const NamedFile& file, RowPacking packing) : name_(file.name), packing_(packing) {
     static_cast<void>(InputFile(file));  // missing, empty, may not be read
     sqlite3* opened = nullptr;
-    const int status = sqlite3_open_v2(file.path.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
+    const int status = sqlite3_open_v2(uri_of(file.path).c_str(), &opened,
+                                       SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
     database_.reset(opened);
     if (status != SQLITE_OK) refuse();
     // A schema from elsewhere must not run anything.

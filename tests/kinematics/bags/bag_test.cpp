@@ -199,6 +199,19 @@ TEST(Bag, DamageThatHidesTopicsIsSaid) {
   EXPECT_NE(contents.warnings[1].find("topic stood in a damaged chunk"), std::string::npos);
 }
 
+TEST(Bag, NothingIsLeftBesideADatabase) {
+  const fs::path folder = truth::temporary_path("a b#1?%41");
+  fs::create_directories(folder);
+  for (const fs::directory_entry& entry : fs::directory_iterator(kData / "joints_sqlite3"))
+    fs::copy(entry.path(), folder / entry.path().filename());
+  const auto count = [&] {
+    return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+  };
+  const auto before = count();
+  EXPECT_EQ(read_contents(folder).joints.front().times_s.size(), 40U);
+  EXPECT_EQ(count(), before);
+}
+
 TEST(Bag, SourceNamesATopic) {
   const fs::path file = truth::temporary_path("named.mcap");
   truth::BagWriter(file).finish();
