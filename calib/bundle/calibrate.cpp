@@ -144,8 +144,8 @@ State solve_without(const Spec& spec, const State& solution, const Split& split,
   return state;
 }
 
-// A fold starts at the whole's solution and is there in three to eight steps, unless the whole had
-// none: then every fold would creep on to the limit of the fit, for an answer that is refused.
+// A fold starts at the whole's solution. Where the whole had none, every fold would creep on to the
+// limit of the fit, for an answer that is refused. Chosen, not measured.
 constexpr int kStepsWithoutMinimum = 10;
 
 // Cross-validation: each fold's frames are predicted by a model that has not seen them. Outliers

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/av_frame.h"
 
-#include <cstring>
-
 extern "C" {
 #include <libavutil/pixdesc.h>
 }
@@ -23,23 +21,12 @@ bool has_luma_plane(AVPixelFormat format) {
          d->comp[0].plane == 0 && d->comp[0].offset == 0;
 }
 
-GreyImage copy_plane(const std::uint8_t* data, int stride, int width, int height) {
-  GreyImage grey{width, height, {}};
-  const std::size_t row_bytes = static_cast<std::size_t>(width);
-  grey.pixels.resize(row_bytes * static_cast<std::size_t>(height));
-  for (int row = 0; row < height; ++row) {
-    std::memcpy(grey.pixels.data() + row_bytes * static_cast<std::size_t>(row),
-                data + static_cast<std::ptrdiff_t>(stride) * row, row_bytes);
-  }
-  return grey;
-}
-
 }  // namespace
 
 GreyImage grey_of(const AVFrame& frame, Av<SwsContext>& scaler, const std::string& source) {
   const auto format = static_cast<AVPixelFormat>(frame.format);
   if (has_luma_plane(format))
-    return copy_plane(frame.data[0], frame.linesize[0], frame.width, frame.height);
+    return copy_of({frame.data[0], frame.width, frame.height, frame.linesize[0]});
   scaler.reset(sws_getCachedContext(scaler.release(), frame.width, frame.height, format,
                                     frame.width, frame.height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr,
                                     nullptr, nullptr));
@@ -53,7 +40,7 @@ GreyImage grey_of(const AVFrame& frame, Av<SwsContext>& scaler, const std::strin
   out->format = AV_PIX_FMT_GRAY8;
   KINESCOPE_CHECK(av_frame_get_buffer(out.get(), 0) == 0, "no memory for a frame");
   sws_scale(scaler.get(), frame.data, frame.linesize, 0, frame.height, out->data, out->linesize);
-  return copy_plane(out->data[0], out->linesize[0], out->width, out->height);
+  return copy_of({out->data[0], out->width, out->height, out->linesize[0]});
 }
 
 }  // namespace kinescope

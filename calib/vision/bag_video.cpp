@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
@@ -56,15 +55,8 @@ const Encoding* find_encoding(const std::string& name) {
   return found == kEncodings.end() ? nullptr : &*found;
 }
 
-GreyImage copy_of(const cv::Mat& grey) {
-  GreyImage out{grey.cols, grey.rows, {}};
-  const auto row_bytes = static_cast<std::size_t>(grey.cols);
-  out.pixels.resize(row_bytes * static_cast<std::size_t>(grey.rows));
-  for (int row = 0; row < grey.rows; ++row) {
-    std::memcpy(out.pixels.data() + row_bytes * static_cast<std::size_t>(row), grey.ptr(row),
-                row_bytes);
-  }
-  return out;
+ImageView view_of(const cv::Mat& grey) {
+  return {grey.data, grey.cols, grey.rows, static_cast<int>(grey.step)};
 }
 
 /// Throws MessageFault where the pixels are fewer than the size says.
@@ -78,14 +70,14 @@ GreyImage grey_of(const bags::Image& image, const Encoding& encoding) {
   const cv::Mat pixels(static_cast<int>(image.height), static_cast<int>(image.width), encoding.type,
                        const_cast<char*>(image.pixels.data()),  // NOLINT(*-const-cast): read only
                        image.step);
-  if (encoding.conversion == kIsGrey) return copy_of(pixels);
+  if (encoding.conversion == kIsGrey) return copy_of(view_of(pixels));
   cv::Mat grey;
   if (encoding.conversion == kUpperByte) {
     cv::extractChannel(pixels, grey, image.big_endian ? 0 : 1);
   } else {
     cv::cvtColor(pixels, grey, encoding.conversion);
   }
-  return copy_of(grey);
+  return copy_of(view_of(grey));
 }
 
 GreyImage unpacked(const bags::PackedImage& image) {
@@ -98,7 +90,7 @@ GreyImage unpacked(const bags::PackedImage& image) {
     throw MessageFault{};
   }
   if (grey.empty()) throw MessageFault{};
-  return copy_of(grey);
+  return copy_of(view_of(grey));
 }
 
 class BagVideoReader final : public VideoReader {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <utility>
 
@@ -177,15 +176,7 @@ std::optional<GreyImage> read_grey_image(const std::filesystem::path& path) {
     return std::nullopt;  // over OpenCV's size limits
   }
   if (image.empty()) return std::nullopt;
-  GreyImage grey;
-  grey.width = image.cols;
-  grey.height = image.rows;
-  const std::size_t width = static_cast<std::size_t>(image.cols);
-  grey.pixels.resize(width * static_cast<std::size_t>(image.rows));
-  for (int row = 0; row < image.rows; ++row) {
-    std::memcpy(grey.pixels.data() + width * static_cast<std::size_t>(row), image.ptr(row), width);
-  }
-  return grey;
+  return copy_of({image.data, image.cols, image.rows, static_cast<int>(image.step)});
 }
 
 std::unique_ptr<VideoReader> open_image_folder(const std::filesystem::path& folder) {

@@ -39,7 +39,7 @@ double quantile(std::vector<double> values, double share) {
 /// Clocks that are further apart than any message travels are two clocks.
 constexpr double kOneClock = 5.0;  // s
 /// Topics of one other clock are as far from the recorder's, but for what their messages travel and
-/// how fast a simulation runs.
+/// how fast a simulation runs. Chosen, not measured.
 constexpr double kSameOtherClock = 60.0;  // s
 
 double lateness_s(const StampPair& pair) { return seconds(pair.received - pair.header); }
@@ -173,7 +173,7 @@ void add_joints(TopicRecord& record, std::int64_t received_ns, std::string_view 
   if (names.empty() || std::ranges::adjacent_find(names) != names.end()) throw MessageFault{};
   auto group = std::ranges::find(record.joints, names, &JointRows::names);
   if (group == record.joints.end()) {
-    constexpr std::size_t kMostSets = 64;  // of joints, of as many publishers of one topic
+    constexpr std::size_t kMostSets = 64;  // of joints on one topic; chosen, not measured
     if (record.joints.size() == kMostSets) throw MessageFault{};
     record.joints.push_back({std::move(names), {}, {}, {}});
     group = std::prev(record.joints.end());

@@ -67,7 +67,7 @@ void keep_rows_where(JointSeries& series, const std::vector<Eigen::Index>& rows)
 
 /// Adds another publisher's joints; false where it covers too little of the time.
 bool add_series(JointSeries& log, const JointSeries& other) {
-  constexpr double kLeastCovered = 0.9;
+  constexpr double kLeastCovered = 0.9;  // chosen, not measured
   const Eigen::MatrixXd position = at_times(other, other.position, log.times_s);
   std::vector<Eigen::Index> covered;
   for (Eigen::Index row = 0; row < position.rows(); ++row)

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <map>
-#include <utility>
 
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include "kinematics/bags/bag_files.h"
-#include "kinematics/bags/unpack.h"
+#include "kinematics/bags/chunked_file.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::bags {
@@ -35,56 +33,34 @@ std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(crc32_z(0, data, bytes.size()));
 }
 
-class McapFile final : public Reader {
+class McapFile final : public ChunkedFile {
  public:
-  explicit McapFile(const NamedFile& file) : file_(file) {
-    if (file_.left() < kMagic.size() || file_.read(kMagic.size()) != kMagic) {
+  explicit McapFile(const NamedFile& file) : ChunkedFile(file) {
+    if (!begins_with(kMagic))
       throw bad_input(file_.name(), "is no MCAP file", "check what it is, or copy it again");
-    }
-  }
-
-  const std::vector<Topic>& topics() const override { return table_.topics(); }
-  const std::vector<std::string>& warnings() const override { return warnings_; }
-
-  std::optional<Message> next() override {
-    while (true) {
-      if (!records_.empty()) {
-        if (auto message = next_of_chunk()) return message;
-      } else if (finished_) {
-        return std::nullopt;
-      } else if (auto message = next_of_file()) {
-        return message;
-      }
-    }
   }
 
  private:
-  std::optional<Message> next_of_chunk() {
-    try {
-      ByteReader reader(records_);
-      const auto kind = static_cast<Record>(reader.u8());
-      const std::string_view content = reader.take(reader.u64());
-      records_ = reader.rest();
-      return kind == Record::kChunk ? std::nullopt : read(kind, content);
-    } catch (const CutOff&) {
-      // What is cut off inside of a chunk was said when the chunk was unpacked.
-      if (!chunk_cut_) warn(fmt::format("a damaged record in the chunk at byte {}", chunk_at_));
-      records_ = {};
-      return std::nullopt;
-    }
+  std::optional<Message> next_of_chunk(ByteReader& records) override {
+    const auto kind = static_cast<Record>(records.u8());
+    const std::string_view content = records.take(records.u64());
+    return kind == Record::kChunk ? std::nullopt : read(kind, content);
   }
 
-  std::optional<Message> next_of_file() {
+  std::optional<Message> next_of_file() override {
     const std::uint64_t start = file_.position();
-    if (file_.left() == 0) return end("without a summary: its recorder was stopped");
+    if (file_.left() == 0) {
+      end();
+      warn("the file ends early, without a summary: its recorder was stopped");
+      return std::nullopt;
+    }
     try {
       const std::string head = file_.read(9);
       ByteReader reader(head);
       const auto kind = static_cast<Record>(reader.u8());
       const std::uint64_t size = reader.u64();
       if (kind == Record::kDataEnd || kind == Record::kFooter) {
-        finished_ = true;
-        warn_of_unnamed();
+        end();
         return std::nullopt;
       }
       if (!is_read(kind)) {
@@ -97,11 +73,12 @@ class McapFile final : public Reader {
       if (cut) finished_ = true;
       doubtful_ = false;
       if (kind != Record::kChunk) return read(kind, record_);
-      open_chunk(record_, start, cut);
-      return std::nullopt;
+      read_chunk(start, cut);
     } catch (const CutOff&) {
-      return end(fmt::format("inside of the record at byte {}", start));
+      end();
+      warn_of_cut(start);
     }
+    return std::nullopt;
   }
 
   /// A schema, a channel or a message.
@@ -128,8 +105,8 @@ class McapFile final : public Reader {
     return std::nullopt;
   }
 
-  void open_chunk(std::string_view content, std::uint64_t start, bool cut) {
-    ByteReader reader(content);
+  void read_chunk(std::uint64_t start, bool cut) {
+    ByteReader reader(record_);
     static_cast<void>(reader.u64());  // stamps of its first and last message
     static_cast<void>(reader.u64());
     const std::uint64_t size = reader.u64();
@@ -139,56 +116,23 @@ class McapFile final : public Reader {
     // Of a cut chunk as much as there is, and no more than that of one with a wrong length.
     const std::string_view packed =
         reader.take(std::min<std::uint64_t>(packed_size, reader.size()));
-    const auto known = packing_named(packing);
-    if (!known) {
-      throw bad_input(file_.name(), fmt::format("chunks packed with '{}'", packing),
-                      "zstd, lz4 and none are read: mcap compress --compression zstd");
-    }
-    Unpacked chunk = unpack(*known, packed, size);
-    chunk_at_ = start;
-    chunk_cut_ = !chunk.whole;
-    if (cut) {
-      warn(fmt::format("the file ends early, inside of the chunk at byte {}", start));
-    } else if (!chunk.whole) {
-      warn(fmt::format("the chunk at byte {} is damaged: what stands before it is read", start));
-    } else if (crc != 0 && checksum(chunk.bytes) != crc) {
+    const bool whole = open_chunk(packing, packed, size, start, cut,
+                                  "zstd, lz4 and none are read: mcap compress --compression zstd");
+    doubtful_ = whole && crc != 0 && checksum(chunk()) != crc;
+    if (doubtful_ && !cut)
       warn(fmt::format("the chunk at byte {} is damaged (checksum) and left out", start));
-    }
-    doubtful_ = chunk.whole && crc != 0 && checksum(chunk.bytes) != crc;
-    chunk_ = std::move(chunk.bytes);
-    records_ = chunk_;
   }
 
-  void warn_of_unnamed() {
+  void end() {
+    finished_ = true;
     if (unnamed_ > 0)
       warn(fmt::format("{} messages are left out whose topic stood in a damaged chunk", unnamed_));
   }
 
-  std::optional<Message> end(const std::string& where) {
-    finished_ = true;
-    warn_of_unnamed();
-    warn(fmt::format("the file ends early, {}", where));
-    return std::nullopt;
-  }
-
-  void warn(const std::string& what) {
-    warnings_.push_back(fmt::format("{}: {}", file_.name(), what));
-  }
-
-  InputFile file_;
-  TopicTable table_;
   std::map<std::uint16_t, std::string> schemas_;
-  std::string record_;        // of the file
-  std::string chunk_;         // unpacked
-  std::string_view records_;  // of the chunk, those to come
-  std::uint64_t chunk_at_ = 0;
-  bool chunk_cut_ = false;
   // Of the chunk only what names topics is believed: it is written once, and all that follows needs
   // it.
   bool doubtful_ = false;
-  bool finished_ = false;
-  std::uint64_t unnamed_ = 0;  // messages of a channel that was not declared
-  std::vector<std::string> warnings_;
 };
 
 }  // namespace

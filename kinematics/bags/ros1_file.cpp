@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <map>
-#include <utility>
 
-#include <fmt/format.h>
-
-#include "kinematics/bags/bag_files.h"
-#include "kinematics/bags/unpack.h"
+#include "kinematics/bags/chunked_file.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::bags {
@@ -55,44 +51,19 @@ std::int64_t time_ns(std::string_view bytes) {
   return seconds * 1'000'000'000 + reader.u32();
 }
 
-class Ros1File final : public Reader {
+class Ros1File final : public ChunkedFile {
  public:
-  explicit Ros1File(const NamedFile& file) : file_(file) {
-    if (file_.left() < kBagMagic.size() || file_.read(kBagMagic.size()) != kBagMagic) {
+  explicit Ros1File(const NamedFile& file) : ChunkedFile(file) {
+    if (!begins_with(kBagMagic)) {
       throw bad_input(file_.name(), "is no bag of ROS 1 (format 2.0)",
                       "check what it is; a bag of format 1.2 is brought to 2.0 by rosbag fix");
     }
   }
 
-  const std::vector<Topic>& topics() const override { return table_.topics(); }
-  const std::vector<std::string>& warnings() const override { return warnings_; }
-
-  std::optional<Message> next() override {
-    while (true) {
-      if (!records_.empty()) {
-        if (auto message = next_of_chunk()) return message;
-      } else if (finished_ || file_.left() == 0) {
-        return std::nullopt;
-      } else if (auto message = next_of_file()) {
-        return message;
-      }
-    }
-  }
-
  private:
-  std::optional<Message> next_of_chunk() {
-    try {
-      ByteReader reader(records_);
-      const Fields fields = read_fields(reader.string());
-      const std::string_view data = reader.string();
-      records_ = reader.rest();
-      return read(fields, data);
-    } catch (const CutOff&) {
-      // What is cut off inside of a chunk was said when the chunk was unpacked.
-      if (!chunk_cut_) warn(fmt::format("a damaged record in the chunk at byte {}", chunk_at_));
-      records_ = {};
-      return std::nullopt;
-    }
+  std::optional<Message> next_of_chunk(ByteReader& records) override {
+    const Fields fields = read_fields(records.string());
+    return read(fields, records.string());
   }
 
   std::uint32_t length() {
@@ -100,8 +71,12 @@ class Ros1File final : public Reader {
     return ByteReader(bytes).u32();
   }
 
-  std::optional<Message> next_of_file() {
+  std::optional<Message> next_of_file() override {
     const std::uint64_t start = file_.position();
+    if (file_.left() == 0) {
+      finished_ = true;
+      return std::nullopt;
+    }
     try {
       const std::string head = file_.read(length());
       const Fields fields = read_fields(head);
@@ -117,10 +92,12 @@ class Ros1File final : public Reader {
       record_ = file_.read(cut ? file_.left() : size);
       if (cut) finished_ = true;
       if (kind != BagRecord::kChunk) return read(fields, record_);
-      open_chunk(fields, start, cut);
+      open_chunk(std::string(field(fields, "compression")), record_,
+                 ByteReader(field(fields, "size")).u32(), start, cut,
+                 "none, bz2 and lz4 are read: rosbag decompress");
     } catch (const CutOff&) {
       finished_ = true;
-      warn(fmt::format("the file ends early, inside of the record at byte {}", start));
+      warn_of_cut(start);
     }
     return std::nullopt;
   }
@@ -140,40 +117,6 @@ class Ros1File final : public Reader {
     }
     return std::nullopt;
   }
-
-  void open_chunk(const Fields& fields, std::uint64_t start, bool cut) {
-    const std::string packing(field(fields, "compression"));
-    const auto known = packing_named(packing);
-    if (!known) {
-      throw bad_input(file_.name(), fmt::format("chunks packed with '{}'", packing),
-                      "none, bz2 and lz4 are read: rosbag decompress");
-    }
-    Unpacked chunk = unpack(*known, record_, ByteReader(field(fields, "size")).u32());
-    chunk_at_ = start;
-    chunk_cut_ = !chunk.whole;
-    if (cut) {
-      warn(fmt::format("the file ends early, inside of the chunk at byte {}", start));
-    } else if (!chunk.whole) {
-      warn(fmt::format("the chunk at byte {} is damaged: what stands before it is read", start));
-    }
-    chunk_ = std::move(chunk.bytes);
-    records_ = chunk_;
-  }
-
-  void warn(const std::string& what) {
-    warnings_.push_back(fmt::format("{}: {}", file_.name(), what));
-  }
-
-  InputFile file_;
-  TopicTable table_;
-  std::string record_;        // of the file
-  std::string chunk_;         // unpacked
-  std::string_view records_;  // of the chunk, those to come
-  std::uint64_t chunk_at_ = 0;
-  bool chunk_cut_ = false;
-  bool finished_ = false;
-  std::uint64_t unnamed_ = 0;  // messages of a connection that was not declared
-  std::vector<std::string> warnings_;
 };
 
 }  // namespace
