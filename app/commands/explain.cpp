@@ -14,6 +14,7 @@
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/predictive_score.h"
+#include "calib/quality/unknown_axes.h"
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/log/readings_apart.h"
@@ -48,9 +49,14 @@ bool has_model_doubt(const Structure& structure) {
 
 bool is_converged(const Calibration& of) { return of.status == CalibrationStatus::kConverged; }
 
+/// No axis is known of a joint too many that nothing but noise drives (`undeclared`, 11083).
+bool are_axes_known(const Explanation& of) {
+  return !of.fitted || unknown_axes(of.fitted->calibration).empty();
+}
+
 bool is_structure_clear(const Explanation& of) {
-  return !of.structure ||
-         (of.structure->status == StructureStatus::kDetermined && !has_model_doubt(*of.structure));
+  return !of.structure || (of.structure->status == StructureStatus::kDetermined &&
+                           !has_model_doubt(*of.structure) && are_axes_known(of));
 }
 
 /// Certain of itself, and a fit of its parameters settled.

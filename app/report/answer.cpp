@@ -11,6 +11,7 @@
 #include "app/report/numbers.h"
 #include "app/report/prediction.h"
 #include "app/report/verdict_words.h"
+#include "calib/quality/unknown_axes.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 
@@ -23,30 +24,10 @@ Answer no_answer(std::string where, std::string what, std::string remedy) {
   return {false, std::move(where), std::move(what), std::move(remedy)};
 }
 
-// The frame of this joint was estimated.
-bool is_estimated(const Calibration& calibration, const Joint& joint) {
-  return joint.type != JointType::kFixed &&
-         std::ranges::any_of(calibration.parameters, [&](const Parameter& p) {
-           return p.block == joint.name && p.name.starts_with(joint.name + " turn");
-         });
-}
-
-// Estimated joints, where nothing is known of any.
-std::vector<std::string> unknown_axes(const Calibration& calibration) {
-  std::vector<std::string> out;
-  for (std::size_t j = 0; j < calibration.joints.size(); ++j) {
-    const Joint& joint = calibration.tree.joints[j];
-    if (!is_estimated(calibration, joint)) continue;
-    if (calibration.joints[j].direction_sigma_rad) return {};
-    out.push_back(joint.name);
-  }
-  return out;
-}
-
 // A geometry that is held says how far it is off; where the user holds it, that is what was asked.
 bool is_geometry_held(const Calibration& calibration) {
   return std::ranges::none_of(calibration.tree.joints,
-                              [&](const Joint& joint) { return is_estimated(calibration, joint); });
+                              [&](const Joint& joint) { return is_axis_estimated(calibration, joint); });
 }
 
 // How far a model is from the measurements it did not leave out, and how far those move: root mean
