@@ -322,7 +322,13 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   change_model(change, with, state);
   begin_near(change, state);
   constexpr int kIterations = 60;
-  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
+  bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
+  if (!summary.evaluated) {
+    // Beside what other effects bent, these put a marker where nothing can be predicted.
+    change_model(change, with, state);
+    std::ranges::fill(state.corrections, 0.0);
+    summary = bundle::solve(with, state, used, {}, kIterations);
+  }
   if (summary.converged) remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;

@@ -244,8 +244,13 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &built.problem(), &summary);
-  return {summary.termination_type == ceres::CONVERGENCE, summary.message,
-          static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};
+  const auto iterations = static_cast<int>(summary.iterations.size());
+  return {summary.termination_type == ceres::CONVERGENCE,
+          summary.message,
+          iterations,
+          summary.initial_cost,
+          summary.final_cost,
+          iterations > 0};
 }
 
 std::vector<int> usable_sightings(const Spec& spec, const State& state) {

@@ -17,6 +17,7 @@ struct SolveSummary {
   int iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
+  bool evaluated = true;  ///< false: not even at the start, where the state has been left
 };
 
 /// Least squares over the given sightings; moves `state`. Single-threaded, so that the bits are the

@@ -613,7 +613,7 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
       corrections[k].prior_sigma = added.spread * std::sqrt(fit.variance);
       out.corrections.push_back(std::move(corrections[k]));
     }
-    if (effect.candidate.is_curve()) {
+    if (effect.candidate.is_curve() && !traced.empty()) {
       const auto known = std::ranges::find_if(
           traced, [&](const TracedEffect& t) { return t.id == added.id && t.scan == added.scan; });
       KINESCOPE_CHECK(known != traced.end(), "tracing knows its curves");

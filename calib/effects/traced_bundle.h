@@ -21,7 +21,8 @@ class TracedBundle final : public TracedModel {
     std::vector<Correction> corrections;  ///< of all effects but the time offset, then nuisances
     std::optional<Eigen::Vector3d> gravity_base;  ///< as known before, turned as sags say
   };
-  /// `traced`: the same effects as tracing has them, which knows how certain curves are.
+  /// `traced`: the same effects as tracing has them, which knows how certain curves are; without it
+  /// curves have no table.
   [[nodiscard]] Corrected corrected(const std::vector<AddedEffect>& effects,
                                     const std::vector<TracedEffect>& traced) const;
 

@@ -22,6 +22,9 @@ struct TraceOptions {
   double false_alarm_rate = 0.01;  ///< of finding anything at all in a recording without effects
   int max_effects = 12;
   int refits = 3;  ///< candidates refitted in full before one is chosen
+  /// Fits after which nothing more is looked for: what is left then has none of the known shapes,
+  /// and many of them stand in for it. 0: no limit.
+  int most_fits = 0;
   /// Effects that move the prediction by less than this (over the rows that they touch, in the
   /// residual's unit) are below what the sensor itself gets wrong and are not looked for.
   double floor = 0.0;

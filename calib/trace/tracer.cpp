@@ -63,6 +63,8 @@ void Tracer::search() {
   do {
     forward();
   } while (backward());
+  if (!may_go_on())
+    add_step(round_, fmt::format("nothing more is looked for after {} fits", fits_), *now_);
   if (!now_->fit.converged) {
     trace_.converged = false;
     say_nothing(fmt::format("the model itself did not converge: {}", now_->fit.reason));
@@ -84,6 +86,7 @@ StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
   for (const StagePtr& stage : last_) {
     if (stage->added == effects) return stage;
   }
+  ++fits_;
   last_.push_front(make_stage(*model_, std::move(effects)));
   if (last_.size() > kKept) last_.pop_back();
   return last_.front();
@@ -111,13 +114,17 @@ bool Tracer::can_look(const Stage& stage) {
   return true;
 }
 
+bool Tracer::may_go_on() const {
+  return options_.most_fits == 0 || fits_ < options_.most_fits;
+}
+
 bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
                                     const Eigen::VectorXd& other) const {
   return trace::predicts_clearly_worse(now_->system.partition(), one, other);
 }
 
 void Tracer::forward() {
-  while (static_cast<int>(now_->added.size()) < options_.max_effects) {
+  while (static_cast<int>(now_->added.size()) < options_.max_effects && may_go_on()) {
     ++round_;
     report_progress(progress_, "trace", round_, 0);
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
@@ -156,6 +163,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   if (hints.size() > kMostHints) hints.resize(kMostHints);
   StagePtr best;
   for (const TestedMember* hint : hints) {
+    if (!may_go_on()) return best;
     std::vector<AddedEffect> effects = now->added;
     effects.push_back({now->fit.candidates[hint->index].id, hint->scan});
     now_ = with_sizes_for_scans(stage_of(effects));
@@ -252,7 +260,7 @@ StagePtr Tracer::chain(const AddedEffect& first) {
   effects.push_back(first);
   StagePtr found;
   double last = now->held_out_sum();
-  for (int step = 0; step < kLongestChain; ++step) {
+  for (int step = 0; step < kLongestChain && may_go_on(); ++step) {
     StagePtr stage = with_sizes_for_scans(stage_of(effects));
     if (!stage->fit.converged || stage->held_out_sum() >= last) break;
     stage = without_idle(std::move(stage), known);
@@ -278,7 +286,7 @@ StagePtr Tracer::chain(const AddedEffect& first) {
 bool Tracer::search_again(const std::optional<std::string>& place) {
   constexpr double kNoticeable = 1e-6;  // of what the effect explains
   const StagePtr before = now_;
-  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+  for (std::size_t i = 0; i < now_->added.size() && may_go_on(); ++i) {
     const AddedEffect effect = now_->added[i];
     if (place && effect.id.place != *place) continue;
     const Candidate* known = find_candidate(base_->fit, effect.id);
@@ -332,7 +340,7 @@ void Tracer::sharpen(std::size_t index) {
   constexpr int kMostSteps = 5;
   constexpr double kSmallStep = 0.1;     // standard deviations of the scan
   constexpr double kLargestStep = 0.25;  // of the value
-  for (int k = 0; k < kMostSteps; ++k) {
+  for (int k = 0; k < kMostSteps && may_go_on(); ++k) {
     const std::optional<Eigen::VectorXd> slope = scan_slope(*now_, index);
     const auto step = slope ? scan_step(now_->system, *slope) : std::nullopt;
     if (!step || std::abs(step->step) < kSmallStep * step->sigma) break;

@@ -57,6 +57,8 @@ class Tracer {
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_look(const Stage& stage);
+  /// TraceOptions::most_fits.
+  [[nodiscard]] bool may_go_on() const;
   void say_nothing(std::string reason);
   void search();
   void forward();
@@ -174,6 +176,7 @@ class Tracer {
   std::set<EffectId> needed_;  // a plainer one in their place leaves a rest
   std::vector<FoundRest> rests_;
   int round_ = 0;
+  int fits_ = 0;
   Trace trace_;
 };
 
