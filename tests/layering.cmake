@@ -10,6 +10,8 @@ set(rooms
     "kinematics/log: kinematics/core"
     "kinematics/bags: kinematics/core kinematics/log"
     "kinematics/parquet: kinematics/core"
+    "kinematics/datasets: kinematics/core kinematics/log kinematics/parquet"
+    "kinematics/recorded: kinematics/core kinematics/log kinematics/bags kinematics/datasets"
     "kinematics/model: kinematics/core"
     "kinematics/structure: kinematics/core kinematics/log kinematics/model"
     "kinematics/urdf: kinematics/core kinematics/log kinematics/model"
@@ -62,7 +64,7 @@ set(third_parties
     "lz4frame.h: kinematics/bags"
     "bzlib.h: kinematics/bags"
     "sqlite3.h: kinematics/bags"
-    "nlohmann/: app/io app/report app/commands dynamics/models"
+    "nlohmann/: kinematics/datasets app/io app/report app/commands dynamics/models"
     "CLI/: app/commands app/manual"
     "gtest/: none")
 
