@@ -2,7 +2,6 @@
 #include "kinematics/datasets/dataset.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include <fmt/format.h>
 
@@ -18,11 +17,12 @@ namespace {
 std::optional<EpisodeRange> episode_range(std::string_view text) {
   constexpr std::size_t kMostDigits = 9;
   const auto number = [](std::string_view digits) -> std::optional<std::size_t> {
+    if (digits.empty() || digits.size() > kMostDigits) return std::nullopt;
     std::size_t out = 0;
-    const char* end = digits.data() + digits.size();
-    const auto [stop, error] = std::from_chars(digits.data(), end, out);
-    if (digits.empty() || digits.size() > kMostDigits || error != std::errc() || stop != end)
-      return std::nullopt;
+    for (const char digit : digits) {
+      if (digit < '0' || digit > '9') return std::nullopt;
+      out = 10 * out + static_cast<std::size_t>(digit - '0');
+    }
     return out;
   };
   const std::size_t dash = text.find('-');

@@ -289,6 +289,13 @@ JointSignals read_signals(const Source& source) {
   return out;
 }
 
+std::vector<double> joined_at_s(const JointSignals& signals) {
+  std::vector<double> out;
+  for (std::size_t row = 1; row < signals.times_s.size(); ++row)
+    if (signals.episodes[row] != signals.episodes[row - 1]) out.push_back(signals.times_s[row]);
+  return out;
+}
+
 CsvTable joint_table(const JointSignals& signals) {
   CsvTable out;
   out.source = signals.source;

@@ -40,6 +40,9 @@ struct JointSignals {
 /// other rows than listed, stamps that do not increase; as parquet::File.
 [[nodiscard]] JointSignals read_signals(const Source& source);
 
+/// The first stamps of all episodes but the first.
+[[nodiscard]] std::vector<double> joined_at_s(const JointSignals& signals);
+
 /// t, a column a joint by its name, JOINT_command, tau_JOINT (efforts, else currents).
 [[nodiscard]] CsvTable joint_table(const JointSignals& signals);
 /// t, episode, JOINT_position, JOINT_velocity, JOINT_effort, JOINT_current,

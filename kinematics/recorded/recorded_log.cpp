@@ -12,13 +12,14 @@ namespace kinescope::recorded {
 LogTable read_log_table(const std::filesystem::path& path) {
   if (const auto bag = bags::bag_source(path)) {
     bags::LogTable read = bags::joint_table(*bag);
-    return {std::move(read.table), std::move(read.warnings)};
+    return {std::move(read.table), std::move(read.warnings), {}};
   }
   if (const auto dataset = datasets::dataset_source(path)) {
     datasets::JointSignals signals = datasets::read_signals(*dataset);
-    return {datasets::joint_table(signals), std::move(signals.warnings)};
+    return {datasets::joint_table(signals), std::move(signals.warnings),
+            datasets::joined_at_s(signals)};
   }
-  return {read_csv(path, RaggedRows::kSetAside), {}};
+  return {read_csv(path, RaggedRows::kSetAside), {}, {}};
 }
 
 JointLog read_joint_log(const std::filesystem::path& path,
@@ -26,6 +27,7 @@ JointLog read_joint_log(const std::filesystem::path& path,
   LogTable read = recorded::read_log_table(path);
   JointLog log = joint_log_of(std::move(read.table), torque_channels).log;
   log.warnings.insert(log.warnings.begin(), read.warnings.begin(), read.warnings.end());
+  log.joined_at_s = std::move(read.joined_at_s);
   return log;
 }
 

@@ -19,6 +19,7 @@ namespace kinescope::recorded {
 struct LogTable {
   CsvTable table;  ///< of a bag or dataset: lines the rows, from 1
   std::vector<std::string> warnings;
+  std::vector<double> joined_at_s;  ///< as JointLog's
 };
 
 /// Throws as read_csv(), bags::joint_table() and datasets::read_signals().
