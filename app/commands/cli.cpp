@@ -13,7 +13,7 @@
 #include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
 #include "dynamics/gp/blas.h"
-#include "kinematics/bags/bag.h"
+#include "kinematics/recorded/container.h"
 
 namespace kinescope {
 namespace {
@@ -86,11 +86,12 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
 // What the settings file says of the log, the command line's words first.
 TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::path& log,
                                const TorqueDataOptions& words) {
-  const auto bag = bags::bag_source(log);
-  const std::filesystem::path file = bag ? bag->bag : log;
-  const std::filesystem::path folder =
-      std::filesystem::is_directory(file) ? file : file.parent_path();
-  const std::filesystem::path beside = folder / "recording.yaml";
+  const auto container = recorded::container_of(log);
+  const std::vector<std::filesystem::path> places =
+      container ? recorded::places_of(*container)
+                : std::vector<std::filesystem::path>{log.parent_path()};
+  std::filesystem::path beside = places.front() / "recording.yaml";
+  if (!std::filesystem::exists(beside)) beside = places.back() / "recording.yaml";
   TorqueDataOptions out;
   if (line.settings) {
     out = read_dynamics_settings(*line.settings);
@@ -118,8 +119,8 @@ TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::p
 
 // "log" of "folder/log.csv.gz".
 std::string log_name(const std::filesystem::path& log) {
-  const auto bag = bags::bag_source(log);
-  const std::string name = (bag ? bag->bag : log).filename().string();
+  const auto container = recorded::container_of(log);
+  const std::string name = (container ? container->path : log).filename().string();
   return name.substr(0, name.find('.'));
 }
 
@@ -207,7 +208,7 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
   }
   if (app.got_subcommand("inspect")) {
     const std::filesystem::path& log = line.inspect.recording.folder;
-    if (std::filesystem::is_regular_file(log) || bags::is_bag(log))
+    if (std::filesystem::is_regular_file(log) || recorded::container_of(log))
       line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
     return inspect_command(line.inspect, console);
   }

@@ -69,8 +69,10 @@ void add_recording_options(CLI::App& command, RecordingPaths& paths, const char*
       ->check(refuse_empty)
       ->required()
       ->type_name(type);
-  add_path(command, "--video", paths.video, "Video file, folder of images with times.csv, or bag");
-  add_path(command, "--joints", paths.joints, "Joint log: t in s, one column a channel; or bag");
+  add_path(command, "--video", paths.video,
+           "Video file, folder of images with times.csv, bag or dataset");
+  add_path(command, "--joints", paths.joints,
+           "Joint log: t in s, one column a channel; or bag, dataset");
   add_path(command, "--camera", paths.camera, "Intrinsics (ROS camera_info, Kalibr or OpenCV)");
   add_path(command, "--tags", paths.tags, "Marker family and sizes");
   add_path(command, "--corners", paths.corners, "Detected corners in place of a video; or bag");
@@ -133,7 +135,9 @@ void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
   add_recording_options(
       run, line.run.recording,
-      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; or a bag of ROS", "PATH");
+      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a LeRobot "
+      "dataset",
+      "PATH");
   run.add_option_function<std::string>(
          "-o,--output", [&line](const std::string& text) { line.run.output = text; },
          "Folder for the results (default: <recording>_run here)")
@@ -196,10 +200,11 @@ void add_correct(CLI::App& app, CommandLine& line) {
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
       "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
-  add_recording_options(
-      inspect, line.inspect.recording,
-      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a torque log",
-      "PATH");
+  add_recording_options(inspect, line.inspect.recording,
+                        "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; "
+                        "a LeRobot dataset; or "
+                        "a torque log",
+                        "PATH");
   add_inspect_log_options(inspect, line);
   add_output_options(inspect, line.output);
   inspect.footer(

@@ -16,7 +16,7 @@
 #include "app/commands/torque_inputs.h"
 #include "app/commands/torque_stages.h"
 #include "dynamics/contact/momentum_observer.h"
-#include "kinematics/bags/bag_log.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -28,7 +28,7 @@ constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
 TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel& model,
                          const TorqueDataOptions& options) {
   TorqueLogReport log =
-      look_at_torque_log(bags::read_channel_tables(files), wanted_joints(model.tree), options);
+      look_at_torque_log(recorded::read_channel_tables(files), wanted_joints(model.tree), options);
   throw_refusals(log.findings);
   if (log.log.torque.cols() == 0) {
     throw bad_input(files.front().string(), "has no torque columns",

@@ -15,10 +15,10 @@
 #include "app/commands/progress_line.h"
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/file.h"
 #include "kinematics/log/header_units.h"
 #include "kinematics/log/joint_log_table.h"
+#include "kinematics/recorded/recorded_log.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
@@ -142,7 +142,7 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
                    {options.log, calibration, options.run_folder / "robot.urdf"}, options.force);
   const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
-  const bags::LogTable logged = bags::read_log_table(options.log);
+  const recorded::LogTable logged = recorded::read_log_table(options.log);
   for (const std::string& warning : logged.warnings) print_warning(warning);
   const CsvTable& table = logged.table;
   const TableLog read = joint_log_of(columns_of_run(table, found));

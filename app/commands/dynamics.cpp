@@ -27,8 +27,8 @@
 #include "app/report/trace_lines.h"
 #include "dynamics/identify/gravity_from_torques.h"
 #include "dynamics/identify/torque_terms.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/file.h"
+#include "kinematics/recorded/recorded_log.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -335,7 +335,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
       hashed_inputs({options.logs, options.test_logs, options.unloaded_logs, {options.robot}});
   summary.joints = robot.joints;
   summary.types = robot.types;
-  const TorqueLogReport log = read_checked_log(bags::read_channel_tables(options.logs),
+  const TorqueLogReport log = read_checked_log(recorded::read_channel_tables(options.logs),
                                                wanted_joints(model.tree), options.data);
   if (asks_for_payload(options)) require_payload_question(options, model, log.log.torque_unit);
   summary.data = filtered_data(log, options.data.motion);

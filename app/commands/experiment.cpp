@@ -12,8 +12,8 @@
 #include "app/commands/output_folder.h"
 #include "app/commands/torque_inputs.h"
 #include "app/experiments/experiments.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/error.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -66,7 +66,7 @@ ExperimentLog read_log(const ExperimentOptions& options) {
     wanted.push_back({body.joint, body.type == JointType::kPrismatic});
   }
   TorqueData data =
-      read_torque_data(bags::read_channel_tables({options.log}), wanted, options.data);
+      read_torque_data(recorded::read_channel_tables({options.log}), wanted, options.data);
   put_into_place({options.log}, data.findings);
   throw_refusals(data.findings);
   for (const LogFinding& finding : data.findings) {

@@ -9,10 +9,13 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/inspect_bag.h"
+#include "app/commands/inspect_dataset.h"
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
 #include "app/commands/progress_line.h"
 #include "kinematics/bags/bag.h"
+#include "kinematics/datasets/dataset.h"
+#include "kinematics/recorded/container.h"
 
 namespace kinescope {
 namespace {
@@ -30,7 +33,7 @@ std::vector<std::string> file_names(const Recording& recording) {
 }
 
 void print_video(const Recording& recording, const VideoFacts& video) {
-  fmt::print("video     {}: {} x {}, {}, {:.3f} frames/s\n", bags::short_name(recording.video),
+  fmt::print("video     {}: {} x {}, {}, {:.3f} frames/s\n", recorded::short_name(recording.video),
              video.info.width, video.info.height,
              video.info.codec.empty() ? "codec unknown" : video.info.codec, video.frame_rate_hz);
   const double last_s = video.times_s.empty() ? 0.0 : video.times_s.back();
@@ -227,20 +230,56 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
   return inspection;
 }
 
+namespace {
+
+/// What a bag or a dataset holds, beside the recording or log in it.
+class ContainerLook {
+ public:
+  explicit ContainerLook(const std::filesystem::path& path)
+      : path_(path), dataset_(datasets::dataset_source(path)) {
+    if (const auto bag = bags::bag_source(path)) contents_ = &bags::look_into(bag->bag);
+  }
+
+  void print() const {
+    if (contents_ != nullptr) print_topics(*contents_);
+    if (dataset_) print_dataset(datasets::look_into(dataset_->folder), *dataset_);
+  }
+
+  /// Those that come with no recording.
+  void print_warnings() const {
+    if (contents_ == nullptr || !contents_->joints.empty()) return;
+    for (const std::string& warning : contents_->warnings) print_warning(warning);
+  }
+
+  /// Joints alone, for `dynamics`; a table is that, too.
+  [[nodiscard]] bool is_log() const {
+    if (contents_ != nullptr) return !shows_robot(*contents_);
+    if (dataset_) return !datasets::shows_robot(datasets::look_into(dataset_->folder));
+    return std::filesystem::is_regular_file(path_);
+  }
+
+  void add_to(nlohmann::json& document) const {
+    if (contents_ != nullptr) document["topics"] = topics_json(*contents_);
+    if (dataset_) document["dataset"] = dataset_json(datasets::look_into(dataset_->folder));
+  }
+
+ private:
+  std::filesystem::path path_;
+  const bags::Contents* contents_ = nullptr;
+  std::optional<datasets::Source> dataset_;
+};
+
+}  // namespace
+
 ExitCode inspect_command(const InspectOptions& options, const Console& console) {
-  const auto bag = bags::bag_source(options.recording.folder);
-  const bags::Contents* contents = bag ? &bags::look_into(bag->bag) : nullptr;
-  if (contents != nullptr && !console.json) print_topics(*contents);
-  if (contents != nullptr && contents->joints.empty())
-    for (const std::string& warning : contents->warnings) print_warning(warning);
-  const bool is_log = contents != nullptr
-                          ? !shows_robot(*contents)
-                          : std::filesystem::is_regular_file(options.recording.folder);
+  const ContainerLook container(options.recording.folder);
+  if (!console.json) container.print();
+  container.print_warnings();
   const auto print_json = [&](nlohmann::json document) {
-    if (contents != nullptr) document["topics"] = topics_json(*contents);
+    container.add_to(document);
     fmt::print("{}\n", document.dump(2));
   };
-  if (is_log) {
+  if (container.is_log()) {
     const TorqueLogFacts facts = look_at_torques(options);
     if (console.json) {
       print_json(torque_log_json(facts));

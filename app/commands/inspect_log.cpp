@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/inspection.h"
 #include "app/commands/log_doubts.h"
@@ -49,19 +50,13 @@ ChannelFacts look_at_channel(const JointLog& log, Eigen::Index channel,
                             "record it over a larger range",
                             facts.name, facts.upper - facts.lower)});
   }
-  if (facts.unit == "deg or mm?") {
-    findings.push_back(
-        {false, fmt::format("channel '{}' looks like degrees or mm ({:.1f} to {:.1f}): declare "
-                            "units: {{{}: deg}} in recording.yaml if its joint turns, {{{}: mm}} "
-                            "if it slides",
-                            facts.name, facts.lower, facts.upper, facts.name, facts.name)});
-  }
   return facts;
 }
 
 void look_at_steps(const JointLog& log, LogFacts& facts, std::vector<Finding>& findings) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < log.size(); ++i) {
+    if (log.is_joined_between(log.times_s[i - 1], log.times_s[i])) continue;
     steps.push_back(log.times_s[i] - log.times_s[i - 1]);
     if (steps.back() <= facts.longest_gap_s) continue;
     facts.longest_gap_s = steps.back();
@@ -82,6 +77,28 @@ void look_at_steps(const JointLog& log, LogFacts& facts, std::vector<Finding>& f
   }
 }
 
+/// One note for all channels of the kind: a robot's joints are logged in one unit.
+void note_units(const std::vector<ChannelFacts>& channels, std::vector<Finding>& findings) {
+  std::vector<std::string> quoted, units;
+  double lower = 0.0;
+  double upper = 0.0;
+  for (const ChannelFacts& facts : channels) {
+    if (facts.unit != "deg or mm?") continue;
+    lower = quoted.empty() ? facts.lower : std::min(lower, facts.lower);
+    upper = quoted.empty() ? facts.upper : std::max(upper, facts.upper);
+    quoted.push_back(fmt::format("'{}'", facts.name));
+    units.push_back(facts.name + ": deg");
+  }
+  if (quoted.empty()) return;
+  const bool one = quoted.size() == 1;
+  findings.push_back(
+      {false, fmt::format("channel{} {} look{} like degrees or mm ({:.1f} to {:.1f}): declare "
+                          "units: {{{}}} in recording.yaml, mm in place of deg for a joint that "
+                          "slides; the scale of what is not declared is estimated",
+                          one ? "" : "s", fmt::join(quoted, ", "), one ? "s" : "", lower, upper,
+                          fmt::join(units, ", "))});
+}
+
 }  // namespace
 
 LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
@@ -97,6 +114,7 @@ LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
   for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
     facts.channels.push_back(look_at_channel(log, c, settings, findings));
   }
+  note_units(facts.channels, findings);
   for (std::string& words : clock_jump_words(log)) findings.push_back({false, std::move(words)});
   const bool continuous = facts.rate_hz > 1.0 / kLongGapS;
   if (continuous && facts.longest_gap_s > kLongGapS) {

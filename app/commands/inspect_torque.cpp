@@ -11,10 +11,10 @@
 #include "app/commands/inspection.h"
 #include "app/commands/torque_inputs.h"
 #include "dynamics/data/statistics.h"
-#include "kinematics/bags/bag.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
+#include "kinematics/recorded/container.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -96,11 +96,11 @@ bool TorqueLogFacts::ready() const { return std::ranges::none_of(findings, &Find
 TorqueLogFacts look_at_torques(const InspectOptions& options) {
   const std::filesystem::path& file = options.recording.folder;
   TorqueLogFacts facts;
-  facts.log = bags::short_name(file);
+  facts.log = recorded::short_name(file);
   try {
     const std::optional<TorqueRobot> robot = robot_of(options, facts);
     const TorqueLogReport report = look_at_torque_log(
-        bags::read_channel_tables({file}),
+        recorded::read_channel_tables({file}),
         robot ? wanted_joints(robot->model.tree) : std::vector<WantedJoint>{}, options.data);
     facts.rows = static_cast<int>(report.rows_read);
     facts.rows_used = static_cast<int>(report.log.rows());

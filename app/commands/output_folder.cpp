@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "kinematics/bags/bag.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "kinematics/recorded/container.h"
 
 #ifndef KINESCOPE_VERSION
 #error "KINESCOPE_VERSION is set by the build"
@@ -100,7 +100,7 @@ void require_no_input(const fs::path& file, const std::vector<fs::path>& inputs,
                       std::string_view option) {
   std::error_code error;
   const auto same = [&](const fs::path& input) {
-    return std::ranges::any_of(bags::parts_of(input), [&](const fs::path& part) {
+    return std::ranges::any_of(recorded::parts_of(input), [&](const fs::path& part) {
       return fs::equivalent(file, part, error);
     });
   };

@@ -14,9 +14,9 @@
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
 #include "app/report/result_values.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -72,7 +72,7 @@ JudgedPrediction predict(const PredictOptions& options, const TorqueModelFile& f
   data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
   JudgedPrediction out;
   TorqueData read =
-      read_torque_data(bags::read_channel_tables(options.logs), wanted(file.model.rigid), data);
+      read_torque_data(recorded::read_channel_tables(options.logs), wanted(file.model.rigid), data);
   out.warnings = warnings_of(read.findings);
   out.samples = std::move(read.samples);
   if (out.samples.torque_unit != file.model.torque_unit) {

@@ -11,6 +11,8 @@
 #include "app/io/sha256.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/core/file.h"
+#include "kinematics/datasets/dataset.h"
+#include "kinematics/recorded/container.h"
 
 namespace kinescope {
 namespace {
@@ -97,8 +99,14 @@ std::string describe_geometry(const std::optional<FreeGeometry>& free) {
 }
 
 // Of a file, or of the list of a folder's files with their hashes (as `sha256sum * | sha256sum`);
-// of a bag with its topic.
+// of a bag with its topic, of a dataset with its camera and episodes.
 std::string sha256_of_path(const fs::path& path) {
+  if (datasets::dataset_source(path)) {
+    std::string list = recorded::short_name(path) + "\n";
+    for (const fs::path& part : recorded::parts_of(path))
+      list += fmt::format("{}  {}\n", sha256_of_file(part), part.filename().string());
+    return sha256_of_text(list);
+  }
   if (const auto bag = bags::bag_source(path); bag && !bag->topic.empty())
     return sha256_of_text(sha256_of_path(bag->bag) + bag->topic);
   if (!fs::is_directory(path)) return sha256_of_file(path);

@@ -12,10 +12,10 @@
 #include "dynamics/data/log_checks.h"
 #include "dynamics/simulation/plant.h"
 #include "dynamics/simulation/robot_effects.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/log/smoothing_spline.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -75,7 +75,7 @@ std::vector<ListedEffect> not_yet_in(const fs::path& robot, const fs::path& trac
 
 TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& robot,
                                double rate_hz) {
-  const JointLog log = bags::read_joint_log(trajectory);
+  const JointLog log = recorded::read_joint_log(trajectory);
   for (const std::string& warning : log.warnings) fmt::print(stderr, "warning: {}\n", warning);
   constexpr std::size_t kFewest = 8;  // of the spline
   if (log.size() < kFewest) {

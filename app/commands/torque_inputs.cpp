@@ -9,8 +9,8 @@
 #include "app/io/sha256.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/mass_matrix.h"
-#include "kinematics/bags/bag.h"
 #include "kinematics/core/error.h"
+#include "kinematics/recorded/container.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -73,7 +73,7 @@ void put_into_place(const std::vector<fs::path>& logs, std::vector<LogFinding>& 
 
 std::string file_list(const std::vector<fs::path>& files) {
   std::string out;
-  for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + bags::short_name(file);
+  for (const fs::path& file : files) out += (out.empty() ? "" : ", ") + recorded::short_name(file);
   return out;
 }
 
@@ -81,7 +81,7 @@ std::vector<InputFile> hashed_inputs(const std::vector<std::vector<fs::path>>& l
   std::vector<InputFile> out;
   for (const auto& files : lists) {
     for (const fs::path& file : files) {
-      for (const fs::path& part : bags::parts_of(file))
+      for (const fs::path& part : recorded::parts_of(file))
         out.push_back({part.filename().string(), sha256_of_file(part)});
     }
   }

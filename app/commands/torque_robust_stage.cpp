@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/torque_inputs.h"
-#include "kinematics/bags/bag_log.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -95,7 +95,7 @@ std::optional<TorqueSamples> add_payload(const DynamicsOptions& options, const D
   if (!options.unloaded_logs.empty()) {
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;
-    unloaded = read_torque_data(bags::read_channel_tables(options.unloaded_logs),
+    unloaded = read_torque_data(recorded::read_channel_tables(options.unloaded_logs),
                                 wanted_joints(model.tree), data)
                    .samples;
     out.against = "the log without load " + file_list(options.unloaded_logs);

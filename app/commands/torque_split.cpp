@@ -4,7 +4,7 @@
 #include "app/commands/torque_inputs.h"
 #include "app/report/motion_words.h"
 #include "dynamics/data/splits.h"
-#include "kinematics/bags/bag_log.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -40,7 +40,7 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
     summary.train = summary.data.samples;
-    summary.test = read_torque_data(bags::read_channel_tables(options.test_logs),
+    summary.test = read_torque_data(recorded::read_channel_tables(options.test_logs),
                                     wanted_joints(model.tree), data)
                        .samples;
     summary.split = "the unseen log " + file_list(options.test_logs);

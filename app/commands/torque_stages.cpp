@@ -8,7 +8,7 @@
 
 #include "app/commands/output_folder.h"
 #include "app/io/dynamics_settings.h"
-#include "kinematics/bags/bag_log.h"
+#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -48,7 +48,8 @@ std::optional<LogMapping> mapping_of(const KinematicTree& tree, const JointLog& 
     if (!log.channel(joint.channel)) return std::nullopt;
     const std::string torque = torque_of(joint.channel, log);
     if (torque.empty()) return std::nullopt;
-    const bags::TorqueColumns columns = bags::torque_columns(log.source, joint.channel, torque);
+    const recorded::TorqueColumns columns =
+        recorded::torque_columns(log.source, joint.channel, torque);
     mapping.position.push_back(columns.position);
     mapping.torque.push_back(columns.torque);
     const auto unit = log.unit_factors.find(joint.channel);

@@ -51,6 +51,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     libavutil-dev
     libswscale-dev
     libzstd-dev
+    libsnappy-dev
     liblz4-dev
     libbz2-dev
     libsqlite3-dev

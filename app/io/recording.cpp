@@ -14,9 +14,10 @@
 #include "app/io/nearest_name.h"
 #include "app/io/recording_files.h"
 #include "calib/camera/camera_file.h"
-#include "kinematics/bags/bag_log.h"
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/error.h"
+#include "kinematics/recorded/container.h"
+#include "kinematics/recorded/recorded_log.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
@@ -112,11 +113,11 @@ void read_log(Recording& recording, const RecordingFiles& files) {
     return;
   }
   RecordingSettings& settings = recording.settings;
-  recording.log = bags::read_joint_log(*files.joints, settings.torque_channels);
+  recording.log = recorded::read_joint_log(*files.joints, settings.torque_channels);
   recording.warnings.insert(recording.warnings.end(), recording.log.warnings.begin(),
                             recording.log.warnings.end());
   if (!settings.torque_channels.empty()) {
-    const JointLog all = bags::read_joint_log(*files.joints);
+    const JointLog all = recorded::read_joint_log(*files.joints);
     for (const std::string& name : settings.torque_channels) {
       if (name.starts_with("tau") || all.channel(name)) continue;
       throw bad_input(value_of(files.settings).string(),
@@ -410,11 +411,12 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
 }
 
 std::string recording_name(const fs::path& folder) {
-  const auto bag = bags::bag_source(folder);
-  const fs::path whole = fs::absolute(bag ? bag->bag : folder).lexically_normal();
+  const auto container = recorded::container_of(folder);
+  const fs::path whole = fs::absolute(container ? container->path : folder).lexically_normal();
   const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
   if (name.empty()) return "robot";
-  return bag && !fs::is_directory(bag->bag) ? name.stem().string() : name.string();
+  const bool is_file = container && !fs::is_directory(container->path);
+  return is_file ? name.stem().string() : name.string();
 }
 
 ReadAttempt try_read_recording(const RecordingPaths& paths) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a recording's folder or bag (and files named on the command line in place of those in
+// Takes   a recording's folder, bag or dataset (and files named on the command line in place of
+// those in
 //         it).
 // Gives   Recording: everything declared and logged, read and checked; the video is only found, not
 // decoded.
@@ -27,7 +28,8 @@ namespace kinescope {
 
 /// Files named on the command line; each takes the place of the one in the folder.
 struct RecordingPaths {
-  std::filesystem::path folder;  ///< or a bag, "FILE" or "FILE:/topic"
+  /// or a bag, "FILE" or "FILE:/topic", or a LeRobot dataset, "FOLDER" or "FOLDER:camera:episodes"
+  std::filesystem::path folder;
   std::optional<std::filesystem::path> video, joints, camera, tags, corners, poses, points, nominal;
 };
 
@@ -54,7 +56,7 @@ enum class RecordingEntry { kVideo, kCorners, kPoses, kPoints };
 
 struct Recording {
   std::filesystem::path folder;
-  std::string name;  ///< of the folder or bag
+  std::string name;  ///< of the folder, bag or dataset
   RecordingSettings settings;
   RecordingEntry entry = RecordingEntry::kVideo;
   std::filesystem::path video;              ///< file or image folder; empty unless entry is kVideo

@@ -11,6 +11,8 @@
 #include "kinematics/bags/bag.h"
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
+#include "kinematics/datasets/dataset.h"
+#include "kinematics/recorded/container.h"
 
 namespace kinescope {
 namespace fs = std::filesystem;
@@ -92,8 +94,8 @@ MaybePath find_file(const MaybePath& declared, const fs::path& folder, const cha
                     const char* option) {
   std::error_code error;
   if (declared) {
-    const auto bag = bags::bag_source(*declared);
-    if (fs::exists(bag ? bag->bag : *declared, error)) return declared;
+    const auto container = recorded::container_of(*declared);
+    if (fs::exists(container ? container->path : *declared, error)) return declared;
     throw bad_input(declared->string(), "no such file", fmt::format("correct {}", option));
   }
   if (fs::is_regular_file(folder / name, error)) return folder / name;
@@ -134,22 +136,23 @@ RecordingEntry choose_entry(const RecordingPaths& paths, RecordingFiles& files) 
   }
   if (entry) return *entry;
   throw bad_input(paths.folder.string(),
-                  "holds no video, bag, corners.csv, poses.csv or points.csv",
+                  "holds no video, bag, dataset, corners.csv, poses.csv or points.csv",
                   "add one of them, or name it with --video, --corners, --poses or --points");
 }
 
-/// The only bag of a folder, a file or a folder of ROS 2. Throws where there are several.
-MaybePath bag_in(const fs::path& folder) {
+/// The only bag or dataset of a folder. Throws where there are several.
+MaybePath container_in(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (bags::is_bag(entry.path())) found.push_back(entry.path());
+    if (recorded::container_of(entry.path())) found.push_back(entry.path());
   std::ranges::sort(found);
   if (found.empty()) return std::nullopt;
   if (found.size() == 1) return found.front();
   std::vector<std::string> names;
   for (const fs::path& path : found) names.push_back(path.filename().string());
-  throw bad_input(folder.string(), fmt::format("holds several bags: {}", fmt::join(names, ", ")),
+  throw bad_input(folder.string(),
+                  fmt::format("holds several bags or datasets: {}", fmt::join(names, ", ")),
                   "name one in place of the folder");
 }
 
@@ -190,13 +193,21 @@ void take_from_bag(const bags::Source& source, RecordingFiles& files) {
   if (!files.camera && shown && bags::camera_of(contents, shown->topic)) files.camera = images;
 }
 
-/// Beside a bag that is a file stand the recording's other files.
-fs::path folder_of(const fs::path& given, const std::optional<bags::Source>& bag) {
-  if (!bag) return given;
-  std::error_code error;
-  if (fs::is_directory(bag->bag, error)) return bag->bag;
-  const fs::path parent = bag->bag.parent_path();
-  return parent.empty() ? fs::path(".") : parent;
+/// What a dataset gives in place of files that are not there: a camera's videos, joints.
+void take_from_dataset(const datasets::Source& source, RecordingFiles& files) {
+  const datasets::Dataset& dataset = datasets::look_into(source.folder);
+  const bool seen = files.video || files.corners || files.poses || files.points;
+  if (!seen) {
+    const std::string& camera = datasets::choose_camera(dataset, source).name;
+    files.video = datasets::Source{source.folder, camera, source.episodes}.path();
+  }
+  if (!files.joints && dataset.feature("observation.state") != nullptr)
+    files.joints = datasets::Source{source.folder, {}, source.episodes}.path();
+}
+
+void take_from_container(const fs::path& path, RecordingFiles& files) {
+  if (const auto bag = bags::bag_source(path)) take_from_bag(*bag, files);
+  if (const auto dataset = datasets::dataset_source(path)) take_from_dataset(*dataset, files);
 }
 
 }  // namespace
@@ -208,8 +219,8 @@ std::vector<fs::path> RecordingFiles::all() const {
   for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
     if (!*file) continue;
     std::error_code error;
-    const bool images = !bags::is_bag(**file) && fs::is_directory(**file, error);
-    const std::vector<fs::path> parts = images ? sorted_files(**file) : bags::parts_of(**file);
+    const bool images = !recorded::container_of(**file) && fs::is_directory(**file, error);
+    const std::vector<fs::path> parts = images ? sorted_files(**file) : recorded::parts_of(**file);
     out.insert(out.end(), parts.begin(), parts.end());
   }
   std::ranges::sort(out);
@@ -219,38 +230,44 @@ std::vector<fs::path> RecordingFiles::all() const {
 }
 
 RecordingFiles find_recording_files(const RecordingPaths& paths) {
-  std::optional<bags::Source> bag = bags::bag_source(paths.folder);
-  const bool bag_alone = bag.has_value();
-  if (bag && !fs::exists(bag->bag))
-    throw bad_input(bag->bag.string(), "no such file", "check the path");
-  const fs::path folder = folder_of(paths.folder, bag);
+  const auto container = recorded::container_of(paths.folder);
+  if (container && !fs::exists(container->path))
+    throw bad_input(container->path.string(), "no such file", "check the path");
+  const std::vector<fs::path> places =
+      container ? recorded::places_of(*container) : std::vector<fs::path>{paths.folder};
+  const fs::path& folder = places.front();
   check_folder(folder);
   RecordingFiles files;
   files.folder = folder;
   const bool seen_otherwise = paths.corners || paths.poses || paths.points;
   if (paths.video) {
     files.video = find_file(paths.video, folder, "", "--video");
-  } else if (!seen_otherwise && !bag_alone) {
+  } else if (!seen_otherwise && !container) {
     files.video = find_video(folder);
   }
-  // Of the files beside a bag those that it does not hold itself.
+  // Of the files beside a bag or dataset those that it does not hold itself.
   const auto find = [&](const MaybePath& declared, const char* name, const char* option) {
-    if (bag_alone && !declared) return MaybePath();
+    if (container && !declared) return MaybePath();
     return find_file(declared, folder, name, option);
   };
+  const auto find_beside = [&](const MaybePath& declared, const char* name, const char* option) {
+    MaybePath found = find_file(declared, folder, name, option);
+    return found ? found : find_file(std::nullopt, places.back(), name, option);
+  };
   files.joints = find(paths.joints, "joints.csv", "--joints");
-  files.camera = find_file(paths.camera, folder, "camera.yaml", "--camera");
-  files.tags = find_file(paths.tags, folder, "tags.yaml", "--tags");
-  files.settings = find_file(std::nullopt, folder, "recording.yaml", "");
+  files.camera = find_beside(paths.camera, "camera.yaml", "--camera");
+  files.tags = find_beside(paths.tags, "tags.yaml", "--tags");
+  files.settings = find_beside(std::nullopt, "recording.yaml", "");
   files.corners = find(paths.corners, "corners.csv", "--corners");
   files.poses = find(paths.poses, "poses.csv", "--poses");
   files.points = find(paths.points, "points.csv", "--points");
-  files.nominal = find_file(paths.nominal, folder, "nominal.urdf", "--nominal");
+  files.nominal = find_beside(paths.nominal, "nominal.urdf", "--nominal");
   const bool seen = files.video || files.corners || files.poses || files.points;
-  if (!bag && !seen) {
-    if (const MaybePath alone = bag_in(folder)) bag = bags::Source{*alone, {}};
+  if (container) {
+    take_from_container(paths.folder, files);
+  } else if (!seen) {
+    if (const MaybePath alone = container_in(folder)) take_from_container(*alone, files);
   }
-  if (bag) take_from_bag(*bag, files);
   files.entry = choose_entry(paths, files);
   return files;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which files a recording consists of. Only bags are opened here.
+// Which files a recording consists of. Only bags and datasets
+// are opened here.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a video file (mp4, avi, mkv, ..), a folder of images with a time-stamp CSV, or a bag.
+// Takes   a video file (mp4, avi, mkv, ..), a folder of images with a time-stamp CSV, a bag, or
+//         a LeRobot dataset.
 // Gives   grey frames one by one with their times, s, from the container (never from frame rate x
 // index). Not here: detection.
 #pragma once
@@ -44,7 +45,8 @@ class VideoReader {
 
 /// Opens a video file, or a folder of images (png, jpg, ..; in the order of their times, from
 /// `times.csv` with columns image,t in it or beside it). Pictures that the container declares as
-/// turned are turned upright. Or the images of a bag (bag_video.h), "FILE" or "FILE:/topic".
+/// turned are turned upright. Or the images of a bag (bag_video.h), "FILE" or "FILE:/topic", or of
+/// a LeRobot dataset (dataset_video.h), "FOLDER" or "FOLDER:camera".
 [[nodiscard]] std::unique_ptr<VideoReader> open_video(const std::filesystem::path& path);
 
 }  // namespace kinescope

@@ -43,6 +43,7 @@ bool is_key(const AVFrame& frame) {
 #endif
 }
 
+constexpr double kHalfTick = 0.5;
 constexpr double kLeastTicks = 4.0;  // a frame, for its stamp's rounding to be seen as such
 
 // Turns by quarter turns, counterclockwise as the display matrix counts.
@@ -69,12 +70,13 @@ GreyImage turned(GreyImage in, int quarters) {
 
 class VideoFileReader final : public VideoReader {
  public:
-  explicit VideoFileReader(const std::filesystem::path& path) : path_(path.string()) {
+  VideoFileReader(const std::filesystem::path& path, double from_s) : path_(path.string()) {
     av_log_set_level(AV_LOG_QUIET);
     check_readable(path);
     open_container();
     open_decoder();
     fill_info();
+    if (from_s > 0.0) go_to(from_s);
     first_ = decode_next();
     if (!first_) {
       throw bad_input(path_, "no frame of the video can be decoded",
@@ -174,6 +176,13 @@ class VideoFileReader final : public VideoReader {
         quarters_ = ((static_cast<int>(std::lround(angle / 90.0)) % 4) + 4) % 4;
       }
     }
+  }
+
+  // Where it cannot go there, reading begins with the file.
+  void go_to(double from_s) {
+    const double tick = av_q2d(stream().time_base);
+    const auto stamp = static_cast<std::int64_t>(std::floor((from_s + kHalfTick * tick) / tick));
+    in_the_middle_ = av_seek_frame(container_.get(), stream_, stamp, AVSEEK_FLAG_BACKWARD) >= 0;
   }
 
   [[nodiscard]] const AVStream& stream() const {
@@ -299,7 +308,8 @@ class VideoFileReader final : public VideoReader {
     constexpr double kSteps = 4.0;
     const bool short_of_time =
         info_.duration_s > 0.0 && step > 0.0 && last_time_ + kSteps * step < end;
-    const bool short_of_packets = info_.frame_count > 0 && packets_ < info_.frame_count;
+    const bool short_of_packets =
+        !in_the_middle_ && info_.frame_count > 0 && packets_ < info_.frame_count;
     const auto gaps = std::ranges::count_if(steps_, [&](double s) { return s > kSteps * step; });
     if (gaps > 0) {
       warnings_.push_back(fmt::format("{}: {} gaps between frames, the longest of {:.3f} s", path_,
@@ -329,6 +339,7 @@ class VideoFileReader final : public VideoReader {
   bool drained_ = false;
   bool finished_ = false;
   bool read_error_ = false;
+  bool in_the_middle_ = false;  // of the file reading began
   bool after_damage_ = false;
   int packets_ = 0;
   int index_ = 0;
@@ -344,8 +355,8 @@ class VideoFileReader final : public VideoReader {
 
 }  // namespace
 
-std::unique_ptr<VideoReader> open_video_file(const std::filesystem::path& path) {
-  return std::make_unique<VideoFileReader>(path);
+std::unique_ptr<VideoReader> open_video_file(const std::filesystem::path& path, double from_s) {
+  return std::make_unique<VideoFileReader>(path, from_s);
 }
 
 }  // namespace kinescope

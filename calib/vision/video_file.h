@@ -11,7 +11,9 @@
 
 namespace kinescope {
 
-/// Throws bad_input as open_video().
-[[nodiscard]] std::unique_ptr<VideoReader> open_video_file(const std::filesystem::path& path);
+/// Throws bad_input as open_video(). The first frame is the file's, or with `from_s` the last key
+/// frame up to that stamp, s.
+[[nodiscard]] std::unique_ptr<VideoReader> open_video_file(const std::filesystem::path& path,
+                                                           double from_s = 0.0);
 
 }  // namespace kinescope

@@ -36,17 +36,6 @@ std::vector<fs::path> files_of(const fs::path& bag) {
   return {bag};
 }
 
-std::vector<fs::path> parts_of(const fs::path& path) {
-  if (const auto source = bag_source(path)) return files_of(source->bag);
-  return {path};
-}
-
-std::string short_name(const fs::path& path) {
-  const auto source = bag_source(path);
-  if (!source || source->topic.empty()) return path.filename().string();
-  return source->bag.filename().string() + ":" + source->topic;
-}
-
 std::unique_ptr<Reader> open(const fs::path& bag) {
   std::error_code error;
   if (fs::is_directory(bag, error)) return open_folder(bag);

@@ -60,11 +60,6 @@ struct Source {
 /// The files of a bag, in the order in which they are read. Throws as open().
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::filesystem::path& bag);
 
-/// The files that a path stands for: those of a bag, or itself.
-[[nodiscard]] std::vector<std::filesystem::path> parts_of(const std::filesystem::path& path);
-/// A path's last part, of a bag with its topic: "arm.mcap:/joint_states".
-[[nodiscard]] std::string short_name(const std::filesystem::path& path);
-
 /// Throws bad_input naming file and remedy: missing, empty, of another format, a folder without
 /// bags, a compression that is not known. A file that is damaged further on is read up to there.
 [[nodiscard]] std::unique_ptr<Reader> open(const std::filesystem::path& bag);

@@ -10,7 +10,6 @@
 
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/log/joint_log.h"
-#include "kinematics/log/joint_log_table.h"
 
 namespace kinescope::bags {
 namespace {
@@ -161,6 +160,8 @@ void add_columns(CsvTable& table, const std::string& before, const std::vector<s
   }
 }
 
+}  // namespace
+
 LogTable joint_table(const Source& source) {
   Chosen chosen = choose(source, Needs::kPositions);
   const JointSeries& series = chosen.series;
@@ -217,35 +218,7 @@ ChannelTable channel_table(const Source& source) {
   return out;
 }
 
-}  // namespace
-
-LogTable read_log_table(const std::filesystem::path& path) {
-  if (const auto source = bag_source(path)) return joint_table(*source);
-  return {read_csv(path, RaggedRows::kSetAside), {}};
-}
-
-JointLog read_joint_log(const std::filesystem::path& path,
-                        const std::vector<std::string>& torque_channels) {
-  LogTable read = read_log_table(path);
-  JointLog log = joint_log_of(std::move(read.table), torque_channels).log;
-  log.warnings.insert(log.warnings.begin(), read.warnings.begin(), read.warnings.end());
-  return log;
-}
-
-ChannelTable read_channel_table(const std::filesystem::path& path) {
-  if (const auto source = bag_source(path)) return channel_table(*source);
-  return kinescope::read_channel_table(path);
-}
-
-std::vector<ChannelTable> read_channel_tables(const std::vector<std::filesystem::path>& paths) {
-  std::vector<ChannelTable> out;
-  for (const std::filesystem::path& path : paths) out.push_back(bags::read_channel_table(path));
-  return out;
-}
-
-TorqueColumns torque_columns(const std::filesystem::path& log, const std::string& channel,
-                             const std::string& torque) {
-  if (!is_bag(log)) return {channel, torque};
+TorqueColumns torque_columns(const std::string& channel, const std::string& torque) {
   return {channel + kPosition, torque.substr(std::min(torque.size(), kTorque.size())) + kEffort};
 }
 

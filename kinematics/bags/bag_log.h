@@ -8,41 +8,31 @@
 //         are interpolated at its stamps, where they cover nine tenths of it.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "kinematics/bags/bag.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/log/channel_table.h"
-#include "kinematics/log/joint_log.h"
 
 namespace kinescope::bags {
 
 /// The table of a joint log, and what was wrong with the bag that it is from.
 struct LogTable {
-  CsvTable table;  ///< of a bag: source "FILE:/topic", lines the rows, from 1
+  CsvTable table;  ///< source "FILE:/topic", lines the rows, from 1
   std::vector<std::string> warnings;
 };
 
-/// CSV (also packed with gzip), or a bag: t, then one column a joint by its name, then tau_JOINT
-/// where efforts are published. Throws as read_csv(), open() and choose_joints().
-[[nodiscard]] LogTable read_log_table(const std::filesystem::path& path);
-/// As kinescope::read_joint_log(), also from a bag.
-[[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
-                                      const std::vector<std::string>& torque_channels = {});
-
-/// As kinescope::read_channel_table(), also from a bag: t, then JOINT_position, JOINT_velocity and
-/// JOINT_effort of every joint.
-[[nodiscard]] ChannelTable read_channel_table(const std::filesystem::path& path);
-[[nodiscard]] std::vector<ChannelTable> read_channel_tables(
-    const std::vector<std::filesystem::path>& paths);
+/// t, then one column a joint by its name, then tau_JOINT where efforts are published. Throws as
+/// open() and choose_joints().
+[[nodiscard]] LogTable joint_table(const Source& source);
+/// t, then JOINT_position, JOINT_velocity and JOINT_effort of every joint.
+[[nodiscard]] ChannelTable channel_table(const Source& source);
 
 /// The columns of a torque log that hold a channel of the joint log and its torque.
 struct TorqueColumns {
   std::string position, torque;
 };
-[[nodiscard]] TorqueColumns torque_columns(const std::filesystem::path& log,
-                                           const std::string& channel, const std::string& torque);
+[[nodiscard]] TorqueColumns torque_columns(const std::string& channel, const std::string& torque);
 
 }  // namespace kinescope::bags

@@ -265,6 +265,11 @@ std::optional<int> JointLog::channel(std::string_view name) const {
   return static_cast<int>(found - channels.begin());
 }
 
+bool JointLog::is_joined_between(double from_s, double to_s) const {
+  const auto next = std::ranges::upper_bound(joined_at_s, from_s);
+  return next != joined_at_s.end() && *next <= to_s;
+}
+
 std::size_t time_column(const CsvTable& table) {
   for (const std::string_view name : {"t", "time", "stamp", "timestamp"}) {
     const auto found = std::ranges::find_if(table.header, [&](const std::string& column) {

@@ -34,7 +34,11 @@ struct JointLog {
   /// absent.
   std::map<std::string, double> unit_factors = {};
   std::vector<std::string> warnings = {};  ///< what was left out, and why
+  /// First stamps of what was recorded some time after the row before (episodes): how long that was
+  /// is not known, and the gap says nothing.
+  std::vector<double> joined_at_s = {};
 
+  [[nodiscard]] bool is_joined_between(double from_s, double to_s) const;  ///< up to `to_s`
   [[nodiscard]] std::size_t size() const { return times_s.size(); }
   [[nodiscard]] bool empty() const { return times_s.empty(); }
   [[nodiscard]] std::optional<int> channel(std::string_view name) const;

@@ -87,6 +87,8 @@ std::vector<ClockJump> clock_jumps(const JointLog& log) {
   for (Eigen::Index row = kBeside; row + 1 + kBeside < rows; ++row) {
     const double gap_s = steps[static_cast<std::size_t>(row)];
     if (gap_s <= std::max(0.5 * kMaxGap, kManySteps * step_s)) continue;
+    const double* stamps = log.times_s.data() + row;
+    if (log.is_joined_between(stamps[0], stamps[1])) continue;
     if (!goes_on(log, row, step_s)) continue;
     out.push_back({log.times_s[static_cast<std::size_t>(row)], gap_s - step_s});
   }

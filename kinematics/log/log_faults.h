@@ -32,7 +32,8 @@ struct ClockJump {
 };
 
 /// Gaps of more than kMaxGap / 2 and ten usual steps, over which every channel moves no farther
-/// than over a few usual steps, although one of them is as fast behind the gap as before.
+/// than over a few usual steps, although one of them is as fast behind the gap as before. Not
+/// between episodes (joined_at_s).
 [[nodiscard]] std::vector<ClockJump> clock_jumps(const JointLog& log);
 
 }  // namespace kinescope

@@ -262,8 +262,9 @@ TEST_F(ReadRecording, FolderRefused) {
                 .find("is a file, neither a recording's folder nor a bag"),
             std::string::npos);
   folder_.remove("poses.csv");
-  EXPECT_NE(folder_.refusal().find("holds no video, bag, corners.csv, poses.csv or points.csv"),
-            std::string::npos);
+  EXPECT_NE(
+      folder_.refusal().find("holds no video, bag, dataset, corners.csv, poses.csv or points.csv"),
+      std::string::npos);
 }
 
 TEST_F(ReadRecording, NamedFilesTakeThePlaceOfThoseInTheFolder) {

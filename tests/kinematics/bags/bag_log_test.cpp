@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "kinematics/bags/bag_log.h"
-
 #include <cmath>
 #include <fstream>
 
 #include <gtest/gtest.h>
 
 #include "kinematics/bags/bag_contents.h"
+#include "kinematics/recorded/recorded_log.h"
 #include "tests/truth/bag_writer.h"
 #include "tests/truth/temporary_path.h"
 
@@ -51,7 +50,7 @@ fs::path bag(const std::string& name, const BagOptions& options = {}) {
 }
 
 TEST(BagLog, IsAJointLog) {
-  const JointLog log = read_joint_log(bag("arm.mcap"));
+  const JointLog log = recorded::read_joint_log(bag("arm.mcap"));
   ASSERT_EQ(log.size(), 200U);
   EXPECT_EQ(log.channels, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(log.torque_columns, (std::vector<std::string>{"tau_a", "tau_b"}));
@@ -64,7 +63,7 @@ TEST(BagLog, IsAJointLog) {
 }
 
 TEST(BagLog, IsATorqueLog) {
-  const ChannelTable table = bags::read_channel_table(bag("torques.mcap"));
+  const ChannelTable table = recorded::read_channel_table(bag("torques.mcap"));
   EXPECT_EQ(table.names, (std::vector<std::string>{"t", "a_position", "b_position", "a_velocity",
                                                    "b_velocity", "a_effort", "b_effort"}));
   EXPECT_EQ(table.values(30, 1), std::sin(0.3));
@@ -74,7 +73,7 @@ TEST(BagLog, IsATorqueLog) {
 
 TEST(BagLog, ClocksThatDifferAreMovedToTheRecorders) {
   const JointLog log =
-      read_joint_log(bag("simulated.mcap", {.header_clock_ns = 40 * kMillisecond}));
+      recorded::read_joint_log(bag("simulated.mcap", {.header_clock_ns = 40 * kMillisecond}));
   EXPECT_NEAR(log.times_s.front(), 0.0, 1e-6);
   EXPECT_NEAR(log.times_s[100] - log.times_s[0], 1.0, 1e-9);
   ASSERT_EQ(log.warnings.size(), 1U);
@@ -82,14 +81,14 @@ TEST(BagLog, ClocksThatDifferAreMovedToTheRecorders) {
 }
 
 TEST(BagLog, WithoutStampsTheRecordersAreUsed) {
-  const JointLog log = read_joint_log(bag("unstamped.mcap", {.stamped = false}));
+  const JointLog log = recorded::read_joint_log(bag("unstamped.mcap", {.stamped = false}));
   EXPECT_EQ(log.times_s.front(), 0.0);
   ASSERT_EQ(log.warnings.size(), 1U);
   EXPECT_NE(log.warnings[0].find("no stamps of its own"), std::string::npos) << log.warnings[0];
 }
 
 TEST(BagLog, JointsOfAnotherPublisherJoinInBetweenTheirMessages) {
-  const JointLog log = read_joint_log(bag("gripper.mcap", {.gripper = true}));
+  const JointLog log = recorded::read_joint_log(bag("gripper.mcap", {.gripper = true}));
   EXPECT_EQ(log.channels, (std::vector<std::string>{"a", "b", "g"}));
   ASSERT_EQ(log.size(), 197U);  // the gripper's last message is three before the arm's
   for (const Eigen::Index row : {0, 41, 190})
@@ -123,7 +122,7 @@ TEST(BagLog, OneMessageWithoutAStampIsOne) {
                  truth::joint_state(k == 0 ? 0 : t, {"a"}, {0.01 * k}));
   }
   writer.finish();
-  const JointLog log = read_joint_log(path);
+  const JointLog log = recorded::read_joint_log(path);
   ASSERT_EQ(log.size(), 100U);
   EXPECT_NEAR(log.times_s[1] - log.times_s[0], 0.01, 1e-9);
   EXPECT_TRUE(log.warnings.empty());
@@ -138,23 +137,23 @@ TEST(BagLog, CommandsDoNotJoinMeasurements) {
     writer.write("/gripper/joint_commands", kType, t, truth::joint_state(t, {"g"}, {0.02 * k}));
   }
   writer.finish();
-  const JointLog log = read_joint_log(path);
+  const JointLog log = recorded::read_joint_log(path);
   EXPECT_EQ(log.channels, (std::vector<std::string>{"a"}));
   ASSERT_EQ(log.warnings.size(), 1U);
   EXPECT_NE(log.warnings[0].find("/gripper/joint_commands"), std::string::npos);
 }
 
 TEST(BagLog, OrderOfArrivalDoesNotMatter) {
-  const JointLog straight = read_joint_log(bag("straight.mcap"));
-  const JointLog shuffled = read_joint_log(bag("shuffled.mcap", {.shuffled = true}));
+  const JointLog straight = recorded::read_joint_log(bag("straight.mcap"));
+  const JointLog shuffled = recorded::read_joint_log(bag("shuffled.mcap", {.shuffled = true}));
   EXPECT_EQ(shuffled.values, straight.values);
 }
 
 TEST(BagLog, CsvIsReadAsBefore) {
   const fs::path path = truth::temporary_path("plain.csv");
   std::ofstream(path) << "t,a\n0,0\n1,1\n2,3\n";
-  EXPECT_EQ(read_joint_log(path).size(), 3U);
-  EXPECT_EQ(bags::read_channel_table(path).rows(), 3);
+  EXPECT_EQ(recorded::read_joint_log(path).size(), 3U);
+  EXPECT_EQ(recorded::read_channel_table(path).rows(), 3);
 }
 
 }  // namespace

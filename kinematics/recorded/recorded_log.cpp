@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/recorded/recorded_log.h"
+
+#include <utility>
+
+#include "kinematics/bags/bag_log.h"
+#include "kinematics/datasets/dataset_log.h"
+#include "kinematics/log/joint_log_table.h"
+
+namespace kinescope::recorded {
+
+LogTable read_log_table(const std::filesystem::path& path) {
+  if (const auto bag = bags::bag_source(path)) {
+    bags::LogTable read = bags::joint_table(*bag);
+    return {std::move(read.table), std::move(read.warnings), {}};
+  }
+  if (const auto dataset = datasets::dataset_source(path)) {
+    datasets::JointSignals signals = datasets::read_signals(*dataset);
+    return {datasets::joint_table(signals), std::move(signals.warnings),
+            datasets::joined_at_s(signals)};
+  }
+  return {read_csv(path, RaggedRows::kSetAside), {}, {}};
+}
+
+JointLog read_joint_log(const std::filesystem::path& path,
+                        const std::vector<std::string>& torque_channels) {
+  LogTable read = recorded::read_log_table(path);
+  JointLog log = joint_log_of(std::move(read.table), torque_channels).log;
+  log.warnings.insert(log.warnings.begin(), read.warnings.begin(), read.warnings.end());
+  log.joined_at_s = std::move(read.joined_at_s);
+  return log;
+}
+
+ChannelTable read_channel_table(const std::filesystem::path& path) {
+  if (const auto bag = bags::bag_source(path)) return bags::channel_table(*bag);
+  if (const auto dataset = datasets::dataset_source(path))
+    return datasets::channel_table(datasets::read_signals(*dataset));
+  return kinescope::read_channel_table(path);
+}
+
+std::vector<ChannelTable> read_channel_tables(const std::vector<std::filesystem::path>& paths) {
+  std::vector<ChannelTable> out;
+  for (const std::filesystem::path& path : paths) out.push_back(recorded::read_channel_table(path));
+  return out;
+}
+
+TorqueColumns torque_columns(const std::filesystem::path& log, const std::string& channel,
+                             const std::string& torque) {
+  if (bags::is_bag(log)) {
+    const auto [position, effort] = bags::torque_columns(channel, torque);
+    return {position, effort};
+  }
+  if (const auto dataset = datasets::dataset_source(log)) {
+    const auto [position, effort] = datasets::torque_names(*dataset, channel, torque);
+    return {position, effort};
+  }
+  return {channel, torque};
+}
+
+}  // namespace kinescope::recorded
