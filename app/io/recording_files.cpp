@@ -190,6 +190,18 @@ void take_from_bag(const bags::Source& source, RecordingFiles& files) {
   if (!files.camera && shown && bags::camera_of(contents, shown->topic)) files.camera = images;
 }
 
+/// Poses of the flange take the place of joint values where there are none.
+void find_flange(RecordingFiles& files) {
+  files.flange = find_file(std::nullopt, files.folder, "flange.csv", "");
+  if (!files.flange) return;
+  const MaybePath& preferred = files.joints ? files.joints : files.nominal;
+  if (!preferred && files.entry != RecordingEntry::kPoints) return;
+  files.warnings.push_back(fmt::format("{} is not used: {}", files.flange->string(),
+                                       preferred ? fmt::format("there is {}", preferred->string())
+                                                 : "points have no rotation"));
+  files.flange.reset();
+}
+
 /// Beside a bag that is a file stand the recording's other files.
 fs::path folder_of(const fs::path& given, const std::optional<bags::Source>& bag) {
   if (!bag) return given;
@@ -205,7 +217,7 @@ std::vector<fs::path> RecordingFiles::all() const {
   std::vector<fs::path> out;
   const MaybePath* seen[] = {&video, &corners, &poses, &points};
   const MaybePath& used = *seen[static_cast<std::size_t>(entry)];
-  for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
+  for (const MaybePath* file : {&used, &joints, &flange, &camera, &tags, &settings, &nominal}) {
     if (!*file) continue;
     std::error_code error;
     const bool images = !bags::is_bag(**file) && fs::is_directory(**file, error);
@@ -252,6 +264,7 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
   }
   if (bag) take_from_bag(*bag, files);
   files.entry = choose_entry(paths, files);
+  find_flange(files);
   return files;
 }
 
