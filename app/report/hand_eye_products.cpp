@@ -147,6 +147,10 @@ std::string limit_words(const HandEyeSummary& summary) {
   if (!r.odd_rows.empty())
     out += fmt::format("; {} of {} poses contradict the others and are left out", r.odd_rows.size(),
                        r.frames.size());
+  if (r.odd_sightings > 0)
+    out += fmt::format("; {} sightings of markers contradict the others of their frame and are "
+                       "left out",
+                       r.odd_sightings);
   return out;
 }
 
@@ -208,6 +212,7 @@ json hand_eye_json(const HandEyeSummary& summary) {
              {"flange_rad", report::number(r.flange_noise_rad)},
              {"flange_m", report::number(r.flange_noise_m)}}},
            {"errors", {{"fitted", error_json(r.fitted)}, {"held_out", error_json(r.held_out)}}},
+           {"odd_sightings", r.odd_sightings},
            {"start", r.start},
            {"at_rest", r.postures},
            {"warnings", report::texts(summary.run.warnings)}};

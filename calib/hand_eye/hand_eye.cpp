@@ -13,6 +13,7 @@
 #include "calib/hand_eye/closed_form.h"
 #include "calib/hand_eye/held_out.h"
 #include "calib/hand_eye/observability.h"
+#include "calib/hand_eye/odd_sightings.h"
 #include "calib/hand_eye/traced.h"
 #include "calib/hand_eye/usual.h"
 #include "calib/trace/trace.h"
@@ -297,6 +298,32 @@ Chosen choose(std::vector<Rival> rivals, const HandEyeInput& input, const HandEy
   return out;
 }
 
+// Once with the markers that the first fit shows to be wrong left out, and once more with those that
+// the second does.
+struct Cleaned {
+  std::unique_ptr<Data> data;  // that the rival's model is of
+  int left_out = 0;
+};
+
+Cleaned clean(Rival& rival, const HandEyeOptions& options, const std::vector<int>& fold) {
+  const std::unique_ptr<Model> all = std::move(rival.model);
+  Cleaned out{std::make_unique<Data>(all->data()), 0};
+  Fit seen = rival.fit;
+  for (int round = 0; round < 2; ++round) {
+    CleanedData cleaned = without_odd_sightings(*all, seen, options.reject_sigma);
+    if (cleaned.left_out == 0) break;
+    *out.data = std::move(cleaned.data);
+    out.left_out = cleaned.left_out;
+    const Model model(*out.data, all->log(), all->hypothesis());
+    rival.fit = fit(model, rival.fit.state, options.reject_sigma);
+    seen.state = rival.fit.state;
+    seen.rows = rows_of_all(*all, seen.state);
+  }
+  rival.model = std::make_unique<Model>(*out.data, all->log(), all->hypothesis());
+  if (out.left_out > 0) rival.held_out = hold_out(*rival.model, rival.fit, fold);
+  return out;
+}
+
 std::vector<OddFlangeRow> odd_rows_of(const Model& model, const Fit& fit) {
   std::vector<OddFlangeRow> out;
   const PoseLog& log = model.log();
@@ -353,15 +380,28 @@ void take_frames(const Model& model, const Fit& fit, const std::vector<HeldOutFr
   }
 }
 
+// A jump has its time. One that is as likely at many is the shape of something else: of a robot
+// whose errors follow the order in which its poses were chosen (114 poses of an FR3: 22 times).
+bool is_vague(const TracedEffect& effect) {
+  constexpr std::size_t kMostTimes = 4;
+  return effect.scan_name == "at" && effect.as_likely.size() > kMostTimes;
+}
+
+Trace trace_of(const Rival& rival, const std::vector<int>& fold, const Progress& progress) {
+  // Below what detectors and boards are right to.
+  constexpr double kFloorM = 1e-5;
+  TraceOptions options;
+  options.floor = kFloorM;
+  Trace out =
+      trace_effects(TracedHandEye(*rival.model, rival.fit, fold), options, progress);
+  if (std::ranges::none_of(out.accepted, is_vague)) return out;
+  return trace_effects(TracedHandEye(*rival.model, rival.fit, fold, false), options, progress);
+}
+
 // What the equation lacks; the fit with it.
 void trace_into(Rival& rival, const HandEyeOptions& options, const std::vector<int>& fold,
                 HandEye& out, const Progress& progress) {
-  // Below what detectors and boards are right to.
-  constexpr double kFloorM = 1e-5;
-  TraceOptions trace_options;
-  trace_options.floor = kFloorM;
-  const TracedHandEye traced(*rival.model, rival.fit, fold);
-  out.trace = trace_effects(traced, trace_options, progress);
+  out.trace = trace_of(rival, fold, progress);
   if (out.trace->added.empty()) return;
   auto model = std::make_unique<Model>(rival.model->data(), rival.model->log(),
                                        rival.model->hypothesis(), out.trace->added);
@@ -405,6 +445,9 @@ HandEye calibrate_hand_eye(const HandEyeInput& input, const HandEyeOptions& opti
   HandEye out;
   out.hypothesis = chosen.rival.model->hypothesis();
   out.rivals = std::move(chosen.rivals);
+  const Cleaned cleaned = clean(chosen.rival, options, fold);
+  out.odd_sightings = cleaned.left_out;
+  out.rivals.front().held_out = held_out_error(chosen.rival.held_out);
   out.postures = data.postures;
   if (options.trace) trace_into(chosen.rival, options, fold, out, progress);
   const Rival& rival = chosen.rival;

@@ -110,6 +110,7 @@ struct HandEye {
   HandEyeError held_out;
   std::vector<HandEyeFrame> frames;
   std::vector<OddFlangeRow> odd_rows;
+  int odd_sightings = 0;  ///< of markers, left out: they contradict the others of their frames
   std::string start;                 ///< the closed form that it began from
   std::optional<Trace> trace;        ///< none where it was not asked for
 };

@@ -175,6 +175,49 @@ Components fisher_step(const Restricted& now, const Components& v) {
   return scale.asDiagonal() * solve_symmetric(even, Eigen::VectorXd(scale.asDiagonal() * s));
 }
 
+constexpr double kLittleFlange = 0.1;  // of the start
+
+// Variance over the declared one, if the controller did not err.
+double camera_alone(const std::vector<FrameRows>& frames) {
+  double sum = 0.0;
+  double rows = 0.0;
+  for (const FrameRows& frame : frames) {
+    sum += frame.residual.squaredNorm();
+    rows += static_cast<double>(frame.residual.size());
+  }
+  return sum / rows;
+}
+
+struct Climbed {
+  Components variances;
+  double log_likelihood = 0.0;
+};
+
+Climbed climb(const Likelihood& likelihood, const Components& start) {
+  constexpr int kMaxSteps = 50;
+  constexpr double kSettled = 1e-6;  // of the log likelihood
+  constexpr double kShortestStep = 1e-4;
+  Components v = bounded(start);
+  Restricted now = likelihood.at(v);
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const Components step = fisher_step(now, v);
+    double share = 1.0;
+    Components tried = bounded(v + step);
+    Restricted next = likelihood.at(tried);
+    while (!(next.log_likelihood > now.log_likelihood) && share > kShortestStep) {
+      share *= 0.25;
+      tried = bounded(v + share * step);
+      next = likelihood.at(tried);
+    }
+    if (!(next.log_likelihood > now.log_likelihood)) break;
+    const bool settled = next.log_likelihood - now.log_likelihood < kSettled;
+    v = tried;
+    now = next;
+    if (settled) break;
+  }
+  return {v, now.log_likelihood};
+}
+
 }  // namespace
 
 Matrix6d Noise::flange_covariance() const {
@@ -249,30 +292,17 @@ Noise robust_noise(const std::vector<FrameRows>& frames) {
 }
 
 Noise estimate_noise(const std::vector<FrameRows>& frames, const Noise& start) {
-  constexpr int kMaxSteps = 50;
-  constexpr double kSettled = 1e-6;  // of the log likelihood
-  constexpr double kShortestStep = 1e-4;
   const Likelihood likelihood(frames);
   const auto square = [](double x) { return x * x; };
-  Components v = bounded({square(start.camera), square(start.camera_turn),
-                          square(start.flange_rad), square(start.flange_m)});
-  Restricted now = likelihood.at(v);
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const Components step = fisher_step(now, v);
-    double share = 1.0;
-    Components tried = bounded(v + step);
-    Restricted next = likelihood.at(tried);
-    while (!(next.log_likelihood > now.log_likelihood) && share > kShortestStep) {
-      share *= 0.25;
-      tried = bounded(v + share * step);
-      next = likelihood.at(tried);
-    }
-    if (!(next.log_likelihood > now.log_likelihood)) break;
-    const bool settled = next.log_likelihood - now.log_likelihood < kSettled;
-    v = tried;
-    now = next;
-    if (settled) break;
-  }
+  // The likelihood may have two maxima: what turns and shifts the flange moves the targets, too.
+  const double lower = kLittleFlange * kLittleFlange;
+  const double camera = camera_alone(frames);
+  const Climbed one = climb(likelihood, {square(start.camera), square(start.camera_turn),
+                                         square(start.flange_rad), square(start.flange_m)});
+  const Climbed other =
+      climb(likelihood, {camera, camera, lower * square(start.flange_rad),
+                         lower * square(start.flange_m)});
+  const Components& v = (other.log_likelihood > one.log_likelihood ? other : one).variances;
   return {std::sqrt(v[0]), std::sqrt(v[1]), std::sqrt(v[2]), std::sqrt(v[3])};
 }
 

@@ -21,6 +21,8 @@ std::string direction(const Eigen::Vector3d& v) {
   Eigen::Index largest = 0;
   unit.cwiseAbs().maxCoeff(&largest);
   if (unit[largest] < 0.0) unit = -unit;
+  constexpr double kShown = 0.005;  // smaller shows as zero, of either sign
+  unit = (unit.array().abs() < kShown).select(0.0, unit);
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", unit.x(), unit.y(), unit.z());
 }
 

@@ -101,6 +101,16 @@ void hold(ceres::Problem& problem, std::array<double, 1>& number, bool free) {
   if (!free) problem.SetParameterBlockConstant(number.data());
 }
 
+// Each sighting for itself: one wrong marker does not spoil the others of its frame.
+std::vector<Frame> parts_of(const Frame& frame, bool robust) {
+  if (!robust) return {frame};
+  std::vector<Frame> out;
+  for (const bundle::Sighting& sighting : frame.sightings)
+    out.push_back({frame.time_s, frame.index, {sighting}});
+  return out;
+}
+
+// `frame` outlives the problem.
 void add_frame(const Model& model, const State& layout, State& state, const Frame& frame,
                const Noise& noise, bool robust, ceres::Problem& problem) {
   const auto rows = rows_of(model, layout, frame);
@@ -114,8 +124,8 @@ void add_frame(const Model& model, const State& layout, State& state, const Fram
   // Of a frame without fault the squares sum up to about its rows.
   ceres::LossFunction* loss =
       robust ? new ceres::CauchyLoss(std::sqrt(static_cast<double>(n))) : nullptr;
-  problem.AddResidualBlock(
-      new FrameCost(model, layout, frame, Whitening(noise, *rows), n), loss, blocks);
+  problem.AddResidualBlock(new FrameCost(model, layout, frame, Whitening(noise, *rows), n), loss,
+                           blocks);
 }
 
 }  // namespace
@@ -127,8 +137,11 @@ Solved solve(const Model& model, const State& start, const Noise& noise,
   ceres::Problem problem;
   hold(problem, out.state.scale, model.has(kPositionScale));
   hold(problem, out.state.lag_s, model.has(kTimeOffset));
-  for (const std::size_t f : frames)
-    add_frame(model, start, out.state, model.data().frames[f], noise, robust, problem);
+  std::vector<std::vector<Frame>> parts;
+  for (const std::size_t f : frames) parts.push_back(parts_of(model.data().frames[f], robust));
+  for (const std::vector<Frame>& of_frame : parts)
+    for (const Frame& part : of_frame)
+      add_frame(model, start, out.state, part, noise, robust, problem);
   for (std::vector<bundle::PoseBlock>* blocks : {&out.state.cameras, &out.state.targets}) {
     for (bundle::PoseBlock& block : *blocks) {
       if (!problem.HasParameterBlock(block.data())) continue;

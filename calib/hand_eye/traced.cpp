@@ -179,6 +179,12 @@ Candidate position_scale() {
                             {{"relative", "m/m"}}, "m/m");
   out.check = "the markers' printed size with a calliper; lengths and gear ratios in the controller";
   out.record = "move the hand over a longer way";
+  // More is another unit or another target, and seen at once: a fit that asks for it bends to
+  // something else (23 poses of a UR10 asked for 37 %).
+  out.possible = [](const Eigen::VectorXd& share) {
+    constexpr double kMost = 0.1;
+    return std::abs(share[0]) < kMost;
+  };
   out.columns = [](double) { return std::vector<EffectColumn>{{kScaleCarrier, {}}}; };
   return out;
 }
@@ -253,10 +259,11 @@ Candidate tag_slip(const Model& model, const Eigen::VectorXd& time_s, std::size_
   return out;
 }
 
-std::vector<Candidate> candidates_of(const Model& model, const Eigen::VectorXd& time_s) {
+std::vector<Candidate> candidates_of(const Model& model, const Eigen::VectorXd& time_s,
+                                     bool jumps) {
   std::vector<Candidate> out{position_scale()};
   if (!model.data().postures) out.push_back(time_offset());
-  if (switching_times(time_s).empty()) return out;
+  if (!jumps || switching_times(time_s).empty()) return out;
   out.push_back(camera_bump(model, time_s));
   for (std::size_t k = 0; k < model.data().targets.size(); ++k)
     out.push_back(tag_slip(model, time_s, k));
@@ -281,8 +288,8 @@ std::vector<Covariate> covariates_of(const Model& model, const State& state,
 
 }  // namespace
 
-TracedHandEye::TracedHandEye(const Model& model, const Fit& fit, std::vector<int> fold)
-    : model_(model), fit_(fit), fold_(std::move(fold)) {}
+TracedHandEye::TracedHandEye(const Model& model, const Fit& fit, std::vector<int> fold, bool jumps)
+    : model_(model), fit_(fit), fold_(std::move(fold)), jumps_(jumps) {}
 
 TracedFit TracedHandEye::fit(const std::vector<AddedEffect>& effects) const {
   const Model with(model_.data(), model_.log(), model_.hypothesis(), effects);
@@ -310,7 +317,7 @@ TracedFit TracedHandEye::fit(const std::vector<AddedEffect>& effects) const {
   out.linear.correlation_time_s = correlation_time(with, now);
   for (std::size_t k = 0; k < effects.size(); ++k)
     out.values.push_back(effect_values(with, solved.state, k));
-  out.candidates = candidates_of(with, out.linear.time_s);
+  out.candidates = candidates_of(with, out.linear.time_s, jumps_);
   out.covariates = covariates_of(with, solved.state, fit_.used);
   for (int k = 0; k < 3; ++k)
     out.rest_places.push_back({fmt::format("hand along {}", "xyz"[k]), "m", kHandCarrier + k});

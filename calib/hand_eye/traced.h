@@ -19,13 +19,15 @@ namespace kinescope::hand_eye {
 /// predicted, in the target's frame. Frames and weights stay those of `fit`, whatever is added.
 class TracedHandEye final : public TracedModel {
  public:
-  TracedHandEye(const Model& model, const Fit& fit, std::vector<int> fold);
+  /// `jumps`: whether what happens once is among the candidates.
+  TracedHandEye(const Model& model, const Fit& fit, std::vector<int> fold, bool jumps = true);
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
 
  private:
   const Model& model_;
   const Fit& fit_;
   std::vector<int> fold_;  // of every frame of the data
+  bool jumps_;
 };
 
 }  // namespace kinescope::hand_eye

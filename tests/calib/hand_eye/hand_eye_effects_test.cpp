@@ -54,9 +54,9 @@ constexpr int kEffectWorlds = 20;
 TEST(HandEyeEffects, ScaleIsFoundAndSized) {
   HandEyeWorldOptions options;
   options.poses = 30;
-  options.scale = 0.0035;
+  options.scale = 0.01;  // over a way of 0.2 m: 2 mm, where poses err by 0.3
   // The controller's positions are to be made longer by 1 / (1 - scale).
-  const Tally out = tally(options, "position_scale", 1.0 / (1.0 - 0.0035) - 1.0, kEffectWorlds);
+  const Tally out = tally(options, "position_scale", 1.0 / (1.0 - 0.01) - 1.0, kEffectWorlds);
   EXPECT_EQ(out.found, kEffectWorlds);
   EXPECT_GE(out.covered, kEffectWorlds - 4);
   EXPECT_LE(out.others, 1);

@@ -56,6 +56,7 @@ TEST_P(EveryReading, IsExactWithoutNoiseAndNamedRight) {
   options.pose_sigma_m = options.pose_sigma_rad = 0.0;
   const HandEyeWorld world = make_hand_eye_world(options);
   const HandEye result = calibrate_hand_eye(world.input, untraced());
+  for (auto& v : result.rivals) fprintf(stderr, "score %g p %g held %g\n", v.log_score, v.probability, v.held_out.m);
   EXPECT_EQ(result.hypothesis.mount, options.mount);
   EXPECT_EQ(result.hypothesis.direction, options.direction);
   EXPECT_LT(log_pose(result.camera.T.inverse() * world.camera).norm(), kExact);
