@@ -78,10 +78,11 @@ void print_sightings(const Recording& recording) {
 
 void print_flange(const Recording& recording) {
   const PoseLog& log = recording.flange.front().log;
-  fmt::print("flange    {} poses, {} from {:g} to {:g}{}, {}: `run` calibrates the camera to the "
-             "hand\n",
-             log.poses.size(), log.time_column, log.times_s.front(), log.times_s.back(),
-             log.numbered ? "" : " s", recording.flange.front().rotation);
+  fmt::print(
+      "flange    {} poses, {} from {:g} to {:g}{}, {}: `run` calibrates the camera to the "
+      "hand\n",
+      log.poses.size(), log.time_column, log.times_s.front(), log.times_s.back(),
+      log.numbered ? "" : " s", recording.flange.front().rotation);
   for (std::size_t k = 1; k < recording.flange.size(); ++k)
     fmt::print("          or read as {}: `run` tells\n", recording.flange[k].rotation);
 }
@@ -159,12 +160,9 @@ nlohmann::json flange_json(const Recording& recording) {
   const PoseLog& log = recording.flange.front().log;
   nlohmann::json readings = nlohmann::json::array();
   for (const FlangeReading& reading : recording.flange) readings.push_back(reading.rotation);
-  return {{"poses", log.poses.size()},
-          {"time_column", log.time_column},
-          {"numbered", log.numbered},
-          {"first", log.times_s.front()},
-          {"last", log.times_s.back()},
-          {"rotations", readings}};
+  return {{"poses", log.poses.size()},  {"time_column", log.time_column},
+          {"numbered", log.numbered},   {"first", log.times_s.front()},
+          {"last", log.times_s.back()}, {"rotations", readings}};
 }
 
 nlohmann::json inspection_json(const Inspection& inspection) {

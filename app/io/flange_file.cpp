@@ -46,12 +46,11 @@ constexpr std::array<FlangeAngles, 5> kFlangeAngles{{
 }};
 
 constexpr std::array<const char*, 4> kClockColumns{"t", "time", "stamp", "timestamp"};
-constexpr std::array<const char*, 6> kNumberColumns{"row",  "index", "frame",
-                                                    "image", "pose", "id"};
+constexpr std::array<const char*, 6> kNumberColumns{"row", "index", "frame", "image", "pose", "id"};
 
 bool has_all(const CsvTable& table, std::span<const char* const> names) {
-  return std::ranges::all_of(
-      names, [&](const char* name) { return table.column(name).has_value(); });
+  return std::ranges::all_of(names,
+                             [&](const char* name) { return table.column(name).has_value(); });
 }
 
 bool has_quaternion(const CsvTable& table) {
@@ -143,8 +142,7 @@ Eigen::Quaterniond rotation_in(const CsvTable& table, std::size_t row, const Fla
   }
   Eigen::Vector3d v;
   for (Eigen::Index k = 0; k < 3; ++k)
-    v[k] = table.number(row,
-                        table.require_column(angles->columns[static_cast<std::size_t>(k)]));
+    v[k] = table.number(row, table.require_column(angles->columns[static_cast<std::size_t>(k)]));
   return angles->read(v);
 }
 
@@ -168,11 +166,10 @@ std::vector<FlangeRow> good_rows(const CsvTable& table, const FlangeTime& time,
       out.push_back(row);
       continue;
     }
-    bad.add(table.lines[row.row],
-            bad_input(table.place(row.row),
-                      fmt::format("{} = {:g} stands there twice", table.header[time.column],
-                                  row.time_s),
-                      "keep one of the rows"));
+    bad.add(table.lines[row.row], bad_input(table.place(row.row),
+                                            fmt::format("{} = {:g} stands there twice",
+                                                        table.header[time.column], row.time_s),
+                                            "keep one of the rows"));
   }
   return out;
 }
@@ -198,8 +195,7 @@ PoseLog log_of(const CsvTable& table, const FlangeTime& time, const std::vector<
   out.numbered = time.numbered;
   for (const FlangeRow& row : rows) {
     out.times_s.push_back(row.time_s);
-    out.poses.push_back(
-        {rotation_in(table, row.row, angles, false), to_metres * row.position_m});
+    out.poses.push_back({rotation_in(table, row.row, angles, false), to_metres * row.position_m});
     out.lines.push_back(table.lines[row.row]);
   }
   return out;
@@ -225,9 +221,9 @@ ReadSightings<std::vector<FlangeReading>> read_flange(const std::filesystem::pat
   if (rows.empty()) throw bad_input(table.source, "holds no pose", "log the flange's poses");
   const bool millimetres = is_in_millimetres(table, rows);
   if (millimetres) {
-    out.warnings.push_back(fmt::format(
-        "{}: most positions are beyond 20 m: they are taken as mm (write \"x [mm]\")",
-        table.source));
+    out.warnings.push_back(
+        fmt::format("{}: most positions are beyond 20 m: they are taken as mm (write \"x [mm]\")",
+                    table.source));
   }
   const double to_metres = millimetres ? 1e-3 : 1.0;
   if (angles.empty())

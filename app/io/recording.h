@@ -66,8 +66,8 @@ struct Recording {
   JointLog log;                             ///< empty when there is no joints.csv
   /// flange.csv, in place of joints.csv: each way to read its columns; empty when there is none.
   std::vector<FlangeReading> flange;
-  std::optional<CameraModel> camera;        ///< none: to be estimated
-  std::filesystem::path camera_file;        ///< that it was read from
+  std::optional<CameraModel> camera;  ///< none: to be estimated
+  std::filesystem::path camera_file;  ///< that it was read from
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
   std::filesystem::path nominal_file;        ///< that it was read from

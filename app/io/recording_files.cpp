@@ -196,9 +196,9 @@ void find_flange(RecordingFiles& files) {
   if (!files.flange) return;
   const MaybePath& preferred = files.joints ? files.joints : files.nominal;
   if (!preferred && files.entry != RecordingEntry::kPoints) return;
-  files.warnings.push_back(fmt::format("{} is not used: {}", files.flange->string(),
-                                       preferred ? fmt::format("there is {}", preferred->string())
-                                                 : "points have no rotation"));
+  files.warnings.push_back(fmt::format(
+      "{} is not used: {}", files.flange->string(),
+      preferred ? fmt::format("there is {}", preferred->string()) : "points have no rotation"));
   files.flange.reset();
 }
 

@@ -148,9 +148,10 @@ std::string limit_words(const HandEyeSummary& summary) {
     out += fmt::format("; {} of {} poses contradict the others and are left out", r.odd_rows.size(),
                        r.frames.size());
   if (r.odd_sightings > 0)
-    out += fmt::format("; {} sightings of markers contradict the others of their frame and are "
-                       "left out",
-                       r.odd_sightings);
+    out += fmt::format(
+        "; {} sightings of markers contradict the others of their frame and are "
+        "left out",
+        r.odd_sightings);
   return out;
 }
 
@@ -178,8 +179,8 @@ std::vector<std::string> odd_row_lines(const HandEyeSummary& summary) {
   for (const OddFlangeRow& row : summary.hand_eye.odd_rows) {
     out.push_back(fmt::format(
         "{}{}: at {} = {:.6g} the hand reads {}, but the markers say {}: {} and {} off, left out",
-        summary.log, row.line ? fmt::format(":{}", *row.line) : "", summary.time_column,
-        row.time_s, position_words(row.read), position_words(row.expected),
+        summary.log, row.line ? fmt::format(":{}", *row.line) : "", summary.time_column, row.time_s,
+        position_words(row.read), position_words(row.expected),
         text_with_unit(row.shift_m, Quantity::kLength),
         text_with_unit(row.turn_rad, Quantity::kAngle)));
   }

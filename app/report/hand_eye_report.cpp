@@ -65,8 +65,8 @@ std::string transforms_section(const HandEyeSummary& summary, const nlohmann::js
       "right, y down. Covariances are in hand_eye.json.");
   Table table("transforms-table", "Estimated transforms, with expanded uncertainty (k = 2)",
               document);
-  table.header({"Transform", "x, mm", "y, mm", "z, mm", "±, mm", "Roll, °", "Pitch, °", "Yaw, °",
-                "±, °"});
+  table.header(
+      {"Transform", "x, mm", "y, mm", "z, mm", "±, mm", "Roll, °", "Pitch, °", "Yaw, °", "±, °"});
   transform_row(table, on_hand ? "camera in the flange" : "camera in the base", "/camera");
   for (std::size_t k = 0; k < summary.hand_eye.targets.size(); ++k) {
     transform_row(table,
@@ -79,7 +79,7 @@ std::string transforms_section(const HandEyeSummary& summary, const nlohmann::js
 
 // Held-out errors over the poses; those left out apart.
 std::string error_plot(const HandEyeSummary& summary, std::string_view name, std::string_view unit,
-                       double factor, double HandEyeError::*part) {
+                       double factor, double HandEyeError::* part) {
   std::vector<Eigen::Vector2d> held_out;
   std::vector<Eigen::Vector2d> left_out;
   double top = 0.0;
@@ -130,16 +130,15 @@ std::string readings_section(const HandEyeSummary& summary, const nlohmann::json
       "in recording.yaml.");
   Table table("readings-table", "Readings; the score is the log predictive density less the best",
               document);
-  table.header({"Camera", "Log", "Rotation", "Held out, mm", "Held out, °", "Score",
-                "Probability"});
+  table.header(
+      {"Camera", "Log", "Rotation", "Held out, mm", "Held out, °", "Score", "Probability"});
   for (std::size_t k = 0; k < summary.hand_eye.rivals.size(); ++k) {
     const HandEyeRival& rival = summary.hand_eye.rivals[k];
     const std::string at = fmt::format("/rivals/{}", k);
     table.begin_row();
     table.text(rival.hypothesis.mount == CameraMount::kOnHand ? "on the hand" : "fixed");
-    table.text(rival.hypothesis.direction == PoseDirection::kBaseFlange
-                   ? "flange in the base"
-                   : "base in the flange");
+    table.text(rival.hypothesis.direction == PoseDirection::kBaseFlange ? "flange in the base"
+                                                                        : "base in the flange");
     table.text(rival.hypothesis.rotation);
     table.number(at + "/held_out/m", Quantity::kLength);
     table.number(at + "/held_out/rad", Quantity::kAngle);

@@ -15,7 +15,7 @@
 namespace kinescope {
 
 struct HandEyeSummary {
-  RunSummary run;   ///< recording, inputs, options, times, warnings, markers; no robot
+  RunSummary run;  ///< recording, inputs, options, times, warnings, markers; no robot
   HandEye hand_eye;
   std::string log;  ///< name of flange.csv, and of the column that it is matched by
   std::string time_column;

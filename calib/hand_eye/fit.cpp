@@ -73,8 +73,7 @@ constexpr double kMostOut = 0.3;
 Frames without_outliers(const Model& model, const Rows& rows, const Frames& used,
                         const Noise& noise, double sigma) {
   const Frames seen = seen_frames(rows);
-  const auto covariance =
-      covariance_of(information_of(rows, used, noise, model.parameters()));
+  const auto covariance = covariance_of(information_of(rows, used, noise, model.parameters()));
   std::vector<bool> out(rows.size(), false);
   for (const std::size_t f : seen) {
     const bool in = std::ranges::binary_search(used, f);
@@ -92,8 +91,7 @@ bool settled(const Noise& a, const Noise& b) {
   constexpr double kSame = 1e-3;
   const auto same = [](double x, double y) { return std::abs(x - y) <= kSame * std::max(x, y); };
   return same(a.camera, b.camera) && same(a.camera_turn, b.camera_turn) &&
-         same(a.flange_rad, b.flange_rad) &&
-         same(a.flange_m, b.flange_m);
+         same(a.flange_rad, b.flange_rad) && same(a.flange_m, b.flange_m);
 }
 
 // Stretches of a few correlation times, as calib/trace/partition.h has them.
@@ -201,10 +199,9 @@ Fit fit(const Model& model, const State& start, double reject_sigma) {
     out.state = solved.state;
     out.converged = solved.converged;
     out.rows = rows_of_all(model, out.state);
-    const Noise before = std::exchange(
-        out.noise, estimate_noise(chosen(out.rows, out.used), out.noise));
-    const Frames next =
-        without_outliers(model, out.rows, out.used, out.noise, reject_sigma);
+    const Noise before =
+        std::exchange(out.noise, estimate_noise(chosen(out.rows, out.used), out.noise));
+    const Frames next = without_outliers(model, out.rows, out.used, out.noise, reject_sigma);
     const bool same = next == out.used && settled(before, out.noise);
     out.used = next;
     if (same) break;

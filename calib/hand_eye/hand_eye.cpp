@@ -70,8 +70,8 @@ Data make_data(const HandEyeInput& input) {
     for (const auto& [id, sighting] : seen) ++views[id];
   std::erase_if(views, [](const auto& view) { return view.second < kFewestViews; });
   Data out;
-  out.kind = input.measurements.corners.empty() ? MeasurementKind::kPose
-                                                : MeasurementKind::kCorners;
+  out.kind =
+      input.measurements.corners.empty() ? MeasurementKind::kPose : MeasurementKind::kCorners;
   out.camera = input.camera;
   for (const auto& [id, count] : views) out.targets.push_back(id);
   for (auto& [index, seen] : sightings) {
@@ -165,6 +165,9 @@ std::optional<Rival> fit_rival(const Data& data, const FlangeReading& reading,
   out.fit = fit(*out.model, start->state, options.reject_sigma);
   if (!out.fit.converged) return std::nullopt;
   out.held_out = hold_out(*out.model, out.fit, fold);
+  // One whose folds leave directions open predicts nothing.
+  const auto known = std::ranges::count_if(out.held_out, &HeldOutFrame::known);
+  if (2 * known < std::ssize(out.fit.used)) return std::nullopt;
   return out;
 }
 
@@ -201,8 +204,7 @@ HandEyeError error_over(const std::vector<ClosedLoop>& errors) {
     out.rad += e.rad * e.rad / n;
     out.px += e.px * e.px / n;
   }
-  return {std::sqrt(out.m), std::sqrt(out.rad), std::sqrt(out.px),
-          static_cast<int>(errors.size())};
+  return {std::sqrt(out.m), std::sqrt(out.rad), std::sqrt(out.px), static_cast<int>(errors.size())};
 }
 
 HandEyeError held_out_error(const std::vector<HeldOutFrame>& frames) {
@@ -225,8 +227,7 @@ double usual_log_odds(const Rival& rival) {
   double targets_m = 0.0;
   for (std::size_t k = 1; k < at.size(); ++k)
     targets_m += at[k].translation.norm() / static_cast<double>(at.size() - 1);
-  return log_odds_on_hand(at.front().translation.norm(), targets_m,
-                          rival.model->hypothesis());
+  return log_odds_on_hand(at.front().translation.norm(), targets_m, rival.model->hypothesis());
 }
 
 struct Chosen {
@@ -298,8 +299,8 @@ Chosen choose(std::vector<Rival> rivals, const HandEyeInput& input, const HandEy
   return out;
 }
 
-// Once with the markers that the first fit shows to be wrong left out, and once more with those that
-// the second does.
+// Once with the markers that the first fit shows to be wrong left out, and once more with those
+// that the second does.
 struct Cleaned {
   std::unique_ptr<Data> data;  // that the rival's model is of
   int left_out = 0;
@@ -335,8 +336,12 @@ std::vector<OddFlangeRow> odd_rows_of(const Model& model, const Fit& fit) {
     expected.translation /= 1.0 + fit.state.scale[0];
     if (model.hypothesis().direction == PoseDirection::kFlangeBase) expected = expected.inverse();
     const auto logged = pose_at(log, frame.time_s);
-    OddFlangeRow row{frame.time_s, std::nullopt, value_of(logged).pose, expected,
-                     e.error.tail<3>().norm(), e.error.head<3>().norm()};
+    OddFlangeRow row{frame.time_s,
+                     std::nullopt,
+                     value_of(logged).pose,
+                     expected,
+                     e.error.tail<3>().norm(),
+                     e.error.head<3>().norm()};
     const auto at = std::ranges::lower_bound(log.times_s, frame.time_s);
     if (at != log.times_s.end() && *at == frame.time_s && !log.lines.empty())
       row.line = log.lines[static_cast<std::size_t>(at - log.times_s.begin())];
@@ -354,9 +359,8 @@ void take_poses(const Model& model, const Fit& fit, HandEye& out) {
   out.camera = {at.front(), out.covariance.topLeftCorner<6, 6>()};
   for (std::size_t k = 0; k < model.data().targets.size(); ++k) {
     const auto block = 6 + 6 * static_cast<Eigen::Index>(k);
-    HandEyeTarget target{model.data().targets[k],
-                         {at[k + 1], out.covariance.block<6, 6>(block, block)},
-                         0};
+    HandEyeTarget target{
+        model.data().targets[k], {at[k + 1], out.covariance.block<6, 6>(block, block)}, 0};
     for (const std::size_t f : fit.used)
       for (const bundle::Sighting& s : model.data().frames[f].sightings)
         if (s.marker == static_cast<int>(k)) ++target.frames;
@@ -392,8 +396,7 @@ Trace trace_of(const Rival& rival, const std::vector<int>& fold, const Progress&
   constexpr double kFloorM = 1e-5;
   TraceOptions options;
   options.floor = kFloorM;
-  Trace out =
-      trace_effects(TracedHandEye(*rival.model, rival.fit, fold), options, progress);
+  Trace out = trace_effects(TracedHandEye(*rival.model, rival.fit, fold), options, progress);
   if (std::ranges::none_of(out.accepted, is_vague)) return out;
   return trace_effects(TracedHandEye(*rival.model, rival.fit, fold, false), options, progress);
 }

@@ -33,12 +33,12 @@ struct FlangeReading {
 };
 
 struct HandEyeInput {
-  Measurements measurements;           ///< corners or poses
-  PoseTracks tracks;                   ///< of the markers: where the search starts
+  Measurements measurements;  ///< corners or poses
+  PoseTracks tracks;          ///< of the markers: where the search starts
   MarkerSet markers;
-  CameraModel camera;                  ///< known; unused for poses
+  CameraModel camera;                   ///< known; unused for poses
   std::vector<FlangeReading> readings;  ///< of one file: rivals
-  std::optional<CameraMount> mount;    ///< declared; none: to be told from the data
+  std::optional<CameraMount> mount;     ///< declared; none: to be told from the data
 };
 
 struct HandEyeOptions {
@@ -101,18 +101,18 @@ struct HandEye {
   std::vector<HandEyeRival> rivals;  ///< the chosen one first
   UncertainPose camera;              ///< T_flange_camera (on the hand) or T_base_camera
   std::vector<HandEyeTarget> targets;
-  Eigen::MatrixXd covariance;        ///< camera, then each target: 6 (1 + targets)
-  bool postures = false;             ///< at rest: nothing was interpolated
-  double camera_noise = 1.0;         ///< over the declared sigmas
-  double flange_noise_rad = 0.0;     ///< of the log's rotations, one axis
-  double flange_noise_m = 0.0;       ///< of its positions, one axis
+  Eigen::MatrixXd covariance;     ///< camera, then each target: 6 (1 + targets)
+  bool postures = false;          ///< at rest: nothing was interpolated
+  double camera_noise = 1.0;      ///< over the declared sigmas
+  double flange_noise_rad = 0.0;  ///< of the log's rotations, one axis
+  double flange_noise_m = 0.0;    ///< of its positions, one axis
   HandEyeError fitted;
   HandEyeError held_out;
   std::vector<HandEyeFrame> frames;
   std::vector<OddFlangeRow> odd_rows;
-  int odd_sightings = 0;  ///< of markers, left out: they contradict the others of their frames
-  std::string start;                 ///< the closed form that it began from
-  std::optional<Trace> trace;        ///< none where it was not asked for
+  int odd_sightings = 0;       ///< of markers, left out: they contradict the others of their frames
+  std::string start;           ///< the closed form that it began from
+  std::optional<Trace> trace;  ///< none where it was not asked for
 };
 
 /// Throws undetermined: too few poses, no rotation or one about a single axis, directions that the

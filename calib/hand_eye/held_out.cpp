@@ -36,9 +36,10 @@ double log_density_of(const FrameRows& rows, const Noise& noise, const Eigen::Ma
 ClosedLoop closed_loop(const Frame& frame, const FrameRows& rows) {
   ClosedLoop out;
   double corners = 0.0;
+  const Vector6d flange = flange_error(rows, {}).error;
   for (std::size_t s = 0; s < frame.sightings.size(); ++s) {
     const bundle::SightingError& error = rows.errors[s];
-    const Vector6d d = least_squares(error.d_marker, -error.residual);
+    const Vector6d d = rows.predicted[s].by_flange * flange;
     out.m += d.tail<3>().squaredNorm();
     out.rad += d.head<3>().squaredNorm();
     const bundle::Sighting& sighting = frame.sightings[s];

@@ -9,7 +9,8 @@
 
 namespace kinescope::hand_eye {
 
-/// How far the targets of a frame are from where they are predicted, rms over the targets.
+/// How far the targets of a frame are from where they are predicted, rms over the targets: all of
+/// them together as one body, for a small marker alone says little of its distance.
 struct ClosedLoop {
   double m = 0.0;
   double rad = 0.0;

@@ -16,7 +16,6 @@ std::size_t passed(const std::vector<double>& times_s, double time_s) {
   return static_cast<std::size_t>(std::ranges::upper_bound(times_s, time_s) - times_s.begin());
 }
 
-
 Matrix6d right_jacobian(const Vector6d& d) {
   const Matrix6d inverse = inverse_right_jacobian(d);
   Matrix6d out;
@@ -28,8 +27,8 @@ Matrix6d right_jacobian(const Vector6d& d) {
 // Perturbation of blocks[to] by one of blocks[0], where each further block is the one before times
 // a motion that stays.
 Matrix6d by_first(const std::vector<bundle::PoseBlock>& blocks, std::size_t first, std::size_t to) {
-  const Pose later = bundle::from_block(blocks[to].data()).inverse() *
-                     bundle::from_block(blocks[first].data());
+  const Pose later =
+      bundle::from_block(blocks[to].data()).inverse() * bundle::from_block(blocks[first].data());
   return adjoint(later);
 }
 
@@ -53,8 +52,7 @@ bool is_of_target(const Model& model, int target, Eigen::Index column) {
   for (const AddedEffect& effect : model.effects()) {
     next += parameters_of(effect);
     if (column >= next) continue;
-    return effect.id.place ==
-           target_name(model.data().targets[static_cast<std::size_t>(target)]);
+    return effect.id.place == target_name(model.data().targets[static_cast<std::size_t>(target)]);
   }
   return false;
 }

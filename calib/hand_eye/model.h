@@ -21,7 +21,7 @@ namespace kinescope::hand_eye {
 /// An instant at which the log has a pose and the camera saw a target.
 struct Frame {
   double time_s = 0.0;
-  int index = 0;  ///< among the measurements' frames
+  int index = 0;                            ///< among the measurements' frames
   std::vector<bundle::Sighting> sightings;  ///< Sighting::marker: index into Data::targets
 };
 
@@ -75,9 +75,9 @@ class Model {
   const PoseLog* log_;
   HandEyeHypothesis hypothesis_;
   std::vector<AddedEffect> effects_;
-  std::vector<double> bumps_;                    // times, ascending
-  std::vector<std::vector<double>> slips_;       // of every target, likewise
-  std::vector<std::size_t> first_target_;        // block of every target, and one past the last
+  std::vector<double> bumps_;               // times, ascending
+  std::vector<std::vector<double>> slips_;  // of every target, likewise
+  std::vector<std::size_t> first_target_;   // block of every target, and one past the last
 };
 
 struct State {
@@ -112,12 +112,12 @@ struct Predicted {
 
 /// A frame's rows at a state, whitened by what its sightings declare.
 struct FrameRows {
-  bool poses = false;             ///< three rows of turn, three of shift for each sighting
-  Eigen::VectorXd residual;       ///< observed minus predicted
-  Eigen::MatrixXd by_parameter;   ///< rows x Model::parameters(): of the residual
-  Eigen::MatrixXd by_flange;      ///< rows x 6: of the residual, by a perturbation of T_base_flange
-  std::vector<Predicted> predicted;               ///< of every sighting
-  std::vector<bundle::SightingError> errors;      ///< of every sighting
+  bool poses = false;            ///< three rows of turn, three of shift for each sighting
+  Eigen::VectorXd residual;      ///< observed minus predicted
+  Eigen::MatrixXd by_parameter;  ///< rows x Model::parameters(): of the residual
+  Eigen::MatrixXd by_flange;     ///< rows x 6: of the residual, by a perturbation of T_base_flange
+  std::vector<Predicted> predicted;           ///< of every sighting
+  std::vector<bundle::SightingError> errors;  ///< of every sighting
 };
 /// Nothing where a target lies behind the camera.
 [[nodiscard]] std::optional<FrameRows> rows_of(const Model& model, const State& state,

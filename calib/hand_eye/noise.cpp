@@ -299,9 +299,8 @@ Noise estimate_noise(const std::vector<FrameRows>& frames, const Noise& start) {
   const double camera = camera_alone(frames);
   const Climbed one = climb(likelihood, {square(start.camera), square(start.camera_turn),
                                          square(start.flange_rad), square(start.flange_m)});
-  const Climbed other =
-      climb(likelihood, {camera, camera, lower * square(start.flange_rad),
-                         lower * square(start.flange_m)});
+  const Climbed other = climb(likelihood, {camera, camera, lower * square(start.flange_rad),
+                                           lower * square(start.flange_m)});
   const Components& v = (other.log_likelihood > one.log_likelihood ? other : one).variances;
   return {std::sqrt(v[0]), std::sqrt(v[1]), std::sqrt(v[2]), std::sqrt(v[3])};
 }

@@ -19,8 +19,8 @@ namespace kinescope::hand_eye {
 struct Noise {
   double camera = 1.0;       ///< over the declared sigmas; of poses, over those of shifts
   double camera_turn = 1.0;  ///< of poses, over those of turns
-  double flange_rad = 0.0;  ///< about each axis
-  double flange_m = 0.0;    ///< along each axis
+  double flange_rad = 0.0;   ///< about each axis
+  double flange_m = 0.0;     ///< along each axis
   /// Of a perturbation of T_base_flange.
   [[nodiscard]] Matrix6d flange_covariance() const;
 };
@@ -54,7 +54,7 @@ class Whitening {
 /// rows ask for) and its covariance.
 struct FlangeError {
   Vector6d error;
-  Matrix6d covariance;  ///< by both sources of noise
+  Matrix6d covariance;                                    ///< by both sources of noise
   Eigen::Matrix<double, 6, Eigen::Dynamic> by_parameter;  ///< d error / d parameter
 };
 [[nodiscard]] FlangeError flange_error(const FrameRows& rows, const Noise& noise);

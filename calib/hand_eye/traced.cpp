@@ -143,10 +143,10 @@ class Gathered {
             entries.emplace_back(row + i, c, parts_[p].carriers(i, c));
     }
     linear_.carriers.setFromTriplets(entries.begin(), entries.end());
-    linear_.unit = Eigen::Map<const Eigen::VectorXd>(units_.data(),
-                                                     static_cast<Eigen::Index>(units_.size()));
-    linear_.time_s = Eigen::Map<const Eigen::VectorXd>(
-        times_s_.data(), static_cast<Eigen::Index>(times_s_.size()));
+    linear_.unit =
+        Eigen::Map<const Eigen::VectorXd>(units_.data(), static_cast<Eigen::Index>(units_.size()));
+    linear_.time_s = Eigen::Map<const Eigen::VectorXd>(times_s_.data(),
+                                                       static_cast<Eigen::Index>(times_s_.size()));
     linear_.unit_name = "m";
     linear_.coordinates = 3;
     linear_.independent_instants = model.data().postures;
@@ -177,7 +177,8 @@ Candidate position_scale() {
                             "the controller's positions are too short by a share (or the markers' "
                             "declared size too large by it)",
                             {{"relative", "m/m"}}, "m/m");
-  out.check = "the markers' printed size with a calliper; lengths and gear ratios in the controller";
+  out.check =
+      "the markers' printed size with a calliper; lengths and gear ratios in the controller";
   out.record = "move the hand over a longer way";
   // More is another unit or another target, and seen at once: a fit that asks for it bends to
   // something else (23 poses of a UR10 asked for 37 %).
@@ -190,9 +191,9 @@ Candidate position_scale() {
 }
 
 Candidate time_offset() {
-  Candidate out = candidate({std::string(kTimeOffset), "clock"},
-                            "the log's clock is ahead of the camera's, or behind",
-                            {{"offset", "s"}}, "s");
+  Candidate out =
+      candidate({std::string(kTimeOffset), "clock"},
+                "the log's clock is ahead of the camera's, or behind", {{"offset", "s"}}, "s");
   out.check = "where images and poses get their stamps";
   out.record = "move faster, and in changing directions";
   out.columns = [](double) { return std::vector<EffectColumn>{{kClockCarrier, {}}}; };
@@ -251,8 +252,8 @@ Candidate camera_bump(const Model& model, const Eigen::VectorXd& time_s) {
 
 Candidate tag_slip(const Model& model, const Eigen::VectorXd& time_s, std::size_t target) {
   const std::string name = target_name(model.data().targets[target]);
-  Candidate out = candidate({std::string(kTagSlip), name}, fmt::format("{} was moved", name),
-                            kTwist, "m");
+  Candidate out =
+      candidate({std::string(kTagSlip), name}, fmt::format("{} was moved", name), kTwist, "m");
   out.check = "glue or screws of the marker's plate, what it stands on";
   out.record = "go back to the first poses at the end";
   happens_once_at(model, time_s, kTargetCarrier + 6 * static_cast<int>(target), out);

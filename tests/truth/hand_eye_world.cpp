@@ -11,12 +11,13 @@
 namespace kinescope::truth {
 namespace {
 
+constexpr int kWidth = 2560;  // px: wide enough for every pose
+constexpr int kHeight = 1920;
+
 // The hand points down; so it sees a table before the base.
 const Eigen::Vector3d kHome(0.5, 0.0, 0.45);
 
-Pose pointing_down() {
-  return {exp_rotation({std::numbers::pi, 0.0, 0.0}), kHome};
-}
+Pose pointing_down() { return {exp_rotation({std::numbers::pi, 0.0, 0.0}), kHome}; }
 
 Pose jittered(Rng& rng, const Pose& pose, double rad, double m) {
   Vector6d d;
@@ -52,9 +53,8 @@ class Maker {
       const Eigen::Vector3d beside(0.12 * k, 0.03 * k, 0.0);
       const Pose T_base_target =
           jittered(rng_, {F.rotation, {0.5 + beside.x(), beside.y(), 0.02}}, 0.15, 0.01);
-      const Pose T_flange_target =
-          jittered(rng_, {Eigen::Quaterniond::Identity(), {0.05 + beside.x(), beside.y(), 0.1}},
-                   0.15, 0.01);
+      const Pose T_flange_target = jittered(
+          rng_, {Eigen::Quaterniond::Identity(), {0.05 + beside.x(), beside.y(), 0.1}}, 0.15, 0.01);
       out_.targets.push_back(on_hand() ? T_base_target : T_flange_target);
     }
     if (on_hand()) {
@@ -104,8 +104,7 @@ class Maker {
     const auto wave = [&](double hz, double phase) {
       return std::sin(2.0 * std::numbers::pi * hz * t + phase);
     };
-    const Eigen::Vector3d turn =
-        turn_of({wave(0.11, 0.3), wave(0.17, 1.1), wave(0.07, 2.0)});
+    const Eigen::Vector3d turn = turn_of({wave(0.11, 0.3), wave(0.17, 1.1), wave(0.07, 2.0)});
     const Eigen::Vector3d shift =
         0.06 * Eigen::Vector3d(wave(0.13, 0.5), wave(0.19, 1.7), wave(0.09, 0.1));
     return flange(turn, shift + 0.3 * leaning(turn));
@@ -174,7 +173,7 @@ class Maker {
   }
 
   static CameraModel camera() {
-    CameraModel out = pinhole_guess(1280, 960, 1000.0);
+    CameraModel out = pinhole_guess(kWidth, kHeight, 1000.0);
     out.distortion[0] = -0.05;
     return out;
   }
@@ -191,8 +190,8 @@ class Maker {
       return;
     }
     const TagObservations tags{.times_s = input.measurements.times_s,
-                               .width = 1280,
-                               .height = 960,
+                               .width = kWidth,
+                               .height = kHeight,
                                .observations = input.measurements.corners,
                                .rejected = {}};
     input.tracks = pose_tracks_from_tags(tags, input.camera, input.markers);

@@ -82,6 +82,9 @@ TEST(HandEyeEffects, ALagIsFoundAndSized) {
   options.motion = true;
   options.poses = 300;
   options.lag_s = 0.04;
+  // Rows of one motion tremble by microns; what controllers err by lasts.
+  options.flange_sigma_m = 1e-5;
+  options.flange_sigma_rad = 2e-5;
   const Tally out = tally(options, "time_offset", 0.04, 5);
   EXPECT_EQ(out.found, 5);
   EXPECT_GE(out.covered, 4);

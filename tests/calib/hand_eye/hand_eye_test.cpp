@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Hand-eye calibration of simulated hands: named right, exact without noise, intervals that hold.
+#include "calib/hand_eye/hand_eye.h"
+
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "calib/hand_eye/hand_eye.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
 #include "tests/truth/hand_eye_world.h"
@@ -56,7 +57,6 @@ TEST_P(EveryReading, IsExactWithoutNoiseAndNamedRight) {
   options.pose_sigma_m = options.pose_sigma_rad = 0.0;
   const HandEyeWorld world = make_hand_eye_world(options);
   const HandEye result = calibrate_hand_eye(world.input, untraced());
-  for (auto& v : result.rivals) fprintf(stderr, "score %g p %g held %g\n", v.log_score, v.probability, v.held_out.m);
   EXPECT_EQ(result.hypothesis.mount, options.mount);
   EXPECT_EQ(result.hypothesis.direction, options.direction);
   EXPECT_LT(log_pose(result.camera.T.inverse() * world.camera).norm(), kExact);

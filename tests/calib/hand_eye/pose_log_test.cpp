@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "kinematics/log/pose_log.h"
+
 #include <cmath>
 
 #include <gtest/gtest.h>
-
-#include "kinematics/log/pose_log.h"
 
 namespace kinescope {
 namespace {
