@@ -157,7 +157,10 @@ void add_run(CLI::App& app, CommandLine& line) {
       "output folder");
   add_output_options(run, line.output);
   run.footer(fmt::format(
-      "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}", kExitCodes));
+      "A folder with flange.csv (poses of the robot's flange) in place of joints.csv gives the "
+      "camera's place\non the hand, or before the base: hand_eye.json, hand_eye.urdf, a report.\n\n"
+      "Example:\n  kinescope run sample_videos/scara4_none --output scara_run\n\n{}",
+      kExitCodes));
 }
 
 void add_path_argument(CLI::App& command, const char* name, std::filesystem::path& path,

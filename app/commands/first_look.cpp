@@ -83,8 +83,8 @@ void refuse_flange_poses(const JointLog& log, const PoseTracks& tracks,
           flange->inverted ? ", where the camera is on the hand, or they are of the base in "
                              "the flange's frame"
                            : ""),
-      "log the values of the joints; poses of a flange calibrate a camera to a hand, which is not "
-      "done here");
+      "log the values of the joints; to calibrate the camera to the hand by these poses, name the "
+      "file flange.csv, with the columns t, x, y, z, qx, qy, qz, qw");
 }
 
 std::string csv_of(const Recording& recording, std::string_view entry) {

@@ -79,6 +79,17 @@ void print_sightings(const Recording& recording) {
   }
 }
 
+void print_flange(const Recording& recording) {
+  const PoseLog& log = recording.flange.front().log;
+  fmt::print(
+      "flange    {} poses, {} from {:g} to {:g}{}, {}: `run` calibrates the camera to the "
+      "hand\n",
+      log.poses.size(), log.time_column, log.times_s.front(), log.times_s.back(),
+      log.numbered ? "" : " s", recording.flange.front().rotation);
+  for (std::size_t k = 1; k < recording.flange.size(); ++k)
+    fmt::print("          or read as {}: `run` tells\n", recording.flange[k].rotation);
+}
+
 void print_inspection(const Inspection& inspection) {
   const Recording& recording = inspection.recording;
   fmt::print("recording {} ({}): {}\n", recording.settings.name, to_string(recording.entry),
@@ -86,6 +97,7 @@ void print_inspection(const Inspection& inspection) {
   if (inspection.video) print_video(recording, *inspection.video);
   print_sightings(recording);
   if (inspection.log) print_log(*inspection.log);
+  if (!recording.flange.empty()) print_flange(recording);
   if (recording.camera) {
     fmt::print("camera    {} x {}, focal length {:.1f} px, {}\n", recording.camera->width,
                recording.camera->height, recording.camera->fx, to_string(recording.camera->model));
@@ -147,6 +159,15 @@ nlohmann::json log_json(const LogFacts& log) {
           {"channels", channels}};
 }
 
+nlohmann::json flange_json(const Recording& recording) {
+  const PoseLog& log = recording.flange.front().log;
+  nlohmann::json readings = nlohmann::json::array();
+  for (const FlangeReading& reading : recording.flange) readings.push_back(reading.rotation);
+  return {{"poses", log.poses.size()},  {"time_column", log.time_column},
+          {"numbered", log.numbered},   {"first", log.times_s.front()},
+          {"last", log.times_s.back()}, {"rotations", readings}};
+}
+
 nlohmann::json inspection_json(const Inspection& inspection) {
   const Recording& recording = inspection.recording;
   nlohmann::json out = {{"schema", 1},
@@ -164,6 +185,7 @@ nlohmann::json inspection_json(const Inspection& inspection) {
   }
   if (inspection.video) out["video"] = video_json(*inspection.video);
   if (inspection.log) out["log"] = log_json(*inspection.log);
+  if (!recording.flange.empty()) out["flange"] = flange_json(recording);
   return out;
 }
 
@@ -176,7 +198,7 @@ void note_what_is_missing(Inspection& inspection) {
         {false,
          "no camera.yaml: the intrinsics are estimated too; `kinescope camera` does it better"});
   }
-  if (recording.log.empty() && !recording.nominal) {
+  if (recording.log.empty() && !recording.nominal && recording.flange.empty()) {
     inspection.findings.push_back(
         {false, "no joints.csv: the structure is found from the markers alone"});
   }

@@ -133,7 +133,8 @@ std::vector<std::string> run_products(bool torques) {
   std::vector<std::string> out{"report.html",      "result.json",       "robot.urdf",
                                "structure.json",   "calibration.json",  "trace.json",
                                "observations.csv", "observations.json", "tracks.csv",
-                               "residuals.csv",    "run.json",          "failed_report.html"};
+                               "residuals.csv",    "run.json",          "failed_report.html",
+                               "hand_eye.json",    "hand_eye.urdf"};
   if (!torques) return out;
   append(out, dynamics_products("dynamics_trace.json"));
   append(out, contact_products());

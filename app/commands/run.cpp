@@ -15,6 +15,7 @@
 #include "app/commands/pipeline.h"
 #include "app/commands/progress_line.h"
 #include "app/commands/run_folder.h"
+#include "app/commands/run_hand_eye.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/effects_file.h"
@@ -260,6 +261,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   const std::vector<Limit> limits = parse_limits(options.fail_on);
   const Recording recording = read_recording(options.recording);
   require_nominal(options, recording);
+  if (!recording.flange.empty()) return run_hand_eye(options, recording, console);
   RunFolder folder(options, recording);
   if (options.must_trace) require_same_inputs(options.output, recording);
   clock.lap("read", run.times);

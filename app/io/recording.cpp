@@ -128,6 +128,13 @@ void read_log(Recording& recording, const RecordingFiles& files) {
   if (!settings.units.empty()) convert_units(recording.log, settings, value_of(files.settings));
 }
 
+void read_flange_poses(Recording& recording, const RecordingFiles& files) {
+  if (!files.flange) return;
+  ReadSightings<std::vector<FlangeReading>> read = read_flange(*files.flange);
+  recording.flange = std::move(read.found);
+  recording.warnings.insert(recording.warnings.end(), read.warnings.begin(), read.warnings.end());
+}
+
 /// Distances join targets that hold a point.
 void add_distances(Recording& recording, const RecordingFiles& files) {
   std::vector<std::string> targets;
@@ -345,6 +352,25 @@ void require_seconds(const JointLog& log, const std::vector<double>& times_s,
       fmt::format("stamps are in s: divide them by {:.0f}", std::pow(1e3, thousands)));
 }
 
+void require_flange_time(const Recording& recording) {
+  if (recording.flange.empty()) return;
+  const PoseLog& log = recording.flange.front().log;
+  if (recording.corners && !recording.corners->times_s.empty())
+    require_time_overlap(log, recording.corners->times_s, "corners.csv");
+  if (recording.poses && !recording.poses->times_s.empty())
+    require_time_overlap(log, recording.poses->times_s, "poses.csv");
+}
+
+/// Beside poses of a hand an unknown focal length and the way to the markers are nearly one.
+void require_known_camera(const Recording& recording, const RecordingFiles& files) {
+  const bool by_image =
+      recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners;
+  if (!files.flange || !by_image || files.camera) return;
+  throw bad_input((recording.folder / "camera.yaml").string(),
+                  "no such file, and poses of a flange calibrate a camera whose lens is known",
+                  "calibrate it (kinescope camera), or name its file with --camera");
+}
+
 bool are_whole_numbers(const std::vector<double>& times_s) {
   return std::ranges::all_of(times_s, [](double t) { return t == std::round(t); });
 }
@@ -410,6 +436,24 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
       "first frame");
 }
 
+void require_time_overlap(const PoseLog& log, const std::vector<double>& times_s,
+                          const std::string& source) {
+  JointLog stamps;
+  stamps.source = log.source;
+  stamps.times_s = log.times_s;
+  if (!log.numbered) {
+    require_time_overlap(stamps, times_s, source);
+    return;
+  }
+  if (std::ranges::any_of(times_s, [&](double t) { return is_stamp(stamps, t); })) return;
+  throw bad_input(log.source,
+                  fmt::format("no number of its column '{}' ({:g} to {:g}) is the t of a frame of "
+                              "{} ({:g} to {:g})",
+                              log.time_column, log.times_s.front(), log.times_s.back(), source,
+                              times_s.front(), times_s.back()),
+                  "give each pose the t of the frame it belongs to");
+}
+
 std::string recording_name(const fs::path& folder) {
   const auto container = recorded::container_of(folder);
   const fs::path whole = fs::absolute(container ? container->path : folder).lexically_normal();
@@ -460,7 +504,10 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
     require_metres(*recording.nominal, *files.nominal);
   });
   step([&] { read_log(recording, files); });
+  step([&] { read_flange_poses(recording, files); });
   step([&] { read_sightings(recording, files); });
+  step([&] { require_flange_time(recording); });
+  step([&] { require_known_camera(recording, files); });
   return attempt;
 }
 

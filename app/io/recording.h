@@ -19,6 +19,7 @@
 #include "calib/camera/camera_model.h"
 #include "calib/camera/marker_set.h"
 #include "calib/camera/tag_observations.h"
+#include "calib/hand_eye/hand_eye.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/joint_log.h"
 #include "kinematics/model/kinematic_tree.h"
@@ -34,7 +35,7 @@ struct RecordingPaths {
 };
 
 /// recording.yaml as a value. Its keys: name, torques, gravity, fixed_tags, video_start,
-/// target_distances (list of from, to, distance, sigma) and units (channel: unit).
+/// target_distances (list of from, to, distance, sigma), units (channel: unit) and camera_mount.
 struct RecordingSettings {
   std::string name;                          ///< of the robot; default: the folder's name
   std::vector<std::string> torque_channels;  ///< columns of joints.csv beside those named tau*
@@ -46,6 +47,7 @@ struct RecordingSettings {
   /// channel: rad, deg, m, mm, ticks. read_recording() turns deg to rad and mm to m, in the log and
   /// here.
   std::map<std::string, std::string> units;
+  std::optional<CameraMount> camera_mount;  ///< "hand" or "fixed", beside a flange.csv
 };
 
 /// How far into the path the recording enters.
@@ -64,8 +66,10 @@ struct Recording {
   std::optional<PoseTracks> poses;          ///< poses.csv
   std::optional<PointObservations> points;  ///< points.csv
   JointLog log;                             ///< empty when there is no joints.csv
-  std::optional<CameraModel> camera;        ///< none: to be estimated
-  std::filesystem::path camera_file;        ///< that it was read from
+  /// flange.csv, in place of joints.csv: each way to read its columns; empty when there is none.
+  std::vector<FlangeReading> flange;
+  std::optional<CameraModel> camera;  ///< none: to be estimated
+  std::filesystem::path camera_file;  ///< that it was read from
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
   std::filesystem::path nominal_file;        ///< that it was read from
@@ -93,6 +97,10 @@ struct ReadAttempt {
 void require_time_overlap(const JointLog& log, const std::vector<double>& times_s,
                           const std::string& source);
 
+/// The same for poses of a flange; of numbered ones, one of the times must be one of the numbers.
+void require_time_overlap(const PoseLog& log, const std::vector<double>& times_s,
+                          const std::string& source);
+
 /// The single readers, for the same files anywhere. Those of tables leave a few bad rows out
 /// (bad_rows.h) and say so; those of corners in the observations' warnings.
 /// tags.yaml: family, default_size, sizes (id: size), tags (list of id, size), boards (id: columns,
@@ -111,6 +119,12 @@ struct ReadSightings {
 /// poses.csv: t,body,x,y,z,qx,qy,qz,qw[,sigma_m,sigma_rad] (m; body in the camera's or tracker's
 /// frame). Positions that span more than a hall are taken as mm, with a warning.
 [[nodiscard]] ReadSightings<PoseTracks> read_poses(const std::filesystem::path& path);
+/// flange.csv: t (or row, index, frame, image, pose: a number), x,y,z, and qx,qy,qz,qw (by name in
+/// any order) or three angles: roll,pitch,yaw; w,p,r; a,b,c; rx,ry,rz (a rotation vector or angles:
+/// two readings). Names in any case; rad unless the header says [deg]; positions beyond any robot's
+/// reach are taken as mm, with a warning.
+[[nodiscard]] ReadSightings<std::vector<FlangeReading>> read_flange(
+    const std::filesystem::path& path);
 /// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place
 /// is unknown.
 [[nodiscard]] ReadSightings<PointObservations> read_points(const std::filesystem::path& path);

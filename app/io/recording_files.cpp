@@ -210,13 +210,25 @@ void take_from_container(const fs::path& path, RecordingFiles& files) {
   if (const auto dataset = datasets::dataset_source(path)) take_from_dataset(*dataset, files);
 }
 
+/// Poses of the flange take the place of joint values where there are none.
+void find_flange(RecordingFiles& files) {
+  files.flange = find_file(std::nullopt, files.folder, "flange.csv", "");
+  if (!files.flange) return;
+  const MaybePath& preferred = files.joints ? files.joints : files.nominal;
+  if (!preferred && files.entry != RecordingEntry::kPoints) return;
+  files.warnings.push_back(fmt::format(
+      "{} is not used: {}", files.flange->string(),
+      preferred ? fmt::format("there is {}", preferred->string()) : "points have no rotation"));
+  files.flange.reset();
+}
+
 }  // namespace
 
 std::vector<fs::path> RecordingFiles::all() const {
   std::vector<fs::path> out;
   const MaybePath* seen[] = {&video, &corners, &poses, &points};
   const MaybePath& used = *seen[static_cast<std::size_t>(entry)];
-  for (const MaybePath* file : {&used, &joints, &camera, &tags, &settings, &nominal}) {
+  for (const MaybePath* file : {&used, &joints, &flange, &camera, &tags, &settings, &nominal}) {
     if (!*file) continue;
     std::error_code error;
     const bool images = !recorded::container_of(**file) && fs::is_directory(**file, error);
@@ -269,6 +281,7 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
     if (const MaybePath alone = container_in(folder)) take_from_container(*alone, files);
   }
   files.entry = choose_entry(paths, files);
+  find_flange(files);
   return files;
 }
 

@@ -17,7 +17,7 @@ struct RecordingFiles {
   std::filesystem::path folder;  ///< the recording's, or that of its bag
   RecordingEntry entry = RecordingEntry::kVideo;
   std::optional<std::filesystem::path> video, joints, camera, tags, settings, corners, poses,
-      points, nominal;
+      points, nominal, flange;
   std::vector<std::string> warnings;  ///< files that are there and not used
 
   /// All of them, sorted; a folder of images or of a bag as its files.

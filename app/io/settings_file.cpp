@@ -39,12 +39,18 @@ std::string read_unit(const YamlValue& value) {
   throw value.error(fmt::format("is '{}', a unit nobody knows", unit), did_you_mean(unit, kUnits));
 }
 
+CameraMount read_mount(const YamlValue& value) {
+  for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed})
+    if (value.text() == to_string(mount)) return mount;
+  throw value.error(fmt::format("is '{}'", value.text()), "write hand or fixed");
+}
+
 }  // namespace
 
 RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   const YamlValue file = YamlValue::read(path);
   file.only_keys({"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances",
-                  "units", "dynamics"});
+                  "units", "camera_mount", "dynamics"});
   RecordingSettings settings;
   if (const auto name = file.find("name")) settings.name = name->text();
   if (const auto list = file.find("torques")) {
@@ -63,6 +69,7 @@ RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   if (const auto units = file.find("units")) {
     for (const auto& [channel, unit] : units->entries()) settings.units[channel] = read_unit(unit);
   }
+  if (const auto mount = file.find("camera_mount")) settings.camera_mount = read_mount(*mount);
   return settings;
 }
 

@@ -10,11 +10,11 @@
 
 #include "app/io/bag_files.h"
 #include "app/io/recording.h"
+#include "app/io/sighting_table.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
-#include "kinematics/log/header_units.h"
 
 namespace kinescope {
 namespace {
@@ -27,19 +27,8 @@ constexpr double kPoseSigmaM = 1e-3;
 constexpr double kPoseSigmaRad = 2e-3;
 constexpr double kPointSigmaM = 1e-4;
 
-// Further off than any robot or image: what a broken sensor or an unset variable writes.
-constexpr double kFarthestM = 1e6;
-constexpr double kFarthestPx = 1e7;
 // px, m or rad; simulations without noise declare less than sensors have, but no such thing.
 constexpr double kSmallestSigma = 1e-15;
-
-/// A table by its columns' names without units; its numbers come in s, m, rad and px.
-CsvTable read_sighting_table(const std::filesystem::path& path) {
-  CsvTable table = read_csv(path, RaggedRows::kSetAside);
-  for (const std::string& column : table.header) table.factors.push_back(header_factor(column));
-  strip_units(table);
-  return table;
-}
 
 /// A row whose time and id can be read.
 struct KeyedRow {
@@ -92,17 +81,6 @@ Groups group_by_sighting(const std::vector<KeyedRow>& keys, const std::vector<do
   return groups;
 }
 
-/// A number no further from zero than `most`.
-double bounded_number(const CsvTable& table, std::size_t row, std::string_view name, double most) {
-  const std::size_t column = table.require_column(name);
-  const double value = table.number(row, column);
-  if (std::abs(value) <= most) return value;
-  throw bad_input(
-      table.place(row),
-      fmt::format("column '{}' holds {}, which is out of all reach", name, table.rows[row][column]),
-      "correct or remove the line");
-}
-
 /// A sigma, where the column is there and the cell is filled.
 std::optional<double> sigma(const CsvTable& table, std::size_t row, std::string_view name) {
   const auto column = table.column(name);
@@ -120,11 +98,6 @@ std::optional<double> sigma(const CsvTable& table, std::size_t row, std::string_
         "give a standard deviation, or leave the cell empty");
   }
   return value;
-}
-
-Eigen::Vector3d vector3(const CsvTable& table, std::size_t row) {
-  return {bounded_number(table, row, "x", kFarthestM), bounded_number(table, row, "y", kFarthestM),
-          bounded_number(table, row, "z", kFarthestM)};
 }
 
 std::string marker_in_frame(const char* kind, TagId id, double time_s) {
@@ -175,32 +148,6 @@ bool has_corners(const MarkerSet& markers, TagId id) {
   return markers.size_m(id) > 0.0 || markers.boards.contains(id);
 }
 
-/// The quaternion of a row as it stands there. The columns' order is x, y, z, w.
-Eigen::Quaterniond quaternion(const CsvTable& table, std::size_t row) {
-  Eigen::Quaterniond q;
-  const char* const columns[] = {"qx", "qy", "qz", "qw"};
-  for (int i = 0; i < 4; ++i) {
-    q.coeffs()[i] = table.number(row, table.require_column(columns[i]));
-  }
-  constexpr double kNoRotation = 1e-3;
-  if (q.norm() < kNoRotation) {
-    throw bad_input(table.place(row), fmt::format("the quaternion has length {}", q.norm()),
-                    "columns qx, qy, qz, qw hold a unit quaternion; leave rows without a pose out");
-  }
-  return q;
-}
-
-/// What rounding to two decimals leaves of a unit quaternion; more is another thing in the columns.
-bool is_unit(const Eigen::Quaterniond& q) {
-  constexpr double kRounded = 0.01;
-  return std::abs(q.norm() - 1.0) <= kRounded;
-}
-
-Error not_unit(const CsvTable& table, std::size_t row, const Eigen::Quaterniond& q) {
-  return bad_input(table.place(row), fmt::format("the quaternion has length {:.4g}", q.norm()),
-                   "columns qx, qy, qz, qw hold a unit quaternion");
-}
-
 /// Throws for a quaternion that is no unit one where `unit` is asked for.
 PoseSample read_pose(const CsvTable& table, std::size_t row, int frame, bool unit) {
   PoseSample sample;
@@ -215,25 +162,6 @@ PoseSample read_pose(const CsvTable& table, std::size_t row, int frame, bool uni
       Eigen::Vector3d::Constant(sigma_m * sigma_m);
   sample.covariance = variances.asDiagonal();
   return sample;
-}
-
-/// One odd quaternion is a bad row. Where most are, a whole file was scaled, which changes no
-/// rotation: then they are normalised, with a warning.
-std::optional<std::string> scaled_quaternions(const CsvTable& table, const BadRows& bad) {
-  std::size_t odd = 0;
-  std::string first;
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    try {
-      const Eigen::Quaterniond q = quaternion(table, r);
-      if (is_unit(q)) continue;
-      if (odd++ == 0) first = not_unit(table, r, q).what();
-    } catch (const Error&) {
-      continue;  // told where the row is read
-    }
-  }
-  if (odd == 0 || !bad.too_many(bad.size() + odd)) return std::nullopt;
-  return fmt::format("{}: {} of {} quaternions are normalised, the first: {}", table.source, odd,
-                     table.rows.size(), first);
 }
 
 /// Width of the middle nine tenths of the positions along the axis where it is largest.
@@ -307,11 +235,6 @@ void read_each(const CsvTable& table, const Groups& groups, const std::vector<do
       bad.add(table.lines[rows.front()], error);
     }
   }
-}
-
-void append(std::vector<std::string>& warnings, const BadRows& bad) {
-  const std::vector<std::string> more = bad.warnings();
-  warnings.insert(warnings.end(), more.begin(), more.end());
 }
 
 }  // namespace

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `kinescope run` where the log holds poses of the flange: from markers to a camera on its hand.
+#include "app/commands/run_hand_eye.h"
+
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "app/commands/limits.h"
+#include "app/commands/pipeline.h"
+#include "app/commands/progress_line.h"
+#include "app/commands/run_folder.h"
+#include "app/commands/stopwatch.h"
+#include "app/io/products.h"
+#include "app/report/hand_eye_summary.h"
+#include "app/report/trace_json.h"
+#include "app/report/trace_lines.h"
+#include "calib/hand_eye/hand_eye.h"
+#include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/urdf/urdf.h"
+
+namespace kinescope {
+namespace {
+
+// ROS REP 103: a body's x forward, y left, z up; an optical frame's x right, y down, z forward.
+Pose optical_in_body() {
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {Eigen::Quaterniond(R), Eigen::Vector3d::Zero()};
+}
+
+Joint fixed_joint(std::string name, int parent, int child, const Pose& T) {
+  Joint out;
+  out.name = std::move(name);
+  out.type = JointType::kFixed;
+  out.parent = LinkId{parent};
+  out.child = LinkId{child};
+  out.T_parent_joint = T;
+  return out;
+}
+
+// flange (or base), camera_link, camera_optical_frame.
+std::string hand_eye_urdf(const HandEye& result, const std::string& name) {
+  const bool on_hand = result.hypothesis.mount == CameraMount::kOnHand;
+  KinematicTree tree;
+  tree.name = name;
+  tree.links = {{on_hand ? "flange" : "base"}, {"camera_link"}, {"camera_optical_frame"}};
+  const Pose T_body_optical = optical_in_body();
+  tree.joints = {fixed_joint("camera_joint", 0, 1, result.camera.T * T_body_optical.inverse()),
+                 fixed_joint("camera_optical_joint", 1, 2, T_body_optical)};
+  return write_urdf(tree);
+}
+
+HandEyeInput hand_eye_input(const Recording& recording, Observed observed, const PoseTracks& tracks,
+                            const CameraModel& camera) {
+  HandEyeInput out;
+  out.measurements = std::move(observed.measurements);
+  out.tracks = tracks;
+  out.markers = recording.markers;
+  out.camera = camera;
+  out.readings = recording.flange;
+  out.mount = recording.settings.camera_mount;
+  return out;
+}
+
+void describe(const Recording& recording, const Observed& observed, const RunOptions& options,
+              RunSummary& run) {
+  run.robot = recording.settings.name;
+  run.recording = recording.name;
+  run.entry = to_string(recording.entry);
+  run.version = program_version();
+  run.command = options.command_line;
+  run.arguments = options.arguments;
+  run.inputs = hash_inputs(recording);
+  run.options = list_options(options);
+  run.frames = static_cast<int>(observed.measurements.times_s.size());
+  run.markers = summarise_markers(observed, recording.markers);
+  run.warnings = recording.warnings;
+  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
+}
+
+// What limits of --fail-on speak of.
+void take_errors(const HandEye& result, RunSummary& run) {
+  const bool corners = result.held_out.px > 0.0;
+  run.calibration.kind = corners ? MeasurementKind::kCorners : MeasurementKind::kPose;
+  run.calibration.training_rms = corners ? result.fitted.px : result.fitted.m;
+  run.calibration.held_out_rms = corners ? result.held_out.px : result.held_out.m;
+  run.errors.all.held_out_m.rms = result.held_out.m;
+  run.errors.all.held_out_rad.rms = result.held_out.rad;
+  run.trace = result.trace;
+}
+
+void print_hand_eye(const HandEyeSummary& summary, const RunFolder& folder,
+                    const Console& console) {
+  if (console.json) {
+    fmt::print("{}\n", hand_eye_json(summary).dump(2));
+    return;
+  }
+  const Verdict verdict = hand_eye_verdict(summary);
+  for (const std::string& words : {verdict.found, verdict.accurate, verdict.limits, verdict.next})
+    if (!words.empty()) fmt::print("{}\n", words);
+  if (summary.hand_eye.trace)
+    for (const std::string& line : trace_lines(*summary.hand_eye.trace)) fmt::print("{}\n", line);
+  for (const std::string& line : odd_row_lines(summary)) fmt::print("{}\n", line);
+  fmt::print("poses   {}\nurdf    {}\nreport  {}\n", folder.file("hand_eye.json").string(),
+             folder.file("hand_eye.urdf").string(), folder.file("report.html").string());
+}
+
+void write_all(HandEyeSummary& summary, Stopwatch& clock, RunFolder& folder) {
+  const std::string urdf = hand_eye_urdf(summary.hand_eye, summary.run.robot);
+  if (!summary.run.tracks.tracks.empty())
+    folder.write("tracks.csv", tracks_csv(summary.run.tracks));
+  folder.write("hand_eye.json", hand_eye_json(summary).dump(1) + "\n");
+  folder.write("hand_eye.urdf", urdf);
+  if (summary.hand_eye.trace)
+    folder.write("trace.json", trace_json(*summary.hand_eye.trace).dump(1) + "\n");
+  folder.write("report.html", hand_eye_report_html(summary, urdf));
+  clock.lap("write", summary.run.times);
+  folder.add_products({std::string(kRunFile)});
+  folder.remove_stale_products();
+  folder.write(kRunFile, run_json(summary.run, folder.products()).dump(2) + "\n");
+}
+
+}  // namespace
+
+ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
+                      const Console& console) {
+  Stopwatch clock;
+  HandEyeSummary summary;
+  RunSummary& run = summary.run;
+  const std::vector<Limit> limits = parse_limits(options.fail_on);
+  RunFolder folder(options, recording);
+  if (options.must_trace) require_same_inputs(options.output, recording);
+  Observed observed = observe(recording, options, recording.camera,
+                              folder.cached_observations(recording), console.progress);
+  const CameraModel camera = choose_camera(recording, observed.tags);
+  const PoseLog& log = recording.flange.front().log;
+  require_time_overlap(log, observed.measurements.times_s, "the video");
+  summary.log = std::filesystem::path(log.source).filename().string();
+  summary.time_column = log.time_column;
+  describe(recording, observed, options, run);
+  for (const std::string& warning : run.warnings) print_warning(warning);
+  clock.lap("detect", run.times);
+
+  run.tracks = observed.tags.observations.empty()
+                   ? observed.measurements.poses
+                   : pose_tracks_from_tags(observed.tags, camera, recording.markers);
+  const TagObservations tags = observed.tags;
+  HandEyeOptions hand_eye;
+  hand_eye.reject_sigma = options.calibrate.reject_sigma;
+  hand_eye.folds = options.calibrate.folds;
+  hand_eye.trace = options.trace;
+  summary.hand_eye =
+      calibrate_hand_eye(hand_eye_input(recording, std::move(observed), run.tracks, camera),
+                         hand_eye, console.progress);
+  clock.lap("calibrate", run.times);
+  take_errors(summary.hand_eye, run);
+  folder.keep_observations(recording, tags);
+  write_all(summary, clock, folder);
+  print_hand_eye(summary, folder, console);
+  if (options.must_trace) require_trace(run);
+  return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
+}
+
+}  // namespace kinescope
