@@ -313,6 +313,48 @@ double extent_of(const std::vector<PlacedAxis>& axes) {
   return out;
 }
 
+// By how much higher the second's distances are meant, and how well that is known, m.
+struct Height {
+  double value = 0.0;
+  double sigma = 0.0;
+};
+
+Height height_of(const std::vector<QuantityDifference>& differences,
+                 const Eigen::VectorXd& by_height, double extent_m) {
+  struct Vote {
+    double height, weight;
+  };
+  // Nothing is known of it beforehand but the robot's size.
+  std::vector<Vote> votes{{0.0, 1.0 / extent_m}};
+  double information = 1.0 / (extent_m * extent_m);
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    const double by = by_height[static_cast<Eigen::Index>(i)];
+    if (!differences[i].sigma || *differences[i].sigma <= 0.0 || by == 0.0) continue;
+    const double weight = std::abs(by) / *differences[i].sigma;
+    votes.push_back({differences[i].difference / by, weight});
+    // A median is worth 2 / pi of a mean.
+    information += 2.0 / std::numbers::pi * weight * weight;
+  }
+  std::ranges::stable_sort(votes, {}, &Vote::height);
+  double half = 0.0;
+  for (const Vote& vote : votes) half += 0.5 * vote.weight;
+  std::size_t middle = 0;
+  for (double sum = votes[0].weight; sum < half; sum += votes[middle].weight) ++middle;
+  return {votes[middle].height, 1.0 / std::sqrt(information)};
+}
+
+void take_out_height(const Eigen::VectorXd& by_height, double extent_m,
+                     std::vector<QuantityDifference>& differences) {
+  if (by_height.isZero(0.0) || extent_m <= 0.0) return;
+  const Height height = height_of(differences, by_height, extent_m);
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    const double by = by_height[static_cast<Eigen::Index>(i)];
+    if (!differences[i].sigma) continue;
+    differences[i].difference -= by * height.value;
+    differences[i].sigma = std::hypot(*differences[i].sigma, by * height.sigma);
+  }
+}
+
 std::string why_not(NumberState state) {
   switch (state) {
     case NumberState::kEstimated:
@@ -366,7 +408,7 @@ RobotLayout robot_layout(std::span<const Calibration> runs, std::span<const Join
   }
   const std::vector<PlacedAxis> axes = axes_at(model_of(runs.front()), out, matches.front());
   out.axes = axis_layout(axes);
-  out.height_sigma_m = extent_of(axes);
+  out.extent_m = extent_of(axes);
   name_quantities(first, out);
   return out;
 }
@@ -378,10 +420,10 @@ RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
   RobotNumbers out;
   out.values = values_of(model, layout, match);
   out.covariance = J * run.covariance * J.transpose();
-  const Eigen::VectorXd by_height =
-      layout.height_sigma_m * axis_values_by_height(layout.axes, axes_at(model, layout, match));
-  const Eigen::Index n = by_height.size();
-  out.covariance.topLeftCorner(n, n) += by_height * by_height.transpose();
+  out.by_height = Eigen::VectorXd::Zero(out.values.size());
+  const Eigen::VectorXd of_axes = axis_values_by_height(layout.axes, axes_at(model, layout, match));
+  const Eigen::Index n = of_axes.size();
+  out.by_height.head(n) = of_axes;
   const auto has_channel = [&](int axis) {
     const int first = layout.joints[static_cast<std::size_t>(axis)];
     return !joint_at(run.tree, match.joint_of[static_cast<std::size_t>(first)]).channel.empty();
@@ -414,6 +456,7 @@ std::vector<QuantityDifference> robot_differences(const RobotLayout& layout,
       one.sigma = std::sqrt(first.covariance(at, at) + second.covariance(at, at));
     out.push_back(std::move(one));
   }
+  take_out_height(0.5 * (first.by_height + second.by_height), layout.extent_m, out);
   fill_p_values(out);
   return out;
 }

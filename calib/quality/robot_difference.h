@@ -52,8 +52,7 @@ struct RobotLayout {
   std::vector<int> parents;  ///< of each the one before it, among them; -1: the base
   Eigen::VectorXd readings;  ///< beside `joints`: scale * reading is the joint's value
   AxisLayout axes;
-  double height_sigma_m = 0.0;  ///< by how much the height may differ at which distances of
-                                ///< parallel axes are meant: the robot's extent
+  double extent_m = 0.0;                  ///< largest distance between axes
   std::vector<RobotQuantity> quantities;  ///< of the axes, then the ratio of every joint
 };
 
@@ -65,6 +64,8 @@ struct RobotNumbers {
   Eigen::VectorXd values;      ///< beside RobotLayout::quantities; of a ratio its logarithm
   Eigen::MatrixXd covariance;  ///< likewise
   std::vector<NumberState> states;
+  /// d value / d m of the height at which distances of parallel axes are meant (axis_geometry.h).
+  Eigen::VectorXd by_height;
 };
 
 [[nodiscard]] RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
@@ -83,6 +84,9 @@ struct QuantityDifference {
   bool changed = false;
 };
 
+/// The height at which distances are meant in the second against the first (of robots whose axes
+/// are all nearly parallel) is the one at which most numbers agree: a weighted median, as few
+/// changed numbers must not move it (Chen 1983, of deformation surveys).
 [[nodiscard]] std::vector<QuantityDifference> robot_differences(const RobotLayout& layout,
                                                                 const RobotNumbers& first,
                                                                 const RobotNumbers& second);

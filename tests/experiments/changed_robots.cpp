@@ -81,7 +81,7 @@ struct Score {
 };
 
 struct Recorded {
-  World world;
+  KinematicTree truth;
   Calibration calibration;
 };
 
@@ -102,6 +102,20 @@ KinematicTree draw_robot(RobotKind kind, std::uint64_t seed) {
   return tree;
 }
 
+// The same robot, every joint's frame slid along and turned about its axis.
+KinematicTree redescribed(KinematicTree robot, Rng rng) {
+  std::vector<Pose> T_link_other(robot.links.size());
+  for (Joint& joint : robot.joints) {
+    Pose moved;
+    moved.rotation = exp_rotation(rng.uniform(-3.0, 3.0) * joint.axis);
+    moved.translation = rng.uniform(-0.2, 0.2) * joint.axis;
+    joint.T_parent_joint =
+        T_link_other[joint.parent.index()].inverse() * joint.T_parent_joint * moved;
+    T_link_other[joint.child.index()] = moved;
+  }
+  return robot;
+}
+
 // `ratio`: of the channels' true ones over the logged. The first of the seed's views that shows all
 // markers.
 Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, std::uint64_t seed) {
@@ -109,7 +123,7 @@ Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, st
   for (std::uint64_t view = 0; view < kMostViews; ++view) {
     WorldOptions options;
     options.seed = kMostViews * seed + view;
-    options.robot = robot;
+    options.robot = redescribed(robot, Rng::from_name("redescribed", options.seed));
     options.frames = 300;
     options.sigma_px = 0.03;  // what refined corners have
     Rng clock = Rng::from_name("changed robots' clock", options.seed);
@@ -123,8 +137,9 @@ Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, st
     how.estimate_scales = true;
     Calibration found = calibrate(world.measurements, world.markers, world.log,
                                   truth::perturbed_start(world, 0.01, 0.002, options.seed), how);
-    for (std::size_t j = 0; j < ratio.size(); ++j) world.tree.joints[j].scale = ratio[j];
-    return {std::move(world), std::move(found)};
+    KinematicTree truth = robot;
+    for (std::size_t j = 0; j < ratio.size(); ++j) truth.joints[j].scale = ratio[j];
+    return {std::move(truth), std::move(found)};
   }
   throw std::runtime_error("no view shows all markers");
 }
@@ -132,7 +147,7 @@ Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, st
 // The truth as a calibration without doubt.
 Calibration exactly(const Recorded& recorded) {
   Calibration out;
-  out.tree = recorded.world.tree;
+  out.tree = recorded.truth;
   out.joints = recorded.calibration.joints;
   out.covariance.resize(0, 0);
   return out;
