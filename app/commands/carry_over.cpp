@@ -161,15 +161,22 @@ KinematicTree with_own_columns(KinematicTree tree) {
   return tree;
 }
 
-// The model's link that carries a marker of the recording.
-LinkId link_of(const Marker& marker, const StoredRun& onto, const KinematicTree& model,
-               const JointMatch& match) {
-  auto above = onto.calibration.tree.parent_joint(marker.link);
-  while (above && onto.calibration.tree.joints[above->index()].type == JointType::kFixed)
-    above = onto.calibration.tree.parent_joint(onto.calibration.tree.joints[above->index()].parent);
-  if (!above) return LinkId{0};
-  const auto own = std::ranges::find(match.joint_of, above->value) - match.joint_of.begin();
-  return model.joints[static_cast<std::size_t>(own)].child;
+// The joint that moves a link; -1: it rests.
+int mover_of(const KinematicTree& tree, LinkId link) {
+  auto above = tree.parent_joint(link);
+  while (above && tree.joints[above->index()].type == JointType::kFixed)
+    above = tree.parent_joint(tree.joints[above->index()].parent);
+  return above ? above->value : -1;
+}
+
+// The model's link that carries a marker of the recording: `placed`, where that moves alike.
+LinkId link_of(const Marker& marker, LinkId placed, const StoredRun& onto,
+               const KinematicTree& model, const JointMatch& match) {
+  const int there = mover_of(onto.calibration.tree, marker.link);
+  const auto own = std::ranges::find(match.joint_of, there) - match.joint_of.begin();
+  const int here = there < 0 ? -1 : static_cast<int>(own);
+  if (mover_of(model, placed) == here) return placed;
+  return here < 0 ? LinkId{0} : model.joints[static_cast<std::size_t>(here)].child;
 }
 
 // Where a marker sits by its sighting in the middle of its track.
@@ -206,7 +213,7 @@ CalibrationStart placed_start(const Remeasured& seen, const StoredRun& onto,
     const auto placed = std::ranges::find(placement.markers, known.id, &Marker::id);
     if (placed == placement.markers.end()) continue;
     Marker marker = *placed;
-    const LinkId link = link_of(known, onto, model, match);
+    const LinkId link = link_of(known, placed->link, onto, model, match);
     if (marker.link != link) {
       const auto mount =
           mount_by_track(seen.tracks, model, values, out.T_camera_base, known.id, link);

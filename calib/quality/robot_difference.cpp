@@ -313,45 +313,73 @@ double extent_of(const std::vector<PlacedAxis>& axes) {
   return out;
 }
 
+// A number of the robot as it bears on the height.
+struct HeightVote {
+  double difference = 0.0;
+  double by_height = 0.0;
+  double sigma = 0.0;
+
+  [[nodiscard]] double square(double height_m) const {
+    return std::pow((difference - by_height * height_m) / sigma, 2);
+  }
+};
+
 // By how much higher the second's distances are meant, and how well that is known, m.
 struct Height {
   double value = 0.0;
   double sigma = 0.0;
 };
 
-Height height_of(const std::vector<QuantityDifference>& differences,
-                 const Eigen::VectorXd& by_height, double extent_m) {
-  struct Vote {
-    double height, weight;
+// Squares beyond three standard deviations count alike: what changed has no more to say.
+constexpr double kChangedSquare = 9.0;
+
+// Without the number that is to be judged by it: its own change must not hide in the height.
+Height height_without(std::size_t left_out, const std::vector<HeightVote>& votes, double extent_m) {
+  const auto sum_over = [&](auto term) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < votes.size(); ++i)
+      if (i != left_out && votes[i].by_height != 0.0) sum += term(votes[i]);
+    return sum;
   };
   // Nothing is known of it beforehand but the robot's size.
-  std::vector<Vote> votes{{0.0, 1.0 / extent_m}};
-  double information = 1.0 / (extent_m * extent_m);
-  for (std::size_t i = 0; i < differences.size(); ++i) {
-    const double by = by_height[static_cast<Eigen::Index>(i)];
-    if (!differences[i].sigma || *differences[i].sigma <= 0.0 || by == 0.0) continue;
-    const double weight = std::abs(by) / *differences[i].sigma;
-    votes.push_back({differences[i].difference / by, weight});
-    // A median is worth 2 / pi of a mean.
-    information += 2.0 / std::numbers::pi * weight * weight;
+  const double prior = 1.0 / (extent_m * extent_m);
+  const auto cost = [&](double height) {
+    return prior * height * height + sum_over([&](const HeightVote& vote) {
+             return std::min(kChangedSquare, vote.square(height));
+           });
+  };
+  double best = 0.0;
+  for (std::size_t i = 0; i < votes.size(); ++i) {
+    if (i == left_out || votes[i].by_height == 0.0) continue;
+    const double height = votes[i].difference / votes[i].by_height;
+    if (cost(height) < cost(best)) best = height;
   }
-  std::ranges::stable_sort(votes, {}, &Vote::height);
-  double half = 0.0;
-  for (const Vote& vote : votes) half += 0.5 * vote.weight;
-  std::size_t middle = 0;
-  for (double sum = votes[0].weight; sum < half; sum += votes[middle].weight) ++middle;
-  return {votes[middle].height, 1.0 / std::sqrt(information)};
+  const auto over_agreeing = [&](auto term) {
+    return sum_over([&](const HeightVote& vote) {
+      return vote.square(best) < kChangedSquare ? term(vote) / (vote.sigma * vote.sigma) : 0.0;
+    });
+  };
+  const double information =
+      prior + over_agreeing([](const HeightVote& v) { return v.by_height * v.by_height; });
+  const double pull = over_agreeing([](const HeightVote& v) { return v.by_height * v.difference; });
+  return {pull / information, 1.0 / std::sqrt(information)};
 }
 
 void take_out_height(const Eigen::VectorXd& by_height, double extent_m,
                      std::vector<QuantityDifference>& differences) {
   if (by_height.isZero(0.0) || extent_m <= 0.0) return;
-  const Height height = height_of(differences, by_height, extent_m);
+  std::vector<HeightVote> votes;
   for (std::size_t i = 0; i < differences.size(); ++i) {
-    const double by = by_height[static_cast<Eigen::Index>(i)];
-    if (!differences[i].sigma) continue;
-    differences[i].difference -= by * height.value;
-    differences[i].sigma = std::hypot(*differences[i].sigma, by * height.sigma);
+    const bool counts = differences[i].sigma && *differences[i].sigma > 0.0;
+    votes.push_back({differences[i].difference,
+                     counts ? by_height[static_cast<Eigen::Index>(i)] : 0.0,
+                     counts ? *differences[i].sigma : 1.0});
+  }
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    if (votes[i].by_height == 0.0) continue;
+    const Height height = height_without(i, votes, extent_m);
+    differences[i].difference -= votes[i].by_height * height.value;
+    differences[i].sigma = std::hypot(votes[i].sigma, votes[i].by_height * height.sigma);
   }
 }
 

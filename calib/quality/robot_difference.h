@@ -85,8 +85,8 @@ struct QuantityDifference {
 };
 
 /// The height at which distances are meant in the second against the first (of robots whose axes
-/// are all nearly parallel) is the one at which most numbers agree: a weighted median, as few
-/// changed numbers must not move it (Chen 1983, of deformation surveys).
+/// are all nearly parallel) is, for each number, the one at which most of the others agree: by
+/// truncated squares (Torr and Zisserman 2000), as what changed must not move it.
 [[nodiscard]] std::vector<QuantityDifference> robot_differences(const RobotLayout& layout,
                                                                 const RobotNumbers& first,
                                                                 const RobotNumbers& second);
