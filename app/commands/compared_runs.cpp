@@ -173,6 +173,13 @@ RunDifference difference_of(const RobotLayout& layout, const StoredRun& first,
   fill_p_values(out.quantities);
   if (std::string words = uneven_words(first, other, match); !words.empty())
     out.notes.push_back(std::move(words));
+  for (const StoredRun* run : {&first, &other}) {
+    if (!run->trace || !run->trace->unexplained) continue;
+    out.notes.push_back(fmt::format(
+        "{} has errors that no known effect has the shape of: where another recording weighs them "
+        "otherwise, its numbers move by more than their intervals.",
+        run->name));
+  }
   return out;
 }
 

@@ -20,6 +20,7 @@ constexpr double kNormal95 = 1.959964;
 StoredTrace stored_trace_of(const json& document) {
   StoredTrace out;
   out.stretches = document.value("stretches", 0);
+  out.unexplained = document.at("verdict") == "unknown";
   for (const json& entry : document.at("accepted")) {
     const json& interval = entry.at("interval");
     if (!entry.at("size").is_number() || !interval.at(0).is_number() || !interval.at(1).is_number())

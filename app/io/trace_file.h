@@ -27,7 +27,8 @@ struct StoredAbsence {
 struct StoredTrace {
   std::vector<StoredEffect> found;
   std::vector<StoredAbsence> absent;
-  int stretches = 0;  ///< independent stretches of the recording; 0: not known
+  bool unexplained = false;  ///< something is left that no known effect has the shape of
+  int stretches = 0;         ///< independent stretches of the recording; 0: not known
 };
 
 /// Nothing where there is no such file (a run with --no-trace). Throws bad_input where it is none

@@ -1,28 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Pairs of recordings of one robot: `changed_robots [PAIRS]`. Camera, markers, motion, noise and
-// clock are new in the second one; the robot is the same, or a joint's zero moved by 0.2 deg, a
-// link grew by 0.5 mm, a channel's ratio by 0.1 %. How often the intervals of what differs hold the
-// truth, how often anything is called changed where nothing is, and how often what changed is
-// named. White noise on exact corners, the structure known, ratios estimated.
+// Pairs of recordings of one robot: `changed_robots [PAIRS [PROGRAM]]`. Camera, markers, motion,
+// noise and clock are new in the second one; the robot is the same, or a joint's zero moved by 0.2
+// deg, a link grew by 0.5 mm, a channel's ratio by 0.1 %. How often the intervals of what differs
+// hold the truth, how often anything is called changed where nothing is, and how often what changed
+// is named. White noise on exact corners, the structure known, ratios estimated. With PROGRAM, the
+// path of kinescope: its `run` and `compare` on recordings written to files, the structure to be
+// found, nothing declared.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "calib/bundle/calibrate.h"
 #include "calib/quality/robot_difference.h"
 #include "kinematics/core/rng.h"
 #include "tests/truth/camera_world.h"
 #include "tests/truth/filmed_robot.h"
+#include "tests/truth/recorded_world.h"
+#include "tests/truth/temporary_path.h"
 
 namespace kinescope {
 namespace {
@@ -118,7 +125,7 @@ KinematicTree redescribed(KinematicTree robot, Rng rng) {
 
 // `ratio`: of the channels' true ones over the logged. The first of the seed's views that shows all
 // markers.
-Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, std::uint64_t seed) {
+World filmed(const KinematicTree& robot, const std::vector<double>& ratio, std::uint64_t seed) {
   constexpr std::uint64_t kMostViews = 1000;
   for (std::uint64_t view = 0; view < kMostViews; ++view) {
     WorldOptions options;
@@ -132,16 +139,20 @@ Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, st
     if (!all_seen(world)) continue;
     for (std::size_t j = 0; j < ratio.size(); ++j)
       world.log.values.col(static_cast<Eigen::Index>(j)) /= ratio[j];
-    CalibrateOptions how;
-    how.folds = 0;
-    how.estimate_scales = true;
-    Calibration found = calibrate(world.measurements, world.markers, world.log,
-                                  truth::perturbed_start(world, 0.01, 0.002, options.seed), how);
-    KinematicTree truth = robot;
-    for (std::size_t j = 0; j < ratio.size(); ++j) truth.joints[j].scale = ratio[j];
-    return {std::move(truth), std::move(found)};
+    return world;
   }
   throw std::runtime_error("no view shows all markers");
+}
+
+Recorded record(const KinematicTree& robot, const std::vector<double>& ratio, std::uint64_t seed) {
+  const World world = filmed(robot, ratio, seed);
+  CalibrateOptions how;
+  how.folds = 0;
+  how.estimate_scales = true;
+  Recorded out{robot, calibrate(world.measurements, world.markers, world.log,
+                                truth::perturbed_start(world, 0.01, 0.002, seed), how)};
+  for (std::size_t j = 0; j < ratio.size(); ++j) out.truth.joints[j].scale = ratio[j];
+  return out;
 }
 
 // The truth as a calibration without doubt.
@@ -240,6 +251,103 @@ RobotKind kind_of(std::uint64_t pair) {
   return kKinds[pair % kKinds.size()];
 }
 
+// A robot, and the same one later.
+struct Twice {
+  KinematicTree first, second;
+  std::vector<double> ratio;  // of the second's channels; the first's are 1
+  std::string joint;          // that changed
+};
+
+Twice draw_pair(Change change, std::uint64_t pair) {
+  Twice out{draw_robot(kind_of(pair), pair), {}, {}, {}};
+  out.second = out.first;
+  const std::vector<Joint>& joints = out.first.joints;
+  out.ratio.assign(joints.size(), 1.0);
+  std::size_t joint = 1 + pair % (joints.size() - 2);
+  if (change == Change::kZero)
+    while (joints[joint].type != JointType::kRevolute && joint + 2 < joints.size()) ++joint;
+  change_robot(change, joint, out.second, out.ratio);
+  out.joint = joints[joint].name;
+  return out;
+}
+
+void by_library(Change change, int pairs) {
+  Score score;
+  for (int k = 0; k < pairs; ++k) {
+    const auto pair = static_cast<std::uint64_t>(k);
+    const Twice robots = draw_pair(change, pair);
+    const std::vector<double> as_logged(robots.ratio.size(), 1.0);
+    judge(compared(record(robots.first, as_logged, 2 * pair),
+                   record(robots.second, robots.ratio, 2 * pair + 1)),
+          score);
+  }
+  print(change, score);
+}
+
+// The user's commands, in a folder.
+class Program {
+ public:
+  explicit Program(std::string path) : path_(std::move(path)) {}
+
+  // False: no answer.
+  bool run(const World& world, const std::string& name) const {
+    truth::write_world(world, folder_ / name);
+    return call(fmt::format("run {} -o {} --force", at(name), at(name + "_run"))) == 0;
+  }
+  [[nodiscard]] nlohmann::json compare(const std::string& first, const std::string& second) const {
+    (void)call(fmt::format("compare {} {} --json", at(first + "_run"), at(second + "_run")));
+    return nlohmann::json::parse(read_text_file(folder_ / "out.txt"), nullptr, false);
+  }
+
+ private:
+  [[nodiscard]] std::string at(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] int call(const std::string& words) const {
+    const std::string line =
+        fmt::format("{} {} --quiet > {} 2> {}", path_, words, at("out.txt"), at("err.txt"));
+    return std::system(line.c_str());  // NOLINT(concurrency-mt-unsafe): one thread
+  }
+
+  std::string path_;
+  std::filesystem::path folder_ = truth::temporary_path("changed_robots");
+};
+
+void by_program(const Program& program, Change change, int pairs) {
+  int refused = 0, named = 0, alarms = 0, changed = 0, carries = 0, tried = 0;
+  for (int k = 0; k < pairs; ++k) {
+    const auto pair = static_cast<std::uint64_t>(k);
+    const Twice robots = draw_pair(change, pair);
+    const std::vector<double> as_logged(robots.ratio.size(), 1.0);
+    const bool done = program.run(filmed(robots.first, as_logged, 2 * pair), "first") &&
+                      program.run(filmed(robots.second, robots.ratio, 2 * pair + 1), "second");
+    const nlohmann::json found = done ? program.compare("first", "second") : nlohmann::json();
+    if (!found.is_object()) {
+      ++refused;
+      continue;
+    }
+    if (found.at("changed") == true) {
+      ++changed;
+      fmt::print("  pair {} ({}): {}\n", k, robots.joint, found.at("verdict").get<std::string>());
+    }
+    bool is_named = false;
+    for (const auto& one : found.at("differences")[0].at("quantities"))
+      is_named = is_named || (one.at("changed") == true && one.at("name").get<std::string>().find(
+                                                               robots.joint) != std::string::npos);
+    named += is_named ? 1 : 0;
+    for (const auto& one : found.at("carried_over")) {
+      if (!one.at("carries").is_boolean()) continue;
+      ++tried;
+      carries += one.at("carries") == true ? 1 : 0;
+    }
+  }
+  alarms = change == Change::kNone ? changed : changed - named;
+  fmt::print("{}, {} pairs through the program: {} without an answer of both runs\n",
+             in_words(change), pairs, refused);
+  fmt::print("  called changed {}, {} at the joint that did; nothing of it right {}\n", changed,
+             change == Change::kNone ? 0 : named, alarms);
+  fmt::print("  models that carry over: {} of {}\n", carries, tried);
+  std::fflush(stdout);
+}
+
 }  // namespace
 }  // namespace kinescope
 
@@ -247,20 +355,11 @@ int main(int argc, char** argv) {
   using namespace kinescope;
   const int pairs = argc > 1 ? std::atoi(argv[1]) : 100;
   for (const Change change : {Change::kNone, Change::kZero, Change::kLength, Change::kRatio}) {
-    Score score;
-    for (int k = 0; k < pairs; ++k) {
-      const auto pair = static_cast<std::uint64_t>(k);
-      KinematicTree robot = draw_robot(kind_of(pair), pair);
-      std::vector<double> ratio(robot.joints.size(), 1.0);
-      const Recorded first = record(robot, ratio, 2 * pair);
-      std::size_t joint = 1 + pair % (robot.joints.size() - 2);
-      if (change == Change::kZero)
-        while (robot.joints[joint].type != JointType::kRevolute && joint + 2 < robot.joints.size())
-          ++joint;
-      change_robot(change, joint, robot, ratio);
-      judge(compared(first, record(robot, ratio, 2 * pair + 1)), score);
+    if (argc > 2) {
+      by_program(Program(argv[2]), change, pairs);
+    } else {
+      by_library(change, pairs);
     }
-    print(change, score);
   }
   return 0;
 }

@@ -11,7 +11,7 @@
 namespace kinescope {
 namespace {
 
-constexpr double kExact = 1e-9;  // some tens of products of numbers of order one
+constexpr double kSameNumber = 1e-9;  // some tens of products of numbers of order one
 
 // One chain by Denavit and Hartenberg: distance, twist, offset and angle at each axis.
 struct DhStep {
@@ -65,12 +65,14 @@ TEST(AxisGeometry, GivesBackTheNumbersThatAChainWasMadeOf) {
   for (int k = 0; k < 4; ++k) {
     const DhStep& step = steps[static_cast<std::size_t>(k)];
     EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kDistance, k, k + 1}), step.distance,
-                kExact);
-    EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kTwist, k, k + 1}), step.twist, kExact);
+                kSameNumber);
+    EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kTwist, k, k + 1}), step.twist,
+                kSameNumber);
     if (k == 0) continue;  // where frames hide the first axis' offset and zero
     EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kOffset, k, k + 1}), step.offset,
-                kExact);
-    EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kAngle, k, k + 1}), step.angle, kExact);
+                kSameNumber);
+    EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kAngle, k, k + 1}), step.angle,
+                kSameNumber);
   }
 }
 
@@ -187,7 +189,7 @@ TEST(AxisGeometry, AxesOfATreeStandByThatOfTheirParent) {
   EXPECT_EQ(joints, (std::vector<JointId>{JointId{0}, JointId{2}, JointId{3}}));
   EXPECT_EQ(axes[1].parent, 0);
   EXPECT_EQ(axes[2].parent, 0);
-  EXPECT_NEAR((axes[1].point - Eigen::Vector3d(0.1, 0, 0.3)).norm(), 0.0, kExact);
+  EXPECT_NEAR((axes[1].point - Eigen::Vector3d(0.1, 0, 0.3)).norm(), 0.0, kSameNumber);
 }
 
 }  // namespace
