@@ -99,7 +99,7 @@ std::string effect_joint(const FittedEffect& effect, const KinematicTree& tree) 
 }
 
 // The model without markers, its joints driven by the channels of the recording.
-KinematicTree driven_by(const StoredRun& model, const StoredRun& onto, const JointMatch& match) {
+KinematicTree driven_by(const StoredRun& model, const StoredRun& onto, const RobotMatch& match) {
   KinematicTree out = model.calibration.tree;
   out.markers.clear();
   std::map<std::string, std::string> renamed;
@@ -171,7 +171,7 @@ int mover_of(const KinematicTree& tree, LinkId link) {
 
 // The model's link that carries a marker of the recording: `placed`, where that moves alike.
 LinkId link_of(const Marker& marker, LinkId placed, const StoredRun& onto,
-               const KinematicTree& model, const JointMatch& match) {
+               const KinematicTree& model, const RobotMatch& match) {
   const int there = mover_of(onto.calibration.tree, marker.link);
   const auto own = std::ranges::find(match.joint_of, there) - match.joint_of.begin();
   const int here = there < 0 ? -1 : static_cast<int>(own);
@@ -197,7 +197,7 @@ std::optional<Pose> mount_by_track(const PoseTracks& tracks, const KinematicTree
 // Camera and markers by the model; each marker on the link that its own run found.
 CalibrationStart placed_start(const Remeasured& seen, const StoredRun& onto,
                               const KinematicTree& model, const JointLog& log,
-                              const JointMatch& match) {
+                              const RobotMatch& match) {
   const bool points = seen.recording.entry == RecordingEntry::kPoints;
   const std::vector<double>& times_s = points ? seen.measurements.times_s : seen.tracks.times_s;
   const Eigen::MatrixXd values = resample(log, times_s, onto.calibration.time_offset_s);
@@ -289,7 +289,7 @@ double rms_of(const std::vector<double>& squares, double count) {
   return std::sqrt(sum / count);
 }
 
-CarriedOver tried(const StoredRun& model, const StoredRun& onto, const JointMatch& match,
+CarriedOver tried(const StoredRun& model, const StoredRun& onto, const RobotMatch& match,
                   double level) {
   const Remeasured seen = recording_again(onto);
   const OwnErrors own = read_own_errors(onto.folder / "residuals.csv");
@@ -325,7 +325,7 @@ CarriedOver tried(const StoredRun& model, const StoredRun& onto, const JointMatc
 
 }  // namespace
 
-CarriedOver carry_over(const StoredRun& model, const StoredRun& onto, const JointMatch& match,
+CarriedOver carry_over(const StoredRun& model, const StoredRun& onto, const RobotMatch& match,
                        double level) {
   try {
     return tried(model, onto, match, level);

@@ -16,6 +16,6 @@ namespace kinescope {
 /// `match`: the model's joints in `onto`. What keeps it from being tried (the recording is gone, or
 /// another one now) is said in the answer; throws nothing for that.
 [[nodiscard]] CarriedOver carry_over(const StoredRun& model, const StoredRun& onto,
-                                     const JointMatch& match, double level);
+                                     const RobotMatch& match, double level);
 
 }  // namespace kinescope

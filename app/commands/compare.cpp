@@ -45,7 +45,7 @@ ComparedRun compared_run(const StoredRun& run) {
 
 // The first run's model on every other one's recording, and the other way round.
 std::vector<CarriedOver> carried_over(const std::vector<StoredRun>& runs,
-                                      const std::vector<JointMatch>& matches, double level,
+                                      const std::vector<RobotMatch>& matches, double level,
                                       const Progress& progress) {
   std::vector<CarriedOver> out;
   const int total = 2 * (static_cast<int>(runs.size()) - 1);
@@ -55,7 +55,7 @@ std::vector<CarriedOver> carried_over(const std::vector<StoredRun>& runs,
       CarriedOver one;
       if (matches[k].differences.empty()) {
         one = carry_over(runs[model], runs[onto],
-                         match_joints(runs[model].calibration.tree, runs[onto].calibration.tree),
+                         match_robots(runs[model].calibration.tree, runs[onto].calibration.tree),
                          level);
       } else {
         one.skipped = "the structures differ";
@@ -133,7 +133,7 @@ ExitCode compare_command(const CompareOptions& options, const Console& console) 
   if (!options.output.empty()) require_apart(options.output, inputs);
   std::vector<StoredRun> runs;
   for (const fs::path& folder : options.runs) runs.push_back(read_stored_run(folder));
-  const std::vector<JointMatch> matches = match_runs(runs);
+  const std::vector<RobotMatch> matches = match_runs(runs);
   const std::optional<OutputFolder> folder = output_of(options);
 
   CompareSummary summary;

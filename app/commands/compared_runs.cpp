@@ -56,7 +56,7 @@ struct EffectSize {
 };
 
 // The joint of the first run in another one; empty: a place that is no joint.
-std::string name_in(const StoredRun& first, const StoredRun& other, const JointMatch& match,
+std::string name_in(const StoredRun& first, const StoredRun& other, const RobotMatch& match,
                     const std::string& joint) {
   const auto own = first.calibration.tree.joint(joint);
   if (!own) return {};
@@ -80,7 +80,7 @@ EffectSize size_of(const StoredRun& run, const std::string& effect, const std::s
 
 // Effects of joints that either found. Those of the ratio are in the robot's numbers.
 std::set<EffectAt> effects_of(const StoredRun& first, const StoredRun& other,
-                              const JointMatch& match) {
+                              const RobotMatch& match) {
   std::map<std::string, std::string> first_name;
   for (const Joint& joint : first.calibration.tree.joints)
     first_name[name_in(first, other, match, joint.name)] = joint.name;
@@ -97,7 +97,7 @@ std::set<EffectAt> effects_of(const StoredRun& first, const StoredRun& other,
 }
 
 QuantityDifference effect_difference(const StoredRun& first, const StoredRun& other,
-                                     const JointMatch& match, const EffectAt& at) {
+                                     const RobotMatch& match, const EffectAt& at) {
   const EffectSize one = size_of(first, at.first, at.second);
   const EffectSize two = size_of(other, at.first, name_in(first, other, match, at.second));
   QuantityDifference out;
@@ -112,7 +112,7 @@ QuantityDifference effect_difference(const StoredRun& first, const StoredRun& ot
 }
 
 // A ratio that only one of them estimated stands against what the other would have found.
-void take_unseen_ratio(const RobotLayout& layout, const StoredRun& run, const JointMatch& match,
+void take_unseen_ratio(const RobotLayout& layout, const StoredRun& run, const RobotMatch& match,
                        const RobotNumbers& other, RobotNumbers& numbers) {
   const std::size_t first = layout.quantities.size() - layout.joints.size();
   for (std::size_t k = 0; k < layout.joints.size(); ++k) {
@@ -131,7 +131,7 @@ void take_unseen_ratio(const RobotLayout& layout, const StoredRun& run, const Jo
 }
 
 // Effects that only one has may stand in the other's geometry.
-std::string uneven_words(const StoredRun& first, const StoredRun& other, const JointMatch& match) {
+std::string uneven_words(const StoredRun& first, const StoredRun& other, const RobotMatch& match) {
   std::vector<std::string> names;
   for (const EffectAt& at : effects_of(first, other, match)) {
     const auto has = [&](const StoredRun& run, const std::string& joint) {
@@ -159,7 +159,7 @@ void sort_worst_first(std::vector<QuantityDifference>& quantities) {
 
 RunDifference difference_of(const RobotLayout& layout, const StoredRun& first,
                             RobotNumbers first_numbers, const StoredRun& other,
-                            RobotNumbers numbers, const JointMatch& match, const JointMatch& own) {
+                            RobotNumbers numbers, const RobotMatch& match, const RobotMatch& own) {
   RunDifference out;
   out.by_order = match.by_order;
   if (match.by_order)
@@ -211,11 +211,11 @@ StoredRun read_stored_run(const fs::path& folder) {
   return out;
 }
 
-std::vector<JointMatch> match_runs(std::span<const StoredRun> runs) {
+std::vector<RobotMatch> match_runs(std::span<const StoredRun> runs) {
   const KinematicTree& first = runs.front().calibration.tree;
-  std::vector<JointMatch> out;
+  std::vector<RobotMatch> out;
   for (const StoredRun& run : runs) {
-    out.push_back(match_joints(first, run.calibration.tree));
+    out.push_back(match_robots(first, run.calibration.tree));
     if (!out.back().joint_of.empty()) continue;
     throw bad_input(run.folder.string(),
                     fmt::format("is another robot's: joints {}, not {} as in {}",
@@ -227,9 +227,9 @@ std::vector<JointMatch> match_runs(std::span<const StoredRun> runs) {
 }
 
 std::vector<RunDifference> run_differences(std::span<const StoredRun> runs,
-                                           std::span<const JointMatch> matches, double level) {
+                                           std::span<const RobotMatch> matches, double level) {
   std::vector<Calibration> same;
-  std::vector<JointMatch> same_matches;
+  std::vector<RobotMatch> same_matches;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     if (!matches[k].differences.empty()) continue;
     same.push_back(runs[k].calibration);

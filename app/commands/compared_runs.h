@@ -32,11 +32,11 @@ struct StoredRun {
 
 /// The joints of the first run in each (its own the first). Throws bad_input where one is another
 /// robot's.
-[[nodiscard]] std::vector<JointMatch> match_runs(std::span<const StoredRun> runs);
+[[nodiscard]] std::vector<RobotMatch> match_runs(std::span<const StoredRun> runs);
 
 /// Of runs 2, 3, .. against the first; p-values are corrected over all of them together.
 [[nodiscard]] std::vector<RunDifference> run_differences(std::span<const StoredRun> runs,
-                                                         std::span<const JointMatch> matches,
+                                                         std::span<const RobotMatch> matches,
                                                          double level);
 
 }  // namespace kinescope

@@ -83,7 +83,7 @@ void compare_couplings(const Joint& one, const Joint& two, bool by_order,
                                     shares(one), shares(two)));
 }
 
-void compare_structure(const KinematicTree& first, const KinematicTree& other, JointMatch& match) {
+void compare_structure(const KinematicTree& first, const KinematicTree& other, RobotMatch& match) {
   std::set<int> found;
   for (const int a : moving_joints(first)) {
     const int b = match.joint_of[static_cast<std::size_t>(a)];
@@ -169,7 +169,7 @@ bool move_model(Model& model, const Calibration& run, const Parameter& parameter
 
 // The axes in the order of the layout, at its readings; each points to where its channel grows.
 std::vector<PlacedAxis> axes_at(const Model& model, const RobotLayout& layout,
-                                const JointMatch& match) {
+                                const RobotMatch& match) {
   Eigen::VectorXd values = Eigen::VectorXd::Zero(std::ssize(model.tree.joints));
   std::vector<int> own;
   for (std::size_t k = 0; k < layout.joints.size(); ++k) {
@@ -189,7 +189,7 @@ std::vector<PlacedAxis> axes_at(const Model& model, const RobotLayout& layout,
   return out;
 }
 
-Eigen::VectorXd values_of(const Model& model, const RobotLayout& layout, const JointMatch& match) {
+Eigen::VectorXd values_of(const Model& model, const RobotLayout& layout, const RobotMatch& match) {
   const Eigen::VectorXd of_axes = axis_values(layout.axes, axes_at(model, layout, match));
   Eigen::VectorXd out(std::ssize(layout.quantities));
   out.head(of_axes.size()) = of_axes;
@@ -209,7 +209,7 @@ double difference_of(const RobotQuantity& quantity, double from, double to) {
 
 // d number / d parameter: quantities x parameters.
 Eigen::MatrixXd jacobian_of(const RobotLayout& layout, const Calibration& run,
-                            const JointMatch& match) {
+                            const RobotMatch& match) {
   const Model model = model_of(run);
   Eigen::MatrixXd out =
       Eigen::MatrixXd::Zero(std::ssize(layout.quantities), std::ssize(run.parameters));
@@ -270,11 +270,6 @@ std::string quantity_words(AxisQuantityKind kind, const Joint& axis, const Joint
   return {};
 }
 
-bool is_length(AxisQuantityKind kind) {
-  return kind == AxisQuantityKind::kDistance || kind == AxisQuantityKind::kOffset ||
-         kind == AxisQuantityKind::kPlaceX || kind == AxisQuantityKind::kPlaceY;
-}
-
 void name_quantities(const KinematicTree& first, RobotLayout& layout) {
   const auto joint = [&](int axis) -> const Joint& {
     return joint_at(first, layout.joints[static_cast<std::size_t>(axis)]);
@@ -291,7 +286,7 @@ void name_quantities(const KinematicTree& first, RobotLayout& layout) {
 
 // In the middle of what the recordings have of a joint, so that a ratio that is off a little does
 // not pass for a zero; 0 where none says.
-double middle_reading(std::span<const Calibration> runs, std::span<const JointMatch> matches,
+double middle_reading(std::span<const Calibration> runs, std::span<const RobotMatch> matches,
                       int joint) {
   double sum = 0.0;
   int count = 0;
@@ -399,8 +394,8 @@ std::string why_not(NumberState state) {
 
 }  // namespace
 
-JointMatch match_joints(const KinematicTree& first, const KinematicTree& other) {
-  JointMatch out;
+RobotMatch match_robots(const KinematicTree& first, const KinematicTree& other) {
+  RobotMatch out;
   std::map<std::string, int> by_channel;
   for (const int j : moving_joints(other))
     if (!joint_at(other, j).channel.empty()) by_channel[joint_at(other, j).channel] = j;
@@ -424,7 +419,7 @@ JointMatch match_joints(const KinematicTree& first, const KinematicTree& other) 
   return out;
 }
 
-RobotLayout robot_layout(std::span<const Calibration> runs, std::span<const JointMatch> matches) {
+RobotLayout robot_layout(std::span<const Calibration> runs, std::span<const RobotMatch> matches) {
   const KinematicTree& first = runs.front().tree;
   RobotLayout out;
   out.joints = moving_joints(first);
@@ -442,7 +437,7 @@ RobotLayout robot_layout(std::span<const Calibration> runs, std::span<const Join
 }
 
 RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
-                           const JointMatch& match) {
+                           const RobotMatch& match) {
   const Model model = model_of(run);
   const Eigen::MatrixXd J = jacobian_of(layout, run, match);
   RobotNumbers out;

@@ -21,7 +21,7 @@
 namespace kinescope {
 
 /// The joints of one robot in another calibration of it.
-struct JointMatch {
+struct RobotMatch {
   std::vector<int> joint_of;  ///< beside the first tree's joints; -1: fixed, or not there
   bool by_order = false;      ///< channels have other names, and stand for one another by order
   std::vector<std::string> differences;  ///< of the structure, in words; empty: the same
@@ -30,7 +30,7 @@ struct JointMatch {
 /// Joints with the same channel are the same joint; where no channel is named alike, those at the
 /// same place in the tree. Empty `joint_of` where the two are not one robot: neither the channels
 /// nor the types of the joints agree.
-[[nodiscard]] JointMatch match_joints(const KinematicTree& first, const KinematicTree& other);
+[[nodiscard]] RobotMatch match_robots(const KinematicTree& first, const KinematicTree& other);
 
 /// Whether a number was estimated, and if not why.
 enum class NumberState {
@@ -58,7 +58,7 @@ struct RobotLayout {
 
 /// `runs` and `matches` (of runs[0] with each, its own the first) side by side.
 [[nodiscard]] RobotLayout robot_layout(std::span<const Calibration> runs,
-                                       std::span<const JointMatch> matches);
+                                       std::span<const RobotMatch> matches);
 
 struct RobotNumbers {
   Eigen::VectorXd values;      ///< beside RobotLayout::quantities; of a ratio its logarithm
@@ -69,7 +69,7 @@ struct RobotNumbers {
 };
 
 [[nodiscard]] RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
-                                         const JointMatch& match);
+                                         const RobotMatch& match);
 
 /// One number of the robot in two calibrations.
 struct QuantityDifference {

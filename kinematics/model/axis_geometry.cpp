@@ -234,22 +234,31 @@ Eigen::VectorXd by_start(const AxisLayout& layout, std::span<const PlacedAxis> a
   return difference.unaryExpr([](double d) { return std::remainder(d, kTurn); }) / (2.0 * kStep);
 }
 
-// The ways in which the start may be elsewhere, and what each number makes of them: columns.
-Eigen::MatrixXd by_any_start(const AxisLayout& layout, std::span<const PlacedAxis> axes) {
-  std::vector<Eigen::VectorXd> columns{by_start(layout, axes, 1.0, Eigen::Vector3d::Zero())};
-  if (axes.front().type == JointType::kRevolute) {
-    columns.push_back(by_start(layout, axes, 0.0, axes.front().direction));
-  } else {
-    for (int i = 0; i < 3; ++i)
-      columns.push_back(by_start(layout, axes, 0.0, Eigen::Vector3d::Unit(i)));
+// Which numbers only say where the start was put: angles where it was turned to, lengths where it
+// was shifted to (along an axis that turns, anywhere before one that slides).
+std::vector<bool> only_of_start(const AxisLayout& layout, std::span<const PlacedAxis> axes,
+                                const std::vector<AxisQuantity>& quantities) {
+  const Eigen::VectorXd by_turn = by_start(layout, axes, 1.0, Eigen::Vector3d::Zero());
+  Eigen::VectorXd by_shift = Eigen::VectorXd::Zero(by_turn.size());
+  std::vector<Eigen::Vector3d> shifts{axes.front().direction};
+  if (axes.front().type == JointType::kPrismatic)
+    shifts = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
+  for (const Eigen::Vector3d& shift : shifts)
+    by_shift = by_shift.cwiseMax(by_start(layout, axes, 0.0, shift).cwiseAbs());
+  std::vector<bool> out;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const auto& by = is_length(quantities[i].kind) ? by_shift : by_turn;
+    out.push_back(std::abs(by[static_cast<Eigen::Index>(i)]) > kFollowsStart);
   }
-  Eigen::MatrixXd out(columns.front().size(), std::ssize(columns));
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    out.col(static_cast<Eigen::Index>(c)) = columns[c];
   return out;
 }
 
 }  // namespace
+
+bool is_length(AxisQuantityKind kind) {
+  return kind == AxisQuantityKind::kDistance || kind == AxisQuantityKind::kOffset ||
+         kind == AxisQuantityKind::kPlaceX || kind == AxisQuantityKind::kPlaceY;
+}
 
 std::vector<PlacedAxis> placed_axes(const KinematicTree& tree, const Eigen::VectorXd& values,
                                     std::vector<JointId>& joints) {
@@ -279,9 +288,9 @@ AxisLayout axis_layout(std::span<const PlacedAxis> axes) {
   choose_steps(axes, layout);
   Walk walk(axes, layout.steps);
   walk.start(start_frame(layout, axes));
-  const Eigen::MatrixXd by = by_any_start(layout, axes);
+  const std::vector<bool> of_start = only_of_start(layout, axes, walk.quantities);
   for (std::size_t i = 0; i < walk.quantities.size(); ++i) {
-    if (by.row(static_cast<Eigen::Index>(i)).cwiseAbs().maxCoeff() > kFollowsStart) continue;
+    if (of_start[i]) continue;
     layout.quantities.push_back(walk.quantities[i]);
     layout.kept.push_back(static_cast<int>(i));
   }

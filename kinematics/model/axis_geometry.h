@@ -46,6 +46,9 @@ enum class AxisQuantityKind {
   kPlaceY
 };
 
+/// In m; else in rad.
+[[nodiscard]] bool is_length(AxisQuantityKind kind);
+
 struct AxisQuantity {
   AxisQuantityKind kind = AxisQuantityKind::kDistance;
   int axis = -1;

@@ -170,8 +170,8 @@ struct Pair {
 
 Pair compared(const Recorded& first, const Recorded& second) {
   const std::vector<Calibration> runs{first.calibration, second.calibration};
-  const std::vector<JointMatch> matches{match_joints(runs[0].tree, runs[0].tree),
-                                        match_joints(runs[0].tree, runs[1].tree)};
+  const std::vector<RobotMatch> matches{match_robots(runs[0].tree, runs[0].tree),
+                                        match_robots(runs[0].tree, runs[1].tree)};
   const RobotLayout layout = robot_layout(runs, matches);
   const auto numbers = [&](const Calibration& run, std::size_t k) {
     return robot_numbers(layout, run, matches[k]);

@@ -19,7 +19,7 @@ namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using ComparedJson = nlohmann::json;
 
 constexpr double kZero_rad = 0.2 * std::numbers::pi / 180.0;
 
@@ -67,12 +67,12 @@ class Compare : public testing::Test {
     const Outcome made = run({"run", (runs() / name).string(), "-o", of(name), "--quiet"});
     ASSERT_EQ(made.code, 0) << name << ": " << made.err;
   }
-  static json compared(const std::vector<std::string>& names) {
+  static ComparedJson compared(const std::vector<std::string>& names) {
     std::vector<std::string> words{"compare", "--json", "--quiet"};
     for (const std::string& name : names) words.push_back(of(name));
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
-    return json::parse(outcome.out, nullptr, false);
+    return ComparedJson::parse(outcome.out, nullptr, false);
   }
   // A run of the test's own, to be damaged.
   [[nodiscard]] std::string copied(const std::string& name) const {
@@ -85,19 +85,19 @@ class Compare : public testing::Test {
     expect_refusal({"compare", of("a"), (folder_.path() / "damaged").string()}, ExitCode::kBadInput,
                    part);
   }
-  static json calibration() {
-    return json::parse(read_text_file(fs::path(of("a")) / "calibration.json"));
+  static ComparedJson calibration() {
+    return ComparedJson::parse(read_text_file(fs::path(of("a")) / "calibration.json"));
   }
 
   RecordingFolder folder_;
 };
 
 TEST_F(Compare, TheSameRobotFilmedAnewIsTheSameAndItsModelCarriesOver) {
-  const json found = compared({"a", "b"});
+  const ComparedJson found = compared({"a", "b"});
   EXPECT_EQ(found.at("changed"), false) << found.at("verdict");
   EXPECT_EQ(found.at("differences")[0].at("quantities").size(), 6U + 3U);
   ASSERT_EQ(found.at("carried_over").size(), 2U);
-  for (const json& one : found.at("carried_over")) {
+  for (const ComparedJson& one : found.at("carried_over")) {
     EXPECT_EQ(one.at("skipped"), nullptr);
     EXPECT_EQ(one.at("carries"), true) << one;
     EXPECT_NEAR(one.at("carried_rms").get<double>() / one.at("own_rms").get<double>(), 1.0, 0.1);
@@ -108,15 +108,16 @@ TEST_F(Compare, TheSameRobotFilmedAnewIsTheSameAndItsModelCarriesOver) {
 }
 
 TEST_F(Compare, AZeroThatMovedIsNamedWithItsSizeAndDoesNotCarryOver) {
-  const json found = compared({"a", "moved"});
+  const ComparedJson found = compared({"a", "moved"});
   EXPECT_EQ(found.at("changed"), true);
-  const json& worst = found.at("differences")[0].at("quantities")[0];
+  const ComparedJson& worst = found.at("differences")[0].at("quantities")[0];
   EXPECT_EQ(worst.at("name"), "zero of q2 (towards q3)");
   EXPECT_NEAR(worst.at("difference").get<double>(), kZero_rad,
               2.0 * worst.at("expanded").get<double>());
-  for (const json& other : found.at("differences")[0].at("quantities"))
+  for (const ComparedJson& other : found.at("differences")[0].at("quantities"))
     EXPECT_EQ(other.at("changed"), other == worst) << other;
-  for (const json& one : found.at("carried_over")) EXPECT_EQ(one.at("carries"), false) << one;
+  for (const ComparedJson& one : found.at("carried_over"))
+    EXPECT_EQ(one.at("carries"), false) << one;
 }
 
 TEST_F(Compare, FailOnTurnsTheExitCodeAndSaysWhy) {
@@ -132,11 +133,11 @@ TEST_F(Compare, FailOnTurnsTheExitCodeAndSaysWhy) {
 }
 
 TEST_F(Compare, SeveralRunsAreComparedWithTheFirst) {
-  const json found = compared({"a", "b", "moved"});
+  const ComparedJson found = compared({"a", "b", "moved"});
   ASSERT_EQ(found.at("differences").size(), 2U);
   const auto changed = [&](std::size_t run) {
     int count = 0;
-    for (const json& one : found.at("differences")[run].at("quantities"))
+    for (const ComparedJson& one : found.at("differences")[run].at("quantities"))
       count += one.at("changed") == true ? 1 : 0;
     return count;
   };
@@ -165,12 +166,12 @@ TEST_F(Compare, WritesNumbersThatKeepTheirSchemaAndAPage) {
 
 TEST_F(Compare, ARecordingThatIsGoneIsSaidAndTheRestCompared) {
   const std::string moved_away = copied("b");
-  json document = json::parse(read_text_file(fs::path(moved_away) / "run.json"));
+  ComparedJson document = ComparedJson::parse(read_text_file(fs::path(moved_away) / "run.json"));
   document["arguments"][1] = "/nowhere/at/all";
   folder_.write("b/run.json", document.dump());
   const Outcome outcome = run({"compare", of("a"), moved_away, "--json", "--quiet"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  const json found = json::parse(outcome.out);
+  const ComparedJson found = ComparedJson::parse(outcome.out);
   EXPECT_NE(found.at("carried_over")[0].at("skipped"), nullptr);
   EXPECT_EQ(found.at("carried_over")[1].at("skipped"), nullptr);
   EXPECT_EQ(run({"compare", of("a"), moved_away, "--fail-on", "carry", "--quiet"}).code, 5);
@@ -178,7 +179,7 @@ TEST_F(Compare, ARecordingThatIsGoneIsSaidAndTheRestCompared) {
 }
 
 TEST_F(Compare, AStructureThatDiffersIsSaidFirst) {
-  const json found = compared({"a", "two"});
+  const ComparedJson found = compared({"a", "two"});
   EXPECT_EQ(found.at("changed"), true);
   const std::string verdict = found.at("verdict");
   EXPECT_TRUE(verdict.starts_with("Changed: structure: q3 is not in the other")) << verdict;
@@ -199,7 +200,7 @@ TEST_F(Compare, RefusesACalibrationThatIsDamagedOrOfAnotherVersion) {
   refused_with(whole.substr(0, whole.size() / 2), "ends early");
   refused_with("", "ends early");
   refused_with("[]", "no calibration");
-  json other = calibration();
+  ComparedJson other = calibration();
   other["schema_version"] = 2;
   refused_with(other.dump(), "not 2");
   other = calibration();
@@ -224,8 +225,8 @@ TEST_F(Compare, RefusesACalibrationThatIsDamagedOrOfAnotherVersion) {
 }
 
 TEST_F(Compare, RefusesAnotherRobotAndACalibrationWithoutAnAnswer) {
-  json other = calibration();
-  for (json& joint : other["robot"]["joints"])
+  ComparedJson other = calibration();
+  for (ComparedJson& joint : other["robot"]["joints"])
     joint["channel"] = "other_" + joint["channel"].get<std::string>();
   other["robot"]["joints"][0]["type"] = "prismatic";
   refused_with(other.dump(), "another robot");
@@ -237,7 +238,7 @@ TEST_F(Compare, RefusesAnotherRobotAndACalibrationWithoutAnAnswer) {
 }
 
 TEST_F(Compare, JointsOfOtherNamesAreMatchedByOrder) {
-  json other = json::parse(read_text_file(fs::path(of("b")) / "calibration.json"));
+  ComparedJson other = ComparedJson::parse(read_text_file(fs::path(of("b")) / "calibration.json"));
   std::string text = other.dump();
   for (const char* name : {"q1", "q2", "q3"})
     for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += 4)
@@ -246,7 +247,7 @@ TEST_F(Compare, JointsOfOtherNamesAreMatchedByOrder) {
   const Outcome outcome =
       run({"compare", of("a"), (folder_.path() / "renamed").string(), "--json", "--quiet"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  const json found = json::parse(outcome.out);
+  const ComparedJson found = ComparedJson::parse(outcome.out);
   EXPECT_EQ(found.at("differences")[0].at("matched_by"), "order");
   EXPECT_EQ(found.at("changed"), false) << found.at("verdict");
 }

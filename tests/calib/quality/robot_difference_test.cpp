@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/quality/robot_difference.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -17,10 +18,17 @@ namespace {
 constexpr double kSameDifference =
     1e-7;  // central differences and products of numbers of order one
 
+// The first of the random arms of which no axis is nearly parallel to the next.
 KinematicTree arm_of_four() {
   truth::WorldOptions options;
   options.joints.assign(4, JointType::kRevolute);
-  return truth::make_world(options).tree;
+  for (options.seed = 1;; ++options.seed) {
+    KinematicTree out = truth::make_world(options).tree;
+    std::vector<JointId> joints;
+    const AxisLayout layout =
+        axis_layout(placed_axes(out, Eigen::VectorXd::Constant(4, 0.25), joints));
+    if (std::count(layout.steps.begin(), layout.steps.end(), AxisStep::kNormal) == 3) return out;
+  }
 }
 
 // A calibration of which every joint's four numbers and its ratio are known that well.
@@ -41,8 +49,8 @@ Calibration known_to(const KinematicTree& tree, double sigma) {
 
 std::vector<QuantityDifference> differences(const Calibration& first, const Calibration& second) {
   const std::vector<Calibration> runs{first, second};
-  const std::vector<JointMatch> matches{match_joints(first.tree, first.tree),
-                                        match_joints(first.tree, second.tree)};
+  const std::vector<RobotMatch> matches{match_robots(first.tree, first.tree),
+                                        match_robots(first.tree, second.tree)};
   const RobotLayout layout = robot_layout(runs, matches);
   return robot_differences(layout, robot_numbers(layout, first, matches[0]),
                            robot_numbers(layout, second, matches[1]));
@@ -129,7 +137,7 @@ TEST(RobotDifference, WhatWasHeldOrNotDeterminedIsNotCompared) {
   EXPECT_TRUE(named(found, "twist q3 - q4").sigma);
   Calibration silent = first;
   silent.tree.joints[3].channel.clear();
-  EXPECT_EQ(match_joints(first.tree, silent.tree).differences.size(), 2U);
+  EXPECT_EQ(match_robots(first.tree, silent.tree).differences.size(), 2U);
 }
 
 // Turns and shifts are of the frame at a value of the joint: that frame is where the noise acts.
@@ -190,15 +198,15 @@ TEST(RobotDifference, JointsAreFoundByTheirChannelsInAnyOrder) {
   const KinematicTree first = arm_of_four();
   KinematicTree other = first;
   std::swap(other.joints[1].channel, other.joints[2].channel);
-  const JointMatch match = match_joints(first, other);
+  const RobotMatch match = match_robots(first, other);
   EXPECT_EQ(match.joint_of, (std::vector<int>{0, 2, 1, 3}));
   EXPECT_EQ(match.differences.size(), 3U) << "q2 and q3 carry one another the other way round";
   EXPECT_FALSE(match.by_order);
   other = first;
   for (Joint& joint : other.joints) joint.channel += "_measured";
-  EXPECT_TRUE(match_joints(first, other).by_order);
+  EXPECT_TRUE(match_robots(first, other).by_order);
   other.joints[0].type = JointType::kPrismatic;
-  EXPECT_TRUE(match_joints(first, other).joint_of.empty());
+  EXPECT_TRUE(match_robots(first, other).joint_of.empty());
 }
 
 }  // namespace

@@ -84,6 +84,10 @@ TEST(AxisGeometry, HasAsManyNumbersAsTheRobotHasFreedoms) {
     return axis_layout(chain_of(random_steps(types.size(), rng), types)).quantities.size();
   };
   EXPECT_EQ(count({kRevolute, kRevolute}), 2U);
+  std::vector<DhStep> begins_parallel = random_steps(5, rng);
+  begins_parallel[0].twist = 0.1;
+  begins_parallel[0].distance = 0.1;
+  EXPECT_EQ(axis_layout(chain_of(begins_parallel, kFiveTurns)).quantities.size(), 14U);
   EXPECT_EQ(count(kFiveTurns), 14U);
   EXPECT_EQ(count({kRevolute, kRevolute, kPrismatic, kRevolute}), 8U);
   EXPECT_EQ(count({kPrismatic, kPrismatic, kRevolute, kRevolute}), 6U);
