@@ -221,7 +221,6 @@ Calibration calibration_of(const json& document) {
 }  // namespace
 
 Calibration read_calibration(const std::filesystem::path& calibration_json) {
-  constexpr const char* kRemedy = "give the folder of a finished run, or run the recording again";
   const std::string text = read_text_file(calibration_json);
   std::string what;
   try {
@@ -235,7 +234,8 @@ Calibration read_calibration(const std::filesystem::path& calibration_json) {
     const std::string words = error.what();
     what = words.substr(std::min(words.size(), words.find("] ") + 2));
   }
-  throw bad_input(calibration_json.string(), what, kRemedy);
+  throw bad_input(calibration_json.string(), what,
+                  "give the folder of a finished run, or run the recording again");
 }
 
 }  // namespace kinescope

@@ -83,8 +83,9 @@ std::string differences_section(const CompareSummary& summary, const nlohmann::j
     const RunDifference& run = summary.differences[k];
     const std::string title =
         fmt::format("{} against {}", summary.runs[k + 1].name, summary.runs.front().name);
-    for (const std::string& words : run.structure) out += paragraph(title + ": " + words + ".");
-    for (const std::string& note : run.notes) out += paragraph(title + ": " + note);
+    for (const std::string& words : run.structure)
+      out += paragraph(fmt::format("{}: {}.", title, words));
+    for (const std::string& note : run.notes) out += paragraph(fmt::format("{}: {}", title, note));
     if (run.quantities.empty()) continue;
     Table table(fmt::format("differences-{}", k + 1), title + ", worst first", document);
     table.header({"Number", "Change", "Expanded uncertainty", "p", "p after Holm", "Verdict"});

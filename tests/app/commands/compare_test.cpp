@@ -33,6 +33,13 @@ KinematicTree compared_arm(std::size_t joints) {
   return out;
 }
 
+KinematicTree with_moved_zero(double angle_rad) {
+  KinematicTree out = compared_arm(3);
+  Joint& joint = out.joints[1];
+  joint.T_parent_joint = joint.T_parent_joint * joint_motion(joint.type, joint.axis, angle_rad);
+  return out;
+}
+
 // A view in which no marker is hidden for long.
 truth::World view_of(const KinematicTree& robot, std::uint64_t seed) {
   for (;; seed += 100) {
@@ -54,10 +61,8 @@ class Compare : public testing::Test {
   static void SetUpTestSuite() {
     record("a", compared_arm(3), 1);
     record("b", compared_arm(3), 2);
-    KinematicTree changed = compared_arm(3);
-    Joint& joint = changed.joints[1];
-    joint.T_parent_joint = joint.T_parent_joint * joint_motion(joint.type, joint.axis, kZero_rad);
-    record("moved", changed, 4);
+    record("moved", with_moved_zero(kZero_rad), 4);
+    record("far", with_moved_zero(15.0 * kZero_rad), 6);
     record("two", compared_arm(2), 5);
   }
   static fs::path runs() { return truth::temporary_path("compared"); }
@@ -107,7 +112,7 @@ TEST_F(Compare, TheSameRobotFilmedAnewIsTheSameAndItsModelCarriesOver) {
   EXPECT_TRUE(again.out.starts_with("Same robot within noise")) << again.out;
 }
 
-TEST_F(Compare, AZeroThatMovedIsNamedWithItsSizeAndDoesNotCarryOver) {
+TEST_F(Compare, AZeroThatMovedIsNamedWithItsSize) {
   const ComparedJson found = compared({"a", "moved"});
   EXPECT_EQ(found.at("changed"), true);
   const ComparedJson& worst = found.at("differences")[0].at("quantities")[0];
@@ -116,6 +121,16 @@ TEST_F(Compare, AZeroThatMovedIsNamedWithItsSizeAndDoesNotCarryOver) {
               2.0 * worst.at("expanded").get<double>());
   for (const ComparedJson& other : found.at("differences")[0].at("quantities"))
     EXPECT_EQ(other.at("changed"), other == worst) << other;
+  // Markers placed anew take up most of so little: significantly worse, and no worse in use.
+  for (const ComparedJson& one : found.at("carried_over")) {
+    EXPECT_LT(one.at("p_value").get<double>(), 0.05) << one;
+    EXPECT_EQ(one.at("carries"), true) << one;
+  }
+}
+
+TEST_F(Compare, AModelWhoseZeroIsFarOffDoesNotCarryOver) {
+  const ComparedJson found = compared({"a", "far"});
+  ASSERT_EQ(found.at("carried_over").size(), 2U);
   for (const ComparedJson& one : found.at("carried_over"))
     EXPECT_EQ(one.at("carries"), false) << one;
 }
@@ -123,7 +138,7 @@ TEST_F(Compare, AZeroThatMovedIsNamedWithItsSizeAndDoesNotCarryOver) {
 TEST_F(Compare, FailOnTurnsTheExitCodeAndSaysWhy) {
   constexpr int kOutside = static_cast<int>(ExitCode::kOutsideLimits);
   for (const char* limit : {"change", "carry", "any"}) {
-    const Outcome outcome = run({"compare", of("a"), of("moved"), "--fail-on", limit, "--quiet"});
+    const Outcome outcome = run({"compare", of("a"), of("far"), "--fail-on", limit, "--quiet"});
     EXPECT_EQ(outcome.code, kOutside) << limit;
     EXPECT_TRUE(outcome.err.starts_with("kinescope: outside the limit ")) << outcome.err;
   }
@@ -152,7 +167,7 @@ TEST_F(Compare, WritesNumbersThatKeepTheirSchemaAndAPage) {
   EXPECT_EQ(first.code, 0) << first.err;
   const std::string page = read_text_file(fs::path(output) / "compare.html");
   EXPECT_NE(page.find("zero of q2"), std::string::npos);
-  EXPECT_EQ(page.find("http"), std::string::npos) << "nothing is loaded from anywhere";
+  EXPECT_EQ(page.find("://"), std::string::npos) << "nothing is loaded from anywhere";
   const ProductCheck check = check_products(output);
   if (!check.done) GTEST_SKIP() << check.words;
   EXPECT_TRUE(check.passed) << check.words;
