@@ -9,7 +9,7 @@
 
 #include "app/commands/command_line.h"
 #include "app/commands/progress_line.h"
-#include "app/commands/run_folder.h"
+#include "app/commands/run_again.h"
 #include "app/io/dynamics_settings.h"
 #include "app/io/nearest_name.h"
 #include "dynamics/gp/blas.h"
@@ -68,7 +68,8 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, dynamics, predict, simulate, control, export, contact, experiment, "
+        "run, trace, correct, compare, dynamics, predict, simulate, control, export, contact, "
+        "experiment, "
         "policy, inspect, camera or markers; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
@@ -124,39 +125,13 @@ std::string log_name(const std::filesystem::path& log) {
   return name.substr(0, name.find('.'));
 }
 
-RunOptions finished_options(const CommandLine& line) {
-  RunOptions out = line.run;
-  if (out.output.empty()) out.output = recording_name(out.recording.folder) + "_run";
-  out.calibrate.estimate_time_offset = !line.no_time_offset;
-  out.calibrate.estimate_intrinsics = out.estimate_intrinsics;
-  return out;
-}
-
 // The run of a run folder once more, tracing, from its own command line.
 ExitCode run_again(const CommandLine& line, const Console& console) {
   const std::filesystem::path& folder = line.trace.run_folder;
-  const RunAgain again = read_run_again(folder);
-  CLI::App app;
-  CommandLine first;
-  add_commands(app, first);
-  std::vector<std::string> reversed(again.arguments.rbegin(), again.arguments.rend());
-  try {
-    app.parse(reversed);
-  } catch (const CLI::ParseError&) {
-    throw bad_input((folder / "run.json").string(), "its command line is not understood",
-                    "run the recording again");
-  }
-  if (!app.got_subcommand("run")) {
-    throw bad_input((folder / "run.json").string(), "this is no folder of kinescope run",
-                    "give the folder of a finished run");
-  }
-  RunOptions options = finished_options(first);
-  resolve_paths(options.recording, again.working_folder);
-  options.output = folder;
+  RunOptions options = options_of_run(folder);
   options.trace = true;
   options.must_trace = true;
   options.force = false;  // detection is taken from the folder, and others' files stay
-  options.arguments = again.arguments;
   options.command_line = "kinescope trace " + folder.string();
   return run_command(options, console);
 }
@@ -165,6 +140,7 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
   if (app.got_subcommand("run")) return run_command(finished_options(line), console);
   if (app.got_subcommand("trace")) return run_again(line, console);
   if (app.got_subcommand("correct")) return correct_command(line.correct, console);
+  if (app.got_subcommand("compare")) return compare_command(line.compare, console);
   if (app.got_subcommand("dynamics")) {
     if (line.dynamics.output.empty()) {
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
@@ -277,6 +253,7 @@ int run_program(int argc, const char* const* argv) {
   line.experiment.command_line = line.run.command_line;
   line.policy.command_line = line.run.command_line;
   line.control.command_line = line.run.command_line;
+  line.compare.command_line = line.run.command_line;
   add_commands(app, line);
   try {
     app.parse(argc, argv);

@@ -200,6 +200,47 @@ void add_correct(CLI::App& app, CommandLine& line) {
       kExitCodes));
 }
 
+void add_compare(CLI::App& app, CommandLine& line) {
+  static const std::map<std::string, CompareLimit> kLimits = {{"change", CompareLimit::kChange},
+                                                              {"carry", CompareLimit::kCarry},
+                                                              {"any", CompareLimit::kAny}};
+  CLI::App& compare = *app.add_subcommand(
+      "compare", "What changed of one robot between its runs, and whether their models carry over");
+  CompareOptions& options = line.compare;
+  compare
+      .add_option_function<std::vector<std::string>>(
+          "RUN_FOLDER",
+          [&options](const std::vector<std::string>& folders) {
+            options.runs.assign(folders.begin(), folders.end());
+          },
+          "Folders of finished runs of one robot, two or more; the first is what the others are "
+          "compared with")
+      ->required()
+      ->type_name("FOLDER");
+  compare
+      .add_option("--level", options.level,
+                  "Probability of calling anything changed where nothing is; all numbers together")
+      ->check(number_in(1e-6, 0.5))
+      ->capture_default_str()
+      ->type_name("P");
+  add_choice(
+      compare, "--fail-on", kLimits, options.fail_on,
+      "What turns the exit code to 5: change (of the robot), carry (a model predicts another "
+      "run's recording worse than its own model does), any of both; what could not be "
+      "compared or tried counts")
+      ->type_name("WHAT");
+  compare
+      .add_option_function<std::string>(
+          "-o,--output", [&options](const std::string& text) { options.output = text; },
+          "Folder for compare.json and compare.html (default: only prints)")
+      ->type_name("FOLDER");
+  add_force(compare, options.force, kReplaceOthers);
+  add_output_options(compare, line.output);
+  compare.footer(fmt::format(
+      "Example:\n  kinescope compare march_run june_run --fail-on change --output compared\n\n{}",
+      kExitCodes));
+}
+
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
       "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
@@ -359,6 +400,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_run(app, line);
   add_trace(app, line);
   add_correct(app, line);
+  add_compare(app, line);
   add_dynamics(app, line);
   add_predict(app, line);
   add_simulate(app, line);

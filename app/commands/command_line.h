@@ -37,6 +37,7 @@ struct CommandLine {
   MarkersOptions markers;
   TraceCommandOptions trace;
   CorrectOptions correct;
+  CompareOptions compare;
   std::optional<std::filesystem::path> settings;  ///< recording.yaml of a torque log
   OutputOptions output;
   bool no_time_offset = false;

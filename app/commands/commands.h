@@ -65,6 +65,26 @@ struct CorrectOptions {
 
 [[nodiscard]] ExitCode correct_command(const CorrectOptions& options, const Console& console);
 
+/// What turns the exit code of `compare` to 5.
+enum class CompareLimit {
+  kNone,
+  kChange,  ///< the robot differs, or could not be compared
+  kCarry,   ///< a model predicts another's recording worse, or could not be tried
+  kAny
+};
+
+struct CompareOptions {
+  std::vector<std::filesystem::path>
+      runs;             ///< folders of finished runs; the first is compared with
+  double level = 0.05;  ///< of calling anything changed where nothing is
+  CompareLimit fail_on = CompareLimit::kNone;
+  std::filesystem::path output;  ///< folder; empty: only prints
+  bool force = false;            ///< replace what others wrote
+  std::string command_line;      ///< for the page
+};
+
+[[nodiscard]] ExitCode compare_command(const CompareOptions& options, const Console& console);
+
 struct DynamicsOptions {
   std::vector<std::filesystem::path> logs;
   std::vector<std::filesystem::path> test_logs;  ///< judged on; empty: the logs' last part

@@ -246,6 +246,9 @@ json calibration_json(const Calibration& calibration) {
            {"rms_unit", calibration.kind == MeasurementKind::kCorners ? "px" : "m"},
            {"parameters", json::array()},
            {"covariance", json::array()}};
+  for (std::size_t j = 0; j < calibration.joints.size(); ++j) {
+    out["robot"]["joints"][j]["parameters_at"] = number(calibration.joints[j].parameters_at);
+  }
   for (const Parameter& p : calibration.parameters) {
     out["parameters"].push_back({{"name", p.name},
                                  {"block", p.block},

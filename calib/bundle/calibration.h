@@ -35,6 +35,9 @@ struct JointEstimate {
   Sigma offset_sigma;  ///< rad or m; where the offset was estimated
   Sigma scale_sigma;   ///< rad or m per unit; where the scale was estimated
   JointLimits range;   ///< of the joint value over the recording
+  /// Value of the joint, rad or m, at whose frame the joint's turns and shifts among the parameters
+  /// are taken: T_parent_joint * exp(axis * parameters_at).
+  double parameters_at = 0.0;
 };
 
 struct MarkerEstimate {

@@ -134,6 +134,7 @@ void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncert
     estimate.axis_base = T_base_joint.rotation * joint.axis;
     estimate.point_base = T_base_joint.translation;
     if (joint.limits && !held[j]) estimate.range = *joint.limits;
+    estimate.parameters_at = -state.joint_maps[j][1];  // fill_tree moved the frame on by that
     out.joints.push_back(estimate);
   }
   fill_axis_uncertainty(spec, state, uncertainty, out.tree, mean, held, out.joints);

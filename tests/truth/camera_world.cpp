@@ -144,13 +144,19 @@ void film(const WorldOptions& options, const Motion& motion, Rng& rng, World& wo
 
 }  // namespace
 
-World make_world(const WorldOptions& options) {
+World make_world(const WorldOptions& asked) {
+  WorldOptions options = asked;
+  if (options.robot) {
+    options.joints.clear();
+    for (const Joint& joint : options.robot->joints) options.joints.push_back(joint.type);
+  }
   Rng rng = Rng::from_name("camera world", options.seed);
   World world;
   world.camera = pinhole_guess(1280, 720, 900.0);
   world.camera.distortion = {-0.08, 0.03, 0.0005, -0.0004, 0.0};
   world.markers.default_size_m = options.tag_size_m;
-  world.tree = random_chain(options, rng);
+  world.tree = options.robot ? *options.robot : random_chain(options, rng);
+  world.tree.markers.clear();
   world.T_camera_base = random_pose(rng, rng.uniform(0.0, 3.0), 0.0);
   world.T_camera_base.translation << 0.0, 0.0, options.distance_m;
   mount_tags(options, rng, world);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "calib/bundle/calibrate.h"
@@ -25,6 +26,9 @@ struct WorldOptions {
   double time_offset_s = 0.0;  ///< joint-log time = frame time + offset
   bool base_tag = true;
   double outliers = 0.0;  ///< share of sightings with one corner thrown far off
+  /// Filmed in place of a random chain of `joints`: a robot whose joints are these, with their
+  /// channels; camera, markers and motion are the seed's.
+  std::optional<KinematicTree> robot = {};
 };
 
 struct World {
