@@ -19,8 +19,9 @@
 namespace kinescope {
 
 struct CalibrationTraceOptions {
-  /// Recordings whose effects are all known take 7 to 30 fits (`undeclared`, numbers from 11000 on);
-  /// those with a cause that no effect has the shape of took up to 230 a search without a limit.
+  /// Recordings whose effects are all known take 7 to 30 fits (`undeclared`, numbers from 11000
+  /// on); those with a cause that no effect has the shape of took up to 230 a search without a
+  /// limit.
   TraceOptions trace = {.most_fits = 100};
   CalibrateOptions calibrate;
   /// Unit vector in the base frame along which things fall, where it is known.

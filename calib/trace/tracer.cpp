@@ -114,9 +114,7 @@ bool Tracer::can_look(const Stage& stage) {
   return true;
 }
 
-bool Tracer::may_go_on() const {
-  return options_.most_fits == 0 || fits_ < options_.most_fits;
-}
+bool Tracer::may_go_on() const { return options_.most_fits == 0 || fits_ < options_.most_fits; }
 
 bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
                                     const Eigen::VectorXd& other) const {

@@ -5,6 +5,7 @@
 
 #include "calib/bundle/effect_bundle.h"
 #include "calib/effects/corrected_log.h"
+#include "calib/effects/gravity_by_sag.h"
 #include "calib/effects/trace_calibration.h"
 #include "kinematics/core/error.h"
 #include "tests/calib/effects/traced_worlds.h"
@@ -58,6 +59,41 @@ TEST(TraceCalibration, WhatRepeatsWithAJointsValueIsAMapOfIt) {
   // Beyond what was seen it says nothing.
   EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, 10.0))[0], 0.0);
   EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, -10.0))[0], 0.0);
+}
+
+TEST(TraceCalibration, GravityIsToldBesideACurve) {
+  const World world = make_effect_world(filmed({strong("compliance", "q2")}));
+  CalibrationTraceOptions options;
+  const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
+  const effects::TracedBundle model(bundle, options);
+  constexpr double kSmoothOver = 1.0;  // rad
+  constexpr double kSpread = 1e-3;     // rad
+  const effects::GravityBySag told = effects::gravity_by_sag(
+      model, {{{"joint_map", "q1"}, kSmoothOver, kSpread}}, {"compliance", "q2"});
+  EXPECT_NEAR(told.direction.norm(), 1.0, 1e-12);
+  EXPECT_GT(told.explained, 0.0);
+}
+
+// Where another model ended, a change may begin with a marker behind the camera.
+TEST(EffectBundle, BeginsAnewWhereAStartPredictsNothing) {
+  const World world = make_effect_world(filmed({}, 60));
+  const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
+  const double plain = bundle.solve({}).variance;
+  Correction jump;
+  jump.name = "camera jump";
+  jump.block = "camera";
+  jump.unit = "m";
+  jump.part = CorrectedPart::kCamera;
+  jump.direction[5] = 1.0;
+  const auto frames = static_cast<Eigen::Index>(world.measurements.times_s.size());
+  jump.share = Eigen::VectorXd::LinSpaced(frames, 0.0, 1.0).array().round();
+  for (const double far : {-100.0, 100.0}) {  // m
+    jump.value = far;
+    const BundleFit fit = bundle.fit({{jump}, false, {}}, {});
+    EXPECT_TRUE(fit.residual.allFinite());
+    if (fit.variance > 2.0 * plain) continue;  // the far side has a minimum of its own
+    EXPECT_NEAR(fit.values[0], 0.0, 1e-3);
+  }
 }
 
 // Named shapes are not taken for maps, nor maps invented beside them.

@@ -85,6 +85,23 @@ TEST(TraceTest, TheIntervalOfWhatFewStretchesCarryHoldsTheTruth) {
   EXPECT_GE(held, 0.9 * found) << found;
 }
 
+TEST(TraceTest, ASearchEndsAfterAsManyFitsAsItMayTake) {
+  LinearWorldOptions world;
+  world.seed = 3;
+  const LinearWorld both(world, {{0, "scale", 0.5, 0.0}, {1, "sine", 2.0, 0.0}});
+  const Trace whole = trace_effects(both);
+  EXPECT_EQ(whole.accepted.size(), 2U);
+  TraceOptions options;
+  options.most_fits = 2;  // the model as it is, and one effect
+  const Trace cut = trace_effects(both, options);
+  EXPECT_LT(cut.accepted.size(), 2U);
+  EXPECT_TRUE(std::ranges::any_of(cut.steps, [](const TraceStep& step) {
+    return step.words.starts_with("nothing more is looked for after ");
+  }));
+  options.most_fits = 1000;
+  EXPECT_EQ(trace_effects(both, options).accepted.size(), 2U);
+}
+
 bool names(const Ambiguity& ambiguity, const EffectId& id) {
   return std::ranges::find(ambiguity.effects, id) != ambiguity.effects.end();
 }
