@@ -26,8 +26,9 @@ Answer no_answer(std::string where, std::string what, std::string remedy) {
 
 // A geometry that is held says how far it is off; where the user holds it, that is what was asked.
 bool is_geometry_held(const Calibration& calibration) {
-  return std::ranges::none_of(calibration.tree.joints,
-                              [&](const Joint& joint) { return is_axis_estimated(calibration, joint); });
+  return std::ranges::none_of(calibration.tree.joints, [&](const Joint& joint) {
+    return is_axis_estimated(calibration, joint);
+  });
 }
 
 // How far a model is from the measurements it did not leave out, and how far those move: root mean
