@@ -202,6 +202,10 @@ int main(int argc, char** argv) {
   if (names.empty())
     for (const auto& [name, set] : sets) names.push_back(name);
   for (const std::string& name : names) {
+    if (!sets.contains(name)) {
+      fmt::print(stderr, "hand_eye_real: no set '{}' (abb, aubo, fr3, kuka, ur10)\n", name);
+      return 2;
+    }
     const Set& set = sets.at(name);
     const auto data = shared_data(fmt::format("vision/{}", set.folder));
     if (!data) {
