@@ -41,25 +41,15 @@ constexpr std::string_view kFailedReport = "failed_report.html";
 
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
-  run.robot = recording.settings.name;
-  run.recording = recording.name;
-  run.entry = to_string(recording.entry);
-  run.version = program_version();
-  run.command = options.command_line;
-  run.arguments = options.arguments;
-  run.inputs = hash_inputs(recording);
-  run.options = list_options(options);
-  run.frames = static_cast<int>(observed.measurements.times_s.size());
+  describe_input(recording, observed, options, run);
   if (run.frames > 1) {
     run.duration_s = observed.measurements.times_s.back() - observed.measurements.times_s.front();
   }
-  run.markers = summarise_markers(observed, recording.markers);
   std::map<std::string, int> rejected;
   for (const RejectedTag& tag : observed.tags.rejected) ++rejected[tag.reason];
   run.rejected.assign(rejected.begin(), rejected.end());
-  run.warnings = recording.warnings;
-  for (const std::vector<std::string>& more : {observed.warnings, clock_jump_words(recording.log),
-                                               frozen_log_words(recording.log, observed)}) {
+  for (const std::vector<std::string>& more :
+       {clock_jump_words(recording.log), frozen_log_words(recording.log, observed)}) {
     run.warnings.insert(run.warnings.end(), more.begin(), more.end());
   }
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();

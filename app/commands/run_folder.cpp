@@ -308,6 +308,22 @@ void require_same_inputs(const fs::path& run_folder, const Recording& recording)
   }
 }
 
+void describe_input(const Recording& recording, const Observed& observed, const RunOptions& options,
+                    RunSummary& run) {
+  run.robot = recording.settings.name;
+  run.recording = recording.name;
+  run.entry = to_string(recording.entry);
+  run.version = program_version();
+  run.command = options.command_line;
+  run.arguments = options.arguments;
+  run.inputs = hash_inputs(recording);
+  run.options = list_options(options);
+  run.frames = static_cast<int>(observed.measurements.times_s.size());
+  run.markers = summarise_markers(observed, recording.markers);
+  run.warnings = recording.warnings;
+  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
+}
+
 RunAgain read_run_again(const fs::path& folder) {
   const fs::path path = folder / "run.json";
   const json document = json::parse(read_text_file(path), nullptr, false);

@@ -13,6 +13,7 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
+#include "app/commands/pipeline.h"
 #include "app/report/run_summary.h"
 #include "calib/camera/tag_observations.h"
 
@@ -52,6 +53,9 @@ class RunFolder : public OutputFolder {
 [[nodiscard]] std::vector<InputFile> hash_inputs(const Recording& recording);
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> list_options(
     const RunOptions& options);
+/// What every run says of its input: names, files, options, frames, markers, warnings of reading.
+void describe_input(const Recording& recording, const Observed& observed, const RunOptions& options,
+                    RunSummary& run);
 /// What is needed to run again.
 struct RunAgain {
   std::vector<std::string> arguments;

@@ -64,22 +64,6 @@ HandEyeInput hand_eye_input(const Recording& recording, Observed observed, const
   return out;
 }
 
-void describe(const Recording& recording, const Observed& observed, const RunOptions& options,
-              RunSummary& run) {
-  run.robot = recording.settings.name;
-  run.recording = recording.name;
-  run.entry = to_string(recording.entry);
-  run.version = program_version();
-  run.command = options.command_line;
-  run.arguments = options.arguments;
-  run.inputs = hash_inputs(recording);
-  run.options = list_options(options);
-  run.frames = static_cast<int>(observed.measurements.times_s.size());
-  run.markers = summarise_markers(observed, recording.markers);
-  run.warnings = recording.warnings;
-  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
-}
-
 // What limits of --fail-on speak of.
 void take_errors(const HandEye& result, RunSummary& run) {
   const bool corners = result.held_out.px > 0.0;
@@ -139,7 +123,7 @@ ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
   require_time_overlap(log, observed.measurements.times_s, "the video");
   summary.log = std::filesystem::path(log.source).filename().string();
   summary.time_column = log.time_column;
-  describe(recording, observed, options, run);
+  describe_input(recording, observed, options, run);
   for (const std::string& warning : run.warnings) print_warning(warning);
   clock.lap("detect", run.times);
 
