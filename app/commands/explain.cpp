@@ -127,7 +127,16 @@ std::vector<int> folds_of(const Calibration& calibration) {
 /// A structure, and effects to begin with beside it.
 struct Proposal {
   Structure structure;
-  std::vector<AddedEffect> known;
+  TraceStart begin = {};
+};
+
+/// Structures that were fitted, each with how many effects to begin with.
+using Tried = std::set<std::pair<Shape, std::size_t>>;
+
+/// Another camera than the declared one, and the robot that shows with it.
+struct OtherCamera {
+  CameraModel camera;
+  Structure structure;
 };
 
 class Explainer {
@@ -139,11 +148,18 @@ class Explainer {
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first = of_structure(structure_of(evidence_.tracks), {});
+    Explanation first = plainly_fitted(structure_of(evidence_.tracks));
     ExplainOptions options = options_;
     if (first.fitted && options.calibrate.fold_of_frame.empty())
       options.calibrate.fold_of_frame = folds_of(first.fitted->calibration);
     return Explainer(evidence_, std::move(options)).best_beside(std::move(first));
+  }
+
+  /// The robot and the effects of one account of other evidence, fitted to this; nothing where it
+  /// found no robot.
+  [[nodiscard]] std::optional<Explanation> carried_over(const Explanation& of) const {
+    if (!of.fitted || !of.structure) return std::nullopt;
+    return of_structure(*of.structure, {of.fitted->trace.added});
   }
 
   /// Clearly more probable, over all measurements that there are; of two that are about as
@@ -160,9 +176,10 @@ class Explainer {
   }
 
  private:
+  /// `first`: a plain fit.
   [[nodiscard]] Explanation best_beside(Explanation first) const {
-    std::set<Shape> tried;
-    Explanation now = asked_again(std::move(first));
+    Tried tried;
+    Explanation now = asked_again(begun_with(std::move(first), tried));
     // Beside joints that no fit settles for, doubts about some of them are not worth their time.
     if (now.fitted && !is_converged(now.fitted->calibration)) now = improved(std::move(now), tried);
     now = with_base_at_rest(with_couplings_doubted(std::move(now)));
@@ -228,32 +245,60 @@ class Explainer {
     }
   }
 
-  /// `known`: effects that it begins with.
   [[nodiscard]] TracedCalibration closed_loop(const CalibrationStart& start, FreeGeometry free,
                                               const Calibration& plain,
-                                              const std::vector<AddedEffect>& known) const {
+                                              const TraceStart& begin) const {
     if (!options_.trace) return {{}, plain, {}, {}, 0.0};
     CalibrateOptions options = options_.calibrate;
     options.free = free;
-    TracedCalibration out = trace_stage(recording(), evidence_.observed, start, plain, known,
+    TracedCalibration out = trace_stage(recording(), evidence_.observed, start, plain, begin,
                                         options, options_.progress);
     lap("trace");
     return out;
   }
 
-  /// `known`: effects that it begins with.
-  [[nodiscard]] Explanation of_structure(Structure structure,
-                                         const std::vector<AddedEffect>& known) const {
+  [[nodiscard]] Explanation of_structure(Structure structure, const TraceStart& begin) const {
+    return traced(plainly_fitted(std::move(structure)), begin);
+  }
+
+  /// A fit of the structure alone.
+  [[nodiscard]] Explanation plainly_fitted(Structure structure) const {
+    return plainly_fitted(std::move(structure), evidence_.camera);
+  }
+
+  /// The same with a camera of its own.
+  [[nodiscard]] Explanation fitted_with(const OtherCamera& other) const {
+    ExplainOptions options = options_;
+    options.calibrate.estimate_intrinsics = true;
+    return Explainer(evidence_, std::move(options)).plainly_fitted(other.structure, other.camera);
+  }
+
+  [[nodiscard]] Explanation plainly_fitted(Structure structure, const CameraModel& camera) const {
     Explanation out = begun();
     out.structure = std::move(structure);
     try {
       require_determined(*out.structure);
-      out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
-      fit(out, known);
+      out.start = start_from_structure(*out.structure, recording(), camera);
+      Calibration plain = calibrated(out.start, options_.calibrate.free);
+      if (is_converged(plain) && take_usual_units(plain.tree, out.start))
+        plain = calibrated(out.start, options_.calibrate.free);
+      out.fitted = {{}, std::move(plain), {}, {}, 0.0};
+      lap("calibrate");
     } catch (const Error& error) {
       keep_if_undetermined(error, out);
     }
     return out;
+  }
+
+  /// What a plain fit lacks, found and added.
+  [[nodiscard]] Explanation traced(Explanation plain, const TraceStart& begin) const {
+    if (!plain.fitted) return plain;
+    try {
+      close_loop(plain, begin);
+    } catch (const Error& error) {
+      keep_if_undetermined(error, plain);
+    }
+    return plain;
   }
 
   [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
@@ -273,19 +318,37 @@ class Explainer {
     }
   }
 
-  /// The best of what the moves propose, one after the other until one is of one piece. `tried`:
-  /// structures that were fitted without effects to begin with.
-  [[nodiscard]] Explanation improved(Explanation now, std::set<Shape>& tried) const {
-    if (now.structure) tried.insert(shape_of(*now.structure));
+  /// Effects are looked for beside the robot that shows with the declared camera; or with another
+  /// one, where the shapes of the markers speak for that and it predicts unseen frames better.
+  /// Tracks that a focal length of 19 % too much bends keep tracing busy for minutes, and leave it
+  /// beside couplings (`undeclared`, 12006).
+  [[nodiscard]] Explanation begun_with(Explanation first, Tried& tried) const {
+    if (first.structure) tried.insert({shape_of(*first.structure), 0});
+    if (const auto other = shapes_contradict_camera() ? with_other_camera() : std::nullopt) {
+      const Explanation with = fitted_with(*other);
+      if (is_better(with, first)) {
+        if (first.structure) tried.erase({shape_of(*first.structure), 0});
+        const Proposal proposal = camera_as_effects(with);
+        tried.insert({shape_of(proposal.structure), proposal.begin.known.size()});
+        return of_structure(proposal.structure, proposal.begin);
+      }
+    }
+    return traced(std::move(first), {});
+  }
+
+  /// The best of what the moves propose, one after the other until one is of one piece.
+  [[nodiscard]] Explanation improved(Explanation now, Tried& tried) const {
+    if (now.structure) tried.insert({shape_of(*now.structure), 0});
     for (const auto& propose :
          {&Explainer::with_slides_for_slight_turns, &Explainer::with_half_the_recording,
-          &Explainer::with_errors_allowed, &Explainer::with_camera_doubted}) {
+          &Explainer::with_errors_allowed, &Explainer::with_camera_doubted,
+          &Explainer::with_camera_believed}) {
       if (is_settled(now)) break;
       for (const Proposal& proposal : (this->*propose)(now)) {
         if (is_settled(now)) break;
-        // A structure alone is no news where it was fitted before.
-        if (proposal.known.empty() && !tried.insert(shape_of(proposal.structure)).second) continue;
-        Explanation other = asked_again(of_structure(proposal.structure, proposal.known));
+        if (!tried.insert({shape_of(proposal.structure), proposal.begin.known.size()}).second)
+          continue;
+        Explanation other = asked_again(of_structure(proposal.structure, proposal.begin));
         if (is_better(other, now)) now = std::move(other);
       }
     }
@@ -304,20 +367,16 @@ class Explainer {
     out.failure = error;
   }
 
-  void fit(Explanation& out, const std::vector<AddedEffect>& known) const {
+  void close_loop(Explanation& out, const TraceStart& begin) const {
     const FreeGeometry free = options_.calibrate.free;
-    Calibration plain = calibrated(out.start, free);
-    if (is_converged(plain) && take_usual_units(plain.tree, out.start))
-      plain = calibrated(out.start, free);
-    lap("calibrate");
-    out.fitted = closed_loop(out.start, free, plain, known);
+    out.fitted = closed_loop(out.start, free, out.fitted->calibration, begin);
     // An effect may have looked like another unit.
     if (!is_converged(out.fitted->calibration) ||
         !take_usual_units(out.fitted->calibration.tree, out.start))
       return;
-    plain = calibrated(out.start, free);
+    const Calibration plain = calibrated(out.start, free);
     lap("calibrate");
-    out.fitted = closed_loop(out.start, free, plain, out.fitted->trace.added);
+    out.fitted = closed_loop(out.start, free, plain, {out.fitted->trace.added});
   }
 
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
@@ -345,7 +404,7 @@ class Explainer {
         return now;
       }
       if (!answers.insert(shape_of(*again)).second) return now;
-      Explanation other = of_structure(std::move(*again), now.fitted->trace.added);
+      Explanation other = of_structure(std::move(*again), {now.fitted->trace.added});
       if (!is_better(other, now)) return now;
       now = std::move(other);
     }
@@ -391,7 +450,7 @@ class Explainer {
       for (const Marker& marker : links) {
         Explanation other = asked_again(
             of_structure(with_free_marker_on(*now.structure, marker, now.fitted->calibration),
-                         now.fitted->trace.added));
+                         {now.fitted->trace.added}));
         if (!is_explained(other) || !is_better(other, now)) continue;
         now = std::move(other);
         break;
@@ -457,19 +516,49 @@ class Explainer {
     if (!recording().camera || tags.observations.empty() ||
         (is_structure_clear(now) && now.fitted && !by_place))
       return {};
+    const std::optional<OtherCamera> other = with_other_camera();
+    if (!other) return {};
+    Explanation with = fitted_with(*other);
+    if (!with.fitted) return {};
+    return {camera_as_effects(std::move(with))};
+  }
+
+  // What another camera is, as what the declared one lacks.
+  static Proposal camera_as_effects(Explanation with) {
+    return {std::move(*with.structure),
+            {{{{"lens_distortion", "camera"}, 0.0},
+              {{"intrinsics", "camera focal length"}, 0.0},
+              {{"intrinsics", "camera centre"}, 0.0}},
+             std::move(with.fitted->calibration)}};
+  }
+
+  // Where another camera was begun with.
+  [[nodiscard]] std::vector<Proposal> with_camera_believed(const Explanation&) const {
+    if (!recording().camera || evidence_.observed.tags.observations.empty()) return {};
+    std::optional<Structure> structure = proposed_structure(evidence_.tracks);
+    if (!structure) return {};
+    return {{std::move(*structure), {}}};
+  }
+
+  [[nodiscard]] std::optional<OtherCamera> with_other_camera() const {
+    const TagObservations& tags = evidence_.observed.tags;
     for (const CameraModel& begin : cameras_to_begin_with()) {
       const std::optional<CameraModel> found =
           camera_from_motion(recording(), evidence_.observed, begin, options_.calibrate);
       if (!found) continue;
       std::optional<Structure> structure =
           proposed_structure(pose_tracks_from_tags(tags, *found, recording().markers));
-      if (!structure) continue;
-      return {{std::move(*structure),
-               {{{"lens_distortion", "camera"}, 0.0},
-                {{"intrinsics", "camera focal length"}, 0.0},
-                {{"intrinsics", "camera centre"}, 0.0}}}};
+      if (structure) return OtherCamera{*found, std::move(*structure)};
     }
-    return {};
+    return std::nullopt;
+  }
+
+  /// More than half of the odds, whatever they are worth: it decides what is tried first.
+  [[nodiscard]] bool shapes_contradict_camera() const {
+    const TagObservations& tags = evidence_.observed.tags;
+    if (!options_.trace || !recording().camera || tags.observations.empty()) return false;
+    const CameraModel shown = cameras_to_begin_with().front();
+    return log_odds_of_shapes(shown, evidence_.camera, tags, recording().markers) > 0.0;
   }
 
   // What the shapes of the markers' images say, where they say something; the declared one.
@@ -551,10 +640,18 @@ Explanation explain(const Evidence& evidence, const ExplainOptions& options,
     ExplainOptions alike = options;
     if (without_them.fitted)
       alike.calibrate.fold_of_frame = folds_of(without_them.fitted->calibration);
-    Explanation with_them = Explainer(evidence, std::move(alike)).explained(said_with_them);
-    if (!Explainer::is_better(without_them, with_them, evidence.observed.measurements)) {
-      warnings.insert(warnings.end(), said_with_them.begin(), said_with_them.end());
-      return with_them;
+    const Explainer with(evidence, std::move(alike));
+    const auto is_right = [&](const Explanation& with_them) {
+      return !Explainer::is_better(without_them, with_them, evidence.observed.measurements);
+    };
+    // A robot that the readings contradict is not looked for with them.
+    const std::optional<Explanation> same_robot = with.carried_over(without_them);
+    if (!same_robot || is_right(*same_robot)) {
+      Explanation with_them = with.explained(said_with_them);
+      if (is_right(with_them)) {
+        warnings.insert(warnings.end(), said_with_them.begin(), said_with_them.end());
+        return with_them;
+      }
     }
   }
   warnings.insert(warnings.end(), said.begin(), said.end());

@@ -58,8 +58,8 @@ void take_values(const Calibration& calibration, const std::vector<Correction>& 
 
 TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
                               const CalibrationStart& start, const Calibration& plain,
-                              const std::vector<AddedEffect>& known,
-                              const CalibrateOptions& options, const Progress& progress) {
+                              const TraceStart& begin, const CalibrateOptions& options,
+                              const Progress& progress) {
   if (options.free != FreeGeometry::kGeometry) {
     TracedCalibration out{{}, plain, {}, {}, 0.0};
     out.trace.verdict = TraceVerdict::kNothingToSay;
@@ -70,13 +70,14 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   }
   CalibrationTraceOptions trace_options;
   trace_options.calibrate = options;
-  trace_options.trace.start = known;
+  trace_options.trace.start = begin.known;
   if (recording.entry == RecordingEntry::kVideo) trace_options.trace.floor = kDetectorBias;
   // A declared gravity, and a nominal robot, put the base upright.
   if (recording.settings.gravity || start.nominal) {
     trace_options.gravity_base = -Eigen::Vector3d::UnitZ();
   }
-  CalibrationStart from = continued(start, plain);
+  CalibrationStart from = continued(start, begin.near.value_or(plain));
+  from.camera = plain.camera;
   const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
                                                    recording.log, from, trace_options, progress);
   TracedCalibration out{found.trace, plain, found.effects, found.gravity_base,

@@ -16,11 +16,19 @@ struct TracedCalibration {
   double stamp_jitter_s = 0.0;  ///< CalibrationTrace's
 };
 
-/// `start` is where `plain` began; `known`: effects that it begins with, which stay if they earn
-/// their place. The time offset stays estimated whether it is found to matter or not.
+/// What tracing begins with.
+struct TraceStart {
+  std::vector<AddedEffect> known = {};  ///< effects, which stay if they earn their place
+  /// A fit that has what they do, where one without them ends far from it: with the camera that
+  /// corners show in place of the declared one.
+  std::optional<Calibration> near = {};
+};
+
+/// `start` is where `plain` began. The time offset stays estimated whether it is found to matter or
+/// not.
 [[nodiscard]] TracedCalibration trace_stage(const Recording& recording, const Observed& observed,
                                             const CalibrationStart& start, const Calibration& plain,
-                                            const std::vector<AddedEffect>& known,
+                                            const TraceStart& begin,
                                             const CalibrateOptions& options,
                                             const Progress& progress);
 

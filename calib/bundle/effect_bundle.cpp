@@ -85,16 +85,22 @@ struct End {
   double cost = 0.0;
 };
 
-// For each of the names the first correction of that name that no earlier one has; nothing where
-// one is not among the corrections.
+std::vector<std::string> names_of(const std::vector<Correction>& corrections) {
+  std::vector<std::string> out;
+  for (const Correction& correction : corrections) out.push_back(correction.name);
+  return out;
+}
+
+// For each of the names the first of `among` of that name that no earlier one has; nothing where
+// one is not among them.
 std::optional<std::vector<std::size_t>> matching(const std::vector<std::string>& names,
-                                                 const std::vector<Correction>& corrections) {
+                                                 const std::vector<std::string>& among) {
   std::vector<std::size_t> out;
-  std::vector<bool> taken(corrections.size(), false);
+  std::vector<bool> taken(among.size(), false);
   for (const std::string& name : names) {
     std::size_t k = 0;
-    while (k < corrections.size() && (taken[k] || corrections[k].name != name)) ++k;
-    if (k == corrections.size()) return std::nullopt;
+    while (k < among.size() && (taken[k] || among[k] != name)) ++k;
+    if (k == among.size()) return std::nullopt;
     taken[k] = true;
     out.push_back(k);
   }
@@ -116,8 +122,15 @@ struct EffectBundle::Impl {
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  /// Where the best fit ended whose freedom the change has, too: the fit begins there.
-  void begin_near(const BundleChange& change, State& state) const;
+  /// Where the best fit ended whose freedom the change has, too.
+  [[nodiscard]] std::optional<State> end_with_less(const BundleChange& change,
+                                                   const State& state) const;
+  /// Where the best fit ended that has the change's freedom and the least beyond it.
+  [[nodiscard]] std::optional<State> end_with_more(const BundleChange& change,
+                                                   const State& state) const;
+  /// The most probable of those and of `state`.
+  [[nodiscard]] State begin_of(const BundleChange& change, const Spec& with,
+                               const State& state) const;
   void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s,
@@ -278,33 +291,80 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
   }
 }
 
-void EffectBundle::Impl::begin_near(const BundleChange& change, State& state) const {
+std::optional<State> EffectBundle::Impl::end_with_less(const BundleChange& change,
+                                                       const State& state) const {
+  const std::vector<std::string> names = names_of(change.corrections);
   const End* best = nullptr;
   std::vector<std::size_t> best_places;
   for (const End& end : ends) {
     if (end.time_offset && !change.time_offset) continue;
     if (end.without_couplings != change.without_couplings) continue;
     if (best != nullptr && end.cost > best->cost) continue;
-    auto places = matching(end.corrections, change.corrections);
+    auto places = matching(end.corrections, names);
     if (!places) continue;
     best = &end;
     best_places = std::move(*places);
   }
-  if (best == nullptr) return;
-  const std::vector<double> values = std::move(state.corrections);
-  const std::array<double, 1> time_offset = state.time_offset;
-  state = best->state;
-  if (!best->time_offset) state.time_offset = time_offset;
-  state.corrections = values;
+  if (best == nullptr) return std::nullopt;
+  State out = best->state;
+  if (!best->time_offset) out.time_offset = state.time_offset;
+  out.corrections = state.corrections;
   for (std::size_t k = 0; k < best_places.size(); ++k)
-    state.corrections[best_places[k]] = best->state.corrections[k];
+    out.corrections[best_places[k]] = best->state.corrections[k];
+  return out;
+}
+
+std::optional<State> EffectBundle::Impl::end_with_more(const BundleChange& change,
+                                                       const State& state) const {
+  const std::vector<std::string> names = names_of(change.corrections);
+  const auto freedom_of = [](const End& end) {
+    return end.corrections.size() + static_cast<std::size_t>(end.time_offset);
+  };
+  const End* best = nullptr;
+  std::vector<std::size_t> best_places;
+  for (const End& end : ends) {
+    if (change.time_offset && !end.time_offset) continue;
+    if (end.without_couplings != change.without_couplings) continue;
+    if (best != nullptr &&
+        std::pair(freedom_of(end), end.cost) >= std::pair(freedom_of(*best), best->cost))
+      continue;
+    auto places = matching(names, end.corrections);
+    if (!places) continue;
+    best = &end;
+    best_places = std::move(*places);
+  }
+  if (best == nullptr) return std::nullopt;
+  State out = best->state;
+  if (!change.time_offset) out.time_offset = state.time_offset;
+  out.corrections.clear();
+  for (const std::size_t place : best_places)
+    out.corrections.push_back(best->state.corrections[place]);
+  return out;
+}
+
+State EffectBundle::Impl::begin_of(const BundleChange& change, const Spec& with,
+                                   const State& state) const {
+  std::optional<State> best;
+  double least = 0.0;
+  for (const std::optional<State>& other :
+       {end_with_less(change, state), end_with_more(change, state), std::optional(state)}) {
+    if (!other) continue;
+    State tried = *other;
+    const std::optional<double> cost = bundle::cost_of(with, tried, used);
+    if (!cost || (best && *cost >= least)) continue;
+    best = std::move(tried);
+    least = *cost;
+  }
+  if (best) return *std::move(best);
+  // Everywhere it puts a marker where nothing can be predicted.
+  State without = state;
+  std::ranges::fill(without.corrections, 0.0);
+  return without;
 }
 
 void EffectBundle::Impl::remember(const BundleChange& change, const State& state,
                                   double cost) const {
-  End end{change.time_offset, {}, change.without_couplings, state, cost};
-  for (const Correction& correction : change.corrections)
-    end.corrections.push_back(correction.name);
+  End end{change.time_offset, names_of(change.corrections), change.without_couplings, state, cost};
   const auto known = std::ranges::find_if(ends, [&](const End& other) {
     return other.time_offset == end.time_offset && other.corrections == end.corrections &&
            other.without_couplings == end.without_couplings;
@@ -320,15 +380,9 @@ void EffectBundle::Impl::remember(const BundleChange& change, const State& state
 BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
   change_model(change, with, state);
-  begin_near(change, state);
+  state = begin_of(change, with, state);
   constexpr int kIterations = 60;
-  bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
-  if (!summary.evaluated) {
-    // Beside what other effects bent, these put a marker where nothing can be predicted.
-    change_model(change, with, state);
-    std::ranges::fill(state.corrections, 0.0);
-    summary = bundle::solve(with, state, used, {}, kIterations);
-  }
+  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
   if (summary.converged) remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;

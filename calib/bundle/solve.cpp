@@ -244,13 +244,16 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &built.problem(), &summary);
-  const auto iterations = static_cast<int>(summary.iterations.size());
-  return {summary.termination_type == ceres::CONVERGENCE,
-          summary.message,
-          iterations,
-          summary.initial_cost,
-          summary.final_cost,
-          iterations > 0};
+  return {summary.termination_type == ceres::CONVERGENCE, summary.message,
+          static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};
+}
+
+std::optional<double> cost_of(const Spec& spec, State& state, const std::vector<int>& sightings) {
+  BuiltProblem built(spec, state, sightings, {});
+  if (built.blocks().empty()) return 0.0;
+  double cost = 0.0;
+  if (!built.problem().Evaluate({}, &cost, nullptr, nullptr, nullptr)) return std::nullopt;
+  return cost;
 }
 
 std::vector<int> usable_sightings(const Spec& spec, const State& state) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "calib/bundle/problem.h"
@@ -17,13 +18,17 @@ struct SolveSummary {
   int iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  bool evaluated = true;  ///< false: not even at the start, where the state has been left
 };
 
 /// Least squares over the given sightings; moves `state`. Single-threaded, so that the bits are the
 /// same.
 [[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
                                  const BuildOptions& options, int max_iterations);
+
+/// Of a State, without robust loss, in the unit of SolveSummary's; nothing where a sighting cannot
+/// be predicted.
+[[nodiscard]] std::optional<double> cost_of(const Spec& spec, State& state,
+                                            const std::vector<int>& sightings);
 
 /// Robust solve, noise level per marker (per rotation and translation for poses), and once more:
 /// moves `state` to where no outlier pulls it. Rescales the sigmas in `spec`.

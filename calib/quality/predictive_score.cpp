@@ -10,10 +10,10 @@
 
 #include <Eigen/Geometry>
 
+#include "kinematics/core/student_t.h"
+
 namespace kinescope {
 namespace {
-
-constexpr double kFreedom = 4.0;  // of Student's t: tails as sightings of markers have them
 
 // One kind of residual (corners; turns; shifts): squared lengths, coordinates each, the volume that
 // a sighting without a place may be in.
@@ -23,40 +23,16 @@ struct Part {
   double log_extent = 0.0;  // of one coordinate
 };
 
-// The scale under which the residuals are the most probable, squared: expectation-maximisation.
-double squared_scale(const Part& part) {
-  double scale = 0.0;
-  for (const double r2 : part.squares) scale += r2;
-  scale /= part.coordinates * static_cast<double>(part.squares.size());
-  constexpr int kMostSteps = 200;
-  constexpr double kSettled = 1e-9;
-  for (int step = 0; step < kMostSteps && scale > 0.0; ++step) {
-    double sum = 0.0;
-    for (const double r2 : part.squares)
-      sum += r2 * (kFreedom + part.coordinates) / (kFreedom + r2 / scale);
-    const double next = sum / (part.coordinates * static_cast<double>(part.squares.size()));
-    const bool settled = std::abs(next / scale - 1.0) < kSettled;
-    scale = next;
-    if (settled) break;
-  }
-  return scale;
-}
-
 // `read_off`: coordinates that were used up, and may have been anything.
 double deviance_of(const Part& part, std::size_t sightings, double read_off = 0.0) {
-  const double d = part.coordinates;
   const double elsewhere = static_cast<double>(sightings - part.squares.size());
-  double out = elsewhere * 2.0 * d * part.log_extent;
+  const double out = elsewhere * 2.0 * part.coordinates * part.log_extent;
   if (part.squares.empty()) return out;
   // Data without noise would be infinitely probable.
   constexpr double kExact = 1e-12;
-  const double scale = std::max(squared_scale(part), kExact * std::exp(2.0 * part.log_extent));
-  out += read_off * (2.0 * part.log_extent - std::log(scale));
-  const double norm = std::lgamma(0.5 * (kFreedom + d)) - std::lgamma(0.5 * kFreedom) -
-                      0.5 * d * std::log(kFreedom * std::numbers::pi * scale);
-  for (const double r2 : part.squares)
-    out += (kFreedom + d) * std::log1p(r2 / (kFreedom * scale)) - 2.0 * norm;
-  return out;
+  const StudentT fit =
+      fit_student_t(part.squares, part.coordinates, kExact * std::exp(2.0 * part.log_extent));
+  return out + read_off * (2.0 * part.log_extent - std::log(fit.scale_squared)) + fit.deviance;
 }
 
 double squared_length(const std::vector<Eigen::Vector2d>& corners) {

@@ -42,8 +42,9 @@ Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Prog
 
 Trace Tracer::run() {
   report_progress(progress_, "trace", 0, 0);
+  // From the model's own start, which may have in it what they do; not from where it ends without.
+  now_ = stage_of(options_.start);
   base_ = stage_of({});
-  now_ = options_.start.empty() ? base_ : stage_of(options_.start);
   if (can_look(*now_)) search();
   const int rounds = std::max(1, round_);
   report_progress(progress_, "trace", rounds, rounds);

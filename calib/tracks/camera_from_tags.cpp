@@ -14,6 +14,7 @@
 #include "calib/tracks/planar_pose.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/silence_glog.h"
+#include "kinematics/core/student_t.h"
 
 namespace kinescope {
 namespace {
@@ -153,6 +154,23 @@ CameraModel camera_from_tags(const TagObservations& observations, const MarkerSe
   CameraModel camera = guess;
   for (int round = 0; round < kRounds; ++round) camera = refined(camera, guess, views, markers);
   return camera;
+}
+
+double log_odds_of_shapes(const CameraModel& of, const CameraModel& against,
+                          const TagObservations& observations, const MarkerSet& markers) {
+  std::vector<double> left_of, left_against;  // chi-square
+  for (const TagObservation* view : chosen_views(observations)) {
+    const std::vector<Eigen::Vector3d> corners_m = markers.corners_m(view->id);
+    const auto one = estimate_planar_pose(of, corners_m, view->corners_px, view->sigma_px);
+    const auto other = estimate_planar_pose(against, corners_m, view->corners_px, view->sigma_px);
+    if (!one || !other) continue;
+    left_of.push_back(one->best.chi_square);
+    left_against.push_back(other->best.chi_square);
+  }
+  constexpr double kLeft = 2.0;     // coordinates of a square: eight less the six of its pose
+  constexpr double kExact = 1e-12;  // of the declared noise, squared
+  return 0.5 * (fit_student_t(left_against, kLeft, kExact).deviance -
+                fit_student_t(left_of, kLeft, kExact).deviance);
 }
 
 }  // namespace kinescope
