@@ -88,6 +88,17 @@ TEST(Explain, HalfARecordingShowsTheRobotWhereTheCameraWasBumped) {
   EXPECT_EQ(only_effect(answered), "camera_bump camera");
 }
 
+// A focal length of 19 % too much: beside the structure that shows with the declared camera, it
+// would be found among couplings, if at all.
+TEST(Explain, AFocalLengthThatIsFarOffIsFoundBesideACorruptedRow) {
+  const Answered answered = run_case(12006, Damage::kCorruptedRow);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(only_effect(answered), "intrinsics camera focal length");
+  EXPECT_NE(answered.outcome.err.find("'q3' reads 12.929"), std::string::npos)
+      << answered.outcome.err;
+}
+
 TEST(Explain, AReadingThatContradictsEverythingIsPutAsideAndNamed) {
   const Answered answered = run_case(0, Damage::kCorruptedRow);
   EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;

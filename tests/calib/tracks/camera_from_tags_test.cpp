@@ -74,6 +74,21 @@ TEST(CameraFromTags, LensAndCentreShowInTheMarkersShapes) {
   EXPECT_LT((*project(found, corner) - *project(truth, corner)).norm(), 3.0);
 }
 
+TEST(CameraFromTags, ShapesSpeakForTheCameraThatTheyAreOfWhateverTheMarkersMeasure) {
+  const CameraModel truth = lens();
+  const TagObservations seen = views(truth, 0.2, 1.0);
+  CameraModel zoomed = truth;
+  zoomed.fx = zoomed.fy = 1.1 * truth.fx;
+  const double odds = log_odds_of_shapes(truth, zoomed, seen, one_size());
+  // A tenth of the focal length: half of the noise in each of 400 views is 35.
+  EXPECT_GT(odds, 100.0);
+  EXPECT_DOUBLE_EQ(log_odds_of_shapes(zoomed, truth, seen, one_size()), -odds);
+  EXPECT_EQ(log_odds_of_shapes(truth, truth, seen, one_size()), 0.0);
+  MarkerSet twice;
+  twice.default_size_m = 0.2;
+  EXPECT_NEAR(log_odds_of_shapes(truth, zoomed, seen, twice), odds, 1e-3 * odds);
+}
+
 TEST(CameraFromTags, MarkersSeenFaceOnShowNoFocalLength) {
   TagObservations flat;
   flat.width = 1280;
