@@ -10,13 +10,15 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/doubted_sight.h"
 #include "calib/bundle/undone.h"
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/predictive_score.h"
 #include "calib/quality/unknown_axes.h"
-#include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/tracks/shown_shapes.h"
+#include "kinematics/core/student_t.h"
 #include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
@@ -130,14 +132,31 @@ struct Proposal {
   TraceStart begin = {};
 };
 
-/// Structures that were fitted, each with how many effects to begin with.
-using Tried = std::set<std::pair<Shape, std::size_t>>;
+/// Structures that were fitted, each with the effects to begin with.
+using Tried = std::set<std::pair<Shape, std::vector<EffectId>>>;
 
-/// Another camera than the declared one, and the robot that shows with it.
-struct OtherCamera {
-  CameraModel camera;
-  Structure structure;
-};
+std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
+                                                 const TraceStart& begin) {
+  std::pair<Shape, std::vector<EffectId>> out{shape_of(structure), {}};
+  for (const AddedEffect& effect : begin.known) out.second.push_back(effect.id);
+  return out;
+}
+
+/// Standard deviation of a corner's coordinate about a robot's prediction of frames that it has not
+/// seen, px; 0 where no corner is predicted.
+double noise_of_corners(const Calibration& calibration) {
+  constexpr double kOfASquare = 8.0;
+  constexpr double kLeast = 1e-12;  // px^2
+  std::vector<double> squares;
+  for (const SightingResidual& residual : calibration.residuals) {
+    const auto& px = residual.held_out_px.empty() ? residual.corners_px : residual.held_out_px;
+    if (2.0 * static_cast<double>(px.size()) != kOfASquare) continue;
+    double sum = 0.0;
+    for (const Eigen::Vector2d& corner : px) sum += corner.squaredNorm();
+    squares.push_back(sum);
+  }
+  return std::sqrt(fit_student_t(squares, kOfASquare, kLeast).scale_squared);
+}
 
 class Explainer {
  public:
@@ -263,22 +282,11 @@ class Explainer {
 
   /// A fit of the structure alone.
   [[nodiscard]] Explanation plainly_fitted(Structure structure) const {
-    return plainly_fitted(std::move(structure), evidence_.camera);
-  }
-
-  /// The same with a camera of its own.
-  [[nodiscard]] Explanation fitted_with(const OtherCamera& other) const {
-    ExplainOptions options = options_;
-    options.calibrate.estimate_intrinsics = true;
-    return Explainer(evidence_, std::move(options)).plainly_fitted(other.structure, other.camera);
-  }
-
-  [[nodiscard]] Explanation plainly_fitted(Structure structure, const CameraModel& camera) const {
     Explanation out = begun();
     out.structure = std::move(structure);
     try {
       require_determined(*out.structure);
-      out.start = start_from_structure(*out.structure, recording(), camera);
+      out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
       Calibration plain = calibrated(out.start, options_.calibrate.free);
       if (is_converged(plain) && take_usual_units(plain.tree, out.start))
         plain = calibrated(out.start, options_.calibrate.free);
@@ -288,6 +296,19 @@ class Explainer {
       keep_if_undetermined(error, out);
     }
     return out;
+  }
+
+  /// The robot that shows with another sight, beside that; nothing where none does.
+  [[nodiscard]] std::optional<Explanation> fitted_with(const Sight& sight) const {
+    std::optional<Structure> structure = proposed_structure(
+        pose_tracks_from_tags(evidence_.observed.tags, sight.camera, sight.markers));
+    if (!structure) return std::nullopt;
+    ExplainOptions options = options_;
+    options.calibrate.estimate_intrinsics |= sight.is_camera_free;
+    Recording other = recording();
+    other.markers = sight.markers;
+    const Evidence seen{other, evidence_.observed, evidence_.tracks, sight.camera};
+    return Explainer(seen, std::move(options)).plainly_fitted(*std::move(structure));
   }
 
   /// What a plain fit lacks, found and added.
@@ -318,36 +339,65 @@ class Explainer {
     }
   }
 
-  /// Effects are looked for beside the robot that shows with the declared camera; or with another
-  /// one, where the shapes of the markers speak for that and it predicts unseen frames better.
-  /// Tracks that a focal length of 19 % too much bends keep tracing busy for minutes, and leave it
-  /// beside couplings (`undeclared`, 12006).
+  /// Effects are looked for beside the robot that shows with what was declared; or with a camera or
+  /// markers that the images themselves speak for, where that predicts unseen frames better. Tracks
+  /// that a focal length of 19 % too much bends keep tracing busy for minutes, and leave it beside
+  /// couplings (`undeclared`, 12006); those of a marker that is not flat hang others elsewhere
+  /// (11063).
   [[nodiscard]] Explanation begun_with(Explanation first, Tried& tried) const {
-    if (first.structure) tried.insert({shape_of(*first.structure), 0});
-    if (const auto other = shapes_contradict_camera() ? with_other_camera() : std::nullopt) {
-      const Explanation with = fitted_with(*other);
-      if (is_better(with, first)) {
-        if (first.structure) tried.erase({shape_of(*first.structure), 0});
-        const Proposal proposal = camera_as_effects(with);
-        tried.insert({shape_of(proposal.structure), proposal.begin.known.size()});
-        return of_structure(proposal.structure, proposal.begin);
+    std::optional<Explanation> best;
+    TraceStart begin;
+    if (options_.trace && misses_more_than_shapes(first)) {
+      for (const std::optional<Sight>& sight : contradicted_sights()) {
+        std::optional<Explanation> with = sight ? fitted_with(*sight) : std::nullopt;
+        if (!with || !with->fitted || !is_better(*with, best ? *best : first)) continue;
+        begin = {sight->told_by, with->fitted->calibration};
+        best = std::move(with);
       }
     }
-    return traced(std::move(first), {});
+    if (!best) {
+      if (first.structure) tried.insert(tried_as(*first.structure, {}));
+      return traced(std::move(first), {});
+    }
+    tried.insert(tried_as(*best->structure, begin));
+    return of_structure(*std::move(best->structure), begin);
+  }
+
+  [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights() const {
+    const Observed& observed = evidence_.observed;
+    std::vector<std::optional<Sight>> out;
+    if (shapes_contradict_camera(recording(), observed, evidence_.camera))
+      out.push_back(other_camera());
+    out.push_back(with_other_markers(recording(), observed, evidence_.camera));
+    return out;
+  }
+
+  [[nodiscard]] std::optional<Sight> other_camera() const {
+    return with_other_camera(recording(), evidence_.observed, evidence_.camera, options_.calibrate);
+  }
+
+  /// Worth the second that a look at the shapes takes: more than half of what the robot misses is
+  /// no noise of the corners.
+  [[nodiscard]] bool misses_more_than_shapes(const Explanation& of) const {
+    const TagObservations& tags = evidence_.observed.tags;
+    if (tags.observations.empty()) return false;
+    if (!of.fitted) return true;
+    constexpr double kHalf = 2.0;
+    return noise_of_corners(of.fitted->calibration) >
+           kHalf * noise_of_shapes(evidence_.camera, tags, recording().markers);
   }
 
   /// The best of what the moves propose, one after the other until one is of one piece.
   [[nodiscard]] Explanation improved(Explanation now, Tried& tried) const {
-    if (now.structure) tried.insert({shape_of(*now.structure), 0});
+    if (now.structure) tried.insert(tried_as(*now.structure, {}));
     for (const auto& propose :
          {&Explainer::with_slides_for_slight_turns, &Explainer::with_half_the_recording,
           &Explainer::with_errors_allowed, &Explainer::with_camera_doubted,
-          &Explainer::with_camera_believed}) {
+          &Explainer::with_all_believed}) {
       if (is_settled(now)) break;
       for (const Proposal& proposal : (this->*propose)(now)) {
         if (is_settled(now)) break;
-        if (!tried.insert({shape_of(proposal.structure), proposal.begin.known.size()}).second)
-          continue;
+        if (!tried.insert(tried_as(proposal.structure, proposal.begin)).second) continue;
         Explanation other = asked_again(of_structure(proposal.structure, proposal.begin));
         if (is_better(other, now)) now = std::move(other);
       }
@@ -516,58 +566,17 @@ class Explainer {
     if (!recording().camera || tags.observations.empty() ||
         (is_structure_clear(now) && now.fitted && !by_place))
       return {};
-    const std::optional<OtherCamera> other = with_other_camera();
-    if (!other) return {};
-    Explanation with = fitted_with(*other);
-    if (!with.fitted) return {};
-    return {camera_as_effects(std::move(with))};
+    const std::optional<Sight> other = other_camera();
+    const std::optional<Explanation> with = other ? fitted_with(*other) : std::nullopt;
+    if (!with || !with->fitted) return {};
+    return {{*with->structure, {other->told_by, with->fitted->calibration}}};
   }
 
-  // What another camera is, as what the declared one lacks.
-  static Proposal camera_as_effects(Explanation with) {
-    return {std::move(*with.structure),
-            {{{{"lens_distortion", "camera"}, 0.0},
-              {{"intrinsics", "camera focal length"}, 0.0},
-              {{"intrinsics", "camera centre"}, 0.0}},
-             std::move(with.fitted->calibration)}};
-  }
-
-  // Where another camera was begun with.
-  [[nodiscard]] std::vector<Proposal> with_camera_believed(const Explanation&) const {
-    if (!recording().camera || evidence_.observed.tags.observations.empty()) return {};
+  // Where another sight was begun with.
+  [[nodiscard]] std::vector<Proposal> with_all_believed(const Explanation&) const {
     std::optional<Structure> structure = proposed_structure(evidence_.tracks);
     if (!structure) return {};
     return {{std::move(*structure), {}}};
-  }
-
-  [[nodiscard]] std::optional<OtherCamera> with_other_camera() const {
-    const TagObservations& tags = evidence_.observed.tags;
-    for (const CameraModel& begin : cameras_to_begin_with()) {
-      const std::optional<CameraModel> found =
-          camera_from_motion(recording(), evidence_.observed, begin, options_.calibrate);
-      if (!found) continue;
-      std::optional<Structure> structure =
-          proposed_structure(pose_tracks_from_tags(tags, *found, recording().markers));
-      if (structure) return OtherCamera{*found, std::move(*structure)};
-    }
-    return std::nullopt;
-  }
-
-  /// More than half of the odds, whatever they are worth: it decides what is tried first.
-  [[nodiscard]] bool shapes_contradict_camera() const {
-    const TagObservations& tags = evidence_.observed.tags;
-    if (!options_.trace || !recording().camera || tags.observations.empty()) return false;
-    const CameraModel shown = cameras_to_begin_with().front();
-    return log_odds_of_shapes(shown, evidence_.camera, tags, recording().markers) > 0.0;
-  }
-
-  // What the shapes of the markers' images say, where they say something; the declared one.
-  [[nodiscard]] std::vector<CameraModel> cameras_to_begin_with() const {
-    try {
-      return {camera_from_tags(evidence_.observed.tags, recording().markers), evidence_.camera};
-    } catch (const Error&) {
-      return {evidence_.camera};
-    }
   }
 
   const Evidence& evidence_;

@@ -99,6 +99,14 @@ TEST(Explain, AFocalLengthThatIsFarOffIsFoundBesideACorruptedRow) {
       << answered.outcome.err;
 }
 
+// Bent by 2.5 mm, the only marker of its link: on its track the links behind hang elsewhere.
+TEST(Explain, ABentMarkerIsSeenBeforeTheStructureIsSearchedFor) {
+  const Answered answered = run_case(11063);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(only_effect(answered), "bent_tag tag_11");
+}
+
 TEST(Explain, AReadingThatContradictsEverythingIsPutAsideAndNamed) {
   const Answered answered = run_case(0, Damage::kCorruptedRow);
   EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
