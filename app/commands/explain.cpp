@@ -142,9 +142,9 @@ std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
   return out;
 }
 
-/// Standard deviation of a corner's coordinate about a robot's prediction of frames that it has not
+/// Student's scale of a corner's coordinate about a robot's prediction of frames that it has not
 /// seen, px; 0 where no corner is predicted.
-double noise_of_corners(const Calibration& calibration) {
+double scale_of_corners(const Calibration& calibration) {
   constexpr double kOfASquare = 8.0;
   constexpr double kLeast = 1e-12;  // px^2
   std::vector<double> squares;
@@ -383,8 +383,8 @@ class Explainer {
     if (tags.observations.empty()) return false;
     if (!of.fitted) return true;
     constexpr double kHalf = 2.0;
-    return noise_of_corners(of.fitted->calibration) >
-           kHalf * noise_of_shapes(evidence_.camera, tags, recording().markers);
+    return scale_of_corners(of.fitted->calibration) >
+           kHalf * scale_of_shapes(evidence_.camera, tags, recording().markers);
   }
 
   /// The best of what the moves propose, one after the other until one is of one piece.

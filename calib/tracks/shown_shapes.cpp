@@ -196,7 +196,7 @@ std::vector<ShownShape> shown_shapes(const CameraModel& camera, const TagObserva
   return out;
 }
 
-double noise_of_shapes(const CameraModel& camera, const TagObservations& observations,
+double scale_of_shapes(const CameraModel& camera, const TagObservations& observations,
                        const MarkerSet& markers) {
   std::vector<double> squares;  // px^2
   for (const auto& [id, views] : views_by_marker(observations, markers)) {

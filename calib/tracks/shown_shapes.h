@@ -2,7 +2,7 @@
 //
 // Takes   corners of square markers in many views, and the camera.
 // Gives   the shape that each marker's images show, and how much better it tells them than a flat
-//         square does; the noise of the corners.
+//         square does; the scale of the corners' noise.
 // Method  every view has a pose of its own, whatever carries the marker. What no pose takes is
 //         linear in the shape: variable projection (Golub and Pereyra 1973), views weighted as
 //         Student's t has them.
@@ -30,9 +30,9 @@ struct ShownShape {
                                                    const TagObservations& observations,
                                                    const MarkerSet& markers);
 
-/// Standard deviation of a corner's coordinate, px, by what the best pose of each view leaves; 0
-/// where there is no view of a square.
-[[nodiscard]] double noise_of_shapes(const CameraModel& camera, const TagObservations& observations,
+/// Student's scale of a corner's coordinate, px, by what the best pose of each view leaves (of
+/// normal noise 0.8 of its standard deviation); 0 where there is no view of a square.
+[[nodiscard]] double scale_of_shapes(const CameraModel& camera, const TagObservations& observations,
                                      const MarkerSet& markers);
 
 }  // namespace kinescope
