@@ -13,6 +13,7 @@
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
 #include "app/commands/progress_line.h"
+#include "app/commands/sighting_doubts.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/datasets/dataset.h"
 #include "kinematics/recorded/container.h"
@@ -220,6 +221,27 @@ void look_at_nominal(const Recording& recording, std::vector<Finding>& findings)
   }
 }
 
+// What of the sightings is not used, as `run` says it; of a video its own look says so.
+void look_at_sightings(const Recording& recording, std::vector<Finding>& findings) {
+  const std::vector<double>* times_s = recording.corners  ? &recording.corners->times_s
+                                       : recording.poses  ? &recording.poses->times_s
+                                       : recording.points ? &recording.points->times_s
+                                                          : nullptr;
+  if (times_s == nullptr) return;
+  constexpr std::size_t kFew = 10;
+  if (times_s->size() < kFew) {
+    findings.push_back({false, fmt::format("{} frame{} only: nothing can be told of how the "
+                                           "markers move; record while every joint moves",
+                                           times_s->size(), times_s->size() == 1 ? "" : "s")});
+  }
+  std::vector<std::string> words = uncovered_words(recording.log, *times_s);
+  if (recording.corners) {
+    for (std::string& more : unlisted_marker_words(*recording.corners))
+      words.push_back(std::move(more));
+  }
+  for (std::string& sentence : words) findings.push_back({false, std::move(sentence)});
+}
+
 }  // namespace
 
 bool Inspection::ready() const { return std::ranges::none_of(findings, &Finding::problem); }
@@ -248,6 +270,7 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
   }
   if (!attempt.errors.empty()) return inspection;
   if (recording.nominal) look_at_nominal(recording, findings);
+  look_at_sightings(recording, findings);
   note_what_is_missing(inspection);
   return inspection;
 }

@@ -10,6 +10,7 @@
 #include "app/commands/inspection.h"
 #include "app/commands/log_doubts.h"
 #include "kinematics/core/median.h"
+#include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
 namespace {
@@ -99,6 +100,19 @@ void note_units(const std::vector<ChannelFacts>& channels, std::vector<Finding>&
                           fmt::join(units, ", "))});
 }
 
+// `run` judges them by the markers.
+void note_readings_apart(const JointLog& log, const std::vector<ReadingApart>& apart,
+                         std::vector<Finding>& findings) {
+  for (const ReadingApart& reading : apart) {
+    findings.push_back(
+        {false, fmt::format("{}: at {} = {} '{}' reads {:.6g}, which none of its other readings "
+                            "comes near: `run` puts it aside unless the markers say the same",
+                            log.source, log.time_column, log.times_s[reading.row],
+                            log.channels[static_cast<std::size_t>(reading.channel)],
+                            log.values(static_cast<Eigen::Index>(reading.row), reading.channel))});
+  }
+}
+
 }  // namespace
 
 LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
@@ -111,8 +125,12 @@ LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
   if (log.size() < 10) {
     findings.push_back({false, fmt::format("the log holds {} samples only", log.size())});
   }
+  // One wild reading is no range, and says nothing of the unit.
+  const std::vector<ReadingApart> apart = readings_apart(log);
+  const JointLog calm = without_readings(log, apart);
+  note_readings_apart(log, apart, findings);
   for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
-    facts.channels.push_back(look_at_channel(log, c, settings, findings));
+    facts.channels.push_back(look_at_channel(calm, c, settings, findings));
   }
   note_units(facts.channels, findings);
   for (std::string& words : clock_jump_words(log)) findings.push_back({false, std::move(words)});

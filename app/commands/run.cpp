@@ -16,6 +16,7 @@
 #include "app/commands/progress_line.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
+#include "app/commands/sighting_doubts.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/effects_file.h"
@@ -49,7 +50,9 @@ void describe_recording(const Recording& recording, const Observed& observed,
   for (const RejectedTag& tag : observed.tags.rejected) ++rejected[tag.reason];
   run.rejected.assign(rejected.begin(), rejected.end());
   for (const std::vector<std::string>& more :
-       {clock_jump_words(recording.log), frozen_log_words(recording.log, observed)}) {
+       {clock_jump_words(recording.log), frozen_log_words(recording.log, observed),
+        uncovered_words(recording.log, observed.measurements.times_s),
+        unlisted_marker_words(observed.tags)}) {
     run.warnings.insert(run.warnings.end(), more.begin(), more.end());
   }
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();

@@ -12,6 +12,7 @@
 
 #include "app/io/bag_files.h"
 #include "app/io/nearest_name.h"
+#include "app/io/recording_doubts.h"
 #include "app/io/recording_files.h"
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/bad_rows.h"
@@ -259,6 +260,7 @@ void take_image_size(Recording& recording, const RecordingFiles& files) {
   corners.height = recording.camera->height;
   refuse_normalised(corners, *recording.camera, value_of(files.corners));
   leave_out_outside(corners, *recording.camera, files, recording.warnings);
+  refuse_mirrored(corners, recording.markers, value_of(files.corners));
 }
 
 void read_sightings(Recording& recording, const RecordingFiles& files) {
@@ -496,6 +498,7 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
     if (!recording.camera) return;
     recording.camera_file = *files.camera;
     warn_of_pixels(*recording.camera, *files.camera, recording.warnings);
+    warn_of_principal_point(*recording.camera, *files.camera, recording.warnings);
   });
   step([&] {
     if (!files.nominal) return;

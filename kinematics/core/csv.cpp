@@ -2,6 +2,7 @@
 #include "kinematics/core/csv.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <unordered_set>
@@ -228,6 +229,12 @@ class TableParser {
   bool unnamed_end_ = false;
 };
 
+// As of ISO 8601 or a clock: digits with two colons between them.
+bool is_date(std::string_view cell) {
+  return !cell.empty() && std::isdigit(static_cast<unsigned char>(cell.front())) != 0 &&
+         std::ranges::count(cell, ':') >= 2;
+}
+
 }  // namespace
 
 std::optional<std::size_t> CsvTable::column(std::string_view name) const {
@@ -238,8 +245,9 @@ std::optional<std::size_t> CsvTable::column(std::string_view name) const {
 
 std::size_t CsvTable::require_column(std::string_view name) const {
   if (const auto found = column(name)) return *found;
-  throw bad_input(fmt::format("{}:{}", source, header_line), fmt::format("no column '{}'", name),
-                  fmt::format("the columns are {}", fmt::join(header, ", ")));
+  throw bad_input(
+      fmt::format("{}:{}", source, header_line), fmt::format("no column '{}'", name),
+      fmt::format("name the one that holds it so; the columns are {}", fmt::join(header, ", ")));
 }
 
 std::string CsvTable::place(std::size_t row) const {
@@ -259,7 +267,8 @@ double CsvTable::number(std::size_t row, std::size_t column) const {
     throw bad_input(
         place(row),
         fmt::format("column '{}' holds '{}', not a finite number", header[column], cell),
-        "correct or remove the line");
+        is_date(cell) ? "write times in s, such as those since the first row, not as dates"
+                      : "correct or remove the line");
   }
   return factors.empty() ? *value : *value * factors[column];
 }

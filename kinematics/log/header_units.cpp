@@ -2,6 +2,8 @@
 #include "kinematics/log/header_units.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -25,9 +27,26 @@ std::optional<double> factor_of(std::string_view unit) {
   return found->second;
 }
 
+/// Of a time: "t_ms", "time_s", "timestamp_ns".
+std::pair<std::string_view, std::string_view> time_and_unit(std::string_view column) {
+  constexpr std::array<std::string_view, 4> kTimes{"t", "time", "stamp", "timestamp"};
+  constexpr std::array<std::string_view, 6> kUnits{"s", "sec", "seconds", "ms", "us", "ns"};
+  const std::size_t line = column.rfind('_');
+  if (line == std::string_view::npos) return {column, {}};
+  const std::string_view name = column.substr(0, line);
+  const std::string_view unit = column.substr(line + 1);
+  const bool time = std::ranges::any_of(kTimes, [&](std::string_view known) {
+    return std::ranges::equal(name, known, [](unsigned char a, unsigned char b) {
+      return std::tolower(a) == static_cast<int>(b);
+    });
+  });
+  if (!time || std::ranges::find(kUnits, unit) == kUnits.end()) return {column, {}};
+  return {name, unit};
+}
+
 /// Name and unit; no unit where the name ends in none.
 std::pair<std::string_view, std::string_view> name_and_unit(std::string_view column) {
-  if (!column.ends_with(']') && !column.ends_with(')')) return {column, {}};
+  if (!column.ends_with(']') && !column.ends_with(')')) return time_and_unit(column);
   const std::size_t open = column.rfind(column.ends_with(']') ? '[' : '(');
   if (open == std::string_view::npos) return {column, {}};
   const std::string_view unit = column.substr(open + 1, column.size() - open - 2);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Units in the names of columns: "t [ms]", "ch0 (rad)".
+// Units in the names of columns: "t [ms]", "ch0 (rad)", and of times also "time_ns".
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace kinescope {
 
-/// The column's name without a unit in brackets at its end. Only units are cut off: "q[0]" and
-/// "arm (left)" are names.
+/// The column's name without a unit in brackets at its end, a time's also without one behind an
+/// underscore. Only units are cut off: "q[0]" and "arm (left)" are names.
 [[nodiscard]] std::string without_unit(std::string_view column);
 
 /// What brings a column to s, m, rad or px by the unit in its name; 1 where it names none, or one

@@ -15,6 +15,15 @@ constexpr double kFewSteps = 3.0;
 constexpr double kAlike = 0.5;       // of a speed: how far that behind a gap may differ from it
 constexpr double kManySteps = 10.0;  // a gap as long would show in the position many times over
 
+// Of a column from row to row, motion and noise together.
+double usual_step(const JointLog& log, Eigen::Index channel) {
+  std::vector<double> steps;
+  for (Eigen::Index row = 1; row < log.values.rows(); ++row) {
+    steps.push_back(std::abs(log.values(row, channel) - log.values(row - 1, channel)));
+  }
+  return median_of(std::move(steps));
+}
+
 double mean_rate(const JointLog& log, Eigen::Index channel, Eigen::Index first, Eigen::Index last) {
   const double seconds =
       log.times_s[static_cast<std::size_t>(last)] - log.times_s[static_cast<std::size_t>(first)];
@@ -29,7 +38,8 @@ bool goes_on(const JointLog& log, Eigen::Index row, double step_s) {
     const double behind = mean_rate(log, c, row + 1, row + 1 + kBeside);
     const double moved = std::abs(log.values(row + 1, c) - log.values(row, c));
     const double speed = std::max(std::abs(before), std::abs(behind));
-    if (moved > kFewSteps * speed * step_s) return false;
+    // Near a turning point the speed is that of the noise.
+    if (moved > kFewSteps * std::max(speed * step_s, usual_step(log, c))) return false;
     const bool alike = std::abs(behind - before) < kAlike * std::abs(before);
     // Noise has speeds, too, but not the same ones twice over the rows beside.
     const double range = log.values.col(c).maxCoeff() - log.values.col(c).minCoeff();

@@ -312,7 +312,9 @@ void add_still_doubts(const GrownTree& tree, const Series& series, const Reading
     const std::string name = channel_words(log, readings, c);
     verdict.doubts.push_back(
         {fmt::format("channel {} hardly moves: whether it drives a joint cannot be told", name),
-         fmt::format("record again with {} moving over more of its range", name),
+         fmt::format("record again with {} moving over more of its range, or take the column out "
+                     "of the log if it drives no joint",
+                     name),
          {name.substr(1, name.size() - 2)}});
     if (hides) verdict.status = StructureStatus::kUndetermined;
   }

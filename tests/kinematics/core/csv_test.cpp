@@ -143,7 +143,7 @@ TEST(Csv, NumbersAreFinite) {
   const CsvTable table = parse_csv("t,x\n1,1.5\n", "a.csv");
   EXPECT_NE(refusal([&] { static_cast<void>(table.integer(0, 1)); }), "accepted");
   EXPECT_EQ(refusal([&] { static_cast<void>(table.require_column("q")); }),
-            "a.csv:1: no column 'q' (the columns are t, x)");
+            "a.csv:1: no column 'q' (name the one that holds it so; the columns are t, x)");
 }
 
 TEST(Csv, ParsesNumbersWhole) {

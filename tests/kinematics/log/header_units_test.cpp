@@ -18,6 +18,16 @@ TEST(HeaderUnits, OnlyUnitsAreCutOff) {
   EXPECT_EQ(header_factor("q[0]"), 1.0);
 }
 
+TEST(HeaderUnits, ATimeHasThemBehindAnUnderscoreToo) {
+  EXPECT_EQ(without_unit("t_ms"), "t");
+  EXPECT_EQ(header_factor("timestamp_ns"), 1e-9);
+  EXPECT_EQ(without_unit("Time_s"), "Time");
+  for (const char* name : {"q1_mm", "at_ms", "t_", "_ms", "time_zone", "time_left_s"}) {
+    EXPECT_EQ(without_unit(name), name);
+    EXPECT_EQ(header_factor(name), 1.0);
+  }
+}
+
 TEST(HeaderUnits, NamesThatWouldBecomeAlikeKeepThem) {
   CsvTable table;
   table.header = {"t [s]", "q [deg]", "q [rad]", "tau (Nm)"};

@@ -68,6 +68,19 @@ TEST(ClockJumps, AreGapsOfTimeOnly) {
   EXPECT_NEAR(found[0].by_s, 2.0, 1e-9);
 }
 
+// At its turning point a joint's speed is nothing beside its noise.
+TEST(ClockJumps, AreSeenBesideNoise) {
+  JointLog log = moving();
+  for (Eigen::Index i = 0; i < log.values.rows(); ++i) {
+    log.values(i, 1) = 0.3 * std::cos(0.01 * static_cast<double>(i - 499)) +
+                       (i % 2 == 0 ? 2e-4 : -2e-4) * (i % 3 == 0 ? 2.0 : 1.0);
+  }
+  for (std::size_t i = 500; i < log.size(); ++i) log.times_s[i] += 2.0;
+  const auto found = clock_jumps(log);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_DOUBLE_EQ(found[0].after_s, log.times_s[499]);
+}
+
 TEST(ClockJumps, MissedReadingsAreNone) {
   EXPECT_TRUE(clock_jumps(without_rows(moving(), 400, 600)).empty());
 }

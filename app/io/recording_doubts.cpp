@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/io/recording_doubts.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "kinematics/core/error.h"
+
+namespace kinescope {
+namespace {
+
+/// Twice the area within the corners, by Gauss' formula: below zero where they go round
+/// counter-clockwise in an image whose v counts down.
+double doubled_area(const std::vector<Eigen::Vector2d>& corners_px) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < corners_px.size(); ++i) {
+    const Eigen::Vector2d& a = corners_px[i];
+    const Eigen::Vector2d& b = corners_px[(i + 1) % corners_px.size()];
+    sum += a.x() * b.y() - b.x() * a.y();
+  }
+  return sum;
+}
+
+}  // namespace
+
+void refuse_mirrored(const TagObservations& corners, const MarkerSet& markers,
+                     const std::filesystem::path& file) {
+  constexpr double kNearlyAll = 0.95;  // a detector errs in fewer
+  int squares = 0;
+  int behind = 0;
+  for (const TagObservation& tag : corners.observations) {
+    if (markers.boards.contains(tag.id)) continue;
+    ++squares;
+    if (doubled_area(tag.corners_px) > 0.0) ++behind;
+  }
+  if (behind == 0 || behind < kNearlyAll * squares) return;
+  throw bad_input(
+      file.string(),
+      fmt::format("the corners 0, 1, 2, 3 of {} of {} sightings go round clockwise, as of markers "
+                  "seen from behind: does v count upward, which would mirror the robot?",
+                  behind, squares),
+      "v counts down from the top row: take it from the images' height; where it does, the corners "
+      "are in another order: number them counter-clockwise from the lower left");
+}
+
+void warn_of_principal_point(const CameraModel& camera, const std::filesystem::path& file,
+                             std::vector<std::string>& warnings) {
+  if (camera.width <= 0 || camera.height <= 0) return;  // its file tells no size
+  constexpr double kMiddle = 0.15;  // of the size; lenses sit within a few hundredths
+  const auto off = [&](double at, int size) {
+    return std::abs(at / static_cast<double>(size) - 0.5) > kMiddle;
+  };
+  if (!off(camera.cx, camera.width) && !off(camera.cy, camera.height)) return;
+  const bool exchanged = !off(camera.cy, camera.width) && !off(camera.cx, camera.height);
+  warnings.push_back(fmt::format(
+      "{}: the principal point ({:.6g}, {:.6g}) is far from the middle of images of {} x {} px: {}",
+      file.string(), camera.cx, camera.cy, camera.width, camera.height,
+      exchanged ? "are cx and cy exchanged?"
+                : fmt::format("are these the intrinsics of images of {:.0f} x {:.0f} px, or were "
+                              "the images cut out of larger ones?",
+                              2.0 * camera.cx + 1.0, 2.0 * camera.cy + 1.0)));
+}
+
+}  // namespace kinescope
