@@ -5,6 +5,8 @@
 // Units   SI, as everywhere; the package's docstrings say shapes, units and frames.
 // Method  pybind11; the interpreter's lock is given up while a command or a loop over rows runs.
 // Not here: names, signatures and help, which the package has.
+#include <utility>
+
 #include "app/commands/output_folder.h"
 #include "app/python/bindings.h"
 #include "kinematics/core/error.h"
@@ -29,7 +31,7 @@ PYBIND11_MODULE(_kinescope, m) {
   m.attr("__version__") = kinescope::program_version();
   pybind11::register_exception_translator([](std::exception_ptr thrown) {
     try {
-      if (thrown) std::rethrow_exception(thrown);
+      if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const kinescope::Error& error) {
       throw_in_python(error);
     }
