@@ -11,10 +11,11 @@ packages=(
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev
   libzstd-dev libsnappy-dev liblz4-dev libbz2-dev libsqlite3-dev
   esbuild libjs-three
+  pybind11-dev python3-dev python3-numpy
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev
-             python3-jsonschema groff-base zsh dpkg-dev file)
+             python3-jsonschema python3-matplotlib groff-base zsh dpkg-dev file)
   # Not in every release; the tests that want them say so and skip.
   optional=(libmujoco-dev clang-format-19 chromium)
 else

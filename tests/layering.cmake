@@ -40,6 +40,7 @@ set(rooms
     "app/experiments: kinematics/* dynamics/* app/report"
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report app/experiments"
     "app/manual: kinematics/core app/commands"
+    "app/python: kinematics/* calib/camera calib/bundle calib/tracks dynamics/data dynamics/gp dynamics/effects dynamics/models app/io app/report app/commands"
     "app/examples: kinematics/* calib/* dynamics/control app/io app/commands"
     "app: app/commands")
 
@@ -67,6 +68,7 @@ set(third_parties
     "sqlite3.h: kinematics/bags"
     "nlohmann/: kinematics/datasets app/io app/report app/commands dynamics/models"
     "CLI/: app/commands app/manual"
+    "pybind11/: app/python"
     "gtest/: none")
 
 function(room_of file out)

@@ -124,7 +124,7 @@ ExitCode camera_command(const CameraOptions& options, const Console& console) {
       calibrate_intrinsics(options.source, options.board, options.calibration, console.progress);
   write_file_atomically(options.output, write_camera_info(result.camera));
   if (console.json) {
-    fmt::print("{}\n", result_to_json(result, options).dump(2));
+    console.print(result_to_json(result, options));
   } else {
     print_words(result, options);
   }

@@ -6,11 +6,12 @@
 #include <iostream>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/commands/command_line.h"
 #include "app/commands/progress_line.h"
 #include "app/commands/run_again.h"
-#include "app/io/dynamics_settings.h"
+#include "app/commands/saved_model_log.h"
 #include "app/io/nearest_name.h"
 #include "dynamics/gp/blas.h"
 #include "kinematics/recorded/container.h"
@@ -54,8 +55,8 @@ std::vector<std::string> known_words(const CLI::App& app, const CLI::App* comman
 }
 
 /// What CLI11 found wrong, with the nearest word that it would have taken.
-int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int argc,
-                       const char* const* argv) {
+std::string parse_error_words(const CLI::App& app, const CLI::ParseError& error, int argc,
+                              const char* const* argv) {
   const std::vector<CLI::App*> chosen = app.get_subcommands();
   const CLI::App* command = chosen.empty() ? nullptr : chosen.front();
   std::string remedy = command == nullptr
@@ -80,42 +81,7 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error, int ar
       remedy = did_you_mean(*option, known_words(app, command));
     }
   }
-  print_error(fmt::format("{} ({})", in_one_line(message), remedy));
-  return static_cast<int>(ExitCode::kBadRequest);
-}
-
-// What the settings file says of the log, the command line's words first.
-TorqueDataOptions log_settings(const CommandLine& line, const std::filesystem::path& log,
-                               const TorqueDataOptions& words) {
-  const auto container = recorded::container_of(log);
-  const std::vector<std::filesystem::path> places =
-      container ? recorded::places_of(*container)
-                : std::vector<std::filesystem::path>{log.parent_path()};
-  std::filesystem::path beside = places.front() / "recording.yaml";
-  if (!std::filesystem::exists(beside)) beside = places.back() / "recording.yaml";
-  TorqueDataOptions out;
-  if (line.settings) {
-    out = read_dynamics_settings(*line.settings);
-  } else if (std::filesystem::exists(beside)) {
-    out = read_dynamics_settings(beside);
-  }
-  const auto take = [](auto& value, const auto& word) {
-    if (!word.empty()) value = word;
-  };
-  LogMapping& mapping = out.mapping;
-  take(mapping.time, words.mapping.time);
-  take(mapping.time_unit, words.mapping.time_unit);
-  take(mapping.position, words.mapping.position);
-  take(mapping.velocity, words.mapping.velocity);
-  take(mapping.acceleration, words.mapping.acceleration);
-  take(mapping.torque, words.mapping.torque);
-  take(mapping.position_unit, words.mapping.position_unit);
-  take(mapping.velocity_unit, words.mapping.velocity_unit);
-  take(mapping.torque_unit, words.mapping.torque_unit);
-  take(mapping.torque_factor, words.mapping.torque_factor);
-  if (words.mapping.rate_hz > 0.0) mapping.rate_hz = words.mapping.rate_hz;
-  if (words.motion.cutoff_hz > 0.0) out.motion.cutoff_hz = words.motion.cutoff_hz;
-  return out;
+  return fmt::format("{} ({})", in_one_line(message), remedy);
 }
 
 // "log" of "folder/log.csv.gz".
@@ -145,14 +111,15 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     if (line.dynamics.output.empty()) {
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
     }
-    line.dynamics.data = log_settings(line, line.dynamics.logs.front(), line.dynamics.data);
+    line.dynamics.data =
+        log_settings(line.settings, line.dynamics.logs.front(), line.dynamics.data);
     return dynamics_command(line.dynamics, console);
   }
   if (app.got_subcommand("predict")) {
     if (line.predict.output.empty()) {
       line.predict.output = log_name(line.predict.logs.front()) + "_predicted.csv";
     }
-    line.predict.data = log_settings(line, line.predict.logs.front(), line.predict.data);
+    line.predict.data = log_settings(line.settings, line.predict.logs.front(), line.predict.data);
     return predict_command(line.predict, console);
   }
   if (app.got_subcommand("simulate")) return simulate_command(line.simulate, console);
@@ -167,14 +134,14 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     if (line.contact.output.empty()) {
       line.contact.output = log_name(line.contact.logs.front()) + "_contact";
     }
-    line.contact.data = log_settings(line, line.contact.logs.front(), line.contact.data);
+    line.contact.data = log_settings(line.settings, line.contact.logs.front(), line.contact.data);
     return contact_command(line.contact, console);
   }
   if (app.got_subcommand("experiment")) {
     ExperimentOptions& experiment = line.experiment;
     if (experiment.output.empty()) experiment.output = experiment.name + "_experiment";
     if (!experiment.log.empty())
-      experiment.data = log_settings(line, experiment.log, experiment.data);
+      experiment.data = log_settings(line.settings, experiment.log, experiment.data);
     return experiment_command(experiment, console);
   }
   if (app.got_subcommand("policy")) {
@@ -185,42 +152,53 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
   if (app.got_subcommand("inspect")) {
     const std::filesystem::path& log = line.inspect.recording.folder;
     if (std::filesystem::is_regular_file(log) || recorded::container_of(log))
-      line.inspect.data = log_settings(line, line.inspect.recording.folder, line.inspect.data);
+      line.inspect.data =
+          log_settings(line.settings, line.inspect.recording.folder, line.inspect.data);
     return inspect_command(line.inspect, console);
   }
   if (app.got_subcommand("markers")) return markers_command(line.markers, console);
   return camera_command(line.camera, console);
 }
 
-/// The command, with its progress; all that is thrown ends here.
-int run_guarded(const CLI::App& app, CommandLine& line) {
+struct Outcome {
+  ExitCode code = ExitCode::kInternalError;
+  std::string message;  ///< of what was thrown
+};
+
+/// All that is thrown ends here.
+Outcome run_guarded(const CLI::App& app, CommandLine& line, const Console& console) {
+  Outcome out;
+  try {
+    out.code = run_parsed(app, line, console);
+  } catch (const Error& error) {
+    out.code = error.code();
+    out.message = error.what();
+  } catch (const std::bad_alloc&) {
+    out.message = "out of memory (a shorter video, or a machine with more of it)";
+  } catch (const std::exception& error) {
+    // fmt throws where standard output cannot be written; after_output() tells that.
+    if (std::ferror(stdout) == 0)
+      out.message =
+          fmt::format("internal error: {} (please report it with the command line)", error.what());
+  } catch (...) {
+    out.message = "internal error of unknown kind (please report it with the command line)";
+  }
+  return out;
+}
+
+/// The command on the terminal, with its progress.
+int run_in_terminal(const CLI::App& app, CommandLine& line) {
   ProgressLine progress = ProgressLine::for_standard_error();
-  Console console{.json = line.output.json, .quiet = line.output.quiet, .progress = {}};
+  Console console{.json = line.output.json, .quiet = line.output.quiet};
   if (!console.quiet) {
     console.progress = [&progress](std::string_view stage, int done, int total) {
       progress.update(stage, done, total);
     };
   }
-  ExitCode code = ExitCode::kInternalError;
-  std::string message;
-  try {
-    code = run_parsed(app, line, console);
-  } catch (const Error& error) {
-    code = error.code();
-    message = error.what();
-  } catch (const std::bad_alloc&) {
-    message = "out of memory (a shorter video, or a machine with more of it)";
-  } catch (const std::exception& error) {
-    // fmt throws where standard output cannot be written; after_output() tells that.
-    if (std::ferror(stdout) == 0)
-      message =
-          fmt::format("internal error: {} (please report it with the command line)", error.what());
-  } catch (...) {
-    message = "internal error of unknown kind (please report it with the command line)";
-  }
+  const Outcome outcome = run_guarded(app, line, console);
   progress.finish();
-  if (!message.empty()) print_error(message);
-  return static_cast<int>(code);
+  if (!outcome.message.empty()) print_error(outcome.message);
+  return static_cast<int>(outcome.code);
 }
 
 /// The exit code, unless what was printed did not arrive (a full disk, a closed output).
@@ -239,13 +217,8 @@ bool names_no_command(const CLI::App& app, int argc, const char* const* argv) {
   return argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty();
 }
 
-}  // namespace
-
-int run_program(int argc, const char* const* argv) {
-  // Of the sparse factors of the bundle, too.
-  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
-  CLI::App app;
-  CommandLine line;
+/// A command line with what reports say of it, and its options.
+void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* argv) {
   line.run.command_line = join_arguments(argc, argv);
   line.run.arguments.assign(argv + 1, argv + argc);
   line.dynamics.command_line = line.run.command_line;
@@ -255,14 +228,56 @@ int run_program(int argc, const char* const* argv) {
   line.control.command_line = line.run.command_line;
   line.compare.command_line = line.run.command_line;
   add_commands(app, line);
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  // Of the sparse factors of the bundle, too.
+  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
+  CLI::App app;
+  CommandLine line;
+  begin_line(app, line, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool asked = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
     if (asked && !names_no_command(app, argc, argv)) return after_output(app.exit(error));
-    return report_parse_error(app, error, argc, argv);
+    print_error(parse_error_words(app, error, argc, argv));
+    return static_cast<int>(ExitCode::kBadRequest);
   }
-  return after_output(run_guarded(app, line));
+  return after_output(run_in_terminal(app, line));
+}
+
+CalledCommand call_command(const std::vector<std::string>& arguments, const Progress& progress) {
+  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
+  std::vector<const char*> argv{"kinescope"};
+  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+  const int argc = static_cast<int>(argv.size());
+  CLI::App app;
+  CommandLine line;
+  begin_line(app, line, argc, argv.data());
+  try {
+    app.parse(argc, argv.data());
+  } catch (const CLI::ParseError& error) {
+    return {.code = ExitCode::kBadRequest,
+            .message = parse_error_words(app, error, argc, argv.data())};
+  }
+  CalledCommand out;
+  std::vector<std::string> passed;
+  const Console console{
+      .json = true,
+      .quiet = true,
+      .progress = progress,
+      .result = [&out](const std::string& text) { out.result = text; },
+      .warning = [&out](const std::string& text) { out.warnings.push_back(text); },
+      .passed_limit = [&passed](const std::string& text) { passed.push_back(text); }};
+  Outcome outcome = run_guarded(app, line, console);
+  out.code = outcome.code;
+  out.message = in_one_line(std::move(outcome.message));
+  if (out.message.empty() && !passed.empty())
+    out.message = fmt::format("outside the limit {}", fmt::join(passed, "; "));
+  return out;
 }
 
 }  // namespace kinescope

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/console.h"
 #include "app/experiments/experiment_choice.h"
 #include "app/io/recording.h"
 #include "calib/bundle/calibrate.h"
@@ -22,13 +23,6 @@
 #include "kinematics/core/progress.h"
 
 namespace kinescope {
-
-/// Where the words go. Results to standard output, progress and warnings to standard error.
-struct Console {
-  bool json = false;
-  bool quiet = false;
-  Progress progress;  ///< filled by the program; empty in tests
-};
 
 struct RunOptions {
   RecordingPaths recording;

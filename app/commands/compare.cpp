@@ -10,7 +10,6 @@
 #include "app/commands/commands.h"
 #include "app/commands/compared_runs.h"
 #include "app/commands/output_folder.h"
-#include "app/commands/progress_line.h"
 #include "app/commands/torque_inputs.h"
 #include "app/report/compare_summary.h"
 
@@ -80,13 +79,13 @@ bool could_not_try(const CompareSummary& summary) {
                              [](const CarriedOver& one) { return !one.skipped.empty(); });
 }
 
-// What is not known is not within a limit, as of `run`. One line to standard error for each.
-ExitCode within_limit(const CompareSummary& summary, CompareLimit limit) {
+// What is not known is not within a limit, as of `run`.
+ExitCode within_limit(const CompareSummary& summary, CompareLimit limit, const Console& console) {
   const bool change = limit == CompareLimit::kChange || limit == CompareLimit::kAny;
   const bool carry = limit == CompareLimit::kCarry || limit == CompareLimit::kAny;
   bool within = true;
-  const auto fail = [&within](std::string_view what) {
-    fmt::print(stderr, "kinescope: outside the limit {}\n", what);
+  const auto fail = [&](const std::string& what) {
+    console.say_passed_limit(what);
     within = false;
   };
   if (change && anything_changed(summary)) fail("change: the robot differs");
@@ -115,7 +114,7 @@ std::vector<fs::path> input_files(const std::vector<fs::path>& runs) {
 void print_comparison(const CompareSummary& summary, const CompareOptions& options,
                       const Console& console) {
   if (console.json) {
-    fmt::print("{}\n", compare_json(summary).dump(2));
+    console.print(compare_json(summary));
     return;
   }
   fmt::print("{}\n", compare_verdict(summary));
@@ -152,7 +151,7 @@ ExitCode compare_command(const CompareOptions& options, const Console& console) 
     folder->write("compare.html", compare_html(summary));
   }
   print_comparison(summary, options, console);
-  return within_limit(summary, options.fail_on);
+  return within_limit(summary, options.fail_on, console);
 }
 
 }  // namespace kinescope

@@ -272,7 +272,7 @@ Writer writer_of(const ContactCommandOptions& options,
 
 void print_result(const ContactSummary& summary, const fs::path& folder, const Console& console) {
   if (console.json) {
-    fmt::print("{}\n", contact_json(summary).dump(2));
+    console.print(contact_json(summary));
     return;
   }
   fmt::print("{}\ncontacts  {}\nreport    {}\n", contact_verdict(summary),

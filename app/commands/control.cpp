@@ -260,7 +260,7 @@ void check_request(const ControlOptions& options) {
 ExitCode control_command(const ControlOptions& options, const Console& console) {
   check_request(options);
   const Writer writer = writer_of(options);
-  const ControlBench bench(options);
+  const ControlBench bench(options, console);
   if (options.model) (void)learned_of(*options.model, options, bench);  // before any work
   const OutputFolder folder(options.output, writer);
   const std::vector<OutputFolder> rounds = round_folders(options, writer);
@@ -271,7 +271,7 @@ ExitCode control_command(const ControlOptions& options, const Console& console) 
   folder.write("control.json", document.dump(1) + "\n");
   folder.write("control.html", control_html(summary));
   if (console.json) {
-    fmt::print("{}\n", document.dump(2));
+    console.print(document);
     return ExitCode::kDone;
   }
   for (const std::string& finding : control_findings(summary)) fmt::print("{}\n", finding);

@@ -80,13 +80,14 @@ TorqueSamples sinusoids_like(const TorqueSamples& path, DynamicModel model,
 
 }  // namespace
 
-ControlBench::ControlBench(const ControlOptions& options)
+ControlBench::ControlBench(const ControlOptions& options, const Console& console)
     : options_(options),
+      console_(console),
       robot_(robot_with_masses(options.robot, options)),
       nominal_(robot_with_masses(options.nominal.value_or(options.robot), options)),
       nominal_file_(options.nominal.value_or(options.robot)),
       servo_(options.servo),
-      reference_(reference_motion(options.trajectory, robot_, options.servo.rate_hz)) {
+      reference_(reference_motion(options.trajectory, robot_, options.servo.rate_hz, console)) {
   if (nominal_.joints != robot_.joints) {
     throw bad_input(nominal_file_.string(),
                     fmt::format("has other joints than {}", options.robot.filename().string()),
@@ -158,7 +159,7 @@ Eigen::VectorXd ControlBench::shown_times() const { return reference_.t_s(shown_
 
 TorqueSamples ControlBench::training(int round) const {
   if (!options_.training) return sinusoids_like(reference_, nominal_.model, options_, round);
-  TorqueSamples out = reference_motion(*options_.training, robot_, servo_.rate_hz);
+  TorqueSamples out = reference_motion(*options_.training, robot_, servo_.rate_hz, console_);
   check_path(out, *options_.training);
   return out;
 }

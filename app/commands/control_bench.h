@@ -33,7 +33,8 @@ class ControlBench {
  public:
   /// Throws bad_input for robots, effects and trajectories that do not fit, bad_request for limits
   /// that contradict the trajectory or each other.
-  explicit ControlBench(const ControlOptions& options);
+  /// Both must outlive it.
+  ControlBench(const ControlOptions& options, const Console& console);
 
   [[nodiscard]] const TorqueRobot& robot() const { return robot_; }
   [[nodiscard]] const TorqueRobot& nominal() const { return nominal_; }
@@ -53,6 +54,7 @@ class ControlBench {
   void check_limits() const;
 
   const ControlOptions& options_;
+  const Console& console_;
   TorqueRobot robot_, nominal_;
   std::filesystem::path nominal_file_;
   ServoOptions servo_;

@@ -12,7 +12,6 @@
 #include "app/commands/commands.h"
 #include "app/commands/log_range.h"
 #include "app/commands/output_folder.h"
-#include "app/commands/progress_line.h"
 #include "app/io/effects_file.h"
 #include "calib/effects/corrected_log.h"
 #include "kinematics/core/file.h"
@@ -143,18 +142,18 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
   const CalibratedEffects found = read_effects(calibration);
   const KinematicTree tree = tree_of_run(options.run_folder, found.channels);
   const recorded::LogTable logged = recorded::read_log_table(options.log);
-  for (const std::string& warning : logged.warnings) print_warning(warning);
+  for (const std::string& warning : logged.warnings) console.warn(warning);
   const CsvTable& table = logged.table;
   const TableLog read = joint_log_of(columns_of_run(table, found));
   const JointLog& log = read.log;
   // Beforehand: what was left out of the log may be why it is refused.
-  for (const std::string& warning : log.warnings) print_warning(warning);
+  for (const std::string& warning : log.warnings) console.warn(warning);
   JointLog in_si = log;
   to_si(in_si, found.unit_factors);
   CorrectedLog corrected = corrected_log(in_si, tree, found.effects, found.gravity_base);
   std::vector<std::string> warnings = log.warnings;
   for (std::string& warning : range_warnings(in_si, tree, found, corrected.faded)) {
-    print_warning(warning);
+    console.warn(warning);
     warnings.push_back(std::move(warning));
   }
   from_si(corrected.log, log, found.unit_factors);
@@ -164,7 +163,7 @@ ExitCode correct_command(const CorrectOptions& options, const Console& console) 
                              {"left", effects_list(corrected.left)},
                              {"warnings", warnings},
                              {"log", options.output.string()}};
-    fmt::print("{}\n", out.dump(2));
+    console.print(out);
     return ExitCode::kDone;
   }
   fmt::print("{}\n",

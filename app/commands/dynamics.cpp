@@ -409,12 +409,10 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
 ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
   const TorqueSummary summary = model_torque(options, console.progress);
   if (console.json) {
-    fmt::print("{}\n", torque_json(summary).dump(2));
+    console.print(torque_json(summary));
     return ExitCode::kDone;
   }
-  for (const std::string& warning : summary.warnings) {
-    fmt::print(stderr, "warning: {}\n", warning);
-  }
+  for (const std::string& warning : summary.warnings) console.warn(warning);
   const TorqueVerdict verdict = torque_verdict(summary);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
   if (!verdict.payload.empty()) fmt::print("{}\n", verdict.payload);

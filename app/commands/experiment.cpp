@@ -59,7 +59,7 @@ void require_known(const Experiment& experiment, const ExperimentOptions& option
   }
 }
 
-ExperimentLog read_log(const ExperimentOptions& options) {
+ExperimentLog read_log(const ExperimentOptions& options, const Console& console) {
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   std::vector<WantedJoint> wanted;
   for (const RigidBody& body : make_rigid_model(robot.model).bodies) {
@@ -70,8 +70,7 @@ ExperimentLog read_log(const ExperimentOptions& options) {
   put_into_place({options.log}, data.findings);
   throw_refusals(data.findings);
   for (const LogFinding& finding : data.findings) {
-    if (finding.weight == FaultWeight::kWarning)
-      fmt::print(stderr, "warning: {}\n", to_line(finding));
+    if (finding.weight == FaultWeight::kWarning) console.warn(to_line(finding));
   }
   return {robot.model, std::move(data.samples), robot.joints};
 }
@@ -91,7 +90,7 @@ ExitCode experiment_command(const ExperimentOptions& options, const Console& con
   if (!options.log.empty()) {
     writer.inputs = {options.log, options.robot};
     inputs = hashed_inputs({{options.log}, {options.robot}});
-    choice.log = read_log(options);
+    choice.log = read_log(options, console);
   }
   const OutputFolder folder(options.output, writer);
   ExperimentSummary summary = experiment.run(choice, console.progress);
@@ -107,7 +106,7 @@ ExitCode experiment_command(const ExperimentOptions& options, const Console& con
   folder.write("experiment.json", document.dump(1) + "\n");
   folder.write("experiment.html", experiment_html(summary));
   if (console.json) {
-    fmt::print("{}\n", document.dump(2));
+    console.print(document);
     return ExitCode::kDone;
   }
   for (const std::string& finding : summary.findings) fmt::print("{}\n", finding);

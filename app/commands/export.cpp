@@ -130,15 +130,14 @@ ExitCode export_command(const ExportOptions& options, const Console& console) {
   write_file_atomically(options.mjcf, write_mjcf(exported.model, exported.mjcf));
   const std::size_t joints = moving_joints(exported.model.tree).size();
   if (console.json) {
-    fmt::print("{}\n", nlohmann::json{{"urdf", report::text(exported.urdf.string())},
-                                      {"mjcf", report::text(options.mjcf.string())},
-                                      {"joints", joints},
-                                      {"left_out", report::texts(exported.left_out)}}
-                           .dump(2));
+    console.print({{"urdf", report::text(exported.urdf.string())},
+                   {"mjcf", report::text(options.mjcf.string())},
+                   {"joints", joints},
+                   {"left_out", report::texts(exported.left_out)}});
     return ExitCode::kDone;
   }
   for (const std::string& effect : exported.left_out) {
-    fmt::print(stderr, "warning: {} is left out: MuJoCo has no element for it\n", effect);
+    console.warn(fmt::format("{} is left out: MuJoCo has no element for it", effect));
   }
   fmt::print("{} joints of {}\nmjcf    {}\n", joints, exported.urdf.string(),
              options.mjcf.string());

@@ -12,7 +12,6 @@
 #include "app/commands/inspect_dataset.h"
 #include "app/commands/inspection.h"
 #include "app/commands/nominal_channels.h"
-#include "app/commands/progress_line.h"
 #include "app/commands/sighting_doubts.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/datasets/dataset.h"
@@ -291,9 +290,9 @@ class ContainerLook {
   }
 
   /// Those that come with no recording.
-  void print_warnings() const {
+  void print_warnings(const Console& console) const {
     if (contents_ == nullptr || !contents_->joints.empty()) return;
-    for (const std::string& warning : contents_->warnings) print_warning(warning);
+    for (const std::string& warning : contents_->warnings) console.warn(warning);
   }
 
   /// Joints alone, for `dynamics`; a table is that, too.
@@ -319,10 +318,10 @@ class ContainerLook {
 ExitCode inspect_command(const InspectOptions& options, const Console& console) {
   const ContainerLook container(options.recording.folder);
   if (!console.json) container.print();
-  container.print_warnings();
+  container.print_warnings(console);
   const auto print_json = [&](nlohmann::json document) {
     container.add_to(document);
-    fmt::print("{}\n", document.dump(2));
+    console.print(document);
   };
   if (container.is_log()) {
     const TorqueLogFacts facts = look_at_torques(options);

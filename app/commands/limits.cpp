@@ -85,7 +85,8 @@ std::vector<Limit> parse_limits(const std::vector<std::string>& texts) {
   return limits;
 }
 
-bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
+bool within_limits(const RunSummary& run, const std::vector<Limit>& limits,
+                   const Console& console) {
   bool within = true;
   for (const Limit& limit : limits) {
     const auto quantity = std::ranges::find(kQuantities, limit.quantity, &Quantity::name);
@@ -95,8 +96,8 @@ bool within_limits(const RunSummary& run, const std::vector<Limit>& limits) {
         limit.comparison == '>' ? !(value <= limit.value) : !(value >= limit.value);
     if (!outside) continue;
     within = false;
-    fmt::print(stderr, "kinescope: outside the limit {}{}{}: {:.4g}\n", limit.quantity,
-               limit.comparison, limit.value, value);
+    console.say_passed_limit(
+        fmt::format("{}{}{}: {:.4g}", limit.quantity, limit.comparison, limit.value, value));
   }
   return within;
 }

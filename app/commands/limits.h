@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/commands/console.h"
 #include "app/report/answer.h"
 
 namespace kinescope {
@@ -21,8 +22,9 @@ struct Limit {
 /// limit.
 [[nodiscard]] std::vector<Limit> parse_limits(const std::vector<std::string>& texts);
 
-/// Prints one line to standard error for every limit that is passed.
-[[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits);
+/// Tells the console every limit that is passed.
+[[nodiscard]] bool within_limits(const RunSummary& run, const std::vector<Limit>& limits,
+                                 const Console& console);
 
 /// Throws undetermined when tracing was able to say nothing.
 void require_trace(const RunSummary& run);

@@ -18,12 +18,11 @@ ExitCode markers_command(const MarkersOptions& options, const Console& console) 
   require_new_file(options.output, "--output", {}, options.force);
   write_file_atomically(options.output, pdf.bytes);
   if (console.json) {
-    fmt::print("{}\n", nlohmann::json{{"family", sheet.family},
-                                      {"ids", sheet.ids},
-                                      {"size_m", sheet.size_m},
-                                      {"pages", pdf.pages},
-                                      {"pdf", report::text(options.output.string())}}
-                           .dump(2));
+    console.print({{"family", sheet.family},
+                   {"ids", sheet.ids},
+                   {"size_m", sheet.size_m},
+                   {"pages", pdf.pages},
+                   {"pdf", report::text(options.output.string())}});
     return ExitCode::kDone;
   }
   fmt::print(

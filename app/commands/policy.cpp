@@ -30,7 +30,7 @@ ExitCode one_seed(const PolicyCommandOptions& options, const Console& console) {
   search.open(options.force);
   search.run(console);
   if (console.json) {
-    fmt::print("{}\n", policy_search_json(search.summary()).dump(2));
+    console.print(policy_search_json(search.summary()));
     return ExitCode::kDone;
   }
   for (const std::string& finding : policy_findings(search.summary())) fmt::print("{}\n", finding);
@@ -81,7 +81,7 @@ ExitCode several_seeds(const PolicyCommandOptions& options, const Console& conso
     summary = write_table(folder, options, common);
   }
   if (console.json) {
-    fmt::print("{}\n", experiment_json(summary).dump(2));
+    console.print(experiment_json(summary));
     return ExitCode::kDone;
   }
   for (const std::string& finding : summary.findings) fmt::print("{}\n", finding);

@@ -9,14 +9,13 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/output_folder.h"
-#include "app/commands/progress_line.h"
+#include "app/commands/saved_model_log.h"
 #include "app/commands/torque_inputs.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
 #include "app/report/result_values.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
-#include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
 namespace {
@@ -29,33 +28,6 @@ struct JudgedPrediction {
   std::vector<std::string> warnings;
 };
 
-std::vector<WantedJoint> wanted(const RigidModel& rigid) {
-  std::vector<WantedJoint> out;
-  for (const RigidBody& body : rigid.bodies) {
-    out.push_back({body.joint, body.type == JointType::kPrismatic});
-  }
-  return out;
-}
-
-TorquePrediction by_trace(const SavedTrace& traced, const TorqueSamples& samples) {
-  TorquePrediction out;
-  out.mean = predict_torque(traced.corrected, samples, traced.filter);
-  out.model_sigma = Eigen::MatrixXd::Zero(out.mean.rows(), out.mean.cols());
-  out.sigma = traced.sigma.transpose().replicate(out.mean.rows(), 1);
-  return out;
-}
-
-// What is odd about the log and was worked around, and joints that the model does not have.
-std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings) {
-  std::vector<std::string> out;
-  for (const LogFinding& finding : findings) {
-    if (finding.weight == FaultWeight::kWarning || finding.fault == LogFault::kAssignment) {
-      out.push_back(to_line(finding));
-    }
-  }
-  return out;
-}
-
 // Unit and sign of the log's torques against those that the model was learned from.
 void check_scale(const std::vector<std::filesystem::path>& logs, JudgedPrediction& predicted) {
   std::vector<LogFinding> findings =
@@ -66,24 +38,13 @@ void check_scale(const std::vector<std::filesystem::path>& logs, JudgedPredictio
 }
 
 JudgedPrediction predict(const PredictOptions& options, const TorqueModelFile& file) {
-  TorqueDataOptions data = options.data;
-  const TorqueFilter& filter = file.traced ? file.traced->filter : file.filter;
-  data.motion.filter = filter.kind;
-  data.motion.cutoff_hz = filter.cutoff_hz;  // alike, or residuals are not the model's
   JudgedPrediction out;
-  TorqueData read =
-      read_torque_data(recorded::read_channel_tables(options.logs), wanted(file.model.rigid), data);
+  TorqueData read = read_log_for(file, options.logs, options.data);
   out.warnings = warnings_of(read.findings);
   out.samples = std::move(read.samples);
-  if (out.samples.torque_unit != file.model.torque_unit) {
-    throw bad_input(options.logs.front().string(),
-                    fmt::format("its torques are in {}, the model's in {}", out.samples.torque_unit,
-                                file.model.torque_unit),
-                    "state --torque-unit and --torque-factor as for the log it was learned from");
-  }
   out.traced = file.traced.has_value();
   if (out.traced) {
-    out.torque = by_trace(*file.traced, out.samples);
+    out.torque = predict_traced_torque(*file.traced, out.samples);
   } else {
     out.torque = predict_torque(file.model, out.samples.q, out.samples.dq, out.samples.ddq);
     out.bands = file.model.bands;
@@ -163,7 +124,7 @@ ExitCode predict_command(const PredictOptions& options, const Console& console) 
   if (std::string words = worse_words(joints, rigid); !words.empty()) {
     predicted.warnings.push_back(std::move(words));
   }
-  for (const std::string& warning : predicted.warnings) print_warning(warning);
+  for (const std::string& warning : predicted.warnings) console.warn(warning);
   write_file_atomically(options.output, table(predicted, rigid));
   const std::vector<std::string> words = motion_words(file.model.learned, predicted.samples, rigid);
   if (console.json) {
@@ -180,7 +141,7 @@ ExitCode predict_command(const PredictOptions& options, const Console& console) 
                                     {"rms", report::number(joints[j].rms)},
                                     {"within_90", report::number(joints[j].within_90)}});
     }
-    fmt::print("{}\n", document.dump(2));
+    console.print(document);
     return ExitCode::kDone;
   }
   fmt::print("The {} model{} of {}, learned from {} samples, on {} samples.\n",

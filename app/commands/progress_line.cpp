@@ -87,6 +87,4 @@ void ProgressLine::rewrite() {
   out_ << note_ << std::flush;
 }
 
-void print_warning(const std::string& warning) { fmt::print(stderr, "warning: {}\n", warning); }
-
 }  // namespace kinescope

@@ -45,9 +45,6 @@ class ProgressLine {
   double shown_s_ = 0.0;
 };
 
-/// What is odd about the input, on standard error; the report has it, too.
-void print_warning(const std::string& warning);
-
 /// "0:07", "12:05", "1:02:09".
 [[nodiscard]] std::string clock_text(double seconds);
 

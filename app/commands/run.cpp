@@ -13,7 +13,6 @@
 #include "app/commands/limits.h"
 #include "app/commands/log_doubts.h"
 #include "app/commands/pipeline.h"
-#include "app/commands/progress_line.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
 #include "app/commands/sighting_doubts.h"
@@ -85,7 +84,7 @@ std::string jitter_words(double jitter_s, const JointLog& log, const Observed& o
 void print_result(const RunSummary& run, const RunFolder& folder, std::string_view report,
                   const Console& console) {
   if (console.json) {
-    fmt::print("{}\n", result_json(run).dump(2));
+    console.print(result_json(run));
     return;
   }
   const Verdict verdict = make_verdict(run);
@@ -262,7 +261,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   const auto [observed, camera] =
       see(recording, options, folder.cached_observations(recording), console.progress);
   describe_recording(recording, observed, options, run);
-  for (const std::string& warning : run.warnings) print_warning(warning);
+  for (const std::string& warning : run.warnings) console.warn(warning);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
   if (!answered) folder.keep_observations(recording, observed.tags);
@@ -287,7 +286,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (best.failure) throw Error(*best.failure);
   run.tracks = std::move(best.tracks);
   take(std::move(value_of(best.fitted)), recording, observed, options, run);
-  for (std::size_t k = told; k < run.warnings.size(); ++k) print_warning(run.warnings[k]);
+  for (std::size_t k = told; k < run.warnings.size(); ++k) console.warn(run.warnings[k]);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
   run.errors = summarise_errors(run.calibration);
   add_film(recording, run);
@@ -320,7 +319,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   print_result(run, folder, kReport, console);
   require(answer, "the report shows the details");
   if (options.must_trace) require_trace(run);
-  return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
+  return within_limits(run, limits, console) ? ExitCode::kDone : ExitCode::kOutsideLimits;
 }
 
 }  // namespace kinescope

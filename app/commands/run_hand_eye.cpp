@@ -9,7 +9,6 @@
 
 #include "app/commands/limits.h"
 #include "app/commands/pipeline.h"
-#include "app/commands/progress_line.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/stopwatch.h"
 #include "app/io/products.h"
@@ -78,7 +77,7 @@ void take_errors(const HandEye& result, RunSummary& run) {
 void print_hand_eye(const HandEyeSummary& summary, const RunFolder& folder,
                     const Console& console) {
   if (console.json) {
-    fmt::print("{}\n", hand_eye_json(summary).dump(2));
+    console.print(hand_eye_json(summary));
     return;
   }
   const Verdict verdict = hand_eye_verdict(summary);
@@ -124,7 +123,7 @@ ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
   summary.log = std::filesystem::path(log.source).filename().string();
   summary.time_column = log.time_column;
   describe_input(recording, observed, options, run);
-  for (const std::string& warning : run.warnings) print_warning(warning);
+  for (const std::string& warning : run.warnings) console.warn(warning);
   clock.lap("detect", run.times);
 
   run.tracks = observed.tags.observations.empty()
@@ -144,7 +143,7 @@ ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
   write_all(summary, clock, folder);
   print_hand_eye(summary, folder, console);
   if (options.must_trace) require_trace(run);
-  return within_limits(run, limits) ? ExitCode::kDone : ExitCode::kOutsideLimits;
+  return within_limits(run, limits, console) ? ExitCode::kDone : ExitCode::kOutsideLimits;
 }
 
 }  // namespace kinescope

@@ -34,7 +34,8 @@ ExitCode simulate_command(const SimulateOptions& options, const Console& console
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   require_masses(options.robot, robot.model);
-  const TorqueSamples motion = reference_motion(options.trajectory, robot, options.servo.rate_hz);
+  const TorqueSamples motion =
+      reference_motion(options.trajectory, robot, options.servo.rate_hz, console);
   const CorrectedTorqueModel model =
       simulated_robot(options.robot, robot.model, options.effects, motion);
   const Plant plant = make_plant(model);
@@ -48,7 +49,7 @@ ExitCode simulate_command(const SimulateOptions& options, const Console& console
   }
   write_file_atomically(options.output, torque_log_csv(log.samples, robot.joints));
   for (const std::string& effect : plant.left_out) {
-    fmt::print(stderr, "warning: {} is left out: the temperature is not simulated\n", effect);
+    console.warn(fmt::format("{} is left out: the temperature is not simulated", effect));
   }
   if (console.json) {
     nlohmann::json document{{"log", report::text(options.output.string())},
@@ -61,7 +62,7 @@ ExitCode simulate_command(const SimulateOptions& options, const Console& console
           {{"name", report::text(robot.joints[j])},
            {"tracking_error", report::number(log.tracking_error[static_cast<Eigen::Index>(j)])}});
     }
-    fmt::print("{}\n", document.dump(2));
+    console.print(document);
     return ExitCode::kDone;
   }
   Eigen::Index worst = 0;

@@ -73,10 +73,10 @@ std::vector<ListedEffect> not_yet_in(const fs::path& robot, const fs::path& trac
 
 }  // namespace
 
-TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& robot,
-                               double rate_hz) {
+TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& robot, double rate_hz,
+                               const Console& console) {
   const JointLog log = recorded::read_joint_log(trajectory);
-  for (const std::string& warning : log.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : log.warnings) console.warn(warning);
   constexpr std::size_t kFewest = 8;  // of the spline
   if (log.size() < kFewest) {
     throw bad_input(log.source, fmt::format("holds {} rows", log.size()),

@@ -9,16 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/console.h"
 #include "app/commands/torque_inputs.h"
 #include "dynamics/effects/trace_torque.h"
 
 namespace kinescope {
 
-/// The trajectory as a smooth motion in even steps of 1 / rate, without torques. Warnings go to
-/// standard error. Throws bad_input: columns that are no joints, units that cannot be, too few
-/// rows.
+/// The trajectory as a smooth motion in even steps of 1 / rate, without torques; the console is
+/// warned. Throws bad_input: columns that are no joints, units that cannot be, too few rows.
 [[nodiscard]] TorqueSamples reference_motion(const std::filesystem::path& trajectory,
-                                             const TorqueRobot& robot, double rate_hz);
+                                             const TorqueRobot& robot, double rate_hz,
+                                             const Console& console);
 
 /// The robot with the effects of a file (app/io/torque_effects_file.h); none: as it is. Of a trace
 /// beside its robot_traced.urdf, only what that lacks is added. Throws bad_input for an effect that

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# What `cmake --install` copies, in two components: `program` (with manual, completion and schemas) and
-# `development` (libraries, headers, CMake package, pkg-config files, examples).
+# What `cmake --install` copies, in components: `program` (with manual, completion and schemas), `development`
+# (libraries, headers, CMake package, pkg-config files, examples) and, from app/python, `python`.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# Debian packages from the components of install.cmake: `cmake --workflow --preset package` makes kinescope and
-# libkinescope-dev. debian_files.cmake does what Debian wants otherwise than other systems.
+# Debian packages from the components of install.cmake: `cmake --workflow --preset package` makes kinescope,
+# libkinescope-dev and python3-kinescope. debian_files.cmake does what Debian wants otherwise than other systems.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The Kinescope authors <maintainers@kinescope.invalid>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package has its own
@@ -62,4 +62,21 @@ set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
 Static libraries and headers of Kinescope, which learns a robot's body from a
 video of markers and the log of its joints, with a CMake package, a pkg-config
 file and an example.")
+
+if(KINESCOPE_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-kinescope)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/app/install/python/postinst
+                                                ${PROJECT_SOURCE_DIR}/app/install/python/prerm)
+  set(CPACK_DEBIAN_PYTHON_DESCRIPTION
+      "robot calibration from a marker video, Python module
+Every command of Kinescope as a function, and what they write as NumPy arrays:
+structure, calibration with covariance, residuals, forward kinematics, camera,
+torque models.")
+endif()
 include(CPack)

@@ -220,8 +220,7 @@ Calibration calibration_of(const json& document) {
 
 }  // namespace
 
-Calibration read_calibration(const std::filesystem::path& calibration_json) {
-  const std::string text = read_text_file(calibration_json);
+Calibration parse_calibration(std::string_view text, const std::string& source) {
   std::string what;
   try {
     const json document = json::parse(text, nullptr, false);
@@ -234,8 +233,11 @@ Calibration read_calibration(const std::filesystem::path& calibration_json) {
     const std::string words = error.what();
     what = words.substr(std::min(words.size(), words.find("] ") + 2));
   }
-  throw bad_input(calibration_json.string(), what,
-                  "give the folder of a finished run, or run the recording again");
+  throw bad_input(source, what, "give the folder of a finished run, or run the recording again");
+}
+
+Calibration read_calibration(const std::filesystem::path& calibration_json) {
+  return parse_calibration(read_text_file(calibration_json), calibration_json.string());
 }
 
 }  // namespace kinescope

@@ -127,4 +127,12 @@ TorqueModelFile read_torque_model(const std::filesystem::path& path) {
   return out;
 }
 
+TorquePrediction predict_traced_torque(const SavedTrace& traced, const TorqueSamples& samples) {
+  TorquePrediction out;
+  out.mean = predict_torque(traced.corrected, samples, traced.filter);
+  out.model_sigma = Eigen::MatrixXd::Zero(out.mean.rows(), out.mean.cols());
+  out.sigma = traced.sigma.transpose().replicate(out.mean.rows(), 1);
+  return out;
+}
+
 }  // namespace kinescope

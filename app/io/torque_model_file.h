@@ -29,6 +29,11 @@ struct TorqueModelFile {
   std::optional<SavedTrace> traced;
 };
 
+/// Of motions, as the sensors would show them; sigma is what the effects left of the log in which
+/// they were found.
+[[nodiscard]] TorquePrediction predict_traced_torque(const SavedTrace& traced,
+                                                     const TorqueSamples& samples);
+
 [[nodiscard]] std::string torque_model_json(const TorqueModelFile& file);
 /// Throws bad_input for what is no such file, or of another version, or does not fit itself.
 [[nodiscard]] TorqueModelFile read_torque_model(const std::filesystem::path& path);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// kinescope_manual FOLDER: writes the manual pages and the shells' completion, while building.
+// kinescope_manual FOLDER: writes the manual pages, the shells' completion and the functions of the
+// Python module, while building.
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -13,6 +14,7 @@
 #include "app/manual/command_page.h"
 #include "app/manual/completion.h"
 #include "app/manual/man_page.h"
+#include "app/manual/python_functions.h"
 #include "kinematics/core/file.h"
 
 namespace kinescope {
@@ -32,6 +34,7 @@ void write_manual(const std::filesystem::path& folder) {
   for (const CommandPage& command : program.commands) write_page(command);
   write_file_atomically(folder / (program.name + ".bash"), bash_completion(program));
   write_file_atomically(folder / ("_" + program.name), zsh_completion(program));
+  write_file_atomically(folder / "commands.py", python_functions(program));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "app/manual/command_page.h"
 #include "app/manual/completion.h"
 #include "app/manual/man_page.h"
+#include "app/manual/python_functions.h"
 
 namespace kinescope {
 namespace {
@@ -95,6 +96,27 @@ TEST(Manual, CompletionKnowsWordsAndPaths) {
   EXPECT_NE(zsh.find("'(--kind)--kind=[link or joint]:KIND:(link joint)'"), std::string::npos)
       << zsh;
   EXPECT_NE(zsh.find("'*--also=[More robots]:FILE:_files'"), std::string::npos) << zsh;
+}
+
+TEST(Manual, PythonFunctionsHaveOptionsAsArguments) {
+  const std::string python = python_functions(small_program());
+  EXPECT_NE(python.find("__all__ = [\n    \"part\",\n]\n\n\ndef part(\n    robot: Value,\n    *,\n"
+                        "    kind: Value,\n    count: Value | None = None,\n"
+                        "    also: Values | None = None,\n    no_names: bool = False,\n"
+                        "    progress: Progress | None = None,\n) -> dict[str, Any]:\n"),
+            std::string::npos)
+      << python;
+  EXPECT_NE(python.find("    r\"\"\"One part: [its] name.\n"), std::string::npos) << python;
+  EXPECT_NE(python.find("    count: N, 1 to 9, default 3\n"
+                        "        .5 is no count; it's a \\ number\n"),
+            std::string::npos)
+      << python;
+  EXPECT_NE(python.find("    kind: link|joint\n"), std::string::npos) << python;
+  EXPECT_NE(python.find("        \"part\",\n        [robot],\n        [\n"
+                        "            (\"--kind\", kind),\n"),
+            std::string::npos)
+      << python;
+  EXPECT_EQ(python.find("secret"), std::string::npos);
 }
 
 }  // namespace
