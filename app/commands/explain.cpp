@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/see_cameras.h"
 #include "calib/bundle/undone.h"
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
@@ -17,6 +18,7 @@
 #include "calib/quality/unknown_axes.h"
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/tracks/several_cameras.h"
 #include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
@@ -178,8 +180,8 @@ class Explainer {
 
   [[nodiscard]] Explanation of_nominal(std::vector<std::string>& warnings) const {
     Explanation out = begun();
-    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed.measurements,
-                                                evidence_.tracks, evidence_.camera, warnings);
+    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed, evidence_.tracks,
+                                                evidence_.camera, warnings);
     lap("structure");
     out.nominal_faults = std::move(checked.faults);
     out.start = std::move(checked.start);
@@ -249,6 +251,7 @@ class Explainer {
     try {
       require_determined(*out.structure);
       out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
+      add_further_cameras(evidence_.observed, out.start);
       fit(out, known);
     } catch (const Error& error) {
       keep_if_undetermined(error, out);
@@ -258,7 +261,9 @@ class Explainer {
 
   [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
                                        std::optional<double> allowance = {}) const {
-    Structure out = find_robot(recording(), tracks, options_.calibrate, allowance);
+    const std::vector<int>& cameras = evidence_.observed.measurements.camera_of_frame;
+    Structure out =
+        find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance);
     lap("structure");
     return out;
   }
@@ -328,8 +333,10 @@ class Explainer {
     const TagObservations& tags = evidence_.observed.tags;
     if (tags.observations.empty()) return with_effects_undone(calibration, evidence_.tracks);
     const MarkerSet& markers = recording().markers;
-    return pose_tracks_from_tags(with_effects_undone(calibration, markers, tags),
-                                 calibration.camera, markers);
+    const TagObservations undone = with_effects_undone(calibration, markers, tags);
+    if (!calibration.further_cameras.empty())
+      return tracks_of_cameras(undone, calibration, markers);
+    return pose_tracks_from_tags(undone, calibration.camera, markers);
   }
 
   // The structure was searched for on tracks that the effects were in: again without them, until
@@ -454,7 +461,8 @@ class Explainer {
     const TagObservations& tags = evidence_.observed.tags;
     const bool by_place =
         now.fitted && std::ranges::any_of(now.fitted->trace.rest, &Rest::is_field);
-    if (!recording().camera || tags.observations.empty() ||
+    const bool several = !evidence_.observed.cameras.empty();
+    if (several || !recording().camera || tags.observations.empty() ||
         (is_structure_clear(now) && now.fitted && !by_place))
       return {};
     for (const CameraModel& begin : cameras_to_begin_with()) {
