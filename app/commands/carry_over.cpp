@@ -84,6 +84,11 @@ Remeasured recording_again(const StoredRun& run) {
   out.options = options_of_run(run.folder);
   out.recording = read_recording(out.options.recording);
   require_same_inputs(run.folder, out.recording);
+  if (!out.recording.cameras.empty()) {
+    throw bad_input(run.folder.string(),
+                    "its recording is of several cameras, on which models are not tried",
+                    "compare runs of one of its cameras (--video, --corners)");
+  }
   std::optional<TagObservations> kept;
   if (out.recording.entry == RecordingEntry::kVideo)
     kept = read_corners(run.folder / "observations.csv", out.recording.markers);

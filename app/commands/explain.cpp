@@ -11,12 +11,14 @@
 #include <fmt/format.h>
 
 #include "app/commands/doubted_sight.h"
+#include "app/commands/see_cameras.h"
 #include "calib/bundle/undone.h"
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/predictive_score.h"
 #include "calib/quality/unknown_axes.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/tracks/several_cameras.h"
 #include "calib/tracks/shown_shapes.h"
 #include "kinematics/core/student_t.h"
 #include "kinematics/log/readings_apart.h"
@@ -214,8 +216,8 @@ class Explainer {
 
   [[nodiscard]] Explanation of_nominal(std::vector<std::string>& warnings) const {
     Explanation out = begun();
-    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed.measurements,
-                                                evidence_.tracks, evidence_.camera, warnings);
+    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed, evidence_.tracks,
+                                                evidence_.camera, warnings);
     lap("structure");
     out.nominal_faults = std::move(checked.faults);
     out.start = std::move(checked.start);
@@ -287,6 +289,7 @@ class Explainer {
     try {
       require_determined(*out.structure);
       out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
+      add_further_cameras(evidence_.observed, out.start);
       Calibration plain = calibrated(out.start, options_.calibrate.free);
       if (is_converged(plain) && take_usual_units(plain.tree, out.start))
         plain = calibrated(out.start, options_.calibrate.free);
@@ -324,7 +327,9 @@ class Explainer {
 
   [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
                                        std::optional<double> allowance = {}) const {
-    Structure out = find_robot(recording(), tracks, options_.calibrate, allowance);
+    const std::vector<int>& cameras = evidence_.observed.measurements.camera_of_frame;
+    Structure out =
+        find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance);
     lap("structure");
     return out;
   }
@@ -380,7 +385,7 @@ class Explainer {
   /// no noise of the corners.
   [[nodiscard]] bool misses_more_than_shapes(const Explanation& of) const {
     const TagObservations& tags = evidence_.observed.tags;
-    if (tags.observations.empty()) return false;
+    if (tags.observations.empty() || !evidence_.observed.cameras.empty()) return false;
     if (!of.fitted) return true;
     constexpr double kHalf = 2.0;
     return scale_of_corners(of.fitted->calibration) >
@@ -437,8 +442,10 @@ class Explainer {
     const TagObservations& tags = evidence_.observed.tags;
     if (tags.observations.empty()) return with_effects_undone(calibration, evidence_.tracks);
     const MarkerSet& markers = recording().markers;
-    return pose_tracks_from_tags(with_effects_undone(calibration, markers, tags),
-                                 calibration.camera, markers);
+    const TagObservations undone = with_effects_undone(calibration, markers, tags);
+    if (!calibration.further_cameras.empty())
+      return tracks_of_cameras(undone, calibration, markers);
+    return pose_tracks_from_tags(undone, calibration.camera, markers);
   }
 
   // The structure was searched for on tracks that the effects were in: again without them, until
@@ -563,7 +570,8 @@ class Explainer {
     const TagObservations& tags = evidence_.observed.tags;
     const bool by_place =
         now.fitted && std::ranges::any_of(now.fitted->trace.rest, &Rest::is_field);
-    if (!recording().camera || tags.observations.empty() ||
+    const bool several = !evidence_.observed.cameras.empty();
+    if (several || !recording().camera || tags.observations.empty() ||
         (is_structure_clear(now) && now.fitted && !by_place))
       return {};
     const std::optional<Sight> other = other_camera();

@@ -96,6 +96,12 @@ void print_inspection(const Inspection& inspection) {
              fmt::join(file_names(recording), ", "));
   if (inspection.video) print_video(recording, *inspection.video);
   print_sightings(recording);
+  for (const Inspection& one : inspection.cameras) {
+    fmt::print("camera    {}{}\n", one.recording.camera_name,
+               one.recording.camera ? "" : ", intrinsics to be estimated");
+    if (one.video) print_video(one.recording, *one.video);
+    print_sightings(one.recording);
+  }
   if (inspection.log) print_log(*inspection.log);
   if (!recording.flange.empty()) print_flange(recording);
   if (recording.camera) {
@@ -184,6 +190,13 @@ nlohmann::json inspection_json(const Inspection& inspection) {
     out[finding.problem ? "problems" : "notes"].push_back(finding.text);
   }
   if (inspection.video) out["video"] = video_json(*inspection.video);
+  for (const Inspection& one : inspection.cameras) {
+    nlohmann::json camera = {{"name", one.recording.camera_name},
+                             {"camera_declared", one.recording.camera.has_value()}};
+    if (one.video) camera["video"] = video_json(*one.video);
+    if (one.recording.corners) camera["sightings"] = one.recording.corners->observations.size();
+    out["cameras"].push_back(std::move(camera));
+  }
   if (inspection.log) out["log"] = log_json(*inspection.log);
   if (!recording.flange.empty()) out["flange"] = flange_json(recording);
   return out;
@@ -193,7 +206,15 @@ void note_what_is_missing(Inspection& inspection) {
   const Recording& recording = inspection.recording;
   const bool by_image =
       recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners;
-  if (by_image && !recording.camera) {
+  for (const Inspection& one : inspection.cameras) {
+    const std::string& name = one.recording.camera_name;
+    if (one.recording.camera) continue;
+    inspection.findings.push_back(
+        {false, fmt::format("no camera_{}.yaml: its intrinsics are estimated too; `kinescope "
+                            "camera` does it better",
+                            name)});
+  }
+  if (by_image && !recording.camera && inspection.cameras.empty()) {
     inspection.findings.push_back(
         {false,
          "no camera.yaml: the intrinsics are estimated too; `kinescope camera` does it better"});
@@ -241,6 +262,21 @@ void look_at_sightings(const Recording& recording, std::vector<Finding>& finding
   for (std::string& sentence : words) findings.push_back({false, std::move(sentence)});
 }
 
+Inspection look_at_camera(const Recording& recording, const RecordedCamera& camera,
+                          const Progress& progress, std::vector<Finding>& findings) {
+  Inspection out;
+  out.recording = of_camera(recording, camera);
+  if (camera.video.empty()) return out;
+  try {
+    out.video = look_at_video(out.recording, progress, out.findings);
+  } catch (const Error& error) {
+    out.findings.push_back({true, error.what()});
+  }
+  for (const Finding& finding : out.findings)
+    findings.push_back({finding.problem, fmt::format("camera {}: {}", camera.name, finding.text)});
+  return out;
+}
+
 }  // namespace
 
 bool Inspection::ready() const { return std::ranges::none_of(findings, &Finding::problem); }
@@ -260,6 +296,8 @@ Inspection inspect_recording(const RecordingPaths& paths, const Progress& progre
   if (recording.files.empty()) return inspection;
   if (!recording.log.empty())
     inspection.log = look_at_log(recording.log, recording.settings, findings);
+  for (const RecordedCamera& camera : recording.cameras)
+    inspection.cameras.push_back(look_at_camera(recording, camera, progress, findings));
   if (!recording.video.empty()) {
     try {
       inspection.video = look_at_video(recording, progress, findings);

@@ -70,6 +70,8 @@ struct Inspection {
   std::optional<VideoFacts> video;
   std::optional<LogFacts> log;
   std::vector<Finding> findings;
+  /// Of several cameras, each one's own; `video` is empty then. Their findings are in the whole's.
+  std::vector<Inspection> cameras = {};
 
   [[nodiscard]] bool ready() const;
 };

@@ -24,7 +24,8 @@ struct Place {
   Eigen::Vector3d at;  // px of its middle, or m
 };
 
-using Places = std::map<TagId, std::vector<Place>>;
+// Of a marker by a camera.
+using Places = std::map<std::pair<TagId, int>, std::vector<Place>>;
 
 Places places_of(const Observed& observed) {
   const Measurements& measured = observed.measurements;
@@ -33,17 +34,21 @@ Places places_of(const Observed& observed) {
   for (const TagObservation& tag : measured.corners) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const Eigen::Vector2d& corner : tag.corners_px) sum.head<2>() += corner;
-    out[tag.id].push_back({time(tag.frame), sum / static_cast<double>(tag.corners_px.size())});
+    const int camera = measured.camera_of_frame.empty()
+                           ? 0
+                           : measured.camera_of_frame[static_cast<std::size_t>(tag.frame)];
+    out[{tag.id, camera}].push_back(
+        {time(tag.frame), sum / static_cast<double>(tag.corners_px.size())});
   }
   for (const PoseTrack& track : measured.poses.tracks) {
     for (const PoseSample& sample : track.samples) {
-      out[track.id].push_back({time(sample.frame), sample.T_camera_marker.translation});
+      out[{track.id, 0}].push_back({time(sample.frame), sample.T_camera_marker.translation});
     }
   }
   for (const PointObservation& point : measured.points.observations) {
-    if (point.position_m) out[point.id].push_back({time(point.frame), *point.position_m});
+    if (point.position_m) out[{point.id, 0}].push_back({time(point.frame), *point.position_m});
   }
-  for (auto& [id, places] : out) std::ranges::sort(places, {}, &Place::time_s);
+  for (auto& [seen, places] : out) std::ranges::sort(places, {}, &Place::time_s);
   return out;
 }
 
@@ -71,7 +76,7 @@ double usual_step(const std::vector<Place>& places) {
 std::optional<std::pair<TagId, double>> moving_in(const Places& places, double from_s,
                                                   double to_s) {
   std::optional<std::pair<TagId, double>> most;
-  for (const auto& [id, all] : places) {
+  for (const auto& [seen, all] : places) {
     std::vector<Place> inside;
     std::ranges::copy_if(all, std::back_inserter(inside), [&](const Place& place) {
       return place.time_s > from_s && place.time_s < to_s;
@@ -79,7 +84,7 @@ std::optional<std::pair<TagId, double>> moving_in(const Places& places, double f
     const double range = range_of(all);
     const double moved = range_of(inside);
     if (moved < kShareOfRange * range || range < kStepsInRange * usual_step(all)) continue;
-    if (!most || moved > most->second) most = std::pair(id, moved);
+    if (!most || moved > most->second) most = std::pair(seen.first, moved);
   }
   return most;
 }

@@ -17,6 +17,7 @@
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/tracks/several_cameras.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -59,10 +60,11 @@ void require_markers(const Recording& recording, const TagObservations& tags) {
       rejected += fmt::format("{}{} x {}", rejected.empty() ? "; rejected: " : ", ", count, reason);
     }
     const Hint hint = rejected.empty() ? hint_of(recording) : Hint{};
-    throw bad_input(source,
-                    fmt::format("no marker of family {} was found in {} frames{}{}",
-                                recording.markers.family, tags.times_s.size(), rejected, hint.seen),
-                    hint.remedy);
+    throw NothingSeen(
+        bad_input(source,
+                  fmt::format("no marker of family {} was found in {} frames{}{}",
+                              recording.markers.family, tags.times_s.size(), rejected, hint.seen),
+                  hint.remedy));
   }
   std::set<int> unsized;
   for (const TagObservation& seen : tags.observations) {
@@ -168,6 +170,22 @@ void place_before_held_joints(KinematicTree& tree) {
     marker.link = tree.joints[held->index()].parent;
     marker.T_link_marker = T_parent_link * marker.T_link_marker;
   }
+}
+
+// Of joints that no channel drives: as at the reference camera's frame that is nearest in time.
+Eigen::MatrixXd at_all_frames(const Measurements& measurements, const Eigen::MatrixXd& values) {
+  const std::vector<int> reference = frames_of_reference(measurements.camera_of_frame);
+  const auto time_of = [&](std::size_t k) {
+    return measurements.times_s[static_cast<std::size_t>(reference[k])];
+  };
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(measurements.times_s.size()), values.cols());
+  std::size_t nearest = 0;
+  for (std::size_t f = 0; f < measurements.times_s.size(); ++f) {
+    const auto away = [&](std::size_t k) { return std::abs(time_of(k) - measurements.times_s[f]); };
+    while (nearest + 1 < reference.size() && away(nearest + 1) <= away(nearest)) ++nearest;
+    out.row(static_cast<Eigen::Index>(f)) = values.row(static_cast<Eigen::Index>(nearest));
+  }
+  return out;
 }
 
 double edge_px(const TagObservation& seen) {
@@ -320,14 +338,30 @@ std::optional<CameraModel> camera_from_motion(const Recording& recording, const 
   return std::nullopt;
 }
 
-CheckedNominal start_from_nominal(const Recording& recording, const Measurements& measurements,
+void add_further_cameras(const Observed& observed, CalibrationStart& start) {
+  if (observed.cameras.empty()) return;
+  start.camera_name = observed.cameras.front().name;
+  start.further_cameras.clear();
+  for (const ObservedCamera& camera : observed.cameras) {
+    if (&camera == &observed.cameras.front()) continue;
+    start.further_cameras.push_back({camera.name,
+                                     camera.T_reference_camera.inverse() * start.T_camera_base,
+                                     camera.model, 0.0, camera.estimate_intrinsics});
+  }
+  if (start.joint_values.size() > 0)
+    start.joint_values = at_all_frames(observed.measurements, start.joint_values);
+}
+
+CheckedNominal start_from_nominal(const Recording& recording, const Observed& observed,
                                   const PoseTracks& tracks, const CameraModel& camera,
                                   std::vector<std::string>& warnings) {
+  const Measurements& measurements = observed.measurements;
   NominalChannels matched = match_channels(recording);
   if (!tracks.tracks.empty()) {
     StructureOptions structure_options;
     structure_options.units = declared_units(recording);
-    const Structure structure = find_structure(tracks, recording.log, structure_options);
+    const Structure structure = find_structure(
+        at_common_instants(tracks, measurements.camera_of_frame), recording.log, structure_options);
     if (matched.in_order) matched = by_motion(std::move(matched), structure, recording.log);
     require_drawn_types(matched, structure, recording);
   }
@@ -346,6 +380,7 @@ CheckedNominal start_from_nominal(const Recording& recording, const Measurements
     start.tree.markers = placement.markers;
     place_before_held_joints(start.tree);
     for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
+    add_further_cameras(observed, start);
     return start;
   };
   CheckedNominal checked =

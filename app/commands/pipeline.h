@@ -11,15 +11,34 @@
 #include "app/report/run_summary.h"
 #include "calib/bundle/calibrate.h"
 #include "calib/bundle/check_nominal.h"
+#include "kinematics/core/error.h"
 #include "kinematics/structure/structure.h"
 
 namespace kinescope {
+
+/// One of several cameras: what it saw by its own frames, and where it stands.
+struct ObservedCamera {
+  std::string name;
+  CameraModel model;
+  bool estimate_intrinsics = false;
+  TagObservations tags;  ///< on its own clock
+  Pose T_reference_camera;
+  double ahead_s = 0.0;  ///< time of the common frames = own time + ahead
+};
 
 /// What the recording shows, whichever way it enters, and how it was seen.
 struct Observed {
   Measurements measurements;
   TagObservations tags;  ///< empty unless the recording enters by video or corners
   std::vector<std::string> warnings;
+  /// Of several: those that are used, the reference camera first, as `measurements` numbers them.
+  std::vector<ObservedCamera> cameras = {};
+};
+
+/// No marker of the declared family in any frame: what observe() throws then.
+class NothingSeen : public Error {
+ public:
+  explicit NothingSeen(const Error& error) : Error(error) {}
 };
 
 /// Detects the markers of the video, its lens known or not (or takes them from `cached`), or reads
@@ -51,6 +70,10 @@ struct Observed {
                                    const CalibrateOptions& options,
                                    std::optional<double> allowance = {});
 
+/// The cameras beside the reference camera, where that stands as the start says; joint values by
+/// frame (at_common_instants()) for the frames of all cameras. One camera: nothing changes.
+void add_further_cameras(const Observed& observed, CalibrationStart& start);
+
 /// Channels that the structure left in a unit of their own and the calibration finds in a usual
 /// one: the start has them in that. False where there are none.
 bool take_usual_units(const KinematicTree& calibrated, CalibrationStart& start);
@@ -65,8 +88,8 @@ bool take_usual_units(const KinematicTree& calibrated, CalibrationStart& start);
 /// A start from a nominal robot: channels matched by name (or by order, with a warning), markers
 /// placed, axes and channels that are grossly wrong mended. `warnings` receives what was assumed.
 [[nodiscard]] CheckedNominal start_from_nominal(const Recording& recording,
-                                                const Measurements& measurements,
-                                                const PoseTracks& tracks, const CameraModel& camera,
+                                                const Observed& observed, const PoseTracks& tracks,
+                                                const CameraModel& camera,
                                                 std::vector<std::string>& warnings);
 
 /// Throws undetermined with the first doubt's words and remedy when the structure is not

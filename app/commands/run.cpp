@@ -15,6 +15,7 @@
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
+#include "app/commands/see_cameras.h"
 #include "app/commands/sighting_doubts.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
@@ -28,6 +29,7 @@
 #include "calib/quality/error_summary.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/tracks/several_cameras.h"
 #include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
@@ -140,16 +142,11 @@ KinematicTree with_nominal_limits(KinematicTree tree, const KinematicTree& nomin
   return tree;
 }
 
-struct Seen {
-  Observed observed;
-  CameraModel camera;
-};
-
 /// The markers, and the camera. One that nobody declared is found from the markers' borders; then
 /// it is known, and their cells can be used, too.
-Seen see(const Recording& recording, const RunOptions& options,
-         const std::optional<TagObservations>& cached, const Progress& progress) {
-  Seen out;
+SeenAlone see(const Recording& recording, const RunOptions& options,
+              const std::optional<TagObservations>& cached, const Progress& progress) {
+  SeenAlone out;
   out.observed = observe(recording, options, recording.camera, cached, progress);
   out.camera = choose_camera(recording, out.observed.tags);
   if (recording.camera || recording.nominal || out.observed.tags.observations.empty()) return out;
@@ -167,6 +164,30 @@ Seen see(const Recording& recording, const RunOptions& options,
   }
   if (found) out.camera = *found;
   return out;
+}
+
+/// Of one camera, or of all.
+SeenTogether look(const Recording& recording, const RunOptions& options, const RunFolder& folder,
+                  const Progress& progress) {
+  const auto see_alone = [&](const Recording& one) {
+    return see(one, options, folder.cached_observations(one), progress);
+  };
+  if (!recording.cameras.empty()) return see_cameras(recording, options, see_alone);
+  SeenAlone alone = see_alone(recording);
+  PoseTracks tracks =
+      alone.observed.tags.observations.empty()
+          ? alone.observed.measurements.poses
+          : pose_tracks_from_tags(alone.observed.tags, alone.camera, recording.markers);
+  return {std::move(alone.observed), alone.camera, std::move(tracks), recording};
+}
+
+void keep_observations(const Recording& recording, const Observed& observed, RunFolder& folder) {
+  if (recording.cameras.empty()) folder.keep_observations(recording, observed.tags);
+  for (const RecordedCamera& camera : recording.cameras) {
+    const auto seen = std::ranges::find(observed.cameras, camera.name, &ObservedCamera::name);
+    if (seen != observed.cameras.end())
+      folder.keep_observations(of_camera(recording, camera), seen->tags);
+  }
 }
 
 bool shows_postures(const RunSummary& run) {
@@ -215,7 +236,8 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
     run.warnings.push_back(odd_words(odd, recording));
 }
 
-// Frames for the report, spread evenly over those of which the calibration used the most markers.
+// Frames of the (reference) camera for the report, spread evenly over those of which the
+// calibration used the most markers.
 void add_film(const Recording& recording, RunSummary& run) {
   constexpr std::size_t kMostStills = 24;  // with their markers about half a megabyte
   constexpr int kStillWidth = 480;         // px
@@ -223,7 +245,8 @@ void add_film(const Recording& recording, RunSummary& run) {
   std::map<int, int> used;
   int most = 0;
   for (const SightingResidual& residual : run.calibration.residuals)
-    if (residual.used) most = std::max(most, ++used[residual.frame]);
+    if (residual.used && run.calibration.camera_at(residual.frame) == 0)
+      most = std::max(most, ++used[residual.frame]);
   std::vector<int> frames;
   for (const auto& [frame, markers] : used)
     if (2 * markers >= most) frames.push_back(frame);
@@ -251,29 +274,28 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   Stopwatch clock;
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
-  const Recording recording = read_recording(options.recording);
-  require_nominal(options, recording);
-  if (!recording.flange.empty()) return run_hand_eye(options, recording, console);
-  RunFolder folder(options, recording);
-  if (options.must_trace) require_same_inputs(options.output, recording);
+  const Recording given = read_recording(options.recording);
+  require_nominal(options, given);
+  if (!given.flange.empty()) return run_hand_eye(options, given, console);
+  RunFolder folder(options, given);
+  if (options.must_trace) require_same_inputs(options.output, given);
   clock.lap("read", run.times);
 
-  const auto [observed, camera] =
-      see(recording, options, folder.cached_observations(recording), console.progress);
+  auto [observed, camera, tracks, recording] = look(given, options, folder, console.progress);
   describe_recording(recording, observed, options, run);
   for (const std::string& warning : run.warnings) console.warn(warning);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
-  if (!answered) folder.keep_observations(recording, observed.tags);
+  if (!answered) keep_observations(given, observed, folder);
   clock.lap("detect", run.times);
 
-  run.tracks = observed.tags.observations.empty()
-                   ? observed.measurements.poses
-                   : pose_tracks_from_tags(observed.tags, camera, recording.markers);
+  run.tracks = std::move(tracks);
   if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
-  require_plausible_motion(recording, run.tracks, options.calibrate);
+  require_plausible_motion(recording,
+                           at_common_instants(run.tracks, observed.measurements.camera_of_frame),
+                           options.calibrate);
   const Evidence evidence{recording, observed, run.tracks, camera};
   const std::size_t told = run.warnings.size();
   Explanation best =
@@ -302,7 +324,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     require(answer, fmt::format("{} shows the details, the earlier answer stays",
                                 folder.file(kFailedReport).string()));
   }
-  if (answered) folder.keep_observations(recording, observed.tags);
+  if (answered) keep_observations(given, observed, folder);
   write_products(run, urdf, folder);
   clock.lap("write", run.times);
   const TorqueStages torque =

@@ -20,8 +20,20 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr std::string_view kObservations = "observations.csv";
-constexpr std::string_view kObservationsKey = "observations.json";
+// What one camera saw: "observations.csv", "observations_left.csv".
+std::string observations_file(const std::string& camera, std::string_view ending) {
+  return camera.empty() ? fmt::format("observations.{}", ending)
+                        : fmt::format("observations_{}.{}", camera, ending);
+}
+
+std::vector<std::string> products_of(const Recording& recording) {
+  std::vector<std::string> out = run_products(!recording.log.torque_columns.empty());
+  for (const RecordedCamera& camera : recording.cameras) {
+    for (const char* ending : {"csv", "json"})
+      out.push_back(observations_file(camera.name, ending));
+  }
+  return out;
+}
 
 // run.json; nothing where there is none of a run.
 std::optional<json> run_document(const fs::path& folder) {
@@ -151,7 +163,7 @@ std::optional<TagObservations> observations_of(const json& kept, TagObservations
 RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
     : OutputFolder(checked_output(options, recording),
                    {.command = "run",
-                    .products = run_products(!recording.log.torque_columns.empty()),
+                    .products = products_of(recording),
                     .inputs = {},  // none of them lies in the folder
                     .force = options.force}),
       detect_(options.detect),
@@ -179,14 +191,16 @@ std::string RunFolder::detection_key(const Recording& recording) const {
 
 std::optional<TagObservations> RunFolder::cached_observations(const Recording& recording) const {
   if (force_ || recording.entry != RecordingEntry::kVideo) return std::nullopt;
-  if (!fs::exists(file(kObservations)) || !fs::exists(file(kObservationsKey))) return std::nullopt;
-  const json kept = json::parse(read_text_file(file(kObservationsKey)), nullptr, false);
+  const fs::path table = file(observations_file(recording.camera_name, "csv"));
+  const fs::path key = file(observations_file(recording.camera_name, "json"));
+  if (!fs::exists(table) || !fs::exists(key)) return std::nullopt;
+  const json kept = json::parse(read_text_file(key), nullptr, false);
   if (!kept.is_object() || kept.value("key", json()) != detection_key(recording) ||
-      kept.value("sha256", json()) != sha256_of_file(file(kObservations))) {
+      kept.value("sha256", json()) != sha256_of_file(table)) {
     return std::nullopt;
   }
   try {
-    return observations_of(kept, read_corners(file(kObservations), recording.markers));
+    return observations_of(kept, read_corners(table, recording.markers));
   } catch (const json::exception&) {
     return std::nullopt;  // damaged: the video is read once more
   }
@@ -194,18 +208,18 @@ std::optional<TagObservations> RunFolder::cached_observations(const Recording& r
 
 void RunFolder::keep_observations(const Recording& recording, const TagObservations& observations) {
   if (observations.observations.empty()) return;
-  write(kObservations, observations_csv(observations));
+  const std::string table = observations_file(recording.camera_name, "csv");
+  write(table, observations_csv(observations));
   if (recording.entry != RecordingEntry::kVideo) return;
   json rejected = json::array();
   for (const RejectedTag& tag : observations.rejected) {
     rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
   }
-  const json kept{
-      {"key", detection_key(recording)},   {"sha256", sha256_of_file(file(kObservations))},
-      {"width", observations.width},       {"height", observations.height},
-      {"times_s", observations.times_s},   {"rejected", std::move(rejected)},
-      {"warnings", observations.warnings}, {"lens_known", observations.lens_known}};
-  write(kObservationsKey, kept.dump(1) + "\n");
+  const json kept{{"key", detection_key(recording)},   {"sha256", sha256_of_file(file(table))},
+                  {"width", observations.width},       {"height", observations.height},
+                  {"times_s", observations.times_s},   {"rejected", std::move(rejected)},
+                  {"warnings", observations.warnings}, {"lens_known", observations.lens_known}};
+  write(observations_file(recording.camera_name, "json"), kept.dump(1) + "\n");
 }
 
 bool RunFolder::holds_answer() const {

@@ -27,7 +27,8 @@ class RunFolder : public OutputFolder {
   /// files, or with those of others, or, without force, with the run of another recording.
   RunFolder(const RunOptions& options, const Recording& recording);
 
-  /// The observations of an earlier run with the same video, tags and detection options.
+  /// The observations of an earlier run with the same video, tags and detection options. Of several
+  /// cameras one after the other, as of_camera() gives them.
   [[nodiscard]] std::optional<TagObservations> cached_observations(
       const Recording& recording) const;
   void keep_observations(const Recording& recording, const TagObservations& observations);

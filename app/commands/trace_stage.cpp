@@ -17,6 +17,14 @@ constexpr double kDetectorBias = 0.01;  // px
 // around it.
 CalibrationStart continued(const CalibrationStart& start, const Calibration& plain) {
   CalibrationStart out = start;
+  for (std::size_t c = 0; c < out.further_cameras.size(); ++c) {
+    FurtherCamera& camera = out.further_cameras[c];
+    const CameraEstimate& found = plain.further_cameras[c];
+    camera.T_camera_base = found.T_camera_base;
+    if (start.nominal) continue;
+    camera.camera = found.camera;
+    camera.lag_s = found.lag_s;
+  }
   if (start.nominal) {
     out.T_camera_base = plain.T_camera_base;
     out.tree.markers = plain.tree.markers;

@@ -99,8 +99,7 @@ json tree_json(const KinematicTree& tree) {
   return out;
 }
 
-json camera_json(const Calibration& calibration) {
-  const CameraModel& camera = calibration.camera;
+json camera_json(const CameraModel& camera, bool estimated) {
   json distortion = json::array();
   for (int i = 0; i < distortion_count(camera.model); ++i) {
     distortion.push_back(number(camera.distortion[static_cast<std::size_t>(i)]));
@@ -113,7 +112,21 @@ json camera_json(const Calibration& calibration) {
           {"cy", number(camera.cy)},
           {"distortion_model", std::string(to_string(camera.model))},
           {"distortion", std::move(distortion)},
-          {"estimated", calibration.intrinsics_estimated}};
+          {"estimated", estimated}};
+}
+
+json further_cameras_json(const Calibration& calibration) {
+  json out = json::array();
+  for (const CameraEstimate& camera : calibration.further_cameras) {
+    out.push_back({{"name", camera.name},
+                   {"T_camera_base", pose_json(camera.T_camera_base)},
+                   {"rotation_sigma_rad", number(camera.rotation_sigma_rad)},
+                   {"translation_sigma_m", number(camera.translation_sigma_m)},
+                   {"camera", camera_json(camera.camera, camera.intrinsics_estimated)},
+                   {"lag_s", number(camera.lag_s)},
+                   {"lag_sigma_s", number(camera.lag_sigma_s)}});
+  }
+  return out;
 }
 
 void append_vector(std::string& out, const std::vector<Eigen::Vector2d>& corners, std::size_t i) {
@@ -162,9 +175,12 @@ std::string residuals_csv(const Calibration& calibration) {
                               "before_dv\n"
                             : "t,body,used,fold,rx,ry,rz,x,y,z,held_out_rx,held_out_ry,"
                               "held_out_rz,held_out_x,held_out_y,held_out_z\n";
+  const bool several = calibration.cameras() > 1;
+  if (several) out.insert(0, "camera,");
   for (const SightingResidual& r : calibration.residuals) {
-    const std::string head =
+    std::string head =
         fmt::format("{},{}", calibration.times_s[static_cast<std::size_t>(r.frame)], r.id.value);
+    if (several) head = calibration.name_of_camera(calibration.camera_at(r.frame)) + "," + head;
     const std::string flags = fmt::format(",{},{}", r.used ? 1 : 0, r.fold);
     if (corners) {
       for (std::size_t c = 0; c < r.corners_px.size(); ++c) {
@@ -234,7 +250,7 @@ json calibration_json(const Calibration& calibration) {
            {"status_reason", calibration.status_reason},
            {"robot", tree_json(calibration.tree)},
            {"T_camera_base", pose_json(calibration.T_camera_base)},
-           {"camera", camera_json(calibration)},
+           {"camera", camera_json(calibration.camera, calibration.intrinsics_estimated)},
            {"time_offset_s", number(calibration.time_offset_s)},
            {"time_offset_sigma_s", number(calibration.time_offset_sigma_s)},
            {"gauge", calibration.gauge},
@@ -248,6 +264,10 @@ json calibration_json(const Calibration& calibration) {
            {"covariance", json::array()}};
   for (std::size_t j = 0; j < calibration.joints.size(); ++j) {
     out["robot"]["joints"][j]["parameters_at"] = number(calibration.joints[j].parameters_at);
+  }
+  if (calibration.cameras() > 1) {
+    out["camera_name"] = calibration.camera_name;
+    out["further_cameras"] = further_cameras_json(calibration);
   }
   for (const Parameter& p : calibration.parameters) {
     out["parameters"].push_back({{"name", p.name},

@@ -158,7 +158,10 @@ void add_distances(Recording& recording, const RecordingFiles& files) {
 
 /// Stamps of tables are on the log's clock already; a start beside them is one too many.
 void refuse_video_start(const Recording& recording, const RecordingFiles& files) {
-  if (recording.entry == RecordingEntry::kVideo || recording.settings.video_start_s == 0.0) return;
+  const RecordingSettings& settings = recording.settings;
+  if (recording.entry == RecordingEntry::kVideo ||
+      (settings.video_start_s == 0.0 && settings.video_starts_s.empty()))
+    return;
   throw bad_input(value_of(files.settings).string(),
                   fmt::format("video_start is {} s, but the recording is read from {}.csv, whose t "
                               "is on the log's clock",
@@ -222,7 +225,7 @@ void refuse_normalised(const TagObservations& corners, const CameraModel& camera
 
 /// Leaves a few markers outside the images out; more of them are of other images than the camera's.
 void leave_out_outside(TagObservations& corners, const CameraModel& camera,
-                       const RecordingFiles& files, std::vector<std::string>& warnings) {
+                       const CameraFiles& files, std::vector<std::string>& warnings) {
   if (camera.width <= 0 || camera.height <= 0) return;  // its file tells no size
   refuse_exchanged_axes(corners, camera, value_of(files.corners));
   BadRows bad(value_of(files.corners).string(), corners.observations.size(), "sightings");
@@ -248,19 +251,90 @@ void leave_out_outside(TagObservations& corners, const CameraModel& camera,
   warnings.insert(warnings.end(), left_out.begin(), left_out.end());
 }
 
-void take_image_size(Recording& recording, const RecordingFiles& files) {
+void take_image_size(const fs::path& folder, const CameraFiles& files,
+                     const std::optional<CameraModel>& camera, TagObservations& corners,
+                     std::vector<std::string>& warnings) {
   if (!files.camera) {
-    throw bad_input((recording.folder / "camera.yaml").string(),
-                    "no such file, and corners.csv does not say how large the images were",
-                    "add the camera's intrinsics, or name them with --camera");
+    const std::string name =
+        files.name.empty() ? "camera.yaml" : fmt::format("camera_{}.yaml", files.name);
+    throw bad_input((folder / name).string(),
+                    fmt::format("no such file, and {} does not say how large the images were",
+                                value_of(files.corners).filename().string()),
+                    files.name.empty() ? "add the camera's intrinsics, or name them with --camera"
+                                       : "add the camera's intrinsics");
   }
-  if (!recording.camera) return;  // it was refused
-  TagObservations& corners = value_of(recording.corners);
-  corners.width = recording.camera->width;
-  corners.height = recording.camera->height;
-  refuse_normalised(corners, *recording.camera, value_of(files.corners));
-  leave_out_outside(corners, *recording.camera, files, recording.warnings);
-  refuse_mirrored(corners, recording.markers, value_of(files.corners));
+  if (!camera) return;  // it was refused
+  corners.width = camera->width;
+  corners.height = camera->height;
+  refuse_normalised(corners, *camera, value_of(files.corners));
+  leave_out_outside(corners, *camera, files, warnings);
+}
+
+/// One camera's table of corners.
+TagObservations read_corners_of(const Recording& recording, const CameraFiles& files,
+                                const std::optional<CameraModel>& camera,
+                                std::vector<std::string>& warnings) {
+  TagObservations out = read_corners(value_of(files.corners), recording.markers);
+  const std::vector<std::string> said = std::exchange(out.warnings, {});
+  warnings.insert(warnings.end(), said.begin(), said.end());
+  take_image_size(recording.folder, files, camera, out, warnings);
+  turn_clockwise_corners(out, recording.markers, value_of(files.corners), warnings);
+  require_time_overlap(recording.log, out.times_s, value_of(files.corners).string());
+  return out;
+}
+
+std::optional<CameraModel> read_intrinsics(const fs::path& file,
+                                           std::vector<std::string>& warnings) {
+  const auto bag = bags::bag_source(file);
+  std::optional<CameraModel> camera = bag ? camera_of_bag(*bag) : read_camera(file);
+  if (!camera) return camera;
+  warn_of_pixels(*camera, file, warnings);
+  warn_of_principal_point(*camera, file, warnings);
+  return camera;
+}
+
+void read_cameras(Recording& recording, const RecordingFiles& files) {
+  for (const CameraFiles& one : files.cameras) {
+    RecordedCamera& camera = recording.cameras.emplace_back();
+    camera.name = one.name;
+    if (one.camera) {
+      camera.camera = read_intrinsics(*one.camera, recording.warnings);
+      camera.camera_file = *one.camera;
+    }
+    if (one.video) camera.video = *one.video;
+    if (one.corners)
+      camera.corners = read_corners_of(recording, one, camera.camera, recording.warnings);
+  }
+}
+
+/// What only one camera, or only a log, makes possible.
+void check_cameras(const Recording& recording, const RecordingFiles& files) {
+  std::vector<std::string> names;
+  for (const CameraFiles& camera : files.cameras) names.push_back(camera.name);
+  const RecordingSettings& settings = recording.settings;
+  const auto refuse = [&](const std::string& what, const std::string& remedy) {
+    throw bad_input(value_of(files.settings).string(), what, remedy);
+  };
+  const auto require_name = [&](const char* key, const std::string& name) {
+    if (std::ranges::find(names, name) != names.end()) return;
+    refuse(fmt::format("{} names a camera '{}', and there is none of that name", key, name),
+           names.empty() ? "the recording is of one camera: remove it" : did_you_mean(name, names));
+  };
+  for (const auto& [name, start_s] : settings.video_starts_s) require_name("video_start", name);
+  if (!settings.gravity_camera.empty()) require_name("gravity_camera", settings.gravity_camera);
+  if (names.empty()) return;
+  if (settings.gravity && settings.gravity_camera.empty()) {
+    refuse("gravity is declared in a camera's frame, and there are several cameras",
+           fmt::format("add gravity_camera: {}", names.front()));
+  }
+  if (files.flange) {
+    throw bad_input(files.flange->string(), "calibrates one camera, and there are several",
+                    "name one with --video or --corners, and its intrinsics with --camera");
+  }
+  if (files.joints) return;
+  throw bad_input((recording.folder / "joints.csv").string(),
+                  "no such file, and the clocks of several cameras are tied by the joint log",
+                  "add it, or name one camera with --video or --corners");
 }
 
 void read_sightings(Recording& recording, const RecordingFiles& files) {
@@ -268,16 +342,15 @@ void read_sightings(Recording& recording, const RecordingFiles& files) {
     recording.warnings.insert(recording.warnings.end(), warnings.begin(), warnings.end());
   };
   refuse_video_start(recording, files);
+  if (!files.cameras.empty()) return read_cameras(recording, files);
   switch (recording.entry) {
     case RecordingEntry::kVideo:
       recording.video = value_of(files.video);
       break;
     case RecordingEntry::kCorners:
-      recording.corners = read_corners(value_of(files.corners), recording.markers);
-      warn(std::exchange(value_of(recording.corners).warnings, {}));
-      take_image_size(recording, files);
-      require_time_overlap(recording.log, value_of(recording.corners).times_s,
-                           value_of(files.corners).string());
+      recording.corners =
+          read_corners_of(recording, {"", std::nullopt, files.corners, files.camera},
+                          recording.camera, recording.warnings);
       break;
     case RecordingEntry::kPoses: {
       ReadSightings<PoseTracks> read = read_poses(value_of(files.poses));
@@ -493,13 +566,10 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
   step([&] { check_fixed_tags(recording, files); });
   step([&] {
     if (!files.camera) return;
-    const auto bag = bags::bag_source(*files.camera);
-    recording.camera = bag ? camera_of_bag(*bag) : read_camera(*files.camera);
-    if (!recording.camera) return;
-    recording.camera_file = *files.camera;
-    warn_of_pixels(*recording.camera, *files.camera, recording.warnings);
-    warn_of_principal_point(*recording.camera, *files.camera, recording.warnings);
+    recording.camera = read_intrinsics(*files.camera, recording.warnings);
+    if (recording.camera) recording.camera_file = *files.camera;
   });
+  step([&] { check_cameras(recording, files); });
   step([&] {
     if (!files.nominal) return;
     recording.nominal = read_urdf(*files.nominal);
@@ -512,6 +582,19 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
   step([&] { require_flange_time(recording); });
   step([&] { require_known_camera(recording, files); });
   return attempt;
+}
+
+Recording of_camera(const Recording& recording, const RecordedCamera& camera) {
+  Recording out = recording;
+  out.cameras.clear();
+  out.camera_name = camera.name;
+  out.video = camera.video;
+  out.corners = camera.corners;
+  out.camera = camera.camera;
+  out.camera_file = camera.camera_file;
+  const auto start = recording.settings.video_starts_s.find(camera.name);
+  if (start != recording.settings.video_starts_s.end()) out.settings.video_start_s = start->second;
+  return out;
 }
 
 Recording read_recording(const RecordingPaths& paths) {

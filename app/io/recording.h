@@ -35,7 +35,8 @@ struct RecordingPaths {
 };
 
 /// recording.yaml as a value. Its keys: name, torques, gravity, fixed_tags, video_start,
-/// target_distances (list of from, to, distance, sigma), units (channel: unit) and camera_mount.
+/// target_distances (list of from, to, distance, sigma), units (channel: unit), camera_mount,
+/// gravity_camera; video_start may hold one number for each of several cameras.
 struct RecordingSettings {
   std::string name;                          ///< of the robot; default: the folder's name
   std::vector<std::string> torque_channels;  ///< columns of joints.csv beside those named tau*
@@ -43,6 +44,8 @@ struct RecordingSettings {
   std::vector<TagId> fixed_tags;             ///< declared at rest in the camera's frame
   double video_start_s =
       0.0;  ///< added to the video's times: time of its first stamp on the log's clock
+  std::map<std::string, double> video_starts_s;  ///< the same by the name of a camera, of several
+  std::string gravity_camera;  ///< the camera in whose frame `gravity` is, of several
   std::vector<TargetDistance> target_distances;
   /// channel: rad, deg, m, mm, ticks. read_recording() turns deg to rad and mm to m, in the log and
   /// here.
@@ -55,6 +58,15 @@ enum class RecordingEntry { kVideo, kCorners, kPoses, kPoints };
 
 /// "video", "corners", "poses", "points".
 [[nodiscard]] std::string_view to_string(RecordingEntry entry);
+
+/// One of several fixed cameras: video_NAME, images_NAME or corners_NAME.csv, camera_NAME.yaml.
+struct RecordedCamera {
+  std::string name;
+  std::filesystem::path video;             ///< as Recording::video
+  std::optional<TagObservations> corners;  ///< corners_NAME.csv
+  std::optional<CameraModel> camera;       ///< none: to be estimated
+  std::filesystem::path camera_file;
+};
 
 struct Recording {
   std::filesystem::path folder;
@@ -70,6 +82,9 @@ struct Recording {
   std::vector<FlangeReading> flange;
   std::optional<CameraModel> camera;  ///< none: to be estimated
   std::filesystem::path camera_file;  ///< that it was read from
+  /// Two or more, by name, in place of `video`, `corners` and `camera`; empty: one camera.
+  std::vector<RecordedCamera> cameras;
+  std::string camera_name;  ///< of a part that of_camera() gave; else empty
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
   std::filesystem::path nominal_file;        ///< that it was read from
@@ -79,6 +94,9 @@ struct Recording {
 
 /// Reads and checks everything but the video's frames. Throws Error (file, place, remedy).
 [[nodiscard]] Recording read_recording(const RecordingPaths& paths);
+
+/// The recording as if this one of its cameras were the only one.
+[[nodiscard]] Recording of_camera(const Recording& recording, const RecordedCamera& camera);
 
 /// What can be read although something is wrong, and all that is wrong.
 struct ReadAttempt {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/io/recording_doubts.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
-
-#include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
@@ -24,24 +23,24 @@ double doubled_area(const std::vector<Eigen::Vector2d>& corners_px) {
 
 }  // namespace
 
-void refuse_mirrored(const TagObservations& corners, const MarkerSet& markers,
-                     const std::filesystem::path& file) {
+void turn_clockwise_corners(TagObservations& corners, const MarkerSet& markers,
+                            const std::filesystem::path& file, std::vector<std::string>& warnings) {
   constexpr double kNearlyAll = 0.95;  // a detector errs in fewer
+  std::vector<TagObservation*> clockwise;
   int squares = 0;
-  int behind = 0;
-  for (const TagObservation& tag : corners.observations) {
+  for (TagObservation& tag : corners.observations) {
     if (markers.boards.contains(tag.id)) continue;
     ++squares;
-    if (doubled_area(tag.corners_px) > 0.0) ++behind;
+    if (doubled_area(tag.corners_px) > 0.0) clockwise.push_back(&tag);
   }
-  if (behind == 0 || behind < kNearlyAll * squares) return;
-  throw bad_input(
-      file.string(),
-      fmt::format("the corners 0, 1, 2, 3 of {} of {} sightings go round clockwise, as of markers "
-                  "seen from behind: does v count upward, which would mirror the robot?",
-                  behind, squares),
-      "v counts down from the top row: take it from the images' height; where it does, the corners "
-      "are in another order: number them counter-clockwise from the lower left");
+  const auto count = static_cast<int>(clockwise.size());
+  if (count == 0 || count < kNearlyAll * squares) return;
+  for (TagObservation* tag : clockwise) std::ranges::reverse(tag->corners_px);
+  warnings.push_back(fmt::format(
+      "{}: the corners 0, 1, 2, 3 of {} of {} sightings go round clockwise: taken for OpenCV's "
+      "order, from the upper left. Does v count upward instead, the robot comes out mirrored: take "
+      "v from the images' height",
+      file.string(), count, squares));
 }
 
 void warn_of_principal_point(const CameraModel& camera, const std::filesystem::path& file,

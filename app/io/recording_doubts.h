@@ -14,11 +14,11 @@
 
 namespace kinescope {
 
-/// Throws bad_input (file, remedy) where nearly all square markers are seen from behind, through
-/// the paper: v counts upward, which mirrors the robot, or their corners are numbered the other way
-/// round.
-void refuse_mirrored(const TagObservations& corners, const MarkerSet& markers,
-                     const std::filesystem::path& file);
+/// Where nearly all square markers are seen from behind, through the paper, their corners are
+/// turned to AprilTag's order, and a warning says so: OpenCV's order is told from v counted upward,
+/// which mirrors the robot, by no table alone.
+void turn_clockwise_corners(TagObservations& corners, const MarkerSet& markers,
+                            const std::filesystem::path& file, std::vector<std::string>& warnings);
 
 /// One sentence where the principal point is far from the middle of the images: they are of another
 /// size, or cx and cy are exchanged. Images that were cut out of others have such a point, too.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -87,6 +88,105 @@ MaybePath find_video(const fs::path& folder) {
     if (fs::is_directory(folder / name, error)) return folder / name;
   }
   return std::nullopt;
+}
+
+/// What stands behind the underscore of "video_left": "left"; nothing of other names.
+std::optional<std::string> name_behind(const std::string& stem, std::string_view kind) {
+  if (!stem.starts_with(kind) || stem.size() <= kind.size() + 1 || stem[kind.size()] != '_')
+    return std::nullopt;
+  return stem.substr(kind.size() + 1);
+}
+
+/// What each camera of the folder shows: its videos and folders of images, or its tables of
+/// corners.
+std::map<std::string, fs::path> shown_by_cameras(const fs::path& folder, bool corners) {
+  std::map<std::string, fs::path> out;
+  const auto add = [&](const std::optional<std::string>& name, const fs::path& path) {
+    if (!name) return;
+    const auto [known, fresh] = out.emplace(*name, path);
+    if (fresh) return;
+    throw bad_input(folder.string(),
+                    fmt::format("both {} and {} are of camera '{}'",
+                                known->second.filename().string(), path.filename().string(), *name),
+                    "give each camera one of them");
+  };
+  for (const fs::path& path : sorted_files(folder)) {
+    const std::string stem = path.stem().string();
+    if (corners && path.extension() == ".csv") add(name_behind(stem, "corners"), path);
+    if (!corners && is_video_file(path)) add(name_behind(stem, "video"), path);
+  }
+  if (corners) return out;
+  std::error_code error;
+  std::vector<fs::path> folders;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.is_directory(error)) folders.push_back(entry.path());
+  std::ranges::sort(folders);
+  for (const fs::path& path : folders) add(name_behind(path.filename().string(), "images"), path);
+  return out;
+}
+
+/// Several cameras are two or more; what is called without a name is the only one's.
+bool has_single_camera(const fs::path& folder) {
+  std::error_code error;
+  for (const char* ending : kVideoEndings)
+    if (fs::exists(folder / (std::string("video") + ending), error)) return true;
+  return fs::is_directory(folder / "images", error) || fs::exists(folder / "corners.csv", error);
+}
+
+/// Names of cameras are in the names of products and in tables.
+void require_plain_name(const std::string& name, const fs::path& path) {
+  const bool plain = std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+  });
+  if (plain) return;
+  throw bad_input(path.string(), fmt::format("'{}' is no name for a camera", name),
+                  "use letters, digits, '_', '-' and '.'");
+}
+
+void find_cameras(const fs::path& folder, RecordingFiles& files) {
+  for (const bool corners : {false, true}) {
+    const std::map<std::string, fs::path> shown = shown_by_cameras(folder, corners);
+    if (shown.size() < 2) continue;
+    if (has_single_camera(folder)) {
+      files.warnings.push_back(
+          fmt::format("{} is not used: a video, images or corners.csv without a camera's name "
+                      "stand beside it",
+                      shown.begin()->second.string()));
+      return;
+    }
+    files.entry = corners ? RecordingEntry::kCorners : RecordingEntry::kVideo;
+    for (const auto& [name, path] : shown) {
+      require_plain_name(name, path);
+      CameraFiles camera{name, {}, {}, {}};
+      (corners ? camera.corners : camera.video) = path;
+      const fs::path intrinsics = folder / fmt::format("camera_{}.yaml", name);
+      std::error_code error;
+      if (fs::is_regular_file(intrinsics, error)) camera.camera = intrinsics;
+      files.cameras.push_back(std::move(camera));
+    }
+    return;
+  }
+}
+
+/// A camera's file that belongs to none is a slip of the pen.
+void check_camera_files(const fs::path& folder, const RecordingPaths& paths,
+                        RecordingFiles& files) {
+  if (paths.camera) {
+    throw bad_request("--camera", "the recording is of several cameras",
+                      "call each one's intrinsics camera_NAME.yaml, or name one video with "
+                      "--video");
+  }
+  std::vector<std::string> names;
+  for (const CameraFiles& camera : files.cameras) names.push_back(camera.name);
+  for (const fs::path& path : sorted_files(folder)) {
+    if (path.extension() != ".yaml") continue;
+    const std::string stem = path.stem().string();
+    const auto name = name_behind(stem, "camera");
+    if (stem != "camera" && !name) continue;
+    if (name && std::ranges::find(names, *name) != names.end()) continue;
+    files.warnings.push_back(
+        fmt::format("{} is not used: the cameras are {}", path.string(), fmt::join(names, ", ")));
+  }
 }
 
 /// The file named on the command line, else the one of that name in the folder.
@@ -228,7 +328,10 @@ std::vector<fs::path> RecordingFiles::all() const {
   std::vector<fs::path> out;
   const MaybePath* seen[] = {&video, &corners, &poses, &points};
   const MaybePath& used = *seen[static_cast<std::size_t>(entry)];
-  for (const MaybePath* file : {&used, &joints, &flange, &camera, &tags, &settings, &nominal}) {
+  std::vector<const MaybePath*> files{&used, &joints, &flange, &camera, &tags, &settings, &nominal};
+  for (const CameraFiles& one : cameras)
+    files.insert(files.end(), {&one.video, &one.corners, &one.camera});
+  for (const MaybePath* file : files) {
     if (!*file) continue;
     std::error_code error;
     const bool images = !recorded::container_of(**file) && fs::is_directory(**file, error);
@@ -252,9 +355,11 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
   RecordingFiles files;
   files.folder = folder;
   const bool seen_otherwise = paths.corners || paths.poses || paths.points;
+  const bool named = paths.video || seen_otherwise;
+  if (!named && !container) find_cameras(folder, files);
   if (paths.video) {
     files.video = find_file(paths.video, folder, "", "--video");
-  } else if (!seen_otherwise && !container) {
+  } else if (!seen_otherwise && !container && files.cameras.empty()) {
     files.video = find_video(folder);
   }
   // Of the files beside a bag or dataset those that it does not hold itself.
@@ -267,20 +372,25 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
     return found ? found : find_file(std::nullopt, places.back(), name, option);
   };
   files.joints = find(paths.joints, "joints.csv", "--joints");
-  files.camera = find_beside(paths.camera, "camera.yaml", "--camera");
+  if (files.cameras.empty()) {
+    files.camera = find_beside(paths.camera, "camera.yaml", "--camera");
+  } else {
+    check_camera_files(folder, paths, files);
+  }
   files.tags = find_beside(paths.tags, "tags.yaml", "--tags");
   files.settings = find_beside(std::nullopt, "recording.yaml", "");
   files.corners = find(paths.corners, "corners.csv", "--corners");
   files.poses = find(paths.poses, "poses.csv", "--poses");
   files.points = find(paths.points, "points.csv", "--points");
   files.nominal = find_beside(paths.nominal, "nominal.urdf", "--nominal");
-  const bool seen = files.video || files.corners || files.poses || files.points;
+  const bool seen =
+      files.video || files.corners || files.poses || files.points || !files.cameras.empty();
   if (container) {
     take_from_container(paths.folder, files);
   } else if (!seen) {
     if (const MaybePath alone = container_in(folder)) take_from_container(*alone, files);
   }
-  files.entry = choose_entry(paths, files);
+  if (files.cameras.empty()) files.entry = choose_entry(paths, files);
   find_flange(files);
   return files;
 }

@@ -50,7 +50,7 @@ CameraMount read_mount(const YamlValue& value) {
 RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   const YamlValue file = YamlValue::read(path);
   file.only_keys({"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances",
-                  "units", "camera_mount", "dynamics"});
+                  "units", "camera_mount", "gravity_camera", "dynamics"});
   RecordingSettings settings;
   if (const auto name = file.find("name")) settings.name = name->text();
   if (const auto list = file.find("torques")) {
@@ -60,7 +60,15 @@ RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   if (const auto list = file.find("fixed_tags")) {
     for (const YamlValue& item : list->items()) settings.fixed_tags.push_back({item.whole(0)});
   }
-  if (const auto start = file.find("video_start")) settings.video_start_s = start->number();
+  if (const auto start = file.find("video_start")) {
+    if (start->is_mapping()) {
+      for (const auto& [camera, value] : start->entries())
+        settings.video_starts_s[camera] = value.number();
+    } else {
+      settings.video_start_s = start->number();
+    }
+  }
+  if (const auto name = file.find("gravity_camera")) settings.gravity_camera = name->text();
   if (const auto list = file.find("target_distances")) {
     for (const YamlValue& item : list->items()) {
       settings.target_distances.push_back(read_target_distance(item));

@@ -30,6 +30,7 @@ class YamlValue {
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   [[nodiscard]] std::vector<YamlValue> items() const;
   [[nodiscard]] bool is_list() const { return node_.IsSequence(); }
+  [[nodiscard]] bool is_mapping() const { return node_.IsMap(); }
   /// The value of a key, where it is there.
   [[nodiscard]] std::optional<YamlValue> find(const std::string& key) const;
   /// The value of a key that must be there.

@@ -52,7 +52,8 @@ void add_corners(const RunSummary& run, Analysis& analysis) {
           {.frame = sighting.frame,
            .marker = static_cast<std::size_t>(found - analysis.markers.begin()),
            .pixel = predicted[k] + sighting.corners_px[k],
-           .residual = sighting.corners_px[k]});
+           .residual = sighting.corners_px[k],
+           .camera = run.calibration.camera_at(sighting.frame)});
     }
   }
 }

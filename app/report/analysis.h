@@ -29,6 +29,7 @@ struct CornerPoint {
   std::size_t marker = 0;    ///< index into the marker list of the analysis
   Eigen::Vector2d pixel;     ///< where it was seen
   Eigen::Vector2d residual;  ///< px
+  std::size_t camera = 0;    ///< whose image it is in
 };
 
 /// What change of one joint alone would best explain one frame.

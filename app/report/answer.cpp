@@ -45,7 +45,7 @@ Missed missed_motion(const Calibration& calibration) {
     std::vector<Eigen::VectorXd> seen;
     double squares = 0.0;
   };
-  std::map<TagId, Places> markers;
+  std::map<std::pair<TagId, std::size_t>, Places> markers;  // and cameras
   const bool px = calibration.kind == MeasurementKind::kCorners;
   for (const SightingResidual& sighting : calibration.residuals) {
     const std::vector<Pose>& links = predictor.links(sighting.frame);
@@ -66,8 +66,9 @@ Missed missed_motion(const Calibration& calibration) {
       place = T.translation;
       squares = sighting.displacement.tail<3>().squaredNorm();
     }
-    markers[sighting.id].seen.push_back(std::move(place));
-    markers[sighting.id].squares += squares;
+    Places& places = markers[{sighting.id, calibration.camera_at(sighting.frame)}];
+    places.seen.push_back(std::move(place));
+    places.squares += squares;
   }
   Missed out{0.0, 0.0, px};
   double count = 0.0;

@@ -63,9 +63,11 @@ std::vector<Eigen::Vector2d> Predictor::corners(const SightingResidual& sighting
   const std::vector<Pose>& links_base = links(sighting.frame);
   const Marker* marker = calibration_.tree.marker(sighting.id);
   if (links_base.empty() || marker == nullptr) return {};
+  const std::size_t camera = calibration_.camera_at(sighting.frame);
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& corner : corners_base(sighting, links_base, *marker)) {
-    const auto pixel = project(calibration_.camera, calibration_.T_camera_base * corner);
+    const auto pixel = project(calibration_.model_of_camera(camera),
+                               calibration_.T_camera_base_of(camera) * corner);
     if (!pixel) return {};
     pixels.push_back(*pixel);
   }
@@ -91,12 +93,14 @@ std::vector<ResidualAndRate> Predictor::rates(const SightingResidual& sighting,
   std::vector<ResidualAndRate> rates;
   if (calibration_.kind == MeasurementKind::kCorners) {
     const std::vector<Eigen::Vector3d> corners = corners_base(sighting, links_base, *marker);
+    const std::size_t camera = calibration_.camera_at(sighting.frame);
+    const Pose& T_camera_base = calibration_.T_camera_base_of(camera);
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      const auto projection =
-          project_with_derivatives(calibration_.camera, calibration_.T_camera_base * corners[k]);
+      const auto projection = project_with_derivatives(calibration_.model_of_camera(camera),
+                                                       T_camera_base * corners[k]);
       if (!projection) return {};
-      const Eigen::Vector2d rate = projection->d_point * (calibration_.T_camera_base.rotation *
-                                                          velocity(links_base, joint, corners[k]));
+      const Eigen::Vector2d rate =
+          projection->d_point * (T_camera_base.rotation * velocity(links_base, joint, corners[k]));
       for (int axis = 0; axis < 2; ++axis) {
         rates.push_back({.residual = sighting.corners_px[k](axis), .rate = rate(axis)});
       }

@@ -179,6 +179,30 @@ json camera_json(const Calibration& calibration) {
   return document;
 }
 
+/// Of several cameras, the reference camera first; null of one.
+json cameras_json(const Calibration& calibration) {
+  if (calibration.cameras() < 2) return nullptr;
+  const std::vector<CameraErrors> errors = errors_of_cameras(calibration);
+  json list = json::array();
+  for (std::size_t c = 0; c < calibration.cameras(); ++c) {
+    const CameraEstimate* further = c == 0 ? nullptr : &calibration.further_cameras[c - 1];
+    list.push_back(
+        {{"name", text(calibration.name_of_camera(c))},
+         {"pose_in_base", pose(calibration.T_camera_base_of(c).inverse())},
+         {"rotation_expanded_rad", further ? expanded(further->rotation_sigma_rad)
+                                           : worst_of_block(calibration, "camera", "rad")},
+         {"translation_expanded_m", further ? expanded(further->translation_sigma_m)
+                                            : worst_of_block(calibration, "camera", "m")},
+         {"lag_s", number(further ? further->lag_s : 0.0)},
+         {"lag_expanded_s", further ? expanded(further->lag_sigma_s) : json(nullptr)},
+         {"sightings_used", errors[c].used},
+         {"sightings_rejected", errors[c].rejected},
+         {"final_px", number(errors[c].final_px)},
+         {"held_out_px", number(errors[c].held_out_px)}});
+  }
+  return list;
+}
+
 json parameters_json(const Calibration& calibration) {
   json list = json::array();
   for (const Parameter& parameter : calibration.parameters) {
@@ -206,32 +230,35 @@ json calibration_json(const RunSummary& run) {
     (sighting.used ? used : left_out) += 1;
   }
   const double ratio = held_out_ratio(calibration);
-  return {{"status", status_words(calibration.status)},
-          {"reason", text(calibration.status_reason)},
-          {"gauge", text(calibration.gauge)},
-          {"joints", joints_json(run)},
-          {"markers", markers},
-          {"camera", camera_json(calibration)},
-          {"time_offset_s", number(calibration.time_offset_s)},
-          {"time_offset_expanded_s", expanded(calibration.time_offset_sigma_s)},
-          {"parameters", parameters_json(calibration)},
-          {"sightings_used", used},
-          {"sightings_rejected", left_out},
-          {"sigma_scale", number(calibration.sigma_scale)},
-          {"before_rms", number(calibration.before_rms)},
-          {"training_rms", number(calibration.training_rms)},
-          {"held_out_rms", number(calibration.held_out_rms)},
-          {"final_rms", number(calibration.final_rms)},
-          {"held_out_over_training", ratio > 0.0 ? number(ratio) : json(nullptr)},
-          {"before_rotation_rms_rad", number(calibration.before_rotation_rms_rad)},
-          {"training_rotation_rms_rad", number(calibration.training_rotation_rms_rad)},
-          {"held_out_rotation_rms_rad", number(calibration.held_out_rotation_rms_rad)},
-          {"folds", calibration.folds},
-          {"correlation_time_s", number(calibration.correlation_time_s)},
-          {"iterations", calibration.iterations},
-          {"initial_cost", number(calibration.initial_cost)},
-          {"final_cost", number(calibration.final_cost)},
-          {"warnings", texts(calibration.warnings)}};
+  json out = {{"status", status_words(calibration.status)},
+              {"reason", text(calibration.status_reason)},
+              {"gauge", text(calibration.gauge)},
+              {"joints", joints_json(run)},
+              {"markers", markers},
+              {"camera", camera_json(calibration)},
+              {"time_offset_s", number(calibration.time_offset_s)},
+              {"time_offset_expanded_s", expanded(calibration.time_offset_sigma_s)},
+              {"parameters", parameters_json(calibration)},
+              {"sightings_used", used},
+              {"sightings_rejected", left_out},
+              {"sigma_scale", number(calibration.sigma_scale)},
+              {"before_rms", number(calibration.before_rms)},
+              {"training_rms", number(calibration.training_rms)},
+              {"held_out_rms", number(calibration.held_out_rms)},
+              {"final_rms", number(calibration.final_rms)},
+              {"held_out_over_training", ratio > 0.0 ? number(ratio) : json(nullptr)},
+              {"before_rotation_rms_rad", number(calibration.before_rotation_rms_rad)},
+              {"training_rotation_rms_rad", number(calibration.training_rotation_rms_rad)},
+              {"held_out_rotation_rms_rad", number(calibration.held_out_rotation_rms_rad)},
+              {"folds", calibration.folds},
+              {"correlation_time_s", number(calibration.correlation_time_s)},
+              {"iterations", calibration.iterations},
+              {"initial_cost", number(calibration.initial_cost)},
+              {"final_cost", number(calibration.final_cost)},
+              {"warnings", texts(calibration.warnings)}};
+  if (json cameras = cameras_json(calibration); !cameras.is_null())
+    out["cameras"] = std::move(cameras);
+  return out;
 }
 
 namespace {

@@ -103,10 +103,10 @@ void draw_markers(const KinematicTree& tree, const std::vector<Pose>& links, dou
   }
 }
 
-void draw_camera(const Calibration& calibration, double depth, Drawing& drawing) {
-  const CameraModel& camera = calibration.camera;
+void draw_camera(const Calibration& calibration, std::size_t c, double depth, Drawing& drawing) {
+  const CameraModel& camera = calibration.model_of_camera(c);
   if (!(camera.fx > 0.0) || camera.width <= 0) return;
-  const Pose T = calibration.T_camera_base.inverse();
+  const Pose T = calibration.T_camera_base_of(c).inverse();
   std::vector<Eigen::Vector3d> corners;
   const std::array<std::array<double, 2>, 4> image = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   corners.reserve(image.size());
@@ -119,7 +119,8 @@ void draw_camera(const Calibration& calibration, double depth, Drawing& drawing)
     drawing.strokes.push_back({{T.translation, corner}, "camera"});
   }
   drawing.strokes.push_back({corners, "camera", true});
-  drawing.labels.push_back({T.translation, "camera", "tick"});
+  const std::string& name = calibration.name_of_camera(c);
+  drawing.labels.push_back({T.translation, name.empty() ? "camera" : "camera " + name, "tick"});
 }
 
 /// Diagonal of what the robot itself spans.
@@ -243,14 +244,16 @@ std::string draw_view(const Drawing& robot, const Calibration& calibration, doub
   const Sheet sheet(view, T_view_base, robot);
   std::string out = sheet.draw(robot);
   if (calibration.kind == MeasurementKind::kCorners) {
-    const Eigen::Vector3d centre = calibration.T_camera_base.inverse().translation;
-    const std::string arrow = camera_arrow(sheet, centre);
-    if (arrow.empty()) {
-      Drawing camera;
-      draw_camera(calibration, depth, camera);
-      out += sheet.draw(camera);
+    for (std::size_t c = 0; c < calibration.cameras(); ++c) {
+      const Eigen::Vector3d centre = calibration.T_camera_base_of(c).inverse().translation;
+      const std::string arrow = camera_arrow(sheet, centre);
+      if (arrow.empty()) {
+        Drawing camera;
+        draw_camera(calibration, c, depth, camera);
+        out += sheet.draw(camera);
+      }
+      out += arrow;
     }
-    out += arrow;
   }
   return fmt::format(
       "<figure><svg class=\"view\" viewBox=\"0 0 {0} {0}\" role=\"img\" aria-label=\"Robot "

@@ -136,6 +136,35 @@ std::string camera_table(const Facts& facts) {
   return table.str();
 }
 
+/// Each of several cameras: where it stands, what it saw, how well that is predicted.
+std::string cameras_table(const Facts& facts) {
+  const Calibration& calibration = facts.run.calibration;
+  if (calibration.cameras() < 2) return "";
+  Table table("cameras-table",
+              "The cameras in the base frame; U of the length of an error. The first is the "
+              "reference camera, on whose clock the frames' times are",
+              facts.result);
+  table.header({"Camera", "x, mm", "y, mm", "z, mm", "U, mm", "roll, °", "pitch, °", "yaw, °",
+                "U, °", "Lag of the clock, ms", "U, ms", "Sightings used", "left out",
+                "Rms, final fit, px", "Rms, held out, px"});
+  for (std::size_t c = 0; c < calibration.cameras(); ++c) {
+    const std::string at = fmt::format("/calibration/cameras/{}", c);
+    const std::string& name = calibration.name_of_camera(c);
+    table.begin_row();
+    table.text(name);
+    pose_cells(table, at + "/pose_in_base", at + "/translation_expanded_m",
+               at + "/rotation_expanded_rad", true,
+               absent_word(facts, c == 0 ? "camera" : "camera " + name));
+    table.value(at + "/lag_s", at + "/lag_expanded_s", Quantity::kDelay);
+    table.uncertainty(at + "/lag_expanded_s", Quantity::kDelay, "held");
+    table.number(at + "/sightings_used", Quantity::kCount);
+    table.number(at + "/sightings_rejected", Quantity::kCount);
+    table.number(at + "/final_px", Quantity::kPixels);
+    table.number(at + "/held_out_px", Quantity::kPixels);
+  }
+  return table.str();
+}
+
 std::string clock_and_lens(const Facts& facts) {
   const Calibration& calibration = facts.run.calibration;
   std::string out;
@@ -210,7 +239,8 @@ std::string parameters_section(const Facts& facts) {
       "Expanded uncertainties U = 2 u. Of a direction or a position, the largest over the "
       "directions in which it "
       "can move.");
-  out += joints_table(facts) + nominal_table(facts) + mounts_table(facts) + camera_table(facts);
+  out += joints_table(facts) + nominal_table(facts) + mounts_table(facts) +
+         (facts.run.calibration.cameras() < 2 ? camera_table(facts) : cameras_table(facts));
   out += "<div class=\"columns\">" + clock_and_lens(facts) + "</div>\n";
   out += all_parameters_table(facts);
   return out + "</section>\n";

@@ -38,14 +38,16 @@ double robust_limit(std::vector<double> values) {
   return std::max(1.15 * values[place], 1e-12);
 }
 
-/// Mean residual in each cell of a grid over the image, as arrows.
-std::string image_field(const Facts& facts) {
-  const CameraModel& camera = facts.run.calibration.camera;
+/// Mean residual in each cell of a grid over one camera's image, as arrows.
+std::string image_field(const Facts& facts, std::size_t of) {
+  const Calibration& calibration = facts.run.calibration;
+  const CameraModel& camera = calibration.model_of_camera(of);
   if (camera.width <= 0 || camera.height <= 0) return "";
   constexpr int kColumns = 16, kRows = 9, kFewest = 4;
   std::array<Eigen::Vector3d, kColumns * kRows> cells;
   cells.fill(Eigen::Vector3d::Zero());
   for (const CornerPoint& corner : facts.analysis.corners) {
+    if (corner.camera != of) continue;
     const int column = static_cast<int>(corner.pixel.x() / camera.width * kColumns);
     const int row = static_cast<int>(corner.pixel.y() / camera.height * kRows);
     if (column < 0 || column >= kColumns || row < 0 || row >= kRows) continue;
@@ -58,7 +60,8 @@ std::string image_field(const Facts& facts) {
   }
   const double width = 470.0;
   const double aspect = static_cast<double>(camera.height) / camera.width;
-  Plot plot("Mean residual over the image",
+  const std::string& name = calibration.name_of_camera(of);
+  Plot plot("Mean residual over the image" + (name.empty() ? name : " of camera " + name),
             {.label = "image column, px", .lower = 0.0, .upper = static_cast<double>(camera.width)},
             {.label = "image row, px",
              .lower = 0.0,
@@ -319,8 +322,10 @@ std::string residuals_section(const Facts& facts) {
   out += dependence_table(facts);
   if (has_corners(facts)) {
     out += "<h3 id=\"residuals-image\">Over the image</h3><div class=\"figures\">";
-    out +=
-        figure(image_field(facts), "Mean residual in each part of the image, magnified.", "half");
+    for (std::size_t c = 0; c < facts.run.calibration.cameras(); ++c) {
+      out += figure(image_field(facts, c), "Mean residual in each part of the image, magnified.",
+                    "half");
+    }
     out += figure(image_scatter(facts),
                   "Every corner, by marker. Circle: holds 95 % of a normal error of this rms.",
                   "third");

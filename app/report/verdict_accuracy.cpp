@@ -67,6 +67,20 @@ std::string level_words(const RunSummary& run) {
                      run.nominal_faults.empty() ? "" : ", mended,", text);
 }
 
+/// " By camera: front 0.10 px (1200 sightings), left 0.11 px (800)."
+std::string camera_words(const Calibration& calibration) {
+  if (calibration.cameras() < 2) return "";
+  const std::vector<CameraErrors> errors = errors_of_cameras(calibration);
+  std::string text;
+  for (std::size_t c = 0; c < errors.size(); ++c) {
+    const double error = calibration.folds > 0 ? errors[c].held_out_px : errors[c].final_px;
+    text += fmt::format("{}{} {} ({}{})", c == 0 ? " By camera: " : ", ",
+                        calibration.name_of_camera(c), text_with_unit(error, Quantity::kPixels),
+                        errors[c].used, c == 0 ? " sightings" : "");
+  }
+  return text + ".";
+}
+
 std::string prediction_words(const RunSummary& run) {
   const ErrorRow& all = run.errors.all;
   const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
@@ -88,7 +102,7 @@ std::string prediction_words(const RunSummary& run) {
   } else {
     return "No error can be given: nothing was fitted.";
   }
-  return text + "." + level_words(run);
+  return text + "." + camera_words(run.calibration) + level_words(run);
 }
 
 double median(std::vector<double> values) {

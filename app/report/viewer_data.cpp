@@ -77,12 +77,24 @@ std::string markers_text(const KinematicTree& tree) {
   return out + "]";
 }
 
-std::string camera_text(const Calibration& calibration) {
-  const CameraModel& camera = calibration.camera;
+std::string camera_text(const Calibration& calibration, std::size_t c) {
+  const CameraModel& camera = calibration.model_of_camera(c);
   return fmt::format(
       "{{\"pose\":{},\"width\":{},\"height\":{},\"fx\":{},\"fy\":{},\"cx\":{},\"cy\":{}}}",
-      pose_list(calibration.T_camera_base.inverse()), camera.width, camera.height,
+      pose_list(calibration.T_camera_base_of(c).inverse()), camera.width, camera.height,
       rounded(camera.fx, 3), rounded(camera.fy, 3), rounded(camera.cx, 3), rounded(camera.cy, 3));
+}
+
+/// Of several cameras all of them, and which one each frame is of; nothing of one.
+std::string cameras_text(const Calibration& calibration, const std::vector<std::size_t>& shown) {
+  if (calibration.cameras() < 2) return "";
+  std::string cameras, of_frames;
+  for (std::size_t c = 0; c < calibration.cameras(); ++c)
+    cameras += (c == 0 ? "" : ",") + camera_text(calibration, c);
+  for (const std::size_t frame : shown)
+    of_frames += fmt::format("{}{}", of_frames.empty() ? "" : ",",
+                             calibration.camera_at(static_cast<int>(frame)));
+  return fmt::format("\"cameras\":[{}],\"cameraOf\":[{}],", cameras, of_frames);
 }
 
 /// The residual of a sighting: marker's place in the tree, 0 or 1 for used, then px (corners) or m.
@@ -123,11 +135,13 @@ std::string viewer_data(const Facts& facts) {
   }
   const std::size_t stride = frame_stride(calibration);
   std::vector<double> times;
+  std::vector<std::size_t> shown;
   std::string values, arrows;
   for (std::size_t frame = 0; frame < calibration.times_s.size(); frame += stride) {
     const auto row = static_cast<Eigen::Index>(frame);
     if (row >= calibration.joint_values.rows()) break;
     times.push_back(calibration.times_s[frame]);
+    shown.push_back(frame);
     std::vector<double> posture;
     for (Eigen::Index j = 0; j < calibration.joint_values.cols(); ++j) {
       const bool fixed =
@@ -139,11 +153,12 @@ std::string viewer_data(const Facts& facts) {
   }
   return fmt::format(
       "{{\"kind\":\"{}\",\"baseIsCamera\":{},\"stride\":{},\"links\":{},\"joints\":{},\"markers\":{"
-      "},\"camera\":{},"
+      "},\"camera\":{},{}"
       "\"times\":{},\"values\":[{}],\"residuals\":[{}]}}",
       to_string(calibration.kind), base_is_camera(calibration), stride,
       calibration.tree.links.size(), joints_text(calibration.tree), markers_text(calibration.tree),
-      camera_text(calibration), list(times, 4), values, arrows);
+      camera_text(calibration, 0), cameras_text(calibration, shown), list(times, 4), values,
+      arrows);
 }
 
 std::string viewer_panel() {

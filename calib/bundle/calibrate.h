@@ -4,7 +4,8 @@
 // Gives   Calibration: all parameters with covariance, residuals, held-out errors.
 // Frames  gauge: the base frame is held to the first marker of the base link (or, where there is
 // none, to
-//         the camera); joint frames keep z on the axis and do not turn about or slide along it.
+//         the reference camera); joint frames keep z on the axis and do not turn about or slide
+//         along it.
 // Method  bundle adjustment over the corners (or poses, or points) with Ceres; product of
 // exponentials;
 //         robust loss, then rejection and a plain refit; block-wise (sandwich) covariance.
@@ -27,6 +28,15 @@ enum class FreeGeometry {
   kGeometry    ///< + axes: direction and place
 };
 
+/// A camera beside the reference camera.
+struct FurtherCamera {
+  std::string name;
+  Pose T_camera_base;
+  CameraModel camera;
+  double lag_s = 0.0;  ///< joint-log time = frame time + time offset + lag
+  bool estimate_intrinsics = false;
+};
+
 /// Where the search starts, and what is held.
 struct CalibrationStart {
   KinematicTree tree;
@@ -37,6 +47,8 @@ struct CalibrationStart {
   bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
   bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
   std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
+  std::string camera_name = {};         ///< of the reference camera; empty where there is one
+  std::vector<FurtherCamera> further_cameras = {};  ///< 1, 2, .. of Measurements::camera_of_frame
 };
 
 /// How far a robot is from its drawing: standard deviations of a prior on every joint's frame. A
@@ -48,7 +60,7 @@ struct NominalSigmas {
 
 struct CalibrateOptions {
   FreeGeometry free = FreeGeometry::kGeometry;
-  bool estimate_intrinsics = false;
+  bool estimate_intrinsics = false;  ///< of the reference camera; FurtherCamera has its own
   bool estimate_time_offset = true;
   bool estimate_scales = false;  ///< of channels that are declared in rad or m
   NominalSigmas nominal = {};

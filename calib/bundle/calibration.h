@@ -91,6 +91,19 @@ struct SightingResidual {
   Vector6d before_displacement = Vector6d::Zero();
 };
 
+/// A camera beside the reference camera, whose numbers are members of Calibration.
+struct CameraEstimate {
+  std::string name;
+  Pose T_camera_base;
+  CameraModel camera;
+  bool intrinsics_estimated = false;
+  std::array<Sigma, kMaxIntrinsics> intrinsics_sigma{};
+  double lag_s = 0.0;  ///< joint-log time = frame time + time_offset_s + lag_s
+  Sigma lag_sigma_s;
+  Sigma rotation_sigma_rad;  ///< of the pose in the base frame, of the error's length
+  Sigma translation_sigma_m;
+};
+
 enum class CalibrationStatus { kNotRun, kConverged, kNotConverged, kUndetermined };
 
 /// "not_run", "converged", "not_converged", "undetermined".
@@ -103,7 +116,7 @@ struct Calibration {
   MeasurementKind kind = MeasurementKind::kCorners;
 
   KinematicTree tree;  ///< base to links to markers
-  Pose T_camera_base;  ///< the camera (or tracker) sees the base there
+  Pose T_camera_base;  ///< the (reference) camera or tracker sees the base there
   CameraModel camera;
   bool intrinsics_estimated = false;
   std::array<Sigma, kMaxIntrinsics> intrinsics_sigma{};
@@ -136,6 +149,37 @@ struct Calibration {
   double initial_cost = 0.0;
   double final_cost = 0.0;
   std::vector<std::string> warnings;
+
+  std::string camera_name;  ///< of the reference camera; empty where there is one camera
+  std::vector<CameraEstimate> further_cameras;  ///< 1, 2, .. of camera_of_frame
+  std::vector<int> camera_of_frame;             ///< 0: the reference camera; empty: all frames
+  [[nodiscard]] std::size_t camera_at(int frame) const {
+    return camera_of_frame.empty()
+               ? 0
+               : static_cast<std::size_t>(camera_of_frame[static_cast<std::size_t>(frame)]);
+  }
+  [[nodiscard]] std::size_t cameras() const { return 1 + further_cameras.size(); }
+  /// The reference camera is 0.
+  [[nodiscard]] const std::string& name_of_camera(std::size_t c) const {
+    return c == 0 ? camera_name : further_cameras[c - 1].name;
+  }
+  [[nodiscard]] const Pose& T_camera_base_of(std::size_t c) const {
+    return c == 0 ? T_camera_base : further_cameras[c - 1].T_camera_base;
+  }
+  [[nodiscard]] const CameraModel& model_of_camera(std::size_t c) const {
+    return c == 0 ? camera : further_cameras[c - 1].camera;
+  }
 };
+
+/// What one camera shows: sightings, and distances from corner to corner, rms.
+struct CameraErrors {
+  int used = 0;
+  int rejected = 0;
+  double final_px = 0.0;     ///< of the fit to all frames
+  double held_out_px = 0.0;  ///< at postures that the fit has not seen
+};
+
+/// One a camera, the reference camera first; corners only.
+[[nodiscard]] std::vector<CameraErrors> errors_of_cameras(const Calibration& calibration);
 
 }  // namespace kinescope

@@ -59,7 +59,7 @@ Eigen::MatrixXd d_values_of(const Spec& spec, const Sighting& sighting, const Co
   return out;
 }
 
-// One marker's sightings, in time.
+// One marker's sightings by one camera, in time.
 struct Series {
   std::vector<int> indices;
   std::vector<int> frames;
@@ -149,6 +149,23 @@ double stamp_jitter(const std::map<int, Series>& all) {
   return std::sqrt((explained - by_noise) / speeds / kDifferenceVariance);
 }
 
+std::size_t camera_of(const Spec& spec, const Series& series) {
+  const auto first = static_cast<std::size_t>(series.indices.front());
+  return static_cast<std::size_t>(spec.sightings[first].camera);
+}
+
+// Of every camera: each has stamps of its own.
+std::vector<double> stamp_jitters(const Spec& spec, const std::map<int, Series>& all) {
+  std::vector<double> out;
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
+    std::map<int, Series> own;
+    for (const auto& [number, series] : all)
+      if (camera_of(spec, series) == c) own.emplace(number, series);
+    out.push_back(stamp_jitter(own));
+  }
+  return out;
+}
+
 // Of a sighting at rest, whitened as declared: the median of those that the jitter moves least.
 double noise_of(const Series& series, double jitter_s) {
   std::vector<std::size_t> order(series.indices.size());
@@ -224,8 +241,8 @@ void balance_poses(Spec& spec, const State& state, const std::vector<int>& usabl
     if (!at || !at->error.residual.allFinite()) continue;
     const Matrix6d& W = sighting.whitening;
     const Vector6d d = W.partialPivLu().solve(Vector6d(at->error.residual));
-    turns[sighting.marker].emplace_back(W.topLeftCorner<3, 3>() * d.head<3>());
-    shifts[sighting.marker].emplace_back(W.bottomRightCorner<3, 3>() * d.tail<3>());
+    turns[sighting.series].emplace_back(W.topLeftCorner<3, 3>() * d.head<3>());
+    shifts[sighting.series].emplace_back(W.bottomRightCorner<3, 3>() * d.tail<3>());
   }
   const auto scatter = [](const std::map<int, std::vector<Eigen::VectorXd>>& all) {
     std::vector<double> squares;
@@ -288,16 +305,16 @@ std::vector<int> rejected_in_a_row(const Rejections& of, bool at_the_ends_alone)
 std::vector<int> with_what_lasts(const Spec& spec, const State& state,
                                  const RobustSolution& solution) {
   const Readings readings(spec, state);
-  std::map<int, std::vector<int>> by_marker;
+  std::map<int, std::vector<int>> by_series;
   for (const auto* indices : {&solution.used, &solution.rejected}) {
     for (const int index : *indices)
-      by_marker[spec.sightings[static_cast<std::size_t>(index)].marker].push_back(index);
+      by_series[spec.sightings[static_cast<std::size_t>(index)].series].push_back(index);
   }
   std::set<int> out(solution.used.begin(), solution.used.end());
   const auto frame_of = [&](int index) {
     return spec.sightings[static_cast<std::size_t>(index)].frame;
   };
-  for (auto& [marker, indices] : by_marker) {
+  for (auto& [series, indices] : by_series) {
     const auto is_rejected = [&](int index) {
       return !std::ranges::binary_search(solution.used, index);
     };
@@ -310,7 +327,8 @@ std::vector<int> with_what_lasts(const Spec& spec, const State& state,
     std::ranges::stable_sort(indices, {},
                              [&](int index) { return std::pair(frame_of(index), index); });
     add(true);
-    const Marker& seen = spec.tree.markers[static_cast<std::size_t>(marker)];
+    const Sighting& first = spec.sightings[static_cast<std::size_t>(indices.front())];
+    const Marker& seen = spec.tree.markers[static_cast<std::size_t>(first.marker)];
     for (const int joint : spec.path[seen.link.index()]) {
       if (spec.channel[static_cast<std::size_t>(joint)] < 0) continue;
       std::ranges::stable_sort(indices, {},
@@ -333,7 +351,7 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
     auto at = corrected_error_of(spec, state, readings, sighting);
     if (!at || !at->error.residual.allFinite()) continue;
-    Series& series = all[sighting.marker];
+    Series& series = all[sighting.series];
     series.indices.push_back(index);
     series.frames.push_back(sighting.frame);
     series.residuals.push_back(at->error.residual);
@@ -341,16 +359,18 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
     series.d_values.push_back(d_values_of(spec, sighting, *at));
     if (path_length(spec, sighting) == 0) series.errors.push_back(std::move(at->error));
   }
-  for (auto& [marker, series] : all) {
+  for (auto& [number, series] : all) {
     for (std::size_t i = 0; i < series.indices.size(); ++i) {
       series.differences.push_back(from_neighbours(series.residuals, i));
     }
     series.far = far_runs(series.residuals);
   }
   ChosenSightings out;
-  out.jitter_s = stamp_jitter(all);
-  for (const auto& [marker, series] : all) {
-    const double typical = noise_of(series, out.jitter_s);
+  const std::vector<double> jitter_of_camera = stamp_jitters(spec, all);
+  out.jitter_s = std::ranges::max(jitter_of_camera);
+  for (const auto& [number, series] : all) {
+    const double jitter_s = jitter_of_camera[camera_of(spec, series)];
+    const double typical = noise_of(series, jitter_s);
     const Sighting& first = spec.sightings[static_cast<std::size_t>(series.indices.front())];
     double bias = first.kind == MeasurementKind::kCorners ? kCornerBias / first.sigma : 0.0;
     // A marker at rest repeats its bias in every frame: all of them together say what one does.
@@ -365,7 +385,7 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
       // Median of a mean of `freedom` squares, to first order.
       // All rows are off by the same time: together they say no more of it than one does.
       const double noise = typical / (1.0 - 2.0 / (9.0 * freedom)) +
-                           out.jitter_s * out.jitter_s * series.d_time[i].squaredNorm();
+                           jitter_s * jitter_s * series.d_time[i].squaredNorm();
       widen(sighting, std::sqrt(noise + bias * bias));
       const bool as_near = series.distance(i) * freedom <
                            noise * chi_square_quantile(sighting.dimension(), reject_sigma);

@@ -36,6 +36,10 @@ CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>
   return camera;
 }
 
+const CameraModel& model_of(const Spec& spec, const Sighting& sighting) {
+  return spec.cameras[static_cast<std::size_t>(sighting.camera)].model;
+}
+
 // The number of a marker's shape that a correction changes.
 double& number_of(MarkerShape& shape, CorrectedPart part) {
   if (part == CorrectedPart::kMarkerSize) return shape.size;
@@ -119,7 +123,7 @@ bool acts_in(const Correction& correction, int frame) {
 
 // Rows of the image between a corner and the middle row.
 double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t corner) {
-  return sighting.corners_px[corner].y() - 0.5 * spec.camera.height;
+  return sighting.corners_px[corner].y() - 0.5 * model_of(spec, sighting).height;
 }
 
 }  // namespace
@@ -200,8 +204,8 @@ CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
         out.intrinsics[static_cast<std::size_t>(correction.index)] += amount;
         break;
       case CorrectedPart::kFocalLength:
-        out.intrinsics[0] += amount * spec.camera.fx;
-        out.intrinsics[1] += amount * spec.camera.fy;
+        out.intrinsics[0] += amount * model_of(spec, sighting).fx;
+        out.intrinsics[1] += amount * model_of(spec, sighting).fy;
         break;
       case CorrectedPart::kBloom:
         out.bloom_px += amount;
@@ -281,8 +285,8 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
     case CorrectedPart::kIntrinsic:
       return at.error.d_intrinsics.col(correction.index) * share;
     case CorrectedPart::kFocalLength:
-      return (at.error.d_intrinsics.col(0) * spec.camera.fx +
-              at.error.d_intrinsics.col(1) * spec.camera.fy) *
+      return (at.error.d_intrinsics.col(0) * model_of(spec, sighting).fx +
+              at.error.d_intrinsics.col(1) * model_of(spec, sighting).fy) *
              share;
     case CorrectedPart::kBloom:
       return share * d_bloom(sighting);

@@ -35,6 +35,8 @@ class SightingCost final : public ceres::CostFunction {
     }
     sizes.push_back(7);
     sizes.push_back(1);
+    if (sighting.camera > 0) sizes.push_back(1);
+    behind_clock_ = sizes.size();
     if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
     if (sighting.target >= 0) sizes.push_back(3);
     corrections_ = corrections_of(spec, sighting);
@@ -52,10 +54,10 @@ class SightingCost final : public ceres::CostFunction {
     }
     const std::size_t mount = 1 + 2 * path_->size();
     const bool corners = sighting_->kind == MeasurementKind::kCorners;
-    const CameraModel camera =
-        corners ? camera_from(spec_->camera, parameters[mount + 2]) : spec_->camera;
+    const CameraModel& model = spec_->cameras[static_cast<std::size_t>(sighting_->camera)].model;
+    const CameraModel camera = corners ? camera_from(model, parameters[behind_clock_]) : model;
     Eigen::Vector3d target = Eigen::Vector3d::Zero();
-    if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[mount + 2]);
+    if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[behind_clock_]);
     const CorrectedSighting corrected =
         sum_corrections(*spec_, *sighting_, corrections_, values_of_corrections(parameters));
     const auto at =
@@ -126,14 +128,16 @@ class SightingCost final : public ceres::CostFunction {
     const std::size_t mount = 1 + 2 * path_->size();
     fill_pose(jacobians[mount], error, chain.d_mount * adjoint(exp_pose(-corrected.marker)),
               parameters[mount]);
-    if (jacobians[mount + 1] != nullptr) {
-      Eigen::Map<Eigen::VectorXd>(jacobians[mount + 1], rows) = at.d_time;
+    for (std::size_t clock = mount + 1; clock < behind_clock_; ++clock) {
+      if (jacobians[clock] != nullptr) {
+        Eigen::Map<Eigen::VectorXd>(jacobians[clock], rows) = at.d_time;
+      }
     }
-    if (sighting_->kind == MeasurementKind::kCorners && jacobians[mount + 2] != nullptr) {
-      Eigen::Map<RowMajor>(jacobians[mount + 2], rows, kMaxIntrinsics) = error.d_intrinsics;
+    if (sighting_->kind == MeasurementKind::kCorners && jacobians[behind_clock_] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[behind_clock_], rows, kMaxIntrinsics) = error.d_intrinsics;
     }
-    if (sighting_->target >= 0 && jacobians[mount + 2] != nullptr) {
-      Eigen::Map<RowMajor>(jacobians[mount + 2], rows, 3) =
+    if (sighting_->target >= 0 && jacobians[behind_clock_] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[behind_clock_], rows, 3) =
           Eigen::Matrix3d::Identity() / sighting_->sigma;
     }
     for (std::size_t k = 0; k < corrections_.size(); ++k) {
@@ -150,6 +154,7 @@ class SightingCost final : public ceres::CostFunction {
   const Readings* readings_;
   const std::vector<int>* path_;
   std::vector<int> corrections_;      // that bear on this sighting
+  std::size_t behind_clock_ = 0;      // of the blocks: intrinsics, or a target
   std::size_t first_correction_ = 0;  // of the blocks
 };
 
@@ -256,8 +261,8 @@ ceres::CostFunction* make_distance_cost(const TargetPair& pair) {
   return new DistanceCost(pair.distance_m, pair.sigma_m);
 }
 
-CameraModel camera_of(const Spec& spec, const State& state) {
-  return camera_from(spec.camera, state.intrinsics.data());
+CameraModel camera_of(const Spec& spec, const State& state, std::size_t camera) {
+  return camera_from(spec.cameras[camera].model, state.cameras[camera].intrinsics.data());
 }
 
 }  // namespace kinescope::bundle

@@ -39,9 +39,13 @@ std::vector<int> thin_frames(const Spec& spec, const std::vector<int>& usable) {
   if (static_cast<int>(frames.size()) <= kMostFrames) return usable;
   const auto step = (frames.size() + kMostFrames - 1) / kMostFrames;
   std::set<int> kept;
-  std::size_t n = 0;
+  std::vector<std::size_t> seen_of_camera(spec.cameras.size(), 0);
   for (const int frame : frames) {
-    if (n++ % step == 0) kept.insert(frame);
+    const auto camera =
+        spec.camera_of_frame.empty()
+            ? 0
+            : static_cast<std::size_t>(spec.camera_of_frame[static_cast<std::size_t>(frame)]);
+    if (seen_of_camera[camera]++ % step == 0) kept.insert(frame);
   }
   std::vector<int> out;
   for (const int index : usable) {
@@ -461,7 +465,7 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
       const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
       const Eigen::VectorXd units = units_of(sighting);
       out.unit.segment(at, units.size()) = units;
-      out.marker.insert(out.marker.end(), static_cast<std::size_t>(units.size()), sighting.marker);
+      out.series.insert(out.series.end(), static_cast<std::size_t>(units.size()), sighting.series);
       if (with_places) {
         out.place_px.middleRows(at, units.size()) =
             places_of(spec, sighting, out.residual.segment(at, units.size()));
@@ -532,7 +536,15 @@ void EffectBundle::Impl::add_copies(const Spec& at, const Eigen::MatrixXd& ahead
 
 const KinematicTree& EffectBundle::tree() const { return impl_->spec.tree; }
 MeasurementKind EffectBundle::kind() const { return impl_->spec.kind; }
-const CameraModel& EffectBundle::camera() const { return impl_->spec.camera; }
+std::vector<BundleCamera> EffectBundle::cameras() const {
+  std::vector<BundleCamera> out;
+  for (const bundle::SpecCamera& camera : impl_->spec.cameras)
+    out.push_back({camera.name, camera.model});
+  return out;
+}
+const std::vector<int>& EffectBundle::camera_of_frame() const {
+  return impl_->spec.camera_of_frame;
+}
 double EffectBundle::corner_bias_px() const { return impl_->bias_px; }
 double EffectBundle::stamp_jitter_s() const { return impl_->jitter_s; }
 bool EffectBundle::postures() const { return impl_->spec.postures; }
@@ -541,11 +553,14 @@ const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->s
 
 double EffectBundle::start_time_offset_s() const { return impl_->offset_start_s; }
 
+Eigen::MatrixXd EffectBundle::clock_ahead(double time_offset_s) const {
+  State at = impl_->start;
+  at.time_offset[0] = time_offset_s;
+  return bundle::plain_clock(impl_->spec, at);
+}
+
 JointMotion EffectBundle::motion_at_frames(double time_offset_s) const {
-  const Spec& spec = impl_->spec;
-  return motion_at_frames(
-      Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
-                                static_cast<Eigen::Index>(spec.tree.joints.size()), time_offset_s));
+  return motion_at_frames(clock_ahead(time_offset_s));
 }
 
 JointMotion EffectBundle::motion_at_frames(const Eigen::MatrixXd& ahead_s) const {

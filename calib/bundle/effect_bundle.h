@@ -27,6 +27,11 @@ struct BundleChange {
   std::vector<std::size_t> without_couplings;  ///< of EffectBundle::couplings()
 };
 
+struct BundleCamera {
+  std::string name;  ///< empty where there is one
+  CameraModel model;
+};
+
 /// A joint that another one's channel moves, too, in the plain model.
 struct DesignCoupling {
   int joint = 0;
@@ -60,7 +65,7 @@ struct BundleFit : BundleSolution {
   Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant
-  std::vector<int> marker;              ///< rows: of the tree
+  std::vector<int> series;              ///< rows: of one marker (body, point) and one camera
   Eigen::VectorXd unit;                 ///< rows: px or m of a whitened one; 0 for a pose's turn
   /// Rows: where in the image the corner is expected; NaN where that says nothing of the image (a
   /// marker at rest is at one place only). Empty: rows are no corners, or were mixed.
@@ -97,7 +102,10 @@ class EffectBundle {
   /// The plain model's start: tree with the units of the channels.
   [[nodiscard]] const KinematicTree& tree() const;
   [[nodiscard]] MeasurementKind kind() const;
-  [[nodiscard]] const CameraModel& camera() const;
+  /// The reference camera first.
+  [[nodiscard]] std::vector<BundleCamera> cameras() const;
+  /// Of every frame; empty: there is one camera.
+  [[nodiscard]] const std::vector<int>& camera_of_frame() const;
   /// By how much corners are off in ways that repeat, as markers at rest show it; 0 without one.
   [[nodiscard]] double corner_bias_px() const;
   /// Standard deviation of the frames' stamps about the log's clock; 0 where it does not show.
@@ -109,6 +117,9 @@ class EffectBundle {
   [[nodiscard]] const std::vector<double>& frame_times_s() const;
   /// Of the plain model, where it is free.
   [[nodiscard]] double start_time_offset_s() const;
+  /// Frames x joints: joint-log time minus frame time by that offset, and by the lags of cameras
+  /// beside the reference camera.
+  [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
   /// What the frames show, read at their times and that much later: of all joints, or frames x
   /// joints. By the frames' own times.
   [[nodiscard]] JointMotion motion_at_frames(double time_offset_s) const;

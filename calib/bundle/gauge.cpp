@@ -101,12 +101,24 @@ class Frames {
   void add_base(std::vector<Freedom>& out) const {
     const auto anchor = first_seen_base_marker(spec_);
     const auto held =
-        columns_.find(anchor ? state_.mounts[*anchor].data() : state_.camera_base.data());
+        columns_.find(anchor ? state_.mounts[*anchor].data() : state_.cameras.front().base.data());
     if (held == columns_.end()) return add_base_by_targets(out);
     for (int i = 0; i < 6; ++i) {
       const Vector6d g = Vector6d::Unit(i);
-      add(held->second[static_cast<std::size_t>(i)], state_.camera_base.data(), LinkId{0}, g, out);
+      Freedom freedom{Eigen::VectorXd::Zero(width_), held->second[static_cast<std::size_t>(i)]};
+      if (freedom.held >= 0 && move_cameras(g, freedom.direction) &&
+          stay(LinkId{0}, g, freedom.direction))
+        out.push_back(std::move(freedom));
     }
+  }
+
+  /// All of them see the base's frame take the step; those without a sighting see nothing.
+  [[nodiscard]] bool move_cameras(const Vector6d& g, Eigen::VectorXd& direction) const {
+    return std::ranges::all_of(state_.cameras, [&](const CameraState& camera) {
+      const bool further = &camera != &state_.cameras.front();
+      return (further && !columns_.contains(camera.base.data())) ||
+             move(camera.base.data(), g, false, direction);
+    });
   }
 
   /// Where only targets are measured, the camera's (tracker's) frame is nobody's: they move with
@@ -114,7 +126,7 @@ class Frames {
   /// few.
   void add_base_by_targets(std::vector<Freedom>& out) const {
     if (state_.targets.empty()) return;
-    const Pose T_camera_base = from_block(state_.camera_base.data());
+    const Pose T_camera_base = from_block(state_.cameras.front().base.data());
     Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(width_, 6);
     Eigen::MatrixXd choice = Eigen::MatrixXd::Zero(6, width_);
     for (int i = 0; i < 6; ++i) {

@@ -154,15 +154,16 @@ LinearBundle linearise(const Spec& spec, State& state, const std::vector<int>& u
   return out;
 }
 
-double correlation_time(const Spec& spec, const State& state, const std::vector<int>& used) {
-  const Readings readings(spec, state);
+namespace {
+
+// Residuals of one camera's markers, by the number of its frame among its own.
+struct CameraSeries {
   std::map<int, std::map<int, Eigen::VectorXd>> by_marker;
-  for (const int index : used) {
-    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
-    if (const auto error = error_of(spec, state, readings, sighting)) {
-      by_marker[sighting.marker][sighting.frame] = error->residual;
-    }
-  }
+  std::vector<double> times_s;  // of its frames
+};
+
+double correlation_time_of(const CameraSeries& camera) {
+  const auto& by_marker = camera.by_marker;
   // Long recordings are thinned: neighbours are the frames that were used.
   std::set<int> used_frames;
   for (const auto& [marker, series] : by_marker) {
@@ -175,8 +176,8 @@ double correlation_time(const Spec& spec, const State& state, const std::vector<
     steps.push_back(*std::next(frame) - *frame);
   }
   const int step = static_cast<int>(std::lround(median_of(std::move(steps))));
-  const double step_s = step * (spec.times_s.back() - spec.times_s.front()) /
-                        static_cast<double>(spec.times_s.size() - 1);
+  const double step_s = step * (camera.times_s.back() - camera.times_s.front()) /
+                        static_cast<double>(camera.times_s.size() - 1);
   double variance = 0.0;
   for (const auto& [marker, series] : by_marker) {
     for (const auto& [frame, r] : series)
@@ -204,6 +205,33 @@ double correlation_time(const Spec& spec, const State& state, const std::vector<
     sum += rho;
   }
   return sum * step_s;
+}
+
+}  // namespace
+
+double correlation_time(const Spec& spec, const State& state, const std::vector<int>& used) {
+  const Readings readings(spec, state);
+  // Neighbours are of one camera: frames of several stand side by side.
+  std::vector<int> own_number(spec.times_s.size());
+  std::vector<CameraSeries> cameras(spec.cameras.size());
+  for (std::size_t f = 0; f < own_number.size(); ++f) {
+    const int camera = spec.camera_of_frame.empty() ? 0 : spec.camera_of_frame[f];
+    std::vector<double>& own = cameras[static_cast<std::size_t>(camera)].times_s;
+    own_number[f] = static_cast<int>(own.size());
+    own.push_back(spec.times_s[f]);
+  }
+  for (const int index : used) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
+    if (const auto error = error_of(spec, state, readings, sighting)) {
+      cameras[static_cast<std::size_t>(sighting.camera)]
+          .by_marker[sighting.marker][own_number[static_cast<std::size_t>(sighting.frame)]] =
+          error->residual;
+    }
+  }
+  double longest_s = 0.0;
+  for (const CameraSeries& camera : cameras)
+    longest_s = std::max(longest_s, correlation_time_of(camera));
+  return longest_s;
 }
 
 }  // namespace kinescope::bundle

@@ -7,8 +7,8 @@
 
 namespace kinescope::bundle {
 
-/// Links in the camera's frame, effects apart: one list a frame; empty where a joint value is
-/// unknown.
+/// Links in the (reference) camera's frame, effects apart: one list a frame; empty where a joint
+/// value is unknown.
 [[nodiscard]] std::vector<std::vector<Pose>> links_in_camera(const Calibration& calibration);
 
 }  // namespace kinescope::bundle

@@ -158,7 +158,30 @@ void free_frames(const CalibrationStart& start, Spec& spec) {
     spec.free_mount.push_back(held ? kHeld : point ? kPointMount : kAllFree);
   }
   const bool base_is_seen = start.nominal ? !only_targets(spec) : anchor.has_value();
-  spec.free_camera = base_is_seen ? kAllFree : kHeld;
+  // Beside the reference camera every other one shows where it stands.
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c)
+    spec.cameras[c].free_pose = base_is_seen || c > 0 ? kAllFree : kHeld;
+}
+
+void add_cameras(const Measurements& measurements, const CalibrationStart& start, Spec& spec) {
+  spec.cameras.push_back({start.camera_name, start.camera});
+  for (const FurtherCamera& camera : start.further_cameras)
+    spec.cameras.push_back({camera.name, camera.camera});
+  spec.camera_of_frame = measurements.camera_of_frame;
+  KINESCOPE_CHECK(
+      spec.camera_of_frame.empty() || spec.camera_of_frame.size() == spec.times_s.size(),
+      "a camera for every frame");
+  for (const int camera : spec.camera_of_frame) {
+    KINESCOPE_CHECK(camera >= 0 && camera < std::ssize(spec.cameras), "every camera has a start");
+  }
+}
+
+void free_intrinsics(SpecCamera& camera) {
+  // k3 bends only the far corners of the image, where markers seldom are: held unless the model
+  // needs it.
+  const int count = 4 + distortion_count(camera.model.model);
+  for (int i = 0; i < count; ++i) camera.free_intrinsics[static_cast<std::size_t>(i)] = true;
+  if (camera.model.model == DistortionModel::kPlumbBob) camera.free_intrinsics[8] = false;
 }
 
 void add_couplings(const JointLog& log, Spec& spec) {
@@ -195,7 +218,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   spec.tree = start.tree;
   spec.times_s = measurements.times_s;
   spec.log = log;
-  spec.camera = start.camera;
+  add_cameras(measurements, start, spec);
   for (const Joint& joint : spec.tree.joints) {
     const auto channel =
         joint.type == JointType::kFixed ? std::nullopt : log.channel(joint.channel);
@@ -224,6 +247,12 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   std::ranges::stable_sort(spec.sightings, [](const Sighting& a, const Sighting& b) {
     return std::pair(a.frame, a.marker) < std::pair(b.frame, b.marker);
   });
+  for (Sighting& sighting : spec.sightings) {
+    if (!spec.camera_of_frame.empty())
+      sighting.camera = spec.camera_of_frame[static_cast<std::size_t>(sighting.frame)];
+    sighting.series =
+        sighting.camera * static_cast<int>(spec.tree.markers.size()) + sighting.marker;
+  }
   if (spec.postures) {
     std::erase_if(spec.sightings, [&](const Sighting& sighting) {
       return !is_stamp(log, spec.times_s[static_cast<std::size_t>(sighting.frame)]);
@@ -234,12 +263,12 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   free_frames(start, spec);
   spec.free_time_offset = options.estimate_time_offset && !spec.postures && !log.empty();
   if (start.nominal && options.free == FreeGeometry::kGeometry) spec.prior = options.nominal;
-  if (options.estimate_intrinsics && spec.kind == MeasurementKind::kCorners) {
-    // k3 bends only the far corners of the image, where markers seldom are: held unless the model
-    // needs it.
-    const int count = 4 + distortion_count(spec.camera.model);
-    for (int i = 0; i < count; ++i) spec.free_intrinsics[static_cast<std::size_t>(i)] = true;
-    if (spec.camera.model == DistortionModel::kPlumbBob) spec.free_intrinsics[8] = false;
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
+    SpecCamera& camera = spec.cameras[c];
+    camera.free_lag = c > 0 && options.estimate_time_offset && !spec.postures && !log.empty();
+    const bool estimate =
+        c == 0 ? options.estimate_intrinsics : start.further_cameras[c - 1].estimate_intrinsics;
+    if (estimate && spec.kind == MeasurementKind::kCorners) free_intrinsics(camera);
   }
   return spec;
 }
@@ -299,7 +328,7 @@ std::string gauge_in_words(const Spec& spec) {
   if (const auto anchor = first_seen_base_marker(spec);
       anchor && spec.free_mount[*anchor] == kHeld) {
     words = fmt::format("The base frame is held to tag_{}; ", spec.tree.markers[*anchor].id.value);
-  } else if (spec.free_camera == kHeld) {
+  } else if (spec.cameras.front().free_pose == kHeld) {
     words = "The base frame is held where it starts; ";
   }
   words +=

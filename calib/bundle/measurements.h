@@ -43,6 +43,9 @@ struct Measurements {
   std::vector<TagObservation> corners;  ///< of a video or corners.csv
   PoseTracks poses;                     ///< of poses.csv
   PointObservations points;             ///< of points.csv
+  /// Which camera each frame is of: 0 is the reference camera, on whose clock the frames' times
+  /// are. Empty: there is one camera.
+  std::vector<int> camera_of_frame = {};
 };
 
 /// Of markers, bodies and points, over all frames.

@@ -30,13 +30,6 @@ class ReadingsCallback final : public ceres::EvaluationCallback {
   const State* state_;
 };
 
-// Frames x joints: joint-log time minus frame time.
-Eigen::MatrixXd constant_clock(const Spec& spec, double time_offset_s) {
-  return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(spec.times_s.size()),
-                                   static_cast<Eigen::Index>(spec.tree.joints.size()),
-                                   time_offset_s);
-}
-
 // What drives a joint at a time: its channel, and the others that move it too.
 std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
   auto sum = interpolate(spec.log, spec.channel[joint], time_s, spec.max_gap_s);
@@ -51,8 +44,19 @@ std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double 
 
 }  // namespace
 
+Eigen::MatrixXd plain_clock(const Spec& spec, const State& state) {
+  Eigen::MatrixXd ahead_s = Eigen::MatrixXd::Constant(
+      static_cast<Eigen::Index>(spec.times_s.size()),
+      static_cast<Eigen::Index>(spec.tree.joints.size()), state.time_offset[0]);
+  for (std::size_t f = 0; f < spec.camera_of_frame.size(); ++f) {
+    const auto camera = static_cast<std::size_t>(spec.camera_of_frame[f]);
+    ahead_s.row(static_cast<Eigen::Index>(f)).array() += state.cameras[camera].lag[0];
+  }
+  return ahead_s;
+}
+
 Eigen::MatrixXd clock_of(const Spec& spec, const State& state) {
-  Eigen::MatrixXd ahead_s = constant_clock(spec, state.time_offset[0]);
+  Eigen::MatrixXd ahead_s = plain_clock(spec, state);
   for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
     const Correction& correction = spec.corrections[c];
     if (correction.part != CorrectedPart::kClock) continue;
@@ -70,7 +74,15 @@ Eigen::MatrixXd clock_of(const Spec& spec, const State& state) {
 
 State initial_state(const Spec& spec, const CalibrationStart& start) {
   State state;
-  state.camera_base = to_block(start.T_camera_base);
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
+    CameraState& camera = state.cameras.emplace_back();
+    const CameraModel& model = spec.cameras[c].model;
+    camera.base =
+        to_block(c == 0 ? start.T_camera_base : start.further_cameras[c - 1].T_camera_base);
+    camera.lag[0] = c == 0 ? 0.0 : start.further_cameras[c - 1].lag_s;
+    camera.intrinsics = {model.fx, model.fy, model.cx, model.cy};
+    std::ranges::copy(model.distortion, camera.intrinsics.begin() + 4);
+  }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
     state.joint_frames.push_back(to_block(joint.T_parent_joint));
@@ -90,18 +102,12 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
     state.mounts.push_back(to_block(marker.T_link_marker));
   }
   state.time_offset[0] = start.time_offset_s;
-  const CameraModel& c = spec.camera;
-  state.intrinsics = {c.fx, c.fy, c.cx, c.cy};
-  std::copy(c.distortion.begin(), c.distortion.end(), state.intrinsics.begin() + 4);
   state.targets.resize(spec.targets.size());
   for (const Correction& correction : spec.corrections) {
     state.corrections.push_back(correction.value);
   }
   return state;
 }
-
-Readings::Readings(const Spec& spec, double time_offset_s)
-    : Readings(spec, constant_clock(spec, time_offset_s)) {}
 
 Readings::Readings(const Spec& spec, const State& state) : Readings(spec, clock_of(spec, state)) {}
 
@@ -173,7 +179,7 @@ std::vector<double> rates_of(const Spec& spec, const State& state, const Reading
 
 Pose predict(const Spec& spec, const State& state, const Readings& readings,
              const Sighting& sighting) {
-  Pose pose = from_block(state.camera_base.data());
+  Pose pose = from_block(state.cameras[static_cast<std::size_t>(sighting.camera)].base.data());
   for (const ChainJoint& joint : chain_of(spec, state, readings, sighting)) {
     pose = pose * joint.T_parent_joint * joint_motion(joint.type, joint.axis, joint.value);
   }
@@ -199,7 +205,8 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
                                 const BuildOptions& options) {
   const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
   const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
-  std::vector<double*> blocks{state.camera_base.data()};
+  CameraState& camera = state.cameras[static_cast<std::size_t>(sighting.camera)];
+  std::vector<double*> blocks{camera.base.data()};
   for (const int id : spec.path[marker.link.index()]) {
     const auto j = static_cast<std::size_t>(id);
     blocks.push_back(state.joint_frames[j].data());
@@ -208,7 +215,8 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   }
   blocks.push_back(state.mounts[static_cast<std::size_t>(sighting.marker)].data());
   blocks.push_back(state.time_offset.data());
-  if (sighting.kind == MeasurementKind::kCorners) blocks.push_back(state.intrinsics.data());
+  if (sighting.camera > 0) blocks.push_back(camera.lag.data());
+  if (sighting.kind == MeasurementKind::kCorners) blocks.push_back(camera.intrinsics.data());
   if (sighting.target >= 0) {
     blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
@@ -295,7 +303,13 @@ void BuiltProblem::free_numbers(double* data, const std::vector<bool>& free, Fre
 
 void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOptions& options) {
   const bool frozen = options.freeze_globals;
-  free_pose(state.camera_base.data(), spec.free_camera, "camera", frozen);
+  // Those of the reference camera are named as those of the only one.
+  const auto named = [&](const char* what, std::size_t c) {
+    return c == 0 ? std::string(what) : fmt::format("{} {}", what, spec.cameras[c].name);
+  };
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
+    free_pose(state.cameras[c].base.data(), spec.cameras[c].free_pose, named("camera", c), frozen);
+  }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
     free_pose(state.joint_frames[j].data(), spec.free_joint[j], joint.name, frozen);
@@ -317,14 +331,23 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
   }
   free_numbers(state.time_offset.data(), {spec.free_time_offset},
                {nullptr, "clock", {"time offset"}, {"s"}, {}, -1}, frozen);
-  FreeBlock intrinsics{nullptr, "intrinsics", {}, {}, {}, -1};
-  for (std::size_t i = 0; i < kMaxIntrinsics; ++i) {
-    intrinsics.names.emplace_back(kIntrinsicNames[i]);
-    intrinsics.units.emplace_back(i < 4 ? "px" : "");
+  for (std::size_t c = 1; c < spec.cameras.size(); ++c) {
+    const std::string block = named("clock", c);
+    free_numbers(state.cameras[c].lag.data(), {spec.cameras[c].free_lag},
+                 {nullptr, block, {block + " lag"}, {"s"}, {}, -1}, frozen);
   }
-  free_numbers(state.intrinsics.data(),
-               std::vector<bool>(spec.free_intrinsics.begin(), spec.free_intrinsics.end()),
-               intrinsics, frozen);
+  for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
+    const SpecCamera& camera = spec.cameras[c];
+    FreeBlock intrinsics{nullptr, named("intrinsics", c), {}, {}, {}, -1};
+    for (std::size_t i = 0; i < kMaxIntrinsics; ++i) {
+      intrinsics.names.push_back(c == 0 ? std::string(kIntrinsicNames[i])
+                                        : fmt::format("{} of {}", kIntrinsicNames[i], camera.name));
+      intrinsics.units.emplace_back(i < 4 ? "px" : "");
+    }
+    free_numbers(state.cameras[c].intrinsics.data(),
+                 std::vector<bool>(camera.free_intrinsics.begin(), camera.free_intrinsics.end()),
+                 intrinsics, frozen);
+  }
   for (std::size_t t = 0; t < spec.targets.size(); ++t) {
     const std::string name = "target " + spec.targets[t];
     free_numbers(state.targets[t].data(), {true, true, true},

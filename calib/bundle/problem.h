@@ -26,7 +26,9 @@ namespace kinescope::bundle {
 struct Sighting {
   MeasurementKind kind = MeasurementKind::kCorners;
   int frame = 0;
-  int marker = 0;                             ///< index into Spec::tree.markers
+  int marker = 0;  ///< index into Spec::tree.markers
+  int camera = 0;  ///< index into Spec::cameras
+  int series = 0;  ///< of one camera and one marker: what neighbours in time are looked for in
   std::vector<Eigen::Vector2d> corners_px;    ///< corners
   std::vector<Eigen::Vector3d> geometry_m;    ///< corners in the marker's frame
   double sigma = 1.0;                         ///< px (corners) or m (points)
@@ -45,6 +47,15 @@ struct TargetPair {
   double sigma_m = 0.0;
 };
 
+/// One camera; the first is the reference camera, on whose clock the frames' times are.
+struct SpecCamera {
+  std::string name;  ///< empty where there is one camera
+  CameraModel model;
+  TangentMask free_pose{};
+  std::array<bool, kMaxIntrinsics> free_intrinsics{};
+  bool free_lag = false;
+};
+
 /// What is measured, what is held, what is free. Never changes while solving.
 struct Spec {
   MeasurementKind kind = MeasurementKind::kCorners;
@@ -60,45 +71,49 @@ struct Spec {
   std::vector<Sighting> sightings;     ///< by frame, then marker
   std::vector<std::string> targets;
   std::vector<TargetPair> distances;
-  CameraModel camera;
+  std::vector<SpecCamera> cameras;   ///< at least one
+  std::vector<int> camera_of_frame;  ///< empty: there is one
 
-  TangentMask free_camera{};
   std::vector<TangentMask> free_joint;
   std::vector<TangentMask> free_mount;
   std::vector<bool> free_scale;
   std::vector<bool> free_offset;
   std::vector<bool> free_value;  ///< joints whose value is unknown in every frame
   bool free_time_offset = false;
-  std::array<bool, kMaxIntrinsics> free_intrinsics{};
   std::vector<Correction> corrections;  ///< all free
   std::optional<NominalSigmas> prior;   ///< on the joint frames (nominal robots)
 };
 
+struct CameraState {
+  PoseBlock base{};  ///< T_camera_base
+  std::array<double, kMaxIntrinsics> intrinsics{};
+  std::array<double, 1> lag{};  ///< s that the log is further ahead of its frames' times
+};
+
 /// The estimated numbers. Addresses must not change while a problem built on them lives.
 struct State {
-  PoseBlock camera_base{};
+  std::vector<CameraState> cameras;  ///< beside Spec::cameras; the reference camera has no lag
   std::vector<PoseBlock> joint_frames;
   std::vector<std::array<double, 2>> joint_maps;  ///< scale, offset
   std::vector<PoseBlock> mounts;
   std::array<double, 1> time_offset{};
-  std::array<double, kMaxIntrinsics> intrinsics{};
   std::vector<std::array<double, 3>> targets;
   std::vector<std::vector<double>> values;  ///< joint, frame; only where Spec::free_value
   std::vector<double> corrections;          ///< beside Spec::corrections
 };
 
 [[nodiscard]] State initial_state(const Spec& spec, const CalibrationStart& start);
-[[nodiscard]] CameraModel camera_of(const Spec& spec, const State& state);
+[[nodiscard]] CameraModel camera_of(const Spec& spec, const State& state, std::size_t camera);
 
-/// Frames x joints: joint-log time minus frame time, as the time offset and corrections of the
-/// clock have it.
+/// Frames x joints: joint-log time minus frame time, as the time offset and the cameras' lags have
+/// it.
+[[nodiscard]] Eigen::MatrixXd plain_clock(const Spec& spec, const State& state);
+/// The same with corrections of the clock.
 [[nodiscard]] Eigen::MatrixXd clock_of(const Spec& spec, const State& state);
 
 /// Channel readings and rates at every frame for the present time offset: frames x joints.
 class Readings {
  public:
-  /// Without corrections of the clock.
-  Readings(const Spec& spec, double time_offset_s);
   Readings(const Spec& spec, const State& state);
   Readings(const Spec& spec, Eigen::MatrixXd ahead_s);
   void update(const State& state);

@@ -117,7 +117,43 @@ void fill_tree(const Spec& spec, const State& state, const RobustSolution& robus
   for (std::size_t m = 0; m < out.tree.markers.size(); ++m) {
     out.tree.markers[m].T_link_marker = from_block(state.mounts[m].data());
   }
-  out.T_camera_base = from_block(state.camera_base.data());
+  out.T_camera_base = from_block(state.cameras.front().base.data());
+}
+
+void fill_cameras(const Spec& spec, const State& state, const Uncertainty& uncertainty,
+                  Calibration& out) {
+  const auto is_free = [](bool f) { return f; };
+  out.camera = camera_of(spec, state, 0);
+  out.intrinsics_estimated = std::ranges::any_of(spec.cameras.front().free_intrinsics, is_free);
+  out.camera_name = spec.cameras.front().name;
+  out.camera_of_frame = spec.camera_of_frame;
+  const auto columns = pose_columns(uncertainty.blocks);
+  for (std::size_t c = 1; c < spec.cameras.size(); ++c) {
+    const CameraState& camera = state.cameras[c];
+    CameraEstimate& estimate = out.further_cameras.emplace_back();
+    estimate.name = spec.cameras[c].name;
+    estimate.T_camera_base = from_block(camera.base.data());
+    estimate.camera = camera_of(spec, state, c);
+    estimate.intrinsics_estimated = std::ranges::any_of(spec.cameras[c].free_intrinsics, is_free);
+    estimate.lag_s = camera.lag[0];
+    const auto found = columns.find(camera.base.data());
+    if (found == columns.end()) continue;
+    estimate.rotation_sigma_rad = block_sigma(uncertainty, found->second, 0);
+    estimate.translation_sigma_m = block_sigma(uncertainty, found->second, 3);
+  }
+}
+
+// What one number of a block is known by.
+void take_sigma_of_camera(const State& state, const FreeBlock& block, int component,
+                          const Sigma& sigma, Calibration& out) {
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) {
+    if (block.data == state.cameras[c].intrinsics.data()) {
+      auto& sigmas = c == 0 ? out.intrinsics_sigma : out.further_cameras[c - 1].intrinsics_sigma;
+      sigmas[static_cast<std::size_t>(component)] = sigma;
+    }
+    if (c > 0 && block.data == state.cameras[c].lag.data())
+      out.further_cameras[c - 1].lag_sigma_s = sigma;
+  }
 }
 
 // All joints at their mean.
@@ -146,7 +182,7 @@ void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncer
   out.covariance = uncertainty.covariance;
   std::size_t next = 0;
   for (const FreeBlock& block : uncertainty.blocks) {
-    const bool pose = block.block != "clock" && block.block != "intrinsics" &&
+    const bool pose = !block.block.starts_with("clock") && !block.block.starts_with("intrinsics") &&
                       block.block != "effects" && !block.names.front().ends_with("scale") &&
                       !block.names.front().ends_with("offset") &&
                       !block.block.starts_with("target ");
@@ -154,9 +190,7 @@ void fill_numbers(const Spec& spec, const State& state, const Uncertainty& uncer
       Parameter& parameter = out.parameters[next];
       if (!pose) parameter.value = block.data[block.components[i]];
       if (block.block == "clock") out.time_offset_sigma_s = parameter.sigma;
-      if (block.block == "intrinsics") {
-        out.intrinsics_sigma[static_cast<std::size_t>(block.components[i])] = parameter.sigma;
-      }
+      take_sigma_of_camera(state, block, block.components[i], parameter.sigma, out);
       for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
         if (block.data != state.joint_maps[j].data()) continue;
         (block.components[i] == 0 ? out.joints[j].scale_sigma : out.joints[j].offset_sigma) =
@@ -189,8 +223,7 @@ void read_back(const Spec& spec, const State& state, const RobustSolution& robus
                const Uncertainty& uncertainty, Calibration& out) {
   const Readings readings(spec, state);
   out.times_s = spec.times_s;
-  out.camera = camera_of(spec, state);
-  out.intrinsics_estimated = std::ranges::any_of(spec.free_intrinsics, [](bool f) { return f; });
+  fill_cameras(spec, state, uncertainty, out);
   out.time_offset_s = state.time_offset[0];
   out.gauge = gauge_in_words(spec);
   out.observability = uncertainty.observability;

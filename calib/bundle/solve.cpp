@@ -73,13 +73,13 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
   std::vector<double> all;
   std::vector<double> rotation;
   std::vector<double> translation;
-  std::map<int, std::vector<double>> by_marker;
+  std::map<int, std::vector<double>> by_series;
   for (const Misfit& misfit : misfits) {
     if (!std::isfinite(misfit.chi_square)) continue;
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
     // Per degree of freedom, so that boards and tags can be mixed.
     all.push_back(misfit.chi_square / sighting.dimension());
-    by_marker[sighting.marker].push_back(all.back());
+    by_series[sighting.series].push_back(all.back());
     rotation.push_back(misfit.rotation);
     translation.push_back(misfit.translation);
   }
@@ -93,10 +93,10 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
     }
     return;
   }
-  const auto scale_of = [&](const std::vector<double>& values, int marker) {
+  const auto scale_of = [&](const std::vector<double>& values, int series) {
     double freedom = 8.0;
     for (const Sighting& s : spec.sightings) {
-      if (marker < 0 || s.marker == marker) {
+      if (series < 0 || s.series == series) {
         freedom = s.dimension();
         break;
       }
@@ -107,11 +107,11 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
   };
   const double common = scale_of(all, -1);
   std::map<int, double> scale;
-  for (const auto& [marker, values] : by_marker) {
-    scale[marker] = values.size() >= kMinGroup ? scale_of(values, marker) : common;
+  for (const auto& [series, values] : by_series) {
+    scale[series] = values.size() >= kMinGroup ? scale_of(values, series) : common;
   }
   for (Sighting& sighting : spec.sightings) {
-    const auto found = scale.find(sighting.marker);
+    const auto found = scale.find(sighting.series);
     sighting.sigma *= found == scale.end() ? common : found->second;
   }
 }
@@ -187,18 +187,18 @@ bool is_described(const Spec& spec, const std::vector<Misfit>& of_marker) {
 // cannot tell. All of them go back into `kept`, where the robot describes the marker at all.
 void put_back_the_larger_part(const Spec& spec, const std::vector<Misfit>& misfits,
                               std::vector<int>& kept) {
-  std::map<int, std::vector<Misfit>> by_marker;
+  std::map<int, std::vector<Misfit>> by_series;
   for (const Misfit& misfit : misfits)
-    by_marker[spec.sightings[static_cast<std::size_t>(misfit.sighting)].marker].push_back(misfit);
-  for (const auto& [marker, all] : by_marker) {
+    by_series[spec.sightings[static_cast<std::size_t>(misfit.sighting)].series].push_back(misfit);
+  for (const auto& [series, all] : by_series) {
     const auto rejected = std::ranges::count_if(all, [&](const Misfit& misfit) {
       return !std::ranges::binary_search(kept, misfit.sighting);
     });
     if (2 * rejected <= std::ssize(all) || !is_described(spec, all)) continue;
     std::vector<int> with;
-    std::vector<int> of_marker;
-    for (const Misfit& misfit : all) of_marker.push_back(misfit.sighting);
-    std::ranges::set_union(kept, of_marker, std::back_inserter(with));
+    std::vector<int> of_series;
+    for (const Misfit& misfit : all) of_series.push_back(misfit.sighting);
+    std::ranges::set_union(kept, of_series, std::back_inserter(with));
     kept = std::move(with);
   }
 }
@@ -259,8 +259,11 @@ std::optional<double> cost_of(const Spec& spec, State& state, const std::vector<
 std::vector<int> usable_sightings(const Spec& spec, const State& state) {
   // The offset will move: frames must stay within the log when it does.
   const double margin_s = spec.free_time_offset ? kOffsetMargin : 0.0;
-  const Readings early(spec, state.time_offset[0] - margin_s);
-  const Readings late(spec, state.time_offset[0] + margin_s);
+  State at = state;
+  at.time_offset[0] = state.time_offset[0] - margin_s;
+  const Readings early(spec, plain_clock(spec, at));
+  at.time_offset[0] = state.time_offset[0] + margin_s;
+  const Readings late(spec, plain_clock(spec, at));
   std::vector<int> usable;
   for (std::size_t i = 0; i < spec.sightings.size(); ++i) {
     const Sighting& sighting = spec.sightings[i];

@@ -117,7 +117,7 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
   Rests out;
   double found = 0.0;
   double declared = 0.0;
-  std::map<int, Rest> open;         // by marker
+  std::map<int, Rest> open;         // by series
   std::map<int, Eigen::Index> row;  // by frame, the next sighting's
   const auto close = [&](Rest& rest) {
     const double begin_s = spec.times_s[static_cast<std::size_t>(rest.first->frame)];
@@ -134,7 +134,7 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
     const FrameRows& rows = linear.frames.at(sighting.frame);
     Eigen::Index& begin = row.try_emplace(sighting.frame, 0).first->second;
     const Eigen::Index size = sighting.dimension();
-    Rest& rest = open[sighting.marker];
+    Rest& rest = open[sighting.series];
     if (rest.first != nullptr && !is_near(*rest.first, sighting)) {
       close(rest);
       rest = {};
@@ -149,7 +149,7 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
     rest.pull += rows.J.middleRows(begin, size) / sighting.sigma;
     begin += size;
   }
-  for (auto& [marker, rest] : open) close(rest);
+  for (auto& [series, rest] : open) close(rest);
   if (declared > 0.0) out.noise_ratio = found / declared;
   return out;
 }

@@ -42,7 +42,7 @@ class UsedSightings {
  public:
   /// `calibration` must outlive it.
   explicit UsedSightings(const Calibration& calibration)
-      : links_(bundle::links_in_camera(calibration)) {
+      : calibration_(calibration), links_(bundle::links_in_camera(calibration)) {
     for (const SightingResidual& residual : calibration.residuals)
       residuals_[{residual.frame, residual.id}] = &residual;
   }
@@ -52,10 +52,16 @@ class UsedSightings {
     if (residual == residuals_.end() || !residual->second->used) return std::nullopt;
     const std::vector<Pose>& links = links_[static_cast<std::size_t>(frame)];
     if (links.empty()) return std::nullopt;
-    return UsedSighting{links[marker.link.index()] * marker.T_link_marker, residual->second};
+    const Pose T_camera_marker = links[marker.link.index()] * marker.T_link_marker;
+    if (calibration_.camera_at(frame) == 0) return UsedSighting{T_camera_marker, residual->second};
+    // Each camera's corners are seen from where that camera is.
+    const Pose T_own_reference = calibration_.T_camera_base_of(calibration_.camera_at(frame)) *
+                                 calibration_.T_camera_base.inverse();
+    return UsedSighting{T_own_reference * T_camera_marker, residual->second};
   }
 
  private:
+  const Calibration& calibration_;
   std::map<std::pair<int, TagId>, const SightingResidual*> residuals_;
   std::vector<std::vector<Pose>> links_;  // by frame
 };
@@ -113,8 +119,9 @@ TagObservations with_effects_undone(const Calibration& calibration, const Marker
     }
     const auto sighting = used.find(tag.frame, *marker);
     if (!sighting) continue;
-    auto corners_px = seen(calibration.camera, sighting->T_camera_marker, markers.corners_m(tag.id),
-                           sighting->residual->corners_px);
+    auto corners_px =
+        seen(calibration.model_of_camera(calibration.camera_at(tag.frame)),
+             sighting->T_camera_marker, markers.corners_m(tag.id), sighting->residual->corners_px);
     if (!corners_px) continue;
     tag.corners_px = std::move(*corners_px);
     undone.push_back(std::move(tag));

@@ -19,7 +19,8 @@ namespace kinescope::effects {
 /// What effects are made from: the robot as the plain model has it, and how it moved.
 struct EffectWorld {
   KinematicTree tree;
-  CameraModel camera;
+  std::vector<BundleCamera> cameras;  ///< the reference camera first
+  std::vector<int> camera_of_frame;   ///< empty: there is one
   MeasurementKind kind = MeasurementKind::kCorners;
   bool postures = false;
   std::vector<int> driven;  ///< joints
@@ -93,7 +94,7 @@ struct CameraEffect {
 /// joint_map.
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
-/// Of camera, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
+/// Of cameras, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
 /// intrinsics, blooming, tag_size, bent_tag.
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 

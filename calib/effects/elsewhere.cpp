@@ -29,6 +29,34 @@ Correction correct(CorrectedPart part, const CameraEffect& effect, std::size_t p
   return out;
 }
 
+std::string place_at(const EffectWorld& world, std::size_t camera, const std::string& place) {
+  constexpr std::string_view kCamera = "camera";
+  if (world.cameras.size() < 2) return place;
+  return fmt::format("{} {}{}", kCamera, world.cameras[camera].name, place.substr(kCamera.size()));
+}
+
+CameraEffect at_camera(const EffectWorld& world, std::size_t camera, CameraEffect of) {
+  if (world.cameras.size() < 2) return of;
+  const std::string before = of.candidate.id.place;
+  const std::string place = place_at(world, camera, before);
+  of.candidate.id.place = place;
+  of.candidate.words += fmt::format(" (camera {})", world.cameras[camera].name);
+  Eigen::VectorXd own(static_cast<Eigen::Index>(world.camera_of_frame.size()));
+  for (Eigen::Index f = 0; f < own.size(); ++f)
+    own[f] = world.camera_of_frame[static_cast<std::size_t>(f)] == static_cast<int>(camera);
+  of.corrections = [all = of.corrections, own, before, place](double scan) {
+    std::vector<Correction> out = all(scan);
+    for (Correction& correction : out) {
+      correction.block = place;
+      correction.name.replace(0, before.size(), place);
+      correction.share =
+          correction.share.size() == 0 ? own : Eigen::VectorXd(correction.share.cwiseProduct(own));
+    }
+    return out;
+  };
+  return of;
+}
+
 Eigen::VectorXd frame_times(const EffectWorld& world) {
   return Eigen::Map<const Eigen::VectorXd>(world.frames.times_s.data(),
                                            static_cast<Eigen::Index>(world.frames.times_s.size()));

@@ -18,6 +18,13 @@ namespace kinescope::effects {
 [[nodiscard]] Correction correct(CorrectedPart part, const CameraEffect& effect,
                                  std::size_t parameter, int index = kEverywhere);
 
+/// Where an effect of one camera sits: its place where there is one camera; of several "camera
+/// left", "camera left focal length".
+[[nodiscard]] std::string place_at(const EffectWorld& world, std::size_t camera,
+                                   const std::string& place);
+/// The effect of one camera alone: it acts in that camera's frames. `place` begins with "camera".
+[[nodiscard]] CameraEffect at_camera(const EffectWorld& world, std::size_t camera, CameraEffect of);
+
 [[nodiscard]] Eigen::VectorXd frame_times(const EffectWorld& world);  ///< s
 
 [[nodiscard]] std::string marker_name(const EffectWorld& world, int marker);

@@ -166,12 +166,15 @@ CameraEffect bent_tag(const EffectWorld& world, int marker) {
                             {{"out of plane", "m"}, {"width over height", ""}}, "m");
   const double half = 0.5 * world.tree.markers[static_cast<std::size_t>(marker)].size_m;
   // Any of these bends the images of markers.
-  out.candidate.refines = {{"tag_size", name},
-                           {"blooming", "camera"},
-                           {"lens_distortion", "camera"},
-                           {"lens_distortion", "camera tangential"},
-                           {"intrinsics", kFocalLength},
-                           {"intrinsics", kCentre}};
+  out.candidate.refines = {{"tag_size", name}};
+  for (std::size_t c = 0; c < world.cameras.size(); ++c) {
+    for (const EffectId& id : {EffectId{"blooming", "camera"},
+                               {"lens_distortion", "camera"},
+                               {"lens_distortion", "camera tangential"},
+                               {"intrinsics", kFocalLength},
+                               {"intrinsics", kCentre}})
+      out.candidate.refines.push_back({id.effect, place_at(world, c, id.place)});
+  }
   out.candidate.floor = kUsualShift;
   out.candidate.size = [half](const Eigen::VectorXd& shape) {
     return std::hypot(shape[0], half * shape[1]);
@@ -224,11 +227,15 @@ std::vector<CameraEffect> camera_effects(const EffectWorld& world) {
   if (!world.postures) {
     if (world.clock_free) out.push_back(time_offset());
     out.push_back(clock_drift(world));
-    if (corners) out.push_back(rolling_shutter());
+    for (std::size_t c = 0; corners && c < world.cameras.size(); ++c)
+      out.push_back(at_camera(world, c, rolling_shutter()));
   }
   if (corners) {
-    for (CameraEffect& effect : of_camera(world.camera)) out.push_back(std::move(effect));
-    out.push_back(blooming());
+    for (std::size_t c = 0; c < world.cameras.size(); ++c) {
+      for (CameraEffect& effect : of_camera(world.cameras[c].model))
+        out.push_back(at_camera(world, c, std::move(effect)));
+      out.push_back(at_camera(world, c, blooming()));
+    }
     for (const int marker : world.seen) out.push_back(tag_size(world, marker));
     for (const int marker : world.seen) out.push_back(bent_tag(world, marker));
     if (may_be_misprinted(world)) out.push_back(all_tag_sizes());

@@ -146,6 +146,14 @@ CameraEffect camera_drift(const EffectWorld& world) {
   return out;
 }
 
+// Of one camera beside others, which would see the base move, too.
+CameraEffect without_base(CameraEffect of) {
+  constexpr std::string_view kBase = " (or the robot's base)";
+  const std::size_t at = of.candidate.words.find(kBase);
+  if (at != std::string::npos) of.candidate.words.erase(at, kBase.size());
+  return of;
+}
+
 // The base need not be held where its frame is, but up to a metre away: by a growth of a millimetre
 // a metre that shifts all by a millimetre.
 std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::VectorXd& share) {
@@ -234,8 +242,12 @@ CameraEffect zero_drift(const EffectWorld& world, const Suspect& s) {
 std::vector<CameraEffect> time_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out;
   for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
-  out.push_back(camera_bump(world));
-  out.push_back(camera_drift(world));
+  // Of several cameras all alike: it is the robot's base that moves.
+  for (const CameraEffect& moved : {camera_bump(world), camera_drift(world)}) {
+    out.push_back(moved);
+    for (std::size_t c = 0; world.cameras.size() > 1 && c < world.cameras.size(); ++c)
+      out.push_back(at_camera(world, c, without_base(moved)));
+  }
   out.push_back(thermal_growth(world));
   if (!world.postures) out.push_back(clock_jump(world));
   for (const int joint : world.driven) {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/effects/elsewhere.h"
 #include "calib/effects/suspect.h"
 #include "kinematics/core/error.h"
 
@@ -257,7 +258,24 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
     shift.index = kFirstOfCentre + axis;
     image.carriers[static_cast<std::size_t>(axis)] = carriers.still(shift);
   }
-  return {image};
+  std::vector<RestField> out;
+  for (std::size_t c = 0; c < world.cameras.size(); ++c) {
+    image.name = place_at(world, c, "camera");
+    out.push_back(image);
+  }
+  return out;
+}
+
+// The places of one camera's rows.
+Eigen::MatrixX2d places_in_image(const EffectWorld& world, std::size_t camera,
+                                 const BundleFit& fit) {
+  Eigen::MatrixX2d out = fit.place_px;
+  const auto series_of_camera = static_cast<int>(world.tree.markers.size());
+  for (std::size_t row = 0; row < fit.series.size(); ++row) {
+    if (fit.series[row] / series_of_camera != static_cast<int>(camera))
+      out.row(static_cast<Eigen::Index>(row)).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return out;
 }
 
 // Adds to the joints' values (frames x joints) what the corrections of a solution move them by.
@@ -361,7 +379,8 @@ BundleChange TracedBundle::change_of(const std::vector<CameraEffect>& library,
 EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   EffectWorld world;
   world.tree = bundle_->tree();
-  world.camera = bundle_->camera();
+  world.cameras = bundle_->cameras();
+  world.camera_of_frame = bundle_->camera_of_frame();
   world.kind = bundle_->kind();
   world.postures = bundle_->postures();
   world.driven = bundle_->driven_joints();
@@ -385,9 +404,7 @@ Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effec
 }
 
 Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
-  return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(bundle_->frame_times_s().size()),
-                                   static_cast<Eigen::Index>(bundle_->tree().joints.size()),
-                                   time_offset_s);
+  return bundle_->clock_ahead(time_offset_s);
 }
 
 TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
@@ -527,7 +544,8 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   if (!world.postures) out.clock = clock_carrier(carriers);
   BundleFit fit = bundle_->fit(change, carriers.probes(), solved ? &*solved : nullptr);
   if (fit.place_px.size() == 0) out.rest_fields.clear();
-  for (RestField& field : out.rest_fields) field.at = fit.place_px;
+  for (std::size_t c = 0; c < out.rest_fields.size(); ++c)
+    out.rest_fields[c].at = places_in_image(world, c, fit);
   out.converged = fit.converged;
   out.reason = fit.reason;
   const auto places =
@@ -556,7 +574,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.carriers.swap(fit.probes);
   linear.first_row = std::move(fit.first_row);
   linear.unit = std::move(fit.unit);
-  linear.body = std::move(fit.marker);
+  linear.body = std::move(fit.series);
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";
   linear.coordinates = world.kind == MeasurementKind::kCorners ? 2 : 3;
   linear.independent_instants = world.postures;

@@ -50,7 +50,9 @@ class LinesOfSight {
       return Eigen::Vector3d::UnitZ();
     }
     const Pose T_base_marker = links_[marker->link.index()] * marker->T_link_marker;
-    const Eigen::Vector3d place = calibration_.T_camera_base * T_base_marker.translation;
+    const Eigen::Vector3d place =
+        calibration_.T_camera_base_of(calibration_.camera_at(sighting.frame)) *
+        T_base_marker.translation;
     return place.norm() > 0.0 ? Eigen::Vector3d(place.normalized()) : Eigen::Vector3d::UnitZ();
   }
 

@@ -68,10 +68,11 @@ export function forwardKinematics(model, values) {
 }
 
 /// Start points and vectors of a frame's residuals in the base frame, unscaled. Corner residuals (px) are carried
-/// to the marker's distance; those of poses stand in the marker's axes, those of points in the tracker's.
-export function residualArrows(model, links, sightings) {
+/// to the marker's distance; those of poses stand in the marker's axes, those of points in the tracker's. `seenBy`:
+/// the camera of the frame.
+export function residualArrows(model, links, sightings, seenBy = model.camera) {
   const arrows = [];
-  const camera = poseFromList(model.camera.pose);
+  const camera = poseFromList(seenBy.pose);
   const toCamera = inverse(camera);
   for (const sighting of sightings) {
     const marker = model.markers[sighting[0]];
@@ -87,8 +88,8 @@ export function residualArrows(model, links, sightings) {
       const from = apply(pose, corners[k]);
       const depth = apply(toCamera, from)[2];
       const shift = [
-        (sighting[2 + 2 * k] / model.camera.fx) * depth,
-        (sighting[3 + 2 * k] / model.camera.fy) * depth,
+        (sighting[2 + 2 * k] / seenBy.fx) * depth,
+        (sighting[3 + 2 * k] / seenBy.fy) * depth,
         0,
       ];
       arrows.push({ from, vector: rotate(camera.q, shift), used: sighting[1] === 1 });

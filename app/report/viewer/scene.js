@@ -123,8 +123,18 @@ export class RobotScene {
     return group;
   }
 
+  seenBy(frame) {
+    return this.model.cameras ? this.model.cameras[this.model.cameraOf[frame]] : this.model.camera;
+  }
+
+  /// Of all cameras.
   frustum() {
-    const camera = this.model.camera;
+    const group = new Group();
+    for (const camera of this.model.cameras ?? [this.model.camera]) group.add(this.frustumOf(camera));
+    return group;
+  }
+
+  frustumOf(camera) {
     const pose = poseFromList(camera.pose);
     const depth = 0.14 * this.extent;
     const corners = [[0, 0], [camera.width, 0], [camera.width, camera.height], [0, camera.height]].map(([u, v]) =>
@@ -202,7 +212,7 @@ export class RobotScene {
       setPose(this.markerMeshes[m], pose);
       this.stretch(this.stems[m], shown[marker.link].t, pose.t, this.isPart(marker.link));
     });
-    this.setArrows(links ? residualArrows(this.model, links, this.model.residuals[frame]) : [], arrowScale);
+    this.setArrows(links ? residualArrows(this.model, links, this.model.residuals[frame], this.seenBy(frame)) : [], arrowScale);
     this.draw();
     return links !== null;
   }
@@ -243,7 +253,7 @@ export class RobotScene {
     for (let f = 0; f < this.model.values.length; f += step) {
       const links = forwardKinematics(this.model, this.model.values[f]);
       if (links === null) continue;
-      for (const { vector } of residualArrows(this.model, links, this.model.residuals[f])) {
+      for (const { vector } of residualArrows(this.model, links, this.model.residuals[f], this.seenBy(f))) {
         sum += vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2;
         ++count;
       }

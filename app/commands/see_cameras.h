@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes   a recording of several fixed cameras.
+// Gives   what all of them saw, on one clock and in one camera's frame: a frame is one camera's
+//         picture at its time, and everything behind goes on as with one camera.
+// Method  Every camera is looked at alone; calib/tracks/several_cameras.h places them. Where only
+//         resting markers are common, each camera's own motion against the joint log ties the
+//         clocks.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "app/commands/pipeline.h"
+
+namespace kinescope {
+
+/// One camera's view.
+struct SeenAlone {
+  Observed observed;
+  CameraModel camera;
+};
+
+struct SeenTogether {
+  Observed observed;
+  CameraModel camera;   ///< of the reference camera
+  PoseTracks tracks;    ///< in its frame, by the common frames
+  Recording recording;  ///< with the reference camera's declarations, gravity in its frame
+};
+
+/// `see_alone`: how one camera's recording is seen. Cameras that show no marker, or none in common
+/// with the others, are named in the warnings and left out. Throws undetermined when that leaves
+/// none.
+[[nodiscard]] SeenTogether see_cameras(const Recording& recording, const RunOptions& options,
+                                       const std::function<SeenAlone(const Recording&)>& see_alone);
+
+/// Of the common frames' observations, every camera by its own model and pose, in the reference
+/// camera's frame.
+[[nodiscard]] PoseTracks tracks_of_cameras(const TagObservations& tags,
+                                           const Calibration& calibration,
+                                           const MarkerSet& markers);
+
+}  // namespace kinescope

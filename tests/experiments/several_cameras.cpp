@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Random robots before two or three cameras, through the user's command, together and each camera
+// alone, against their truth:
+//   several_cameras [--seeds N] [--first-seed N] [--robot KIND] [--cameras N] [--seconds S]
+//                   [--split] [--bump DEGREES] [--keep FOLDER]
+// One line a run: exit code, structure, the axes' claimed and true errors, error on unseen data.
+// Clocks of the cameras are up to 0.4 s apart, their rates 30, 25 and 20 Hz, noise 0.1 px. --split:
+// every second link's marker faces the second camera. --bump: camera 1 turns by as much in the
+// middle of the recording.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.h"
+#include "app/io/calibration_file.h"
+#include "kinematics/core/file.h"
+#include "tests/experiments/command_line.h"
+#include "tests/truth/axis_errors.h"
+#include "tests/truth/rig_world.h"
+#include "tests/truth/temporary_path.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using truth::RobotKind;
+
+struct Request {
+  int seeds = 1;
+  int first_seed = 0;
+  int cameras = 2;
+  double seconds = 12.0;
+  std::vector<RobotKind> kinds{truth::kRobotKinds.begin(), truth::kRobotKinds.end()};
+  bool split = false;
+  double bump_deg = 0.0;
+  fs::path keep;
+};
+
+truth::RigOptions rig_of(RobotKind kind, int seed, const Request& request) {
+  truth::RigOptions out;
+  out.robot.seed = 7000 + static_cast<std::uint64_t>(seed);
+  out.robot.kind = kind;
+  out.robot.duration_s = request.seconds;
+  out.robot.tag_size_m = 0.06;
+  out.robot.scale = 1.5;
+  out.robot.distance_m = 1.6;
+  const std::vector<truth::RigCamera> all{
+      {.name = "front", .clock_s = 0.05},
+      {.name = "left", .azimuth_rad = 0.6, .clock_s = -0.35, .rate_hz = 25.0},
+      {.name = "right", .azimuth_rad = -0.6, .clock_s = 0.2, .rate_hz = 20.0}};
+  out.cameras.assign(all.begin(), all.begin() + request.cameras);
+  if (request.bump_deg != 0.0) {
+    out.cameras[1].bumped_s = 0.5 * request.seconds;
+    out.cameras[1].bump_rad = request.bump_deg * std::numbers::pi / 180.0;
+  }
+  if (!request.split) return out;
+  out.cameras[1].azimuth_rad = 1.4;  // beyond what a marker shows of itself to both
+  for (int id = 12; id < 20; id += 2) out.faces[id] = 1;
+  return out;
+}
+
+// Links as joints on the way to each marker: what a structure says.
+using Ways = std::map<int, std::vector<std::pair<std::string, bool>>>;
+
+Ways ways_of(const KinematicTree& tree, const std::set<int>& ids) {
+  Ways out;
+  for (const Marker& marker : tree.markers) {
+    if (!ids.contains(marker.id.value)) continue;
+    auto& way = out[marker.id.value];
+    for (const JointId id : tree.path_to(marker.link)) {
+      const Joint& joint = tree.joints[id.index()];
+      way.emplace_back(joint.channel, joint.type == JointType::kPrismatic);
+    }
+  }
+  return out;
+}
+
+// The found axes beside the true ones, every channel at zero; nothing where joints are others.
+std::optional<truth::AxisDifferences> compare(const KinematicTree& truth,
+                                              const Calibration& found) {
+  Calibration at_zero;
+  at_zero.tree = found.tree;
+  const auto anchor =
+      std::ranges::find(at_zero.tree.markers, truth.markers.front().id, &Marker::id);
+  if (anchor == at_zero.tree.markers.end()) return std::nullopt;
+  std::iter_swap(at_zero.tree.markers.begin(), anchor);
+  const auto zeros = [](const KinematicTree& tree) {
+    return Eigen::VectorXd(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tree.joints.size())));
+  };
+  at_zero.joint_values = zeros(truth).transpose();
+  const std::vector<Pose> links = forward_kinematics(found.tree, zeros(found.tree));
+  for (const Joint& joint : truth.joints) {
+    const auto same = std::ranges::find(found.tree.joints, joint.channel, &Joint::channel);
+    if (same == found.tree.joints.end()) return std::nullopt;
+    const Pose T = links[same->parent.index()] * same->T_parent_joint;
+    JointEstimate estimate;
+    estimate.axis_base = T.rotation * same->axis;
+    estimate.point_base = T.translation;
+    at_zero.joints.push_back(estimate);
+  }
+  return truth::axis_differences(truth, at_zero);
+}
+
+struct Outcome {
+  int code = 0;
+  bool structure = false;
+  double held_out_px = 0.0;
+  /// Of the turning axes' places among each other, rms: one standard uncertainty, and the error.
+  double claimed_mm = 0.0;
+  double true_mm = 0.0;
+  int within = 0;  ///< axes whose error is within twice their standard uncertainty
+  int axes = 0;
+  std::string verdict;
+  std::string effects;
+};
+
+double rms(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v * v;
+  return values.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+// Standard uncertainty of each axis' place among the axes, mm, by channel.
+std::map<std::string, double> claims_of(const json& result) {
+  std::map<std::string, double> out;
+  for (const json& joint : result.at("calibration").at("joints")) {
+    const json expanded = joint.value("among_position_expanded_m", json());
+    if (expanded.is_number())
+      out[joint.at("channel").get<std::string>()] = 1e3 * expanded.get<double>() / 2.0;
+  }
+  return out;
+}
+
+void judge_axes(const KinematicTree& truth, const Calibration& found, const json& result,
+                Outcome& out) {
+  const auto differences = compare(truth, found);
+  if (!differences) return;
+  std::vector<double> claimed, errors;
+  const std::map<std::string, double> claims = claims_of(result);
+  for (std::size_t j = 0; j < truth.joints.size(); ++j) {
+    const auto claim = claims.find(truth.joints[j].channel);
+    if (claim == claims.end() || !differences->among[j].position_m) continue;
+    claimed.push_back(claim->second);
+    errors.push_back(1e3 * *differences->among[j].position_m);
+    ++out.axes;
+    out.within += errors.back() <= 2.0 * claimed.back();
+  }
+  out.claimed_mm = rms(claimed);
+  out.true_mm = rms(errors);
+}
+
+Outcome judge(int code, const fs::path& run, const KinematicTree& truth) {
+  Outcome out;
+  out.code = code;
+  if (!fs::exists(run / "calibration.json")) return out;
+  const json result = json::parse(read_text_file(run / "result.json"));
+  const Calibration found = read_calibration(run / "calibration.json");
+  std::set<int> ids;
+  for (const Marker& marker : found.tree.markers) ids.insert(marker.id.value);
+  out.structure =
+      ids.size() == truth.markers.size() && ways_of(truth, ids) == ways_of(found.tree, ids);
+  out.held_out_px = result.at("calibration").at("held_out_rms").get<double>();
+  if (out.structure) judge_axes(truth, found, result, out);
+  const json trace = json::parse(read_text_file(run / "trace.json"));
+  out.verdict = trace.at("verdict").get<std::string>();
+  for (const json& effect : trace.at("accepted"))
+    out.effects += fmt::format(" {} at {}", effect.at("effect").get<std::string>(),
+                               effect.at("place").get<std::string>());
+  return out;
+}
+
+Outcome run(RunOptions options, const fs::path& folder, const KinematicTree& truth) {
+  options.output = folder;
+  Console console;
+  console.quiet = true;
+  try {
+    return judge(static_cast<int>(run_command(options, console)), folder, truth);
+  } catch (const Error& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return judge(static_cast<int>(error.code()), folder, truth);
+  }
+}
+
+void print_line(const std::string& what, const Outcome& o) {
+  fmt::print("TABLE {:28} {:4} {:9} {:8.4f} {:10.4f} {:8.4f} {:2}/{:<2} {}{}\n", what, o.code,
+             o.structure ? "right" : "wrong", o.held_out_px, o.claimed_mm, o.true_mm, o.within,
+             o.axes, o.verdict, o.effects);
+  std::fflush(stdout);
+}
+
+struct Sums {
+  int recordings = 0, together_right = 0, alone = 0, alone_right = 0, within = 0, axes = 0;
+  std::vector<double> ratios;  // of claimed uncertainties, together over the best alone
+  std::vector<double> true_ratios;
+};
+
+void one_recording(RobotKind kind, int seed, const Request& request, Sums& sums) {
+  const truth::RigOptions rig = rig_of(kind, seed, request);
+  const std::vector<truth::World> worlds = truth::make_rig_worlds(rig);
+  const fs::path root =
+      request.keep.empty() ? truth::temporary_path("several_cameras") : request.keep;
+  const std::string name = fmt::format("{}_{}", to_string(kind), seed);
+  const fs::path folder = root / name;
+  truth::write_rig(worlds, rig, folder);
+  const KinematicTree& truth = worlds.front().tree;
+  RunOptions all;
+  all.recording.folder = folder;
+  const Outcome together = run(all, root / (name + "_run"), truth);
+  print_line(name + " together", together);
+  ++sums.recordings;
+  sums.together_right += together.structure;
+  sums.within += together.within;
+  sums.axes += together.axes;
+  std::optional<Outcome> best;
+  for (const truth::RigCamera& camera : rig.cameras) {
+    RunOptions alone = all;
+    alone.recording.corners = folder / fmt::format("corners_{}.csv", camera.name);
+    alone.recording.camera = folder / fmt::format("camera_{}.yaml", camera.name);
+    const Outcome one = run(alone, root / fmt::format("{}_{}_run", name, camera.name), truth);
+    print_line(fmt::format("{} {}", name, camera.name), one);
+    ++sums.alone;
+    sums.alone_right += one.structure;
+    if (one.structure && (!best || one.claimed_mm < best->claimed_mm)) best = one;
+  }
+  if (!best || !together.structure || best->claimed_mm <= 0.0) return;
+  sums.ratios.push_back(together.claimed_mm / best->claimed_mm);
+  sums.true_ratios.push_back(together.true_mm / best->true_mm);
+}
+
+void run_all(const Request& request) {
+  fmt::print("TABLE {:28} {:4} {:9} {:8} {:10} {:8} {:5} {}\n", "recording", "exit", "structure",
+             "held, px", "U(k=1), mm", "true, mm", "in 2U", "trace");
+  Sums sums;
+  for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed)
+    for (const RobotKind kind : request.kinds) one_recording(kind, seed, request, sums);
+  fmt::print(
+      "SUMMARY structure right: together {} of {}, alone {} of {}; places of axes within twice "
+      "the standard uncertainty: {} of {}\n",
+      sums.together_right, sums.recordings, sums.alone_right, sums.alone, sums.within, sums.axes);
+  fmt::print(
+      "SUMMARY together over the best camera alone, rms: uncertainty {:.2f}, error {:.2f} ({} "
+      "recordings)\n",
+      rms(sums.ratios), rms(sums.true_ratios), sums.ratios.size());
+}
+
+}  // namespace
+}  // namespace kinescope
+
+int main(int argc, char** argv) {
+  using namespace kinescope;
+  Request request;
+  std::string kind;
+  CLI::App app("Several cameras together against each of them alone");
+  app.add_option("--seeds", request.seeds);
+  app.add_option("--first-seed", request.first_seed);
+  app.add_option("--robot", kind);
+  app.add_option("--cameras", request.cameras)->check(CLI::Range(2, 3));
+  app.add_option("--seconds", request.seconds);
+  app.add_flag("--split", request.split);
+  app.add_option("--bump", request.bump_deg);
+  app.add_option("--keep", request.keep);
+  return run_experiment(app, argc, argv, [&] {
+    if (!kind.empty())
+      std::erase_if(request.kinds, [&](truth::RobotKind k) { return to_string(k) != kind; });
+    run_all(request);
+  });
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/truth/rig_world.h"
+
+#include <fmt/format.h>
+
+#include "calib/camera/camera_file.h"
+#include "kinematics/core/file.h"
+#include "tests/truth/recorded_world.h"
+
+namespace kinescope::truth {
+namespace {
+
+constexpr double kSeenFromBehind = 0.25;  // cosine of the view beyond which no tag is found
+constexpr double kLogBeyond = 0.5;        // s, that the log begins before and ends after the motion
+
+// The robot turned about the vertical through its middle, base frame.
+Pose turned_about_middle(const FilmedRobot& robot, double angle_rad) {
+  const std::vector<Pose> links = forward_kinematics(
+      robot.tree, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.tree.joints.size())));
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Pose& link : links) middle += link.translation / static_cast<double>(links.size());
+  Pose T;
+  T.rotation = exp_rotation({0.0, 0.0, angle_rad});
+  T.translation = middle - T.rotation * middle;
+  return T;
+}
+
+// Tags that face another camera than the first.
+void turn_tags(const RigOptions& options, FilmedRobot& robot) {
+  const std::vector<Pose> links = forward_kinematics(
+      robot.tree, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.tree.joints.size())));
+  for (Marker& marker : robot.tree.markers) {
+    const auto faces = options.faces.find(marker.id.value);
+    if (faces == options.faces.end()) continue;
+    Pose T_base_marker = links[marker.link.index()] * marker.T_link_marker;
+    T_base_marker.rotation = exp_rotation({0.0, 0.0, -options.cameras[faces->second].azimuth_rad}) *
+                             T_base_marker.rotation;
+    marker.T_link_marker = links[marker.link.index()].inverse() * T_base_marker;
+  }
+}
+
+JointLog log_of(const FilmedRobot& robot, double rate_hz) {
+  JointLog log;
+  log.source = "joints.csv";
+  for (const Joint& joint : robot.tree.joints) log.channels.push_back(joint.channel);
+  for (double t = -kLogBeyond; t <= robot.duration_s + kLogBeyond; t += 1.0 / rate_hz)
+    log.times_s.push_back(t);
+  log.values.resize(static_cast<Eigen::Index>(log.times_s.size()),
+                    static_cast<Eigen::Index>(log.channels.size()));
+  for (std::size_t i = 0; i < log.times_s.size(); ++i)
+    log.values.row(static_cast<Eigen::Index>(i)) = robot.encoders(log.times_s[i]).transpose();
+  return log;
+}
+
+// The corners of one marker with noise; nothing where it is not found.
+std::optional<TagObservation> seen(const World& world, const Marker& marker,
+                                   const Pose& T_camera_marker, double sigma_px, Rng& rng) {
+  const Eigen::Vector3d normal = T_camera_marker.rotation * Eigen::Vector3d::UnitZ();
+  if (normal.dot(T_camera_marker.translation.normalized()) < kSeenFromBehind) return std::nullopt;
+  TagObservation out;
+  out.id = marker.id;
+  out.sigma_px = sigma_px;
+  for (const Eigen::Vector3d& corner : world.markers.corners_m(marker.id)) {
+    const auto pixel = project(world.camera, T_camera_marker * corner);
+    if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() > world.camera.width - 1.0 ||
+        pixel->y() > world.camera.height - 1.0)
+      return std::nullopt;
+    out.corners_px.emplace_back(pixel->x() + rng.normal(sigma_px),
+                                pixel->y() + rng.normal(sigma_px));
+  }
+  return out;
+}
+
+World view_of(const FilmedRobot& robot, const JointLog& log, const RigCamera& camera) {
+  World world;
+  world.tree = robot.tree;
+  world.camera = robot.camera;
+  world.markers = robot.markers;
+  world.log = log;
+  world.T_camera_base = robot.T_camera_base * turned_about_middle(robot, camera.azimuth_rad);
+  Rng rng = Rng::from_name("rig " + camera.name, robot.seed);
+  Pose T_bumped;
+  T_bumped.rotation = exp_rotation({camera.bump_rad, 0.0, 0.0});
+  const auto frames = static_cast<int>(robot.duration_s * camera.rate_hz);
+  world.joint_values.resize(frames, static_cast<Eigen::Index>(robot.tree.joints.size()));
+  for (int f = 0; f < frames; ++f) {
+    const double log_s = f / camera.rate_hz;
+    const Eigen::VectorXd q = robot.encoders(log_s);
+    world.joint_values.row(f) = q.transpose();
+    world.measurements.times_s.push_back(log_s - camera.clock_s);
+    const std::vector<Pose> links = forward_kinematics(robot.tree, q);
+    const Pose T_camera_base = world.measurements.times_s.back() < camera.bumped_s
+                                   ? world.T_camera_base
+                                   : T_bumped * world.T_camera_base;
+    for (const Marker& marker : robot.tree.markers) {
+      auto tag =
+          seen(world, marker, T_camera_base * links[marker.link.index()] * marker.T_link_marker,
+               camera.sigma_px, rng);
+      if (!tag) continue;
+      tag->frame = f;
+      world.measurements.corners.push_back(std::move(*tag));
+    }
+  }
+  return world;
+}
+
+}  // namespace
+
+std::vector<World> make_rig_worlds(const RigOptions& options) {
+  FilmedRobot robot = draw_filmed_robot(options.robot);
+  turn_tags(options, robot);
+  const JointLog log = log_of(robot, options.log_rate_hz);
+  std::vector<World> out;
+  for (const RigCamera& camera : options.cameras) out.push_back(view_of(robot, log, camera));
+  return out;
+}
+
+void write_rig(const std::vector<World>& worlds, const RigOptions& options,
+               const std::filesystem::path& folder) {
+  for (std::size_t c = 0; c < worlds.size(); ++c) {
+    const std::string& name = options.cameras[c].name;
+    write_world(worlds[c], folder);
+    std::filesystem::rename(folder / "corners.csv", folder / fmt::format("corners_{}.csv", name));
+    std::filesystem::rename(folder / "camera.yaml", folder / fmt::format("camera_{}.yaml", name));
+  }
+}
+
+}  // namespace kinescope::truth
