@@ -132,9 +132,9 @@ struct EffectBundle::Impl {
   /// Where the best fit ended that has the change's freedom and the least beyond it.
   [[nodiscard]] std::optional<State> end_with_more(const BundleChange& change,
                                                    const State& state) const;
-  /// The most probable of those and of `state`.
-  [[nodiscard]] State begin_of(const BundleChange& change, const Spec& with,
-                               const State& state) const;
+  /// From there, `state` moved to the minimum.
+  [[nodiscard]] bundle::SolveSummary solve_from(const BundleChange& change, const Spec& with,
+                                                State& state) const;
   void remember(const BundleChange& change, const State& state, double cost) const;
   [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s,
@@ -346,24 +346,26 @@ std::optional<State> EffectBundle::Impl::end_with_more(const BundleChange& chang
   return out;
 }
 
-State EffectBundle::Impl::begin_of(const BundleChange& change, const Spec& with,
-                                   const State& state) const {
-  std::optional<State> best;
-  double least = 0.0;
-  for (const std::optional<State>& other :
-       {end_with_less(change, state), end_with_more(change, state), std::optional(state)}) {
-    if (!other) continue;
-    State tried = *other;
-    const std::optional<double> cost = bundle::cost_of(with, tried, used);
-    if (!cost || (best && *cost >= least)) continue;
-    best = std::move(tried);
-    least = *cost;
+bundle::SolveSummary EffectBundle::Impl::solve_from(const BundleChange& change, const Spec& with,
+                                                    State& state) const {
+  constexpr int kIterations = 60;
+  const State begin = state;
+  state = end_with_less(change, begin).value_or(begin);
+  bundle::SolveSummary out = bundle::solve(with, state, used, {}, kIterations);
+  if (out.converged) return out;
+  // Far from where it ends: with more freedom another one may have come near.
+  if (std::optional<State> nearer = end_with_more(change, begin)) {
+    const bundle::SolveSummary other = bundle::solve(with, *nearer, used, {}, kIterations);
+    if (other.converged) {
+      state = *std::move(nearer);
+      return other;
+    }
   }
-  if (best) return *std::move(best);
-  // Everywhere it puts a marker where nothing can be predicted.
-  State without = state;
-  std::ranges::fill(without.corrections, 0.0);
-  return without;
+  if (out.iterations > 0) return out;
+  // Beside what other effects bent, these put a marker where nothing can be predicted.
+  state = begin;
+  std::ranges::fill(state.corrections, 0.0);
+  return bundle::solve(with, state, used, {}, kIterations);
 }
 
 void EffectBundle::Impl::remember(const BundleChange& change, const State& state,
@@ -384,9 +386,7 @@ void EffectBundle::Impl::remember(const BundleChange& change, const State& state
 BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
   change_model(change, with, state);
-  state = begin_of(change, with, state);
-  constexpr int kIterations = 60;
-  const bundle::SolveSummary summary = bundle::solve(with, state, used, {}, kIterations);
+  const bundle::SolveSummary summary = solve_from(change, with, state);
   if (summary.converged) remember(change, state, summary.final_cost);
   BundleSolution out;
   out.converged = summary.converged;

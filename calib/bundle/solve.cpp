@@ -248,14 +248,6 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
           static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};
 }
 
-std::optional<double> cost_of(const Spec& spec, State& state, const std::vector<int>& sightings) {
-  BuiltProblem built(spec, state, sightings, {});
-  if (built.blocks().empty()) return 0.0;
-  double cost = 0.0;
-  if (!built.problem().Evaluate({}, &cost, nullptr, nullptr, nullptr)) return std::nullopt;
-  return cost;
-}
-
 std::vector<int> usable_sightings(const Spec& spec, const State& state) {
   // The offset will move: frames must stay within the log when it does.
   const double margin_s = spec.free_time_offset ? kOffsetMargin : 0.0;

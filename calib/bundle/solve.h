@@ -5,7 +5,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "calib/bundle/problem.h"
@@ -15,7 +14,7 @@ namespace kinescope::bundle {
 struct SolveSummary {
   bool converged = false;
   std::string message;
-  int iterations = 0;
+  int iterations = 0;  ///< 0: it cannot be evaluated at the start, where the state has been left
   double initial_cost = 0.0;
   double final_cost = 0.0;
 };
@@ -24,11 +23,6 @@ struct SolveSummary {
 /// same.
 [[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
                                  const BuildOptions& options, int max_iterations);
-
-/// Of a State, without robust loss, in the unit of SolveSummary's; nothing where a sighting cannot
-/// be predicted.
-[[nodiscard]] std::optional<double> cost_of(const Spec& spec, State& state,
-                                            const std::vector<int>& sightings);
 
 /// Robust solve, noise level per marker (per rotation and translation for poses), and once more:
 /// moves `state` to where no outlier pulls it. Rescales the sigmas in `spec`.
