@@ -128,7 +128,7 @@ std::optional<ShapeVector> step_from(const std::vector<std::optional<Left>>& lef
     normal += weight * of->normal;
     gradient += weight * of->gradient;
   }
-  const ShapeVector step = solve_symmetric(normal, gradient);
+  ShapeVector step = solve_symmetric(normal, gradient);
   if (!step.allFinite()) return std::nullopt;
   return step;
 }
