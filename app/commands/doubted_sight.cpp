@@ -19,13 +19,11 @@ std::vector<CameraModel> cameras_to_begin_with(const Recording& recording, const
   }
 }
 
-}  // namespace
-
-std::optional<Sight> with_other_camera(const Recording& recording, const Observed& observed,
-                                       const CameraModel& declared,
-                                       const CalibrateOptions& options) {
-  if (!recording.camera || observed.tags.observations.empty()) return std::nullopt;
-  for (const CameraModel& begin : cameras_to_begin_with(recording, observed, declared)) {
+// As the first robot has it that shows with one of these.
+std::optional<Sight> with_one_of(const std::vector<CameraModel>& cameras,
+                                 const Recording& recording, const Observed& observed,
+                                 const CalibrateOptions& options) {
+  for (const CameraModel& begin : cameras) {
     const std::optional<CameraModel> found =
         camera_from_motion(recording, observed, begin, options);
     if (!found) continue;
@@ -37,6 +35,30 @@ std::optional<Sight> with_other_camera(const Recording& recording, const Observe
                   {{"intrinsics", "camera centre"}, 0.0}}};
   }
   return std::nullopt;
+}
+
+bool is_camera_declared(const Recording& recording, const Observed& observed) {
+  return recording.camera && !observed.tags.observations.empty();
+}
+
+}  // namespace
+
+std::optional<Sight> with_other_camera(const Recording& recording, const Observed& observed,
+                                       const CameraModel& declared,
+                                       const CalibrateOptions& options) {
+  if (!is_camera_declared(recording, observed)) return std::nullopt;
+  return with_one_of(cameras_to_begin_with(recording, observed, declared), recording, observed,
+                     options);
+}
+
+std::optional<Sight> with_shown_camera(const Recording& recording, const Observed& observed,
+                                       const CameraModel& declared,
+                                       const CalibrateOptions& options) {
+  if (!is_camera_declared(recording, observed)) return std::nullopt;
+  const auto cameras = cameras_to_begin_with(recording, observed, declared);
+  if (!(log_odds_of_shapes(cameras.front(), declared, observed.tags, recording.markers) > 0.0))
+    return std::nullopt;
+  return with_one_of(cameras, recording, observed, options);
 }
 
 std::optional<Sight> with_other_markers(const Recording& recording, const Observed& observed,
@@ -51,13 +73,6 @@ std::optional<Sight> with_other_markers(const Recording& recording, const Observ
   }
   if (out.told_by.empty()) return std::nullopt;
   return out;
-}
-
-bool shapes_contradict_camera(const Recording& recording, const Observed& observed,
-                              const CameraModel& declared) {
-  if (!recording.camera || observed.tags.observations.empty()) return false;
-  const CameraModel shown = cameras_to_begin_with(recording, observed, declared).front();
-  return log_odds_of_shapes(shown, declared, observed.tags, recording.markers) > 0.0;
 }
 
 }  // namespace kinescope

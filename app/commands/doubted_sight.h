@@ -29,14 +29,16 @@ struct Sight {
                                                      const CameraModel& declared,
                                                      const CalibrateOptions& options);
 
+/// The same where the images are more probable with the camera that they show than with the
+/// declared one: by more than half of the odds, whatever they are worth, for what is tried first.
+[[nodiscard]] std::optional<Sight> with_shown_camera(const Recording& recording,
+                                                     const Observed& observed,
+                                                     const CameraModel& declared,
+                                                     const CalibrateOptions& options);
+
 /// Markers that are not flat squares; nothing where all are.
 [[nodiscard]] std::optional<Sight> with_other_markers(const Recording& recording,
                                                       const Observed& observed,
                                                       const CameraModel& declared);
-
-/// The images are more probable with another camera than with the declared one. By more than half
-/// of the odds, whatever they are worth: for what is tried first.
-[[nodiscard]] bool shapes_contradict_camera(const Recording& recording, const Observed& observed,
-                                            const CameraModel& declared);
 
 }  // namespace kinescope

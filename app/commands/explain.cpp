@@ -20,7 +20,6 @@
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "calib/tracks/several_cameras.h"
 #include "calib/tracks/shown_shapes.h"
-#include "kinematics/core/student_t.h"
 #include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
@@ -142,22 +141,6 @@ std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
   std::pair<Shape, std::vector<EffectId>> out{shape_of(structure), {}};
   for (const AddedEffect& effect : begin.known) out.second.push_back(effect.id);
   return out;
-}
-
-/// Student's scale of a corner's coordinate about a robot's prediction of frames that it has not
-/// seen, px; 0 where no corner is predicted.
-double scale_of_corners(const Calibration& calibration) {
-  constexpr double kOfASquare = 8.0;
-  constexpr double kLeast = 1e-12;  // px^2
-  std::vector<double> squares;
-  for (const SightingResidual& residual : calibration.residuals) {
-    const auto& px = residual.held_out_px.empty() ? residual.corners_px : residual.held_out_px;
-    if (2.0 * static_cast<double>(px.size()) != kOfASquare) continue;
-    double sum = 0.0;
-    for (const Eigen::Vector2d& corner : px) sum += corner.squaredNorm();
-    squares.push_back(sum);
-  }
-  return std::sqrt(fit_student_t(squares, kOfASquare, kLeast).scale_squared);
 }
 
 class Explainer {
@@ -370,15 +353,8 @@ class Explainer {
 
   [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights() const {
     const Observed& observed = evidence_.observed;
-    std::vector<std::optional<Sight>> out;
-    if (shapes_contradict_camera(recording(), observed, evidence_.camera))
-      out.push_back(other_camera());
-    out.push_back(with_other_markers(recording(), observed, evidence_.camera));
-    return out;
-  }
-
-  [[nodiscard]] std::optional<Sight> other_camera() const {
-    return with_other_camera(recording(), evidence_.observed, evidence_.camera, options_.calibrate);
+    return {with_shown_camera(recording(), observed, evidence_.camera, options_.calibrate),
+            with_other_markers(recording(), observed, evidence_.camera)};
   }
 
   /// Worth the second that a look at the shapes takes: more than half of what the robot misses is
@@ -567,14 +543,12 @@ class Explainer {
   // A lens or a focal length that is not this camera's bends the tracks themselves. The robot that
   // shows when the camera is found with it, the declared camera, and what it lacks as effects.
   [[nodiscard]] std::vector<Proposal> with_camera_doubted(const Explanation& now) const {
-    const TagObservations& tags = evidence_.observed.tags;
     const bool by_place =
         now.fitted && std::ranges::any_of(now.fitted->trace.rest, &Rest::is_field);
     const bool several = !evidence_.observed.cameras.empty();
-    if (several || !recording().camera || tags.observations.empty() ||
-        (is_structure_clear(now) && now.fitted && !by_place))
-      return {};
-    const std::optional<Sight> other = other_camera();
+    if (several || (is_structure_clear(now) && now.fitted && !by_place)) return {};
+    const std::optional<Sight> other =
+        with_other_camera(recording(), evidence_.observed, evidence_.camera, options_.calibrate);
     const std::optional<Explanation> with = other ? fitted_with(*other) : std::nullopt;
     if (!with || !with->fitted) return {};
     return {{*with->structure, {other->told_by, with->fitted->calibration}}};
@@ -622,10 +596,7 @@ std::string words_of(const ReadingApart& reading, const Explanation& of, const E
   const JointLog& log = evidence.recording.log;
   const double time_s = log.times_s[reading.row];
   const std::string& channel = log.channels[static_cast<std::size_t>(reading.channel)];
-  std::string out = fmt::format(
-      "{}: at {} = {} '{}' reads {:.6g}, which none of its other readings comes near: put aside",
-      log.source, log.time_column, time_s, channel,
-      log.values(static_cast<Eigen::Index>(reading.row), reading.channel));
+  const std::string out = words_of(log, reading) + ": put aside";
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   const auto frame = std::ranges::find(times_s, time_s);
   if (frame == times_s.end()) return out;

@@ -105,11 +105,7 @@ void note_readings_apart(const JointLog& log, const std::vector<ReadingApart>& a
                          std::vector<Finding>& findings) {
   for (const ReadingApart& reading : apart) {
     findings.push_back(
-        {false, fmt::format("{}: at {} = {} '{}' reads {:.6g}, which none of its other readings "
-                            "comes near: `run` puts it aside unless the markers say the same",
-                            log.source, log.time_column, log.times_s[reading.row],
-                            log.channels[static_cast<std::size_t>(reading.channel)],
-                            log.values(static_cast<Eigen::Index>(reading.row), reading.channel))});
+        {false, words_of(log, reading) + ": `run` puts it aside unless the markers say the same"});
   }
 }
 

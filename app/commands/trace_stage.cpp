@@ -84,8 +84,9 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
   if (recording.settings.gravity || start.nominal) {
     trace_options.gravity_base = -Eigen::Vector3d::UnitZ();
   }
-  CalibrationStart from = continued(start, begin.near.value_or(plain));
-  from.camera = plain.camera;
+  CalibrationStart from = continued(start, begin.near ? *begin.near : plain);
+  // What the camera lacks is among the effects.
+  if (begin.near) from.camera = plain.camera;
   const CalibrationTrace found = trace_calibration(observed.measurements, recording.markers,
                                                    recording.log, from, trace_options, progress);
   TracedCalibration out{found.trace, plain, found.effects, found.gravity_base,

@@ -15,6 +15,8 @@
 namespace kinescope {
 namespace {
 
+constexpr double kOfASquare = 8.0;  // coordinates of its corners
+
 // One kind of residual (corners; turns; shifts): squared lengths, coordinates each, the volume that
 // a sighting without a place may be in.
 struct Part {
@@ -111,7 +113,6 @@ PredictiveScore predictive_score(const Calibration& calibration, const Measureme
                            static_cast<double>(calibration.residuals.size());
       out.deviance += deviance_of(part, part.squares.size(), share * read_off);
     }
-    constexpr double kOfASquare = 8.0;
     out.deviance += deviance_of({{}, kOfASquare, std::log(side_px)}, missing);
   } else {
     out.deviance += deviance_of(shifts, sightings, read_off);
@@ -123,6 +124,16 @@ PredictiveScore predictive_score(const Calibration& calibration, const Measureme
     out.alike = std::max(1.0, calibration.correlation_time_s / interval_s);
   }
   return out;
+}
+
+double scale_of_corners(const Calibration& calibration) {
+  constexpr double kLeast = 1e-12;  // px^2
+  std::vector<double> squares;
+  for (const SightingResidual& residual : calibration.residuals) {
+    const auto& px = residual.held_out_px.empty() ? residual.corners_px : residual.held_out_px;
+    if (2.0 * static_cast<double>(px.size()) == kOfASquare) squares.push_back(squared_length(px));
+  }
+  return std::sqrt(fit_student_t(squares, kOfASquare, kLeast).scale_squared);
 }
 
 double log_odds(const PredictiveScore& of, const PredictiveScore& against) {

@@ -21,6 +21,10 @@ struct PredictiveScore {
 [[nodiscard]] PredictiveScore predictive_score(const Calibration& calibration,
                                                const Measurements& measurements);
 
+/// Student's scale of a coordinate of a square's corners about the predictions of frames that the
+/// model has not seen, px; 0 where no such corner is predicted.
+[[nodiscard]] double scale_of_corners(const Calibration& calibration);
+
 /// ln of the odds of one model against another of the same measurements.
 [[nodiscard]] double log_odds(const PredictiveScore& of, const PredictiveScore& against);
 

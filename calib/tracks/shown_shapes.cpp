@@ -16,10 +16,9 @@ namespace {
 
 // Of each marker: noise of 0.03 px is known to a tenth, and a clean recording takes 20 ms more.
 constexpr std::size_t kMostViewsOfOne = 100;
-constexpr double kLeftOfASquare = 2.0;   // coordinates: eight less the six of its pose
-constexpr double kLeastScale = 1e-12;    // of the declared noise, squared
-constexpr double kStudentFreedom = 4.0;  // as fit_student_t has it
-constexpr int kShapeNumbers = 3;         // width, shear, warp
+constexpr double kLeftOfASquare = 2.0;  // coordinates: eight less the six of its pose
+constexpr double kLeastScale = 1e-12;   // of the declared noise, squared
+constexpr int kShapeNumbers = 3;        // width, shear, warp
 
 using Views = std::vector<const TagObservation*>;
 using ShapeNormal = Eigen::Matrix3d;
@@ -123,8 +122,7 @@ std::optional<ShapeVector> step_from(const std::vector<std::optional<Left>>& lef
   ShapeVector gradient = -weights.cwiseProduct(numbers);
   for (const auto& of : left) {
     if (!of) continue;
-    const double weight =
-        (kStudentFreedom + kLeftOfASquare) / (kStudentFreedom + of->chi_square / scale);
+    const double weight = student_weight(of->chi_square, kLeftOfASquare, scale);
     normal += weight * of->normal;
     gradient += weight * of->gradient;
   }

@@ -19,7 +19,7 @@ double squared_scale(std::span<const double> squares, double coordinates) {
   constexpr double kSettled = 1e-9;
   for (int step = 0; step < kMostSteps && scale > 0.0; ++step) {
     double sum = 0.0;
-    for (const double r2 : squares) sum += r2 * (kFreedom + coordinates) / (kFreedom + r2 / scale);
+    for (const double r2 : squares) sum += r2 * student_weight(r2, coordinates, scale);
     const double next = sum / all;
     const bool settled = std::abs(next / scale - 1.0) < kSettled;
     scale = next;
@@ -29,6 +29,10 @@ double squared_scale(std::span<const double> squares, double coordinates) {
 }
 
 }  // namespace
+
+double student_weight(double square, double coordinates, double scale_squared) {
+  return (kFreedom + coordinates) / (kFreedom + square / scale_squared);
+}
 
 StudentT fit_student_t(std::span<const double> squares, double coordinates,
                        double least_scale_squared) {

@@ -21,4 +21,7 @@ struct StudentT {
 [[nodiscard]] StudentT fit_student_t(std::span<const double> squares, double coordinates,
                                      double least_scale_squared);
 
+/// What a vector counts as in a weighted sum of squares: the expectation under that scale.
+[[nodiscard]] double student_weight(double square, double coordinates, double scale_squared);
+
 }  // namespace kinescope

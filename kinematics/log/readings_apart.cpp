@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <fmt/format.h>
+
 namespace kinescope {
 namespace {
 
@@ -37,6 +39,14 @@ std::vector<ReadingApart> readings_apart(const JointLog& log) {
   for (int c = 0; c < log.values.cols(); ++c) add_of_channel(log, c, out);
   std::ranges::stable_sort(out, {}, &ReadingApart::row);
   return out;
+}
+
+std::string words_of(const JointLog& log, const ReadingApart& reading) {
+  return fmt::format(
+      "{}: at {} = {} '{}' reads {:.6g}, which none of its other readings comes near", log.source,
+      log.time_column, log.times_s[reading.row],
+      log.channels[static_cast<std::size_t>(reading.channel)],
+      log.values(static_cast<Eigen::Index>(reading.row), reading.channel));
 }
 
 JointLog without_readings(JointLog log, const std::vector<ReadingApart>& apart) {

@@ -38,6 +38,13 @@ void expect_one_line(const Outcome& outcome) {
   EXPECT_EQ(outcome.out, "");
 }
 
+Outcome run_in(const fs::path& folder, Words command) {
+  for (std::string& word : command) {
+    if (word.starts_with("{d}")) word.replace(0, 3, folder.string());
+  }
+  return run(command);
+}
+
 class LyingInputs : public testing::TestWithParam<LyingInput> {
  protected:
   static fs::path folder_of(const LyingInput& input) {
@@ -55,11 +62,7 @@ TEST_P(LyingInputs, AreNamed) {
     fs::create_directories((folder / name).parent_path());
     write_file_atomically(folder / name, text);
   }
-  Words words = input.command;
-  for (std::string& word : words) {
-    if (word.starts_with("{d}")) word.replace(0, 3, folder.string());
-  }
-  const Outcome outcome = run(words);
+  const Outcome outcome = run_in(folder, input.command);
   const std::string said = outcome.err + outcome.out;
   EXPECT_EQ(outcome.code, input.code) << said;
   for (const std::string& part : input.says) {
@@ -106,11 +109,7 @@ TEST(SoundInputs, AreTaken) {
     fs::remove_all(folder);
     fs::create_directories(folder);
     for (const auto& [name, text] : sound()) write_file_atomically(folder / name, text);
-    Words words = command;
-    for (std::string& word : words) {
-      if (word.starts_with("{d}")) word.replace(0, 3, folder.string());
-    }
-    const Outcome outcome = run(words);
+    const Outcome outcome = run_in(folder, command);
     EXPECT_EQ(outcome.code, 0) << command.front() << ": " << outcome.err << outcome.out;
     EXPECT_EQ(outcome.err.find("warning"), std::string::npos) << outcome.err;
     fs::remove_all(folder);
@@ -126,11 +125,7 @@ TEST(LyingTorques, TheAdviceForExchangedColumnsPutsThemRight) {
   fs::remove_all(folder);
   fs::create_directories(folder);
   for (const auto& [name, text] : files) write_file_atomically(folder / name, text);
-  Words words = kDynamics;
-  for (std::string& word : words) {
-    if (word.starts_with("{d}")) word.replace(0, 3, folder.string());
-  }
-  const Outcome outcome = run(words);
+  const Outcome outcome = run_in(folder, kDynamics);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   fs::remove_all(folder);
 }
