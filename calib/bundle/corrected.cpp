@@ -169,6 +169,31 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
   return out;
 }
 
+std::vector<CorrectionBlock> correction_blocks(const Spec& spec) {
+  const auto goes_with = [](const Correction& one, const Correction& other) {
+    return one.part == other.part && one.index == other.index && !one.is_local && !other.is_local;
+  };
+  std::vector<CorrectionBlock> out;
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    if (c > 0 && goes_with(spec.corrections[c - 1], spec.corrections[c])) {
+      ++out.back().count;
+    } else {
+      out.push_back({static_cast<int>(c), 1});
+    }
+  }
+  return out;
+}
+
+std::vector<CorrectionBlock> correction_blocks_of(const Spec& spec, const Sighting& sighting) {
+  const std::vector<int> bearing = corrections_of(spec, sighting);
+  std::vector<CorrectionBlock> out = correction_blocks(spec);
+  std::erase_if(out, [&](const CorrectionBlock& block) {
+    const auto first = std::ranges::lower_bound(bearing, block.first);
+    return first == bearing.end() || *first >= block.first + block.count;
+  });
+  return out;
+}
+
 CorrectedSighting sum_corrections(const Spec& spec, const Sighting& sighting,
                                   const std::vector<int>& which,
                                   const std::vector<double>& values) {

@@ -39,9 +39,12 @@ class SightingCost final : public ceres::CostFunction {
     behind_clock_ = sizes.size();
     if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
     if (sighting.target >= 0) sizes.push_back(3);
-    corrections_ = corrections_of(spec, sighting);
     first_correction_ = sizes.size();
-    sizes.resize(sizes.size() + corrections_.size(), 1);
+    correction_blocks_ = correction_blocks_of(spec, sighting);
+    for (const CorrectionBlock& block : correction_blocks_) {
+      sizes.push_back(block.count);
+      for (int k = 0; k < block.count; ++k) corrections_.push_back(block.first + k);
+    }
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -92,8 +95,10 @@ class SightingCost final : public ceres::CostFunction {
 
   [[nodiscard]] std::vector<double> values_of_corrections(double const* const* parameters) const {
     std::vector<double> out;
-    for (std::size_t k = 0; k < corrections_.size(); ++k)
-      out.push_back(parameters[first_correction_ + k][0]);
+    for (std::size_t b = 0; b < correction_blocks_.size(); ++b) {
+      const double* values = parameters[first_correction_ + b];
+      out.insert(out.end(), values, values + correction_blocks_[b].count);
+    }
     return out;
   }
 
@@ -140,12 +145,15 @@ class SightingCost final : public ceres::CostFunction {
       Eigen::Map<RowMajor>(jacobians[behind_clock_], rows, 3) =
           Eigen::Matrix3d::Identity() / sighting_->sigma;
     }
-    for (std::size_t k = 0; k < corrections_.size(); ++k) {
-      double* out = jacobians[first_correction_ + k];
+    for (std::size_t b = 0; b < correction_blocks_.size(); ++b) {
+      double* out = jacobians[first_correction_ + b];
       if (out == nullptr) continue;
-      const auto c = static_cast<std::size_t>(corrections_[k]);
-      Eigen::Map<Eigen::VectorXd>(out, rows) =
-          d_correction(*spec_, *sighting_, spec_->corrections[c], at);
+      const CorrectionBlock& block = correction_blocks_[b];
+      Eigen::Map<RowMajor> d_block(out, rows, block.count);
+      for (int k = 0; k < block.count; ++k) {
+        const auto c = static_cast<std::size_t>(block.first + k);
+        d_block.col(k) = d_correction(*spec_, *sighting_, spec_->corrections[c], at);
+      }
     }
   }
 
@@ -153,7 +161,8 @@ class SightingCost final : public ceres::CostFunction {
   const Sighting* sighting_;
   const Readings* readings_;
   const std::vector<int>* path_;
-  std::vector<int> corrections_;      // that bear on this sighting
+  std::vector<CorrectionBlock> correction_blocks_;
+  std::vector<int> corrections_;      // of these blocks
   std::size_t behind_clock_ = 0;      // of the blocks: intrinsics, or a target
   std::size_t first_correction_ = 0;  // of the blocks
 };
@@ -198,18 +207,25 @@ Matrix6d whitening_of(const NominalSigmas& sigmas) {
 }
 
 // A value over its prior's sigma.
-class CorrectionPrior final : public ceres::SizedCostFunction<1, 1> {
+class CorrectionPrior final : public ceres::CostFunction {
  public:
-  explicit CorrectionPrior(double sigma) : weight_(1.0 / sigma) {}
+  CorrectionPrior(double sigma, int at, int size) : weight_(1.0 / sigma), at_(at), size_(size) {
+    set_num_residuals(1);
+    mutable_parameter_block_sizes()->push_back(size);
+  }
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    residuals[0] = weight_ * parameters[0][0];
-    if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = weight_;
+    residuals[0] = weight_ * parameters[0][at_];
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    std::fill_n(jacobians[0], size_, 0.0);
+    jacobians[0][at_] = weight_;
     return true;
   }
 
  private:
   double weight_;
+  int at_;
+  int size_;
 };
 
 // A measured distance between two targets.
@@ -255,7 +271,9 @@ ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas, const Joint& n
                         motion_of(nominal).transpose() * whitening_of(sigmas));
 }
 
-ceres::CostFunction* make_correction_prior(double sigma) { return new CorrectionPrior(sigma); }
+ceres::CostFunction* make_correction_prior(double sigma, int at, int size) {
+  return new CorrectionPrior(sigma, at, size);
+}
 
 ceres::CostFunction* make_distance_cost(const TargetPair& pair) {
   return new DistanceCost(pair.distance_m, pair.sigma_m);

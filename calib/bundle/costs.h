@@ -12,7 +12,7 @@ namespace kinescope::bundle {
 /// One sighting, whitened. Blocks: T_camera_base (7), then for every joint on the way its frame (7)
 /// and its map (scale, offset) or its value in this frame (1), the mount (7), the time offset (1),
 /// for a further camera its lag (1), for corners the intrinsics (12), for points in a target its
-/// place (3), each correction that bears on the sighting (1). `readings` must follow the time
+/// place (3), each block of corrections that bears on the sighting (corrected.h). `readings` must follow the time
 /// offset.
 [[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
                                                       const Readings& readings);
@@ -23,8 +23,8 @@ namespace kinescope::bundle {
 /// Its zero: the frame's turn about (shift along) the axis.
 [[nodiscard]] ceres::CostFunction* make_zero_prior(const NominalSigmas& sigmas,
                                                    const Joint& nominal);
-/// A value that should stay near zero. Block: the correction (1).
-[[nodiscard]] ceres::CostFunction* make_correction_prior(double sigma);
+/// A value that should stay near zero. Block: of `size` corrections, that at `at`.
+[[nodiscard]] ceres::CostFunction* make_correction_prior(double sigma, int at, int size);
 /// A measured distance. Blocks: both targets' places (3, 3).
 [[nodiscard]] ceres::CostFunction* make_distance_cost(const TargetPair& pair);
 

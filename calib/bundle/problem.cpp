@@ -30,6 +30,10 @@ class ReadingsCallback final : public ceres::EvaluationCallback {
   const State* state_;
 };
 
+double* corrections_at(State& state, const CorrectionBlock& block) {
+  return &state.corrections[static_cast<std::size_t>(block.first)];
+}
+
 // What drives a joint at a time: its channel, and the others that move it too.
 std::optional<ChannelValue> reading(const Spec& spec, std::size_t joint, double time_s) {
   auto sum = interpolate(spec.log, spec.channel[joint], time_s, spec.max_gap_s);
@@ -195,7 +199,8 @@ BuiltProblem::BuiltProblem(const Spec& spec, State& state, const std::vector<int
   problem_options.enable_fast_removal = false;
   problem_ = std::make_unique<ceres::Problem>(problem_options);
   // Those that nothing shows are unknowns, too.
-  for (double& correction : state.corrections) problem_->AddParameterBlock(&correction, 1);
+  for (const CorrectionBlock& block : correction_blocks(spec))
+    problem_->AddParameterBlock(corrections_at(state, block), block.count);
   for (const int index : sightings) add_sighting(spec, state, index, options);
   add_priors(spec, state);
   set_manifolds(spec, state, options);
@@ -220,8 +225,8 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   if (sighting.target >= 0) {
     blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
-  for (const int c : corrections_of(spec, sighting))
-    blocks.push_back(&state.corrections[static_cast<std::size_t>(c)]);
+  for (const CorrectionBlock& block : correction_blocks_of(spec, sighting))
+    blocks.push_back(corrections_at(state, block));
   ceres::LossFunction* loss =
       options.robust_width ? new ceres::CauchyLoss(*options.robust_width) : nullptr;
   ids_.push_back(
@@ -236,11 +241,13 @@ void BuiltProblem::add_priors(const Spec& spec, State& state) {
     // A measurement, not a prior: it counts among the data.
     ids_.push_back(problem_->AddResidualBlock(make_distance_cost(pair), nullptr, from, to));
   }
-  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
-    const double sigma = spec.corrections[c].prior_sigma;
-    if (!(sigma > 0.0)) continue;
-    prior_ids_.push_back(
-        problem_->AddResidualBlock(make_correction_prior(sigma), nullptr, &state.corrections[c]));
+  for (const CorrectionBlock& block : correction_blocks(spec)) {
+    for (int k = 0; k < block.count; ++k) {
+      const double sigma = spec.corrections[static_cast<std::size_t>(block.first + k)].prior_sigma;
+      if (!(sigma > 0.0)) continue;
+      prior_ids_.push_back(problem_->AddResidualBlock(make_correction_prior(sigma, k, block.count),
+                                                      nullptr, corrections_at(state, block)));
+    }
   }
   if (!spec.prior) return;
   for (std::size_t j = 0; j < state.joint_frames.size(); ++j) {
@@ -354,10 +361,15 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
                  {nullptr, name, {name + " x", name + " y", name + " z"}, {"m", "m", "m"}, {}, -1},
                  frozen);
   }
-  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
-    const Correction& correction = spec.corrections[c];
-    free_numbers(&state.corrections[c], {true},
-                 {nullptr, "effects", {correction.name}, {correction.unit}, {}, -1}, frozen);
+  for (const CorrectionBlock& block : correction_blocks(spec)) {
+    FreeBlock names{nullptr, "effects", {}, {}, {}, -1};
+    for (int k = 0; k < block.count; ++k) {
+      const Correction& correction = spec.corrections[static_cast<std::size_t>(block.first + k)];
+      names.names.push_back(correction.name);
+      names.units.push_back(correction.unit);
+    }
+    free_numbers(corrections_at(state, block), std::vector<bool>(names.names.size(), true), names,
+                 frozen);
   }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     // The zero of a joint that no channel drives is free: its value in the first frame stays.
@@ -370,7 +382,6 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
         zero_held = true;
         continue;
       }
-      has_local_ = true;
       const std::string name = fmt::format("{} value in frame {}", spec.tree.joints[j].name, f);
       blocks_.push_back({value, spec.tree.joints[j].name, {name}, {""}, {0}, static_cast<int>(f)});
     }

@@ -187,8 +187,6 @@ class BuiltProblem {
   [[nodiscard]] const std::vector<FreeBlock>& blocks() const { return blocks_; }
   [[nodiscard]] const std::vector<ceres::ResidualBlockId>& sighting_ids() const { return ids_; }
   [[nodiscard]] const std::vector<ceres::ResidualBlockId>& prior_ids() const { return prior_ids_; }
-  /// True when joint values per frame are among the unknowns.
-  [[nodiscard]] bool has_local_blocks() const { return has_local_; }
 
  private:
   void add_sighting(const Spec& spec, State& state, int index, const BuildOptions& options);
@@ -203,7 +201,6 @@ class BuiltProblem {
   std::vector<ceres::ResidualBlockId> ids_;
   std::vector<ceres::ResidualBlockId> prior_ids_;
   std::vector<FreeBlock> blocks_;
-  bool has_local_ = false;
 };
 
 }  // namespace kinescope::bundle

@@ -16,8 +16,6 @@
 namespace kinescope::bundle {
 namespace {
 
-// Above this many global unknowns the normal equations are kept sparse.
-constexpr int kDenseLimit = 400;
 // Groups smaller than this share the common noise level.
 constexpr std::size_t kMinGroup = 30;
 // How far the time offset may move from its start without running into the ends of the log, s.
@@ -203,13 +201,6 @@ void put_back_the_larger_part(const Spec& spec, const std::vector<Misfit>& misfi
   }
 }
 
-// Where a reading rests on its steps, each correction bears on a few frames: with a third of the
-// unknowns of that kind a sparse factor takes half the time (`undeclared`, 9405: 36 s of 69).
-bool has_many_local_corrections(const Spec& spec, int unknowns) {
-  const auto local = std::ranges::count_if(spec.corrections, &Correction::is_local);
-  return 3 * local > unknowns;
-}
-
 // Factor N / (N - P): residuals of a fit are smaller than the noise.
 double freedom_factor(const Spec& spec, State& state, const std::vector<int>& used) {
   BuiltProblem built(spec, state, used, {});
@@ -227,14 +218,8 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   silence_glog();
   BuiltProblem built(spec, state, sightings, build_options);
   if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
-  int unknowns = 0;
-  for (const FreeBlock& block : built.blocks()) unknowns += static_cast<int>(block.names.size());
-
   ceres::Solver::Options options;
-  options.linear_solver_type = built.has_local_blocks() || unknowns > kDenseLimit ||
-                                       has_many_local_corrections(spec, unknowns)
-                                   ? ceres::SPARSE_NORMAL_CHOLESKY
-                                   : ceres::DENSE_NORMAL_CHOLESKY;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = max_iterations;
   options.initial_trust_region_radius = kFirstRadius;
   options.function_tolerance = build_options.robust_width ? kRobustTolerance : kPlainTolerance;
