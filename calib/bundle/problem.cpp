@@ -356,7 +356,7 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
   }
   for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
     const Correction& correction = spec.corrections[c];
-    free_numbers(&state.corrections[c], {true},
+    free_numbers(&state.corrections[c], {!spec.hold_corrections},
                  {nullptr, "effects", {correction.name}, {correction.unit}, {}, -1}, frozen);
   }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {

@@ -67,12 +67,41 @@ double robust_scale(const std::vector<double>& chi_squares, double freedom, doub
   return std::sqrt(std::max(ratio, 1e-12));
 }
 
+// Of poses: turns and shifts of each camera (tracker) have a noise of their own.
+void rescale_poses(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
+  struct Parts {
+    std::vector<double> rotation, translation;
+  };
+  std::vector<Parts> parts(spec.cameras.size() + 1);  // of all at last
+  for (const Misfit& misfit : misfits) {
+    if (!std::isfinite(misfit.chi_square)) continue;
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    for (Parts* of : {&parts[static_cast<std::size_t>(sighting.camera)], &parts.back()}) {
+      of->rotation.push_back(misfit.rotation);
+      of->translation.push_back(misfit.translation);
+    }
+  }
+  std::vector<std::pair<double, double>> scales;
+  for (const Parts& own : parts) {
+    const Parts& of = own.rotation.size() >= kMinGroup ? own : parts.back();
+    scales.emplace_back(robust_scale(of.rotation, 3.0, shrink),
+                        robust_scale(of.translation, 3.0, shrink));
+  }
+  for (Sighting& sighting : spec.sightings) {
+    const auto& [rotation, translation] = scales[static_cast<std::size_t>(sighting.camera)];
+    sighting.whitening.leftCols<3>() /= rotation;
+    sighting.whitening.rightCols<3>() /= translation;
+  }
+}
+
 // Multiplies the declared sigmas so that the misfits have the size their degrees of freedom ask
 // for.
 void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
+  if (spec.kind == MeasurementKind::kPose) {
+    rescale_poses(spec, misfits, shrink);
+    return;
+  }
   std::vector<double> all;
-  std::vector<double> rotation;
-  std::vector<double> translation;
   std::map<int, std::vector<double>> by_series;
   for (const Misfit& misfit : misfits) {
     if (!std::isfinite(misfit.chi_square)) continue;
@@ -80,19 +109,8 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
     // Per degree of freedom, so that boards and tags can be mixed.
     all.push_back(misfit.chi_square / sighting.dimension());
     by_series[sighting.series].push_back(all.back());
-    rotation.push_back(misfit.rotation);
-    translation.push_back(misfit.translation);
   }
   if (all.empty()) return;
-  if (spec.kind == MeasurementKind::kPose) {
-    const double s_rotation = robust_scale(rotation, 3.0, shrink);
-    const double s_translation = robust_scale(translation, 3.0, shrink);
-    for (Sighting& sighting : spec.sightings) {
-      sighting.whitening.leftCols<3>() /= s_rotation;
-      sighting.whitening.rightCols<3>() /= s_translation;
-    }
-    return;
-  }
   const auto scale_of = [&](const std::vector<double>& values, int series) {
     double freedom = 8.0;
     for (const Sighting& s : spec.sightings) {
