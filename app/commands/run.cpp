@@ -342,7 +342,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   run.levels = std::move(best.levels);
   if (!answered) write_structure(run, folder);
   if (best.failure) throw Error(*best.failure);
-  run.tracks = std::move(best.tracks);
+  run.tracks = placed_again(std::move(best.tracks), observed, value_of(best.fitted).calibration);
   take(std::move(value_of(best.fitted)), recording, observed, options, run);
   for (std::size_t k = told; k < run.warnings.size(); ++k) console.warn(run.warnings[k]);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));

@@ -211,6 +211,7 @@ class Joiner {
     if (is_nominal()) return order.front();
     std::erase_if(order, [&](std::size_t k) { return !is_known(k); });
     if (order.empty()) refuse_unknown();
+    for (const std::size_t k : order) require_same_types(order.front(), k);
     if (all_agree(order)) return order.front();
     std::optional<Together> best;
     std::size_t reference = order.front();
@@ -257,6 +258,7 @@ class Joiner {
       if (k == reference) continue;
       const std::vector<Elsewhere> all = all_elsewhere(k, now);
       const Together anything = together(reference, joined(known, all));
+      if (is_clearly_better(anything, now)) require_same_robot_in(reference, k, anything);
       while (is_clearly_better(anything, now)) {
         std::optional<std::pair<Elsewhere, Together>> next = best_of(reference, known, all, now);
         if (!next) break;
@@ -332,6 +334,46 @@ class Joiner {
     }
     KINESCOPE_CHECK(false, "a structure that is not known is refused");
     std::abort();
+  }
+
+  // Of every channel that drives a joint of its own.
+  [[nodiscard]] std::map<std::string, JointType> types_by_channel(std::size_t k) const {
+    std::map<std::string, JointType> out;
+    const std::vector<std::string>& channels = alone_[k].recording.log.channels;
+    for (const StructureJoint& joint : structures_[k]->joints)
+      if (joint.channel)
+        out.emplace(channels[static_cast<std::size_t>(joint.channel->channel)], joint.type);
+    return out;
+  }
+
+  // One joint that hardly moves may look like the other kind; most of them do not.
+  void require_same_types(std::size_t reference, std::size_t k) const {
+    const std::map<std::string, JointType> first = types_by_channel(reference);
+    int common = 0;
+    std::vector<std::string> other;
+    for (const auto& [channel, type] : types_by_channel(k)) {
+      const auto there = first.find(channel);
+      if (there == first.end()) continue;
+      ++common;
+      if (there->second != type) other.push_back(channel);
+    }
+    if (2 * std::ssize(other) <= common) return;
+    throw undetermined(
+        alone_[k].recording.camera_name,
+        fmt::format("joints that slide there turn in {}, or the other way round ({})",
+                    alone_[reference].recording.camera_name, fmt::join(other, ", ")),
+        "is it a recording of the same robot?");
+  }
+
+  // With every mount and every zero its own, it fits, or it is of another robot.
+  void require_same_robot_in(std::size_t reference, std::size_t k, const Together& anything) const {
+    if (anything.fitted && anything.fitted->status != CalibrationStatus::kUndetermined) return;
+    throw undetermined(
+        alone_[k].recording.camera_name,
+        fmt::format("it does not show the robot that {} shows{}",
+                    alone_[reference].recording.camera_name,
+                    anything.fitted ? ": " + anything.fitted->status_reason : std::string()),
+        "is it a recording of the same robot, with the same channels?");
   }
 
   [[nodiscard]] WaysOfMarkers ways_of(std::size_t k) const {
@@ -676,6 +718,24 @@ Structure with_further_markers(Structure structure, const Recording& recording,
     structure = with_marker_on(std::move(structure), track.id, marker->link.value, T_link_marker);
   }
   return structure;
+}
+
+PoseTracks placed_again(PoseTracks tracks, const Observed& observed,
+                        const Calibration& calibration) {
+  if (!calibration.of_recordings()) return tracks;
+  std::vector<Pose> T_again_before;
+  for (std::size_t c = 0; c < calibration.cameras(); ++c)
+    T_again_before.push_back(calibration.T_camera_base * calibration.T_camera_base_of(c).inverse() *
+                             observed.cameras[c].T_reference_camera.inverse());
+  for (PoseTrack& track : tracks.tracks) {
+    for (PoseSample& sample : track.samples) {
+      const Pose& T = T_again_before[calibration.camera_at(sample.frame)];
+      sample.T_camera_marker = T * sample.T_camera_marker;
+      if (sample.T_camera_marker_alternative)
+        sample.T_camera_marker_alternative = T * *sample.T_camera_marker_alternative;
+    }
+  }
+  return tracks;
 }
 
 }  // namespace kinescope

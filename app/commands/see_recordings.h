@@ -31,4 +31,9 @@ namespace kinescope {
                                              const Observed& observed, const PoseTracks& tracks,
                                              const CameraModel& camera);
 
+/// Tracks in the reference camera's frame as the calibration has the cameras, in place of where
+/// they were first put; unchanged where there are no other recordings.
+[[nodiscard]] PoseTracks placed_again(PoseTracks tracks, const Observed& observed,
+                                      const Calibration& calibration);
+
 }  // namespace kinescope

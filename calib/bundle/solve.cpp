@@ -150,15 +150,21 @@ double rms_sigma(const Spec& spec) {
 // then scatters by a fifth of that, and changes them once in a while.
 std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfits,
                               double reject_sigma) {
-  std::vector<double> sigmas;
-  for (const Misfit& misfit : misfits)
-    sigmas.push_back(spec.sightings[static_cast<std::size_t>(misfit.sighting)].sigma);
-  const double usual = sigmas.empty() ? 0.0 : median_of(std::move(sigmas));
+  std::vector<std::vector<double>> sigmas(spec.cameras.size());
+  for (const Misfit& misfit : misfits) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    sigmas[static_cast<std::size_t>(sighting.camera)].push_back(sighting.sigma);
+  }
+  std::vector<double> usual;  // of each camera
+  for (std::vector<double>& of_camera : sigmas)
+    usual.push_back(of_camera.empty() ? 0.0 : median_of(std::move(of_camera)));
   std::vector<int> kept;
   for (const Misfit& misfit : misfits) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
     const double share =
-        sighting.kind == MeasurementKind::kPose ? 1.0 : std::min(1.0, sighting.sigma / usual);
+        sighting.kind == MeasurementKind::kPose
+            ? 1.0
+            : std::min(1.0, sighting.sigma / usual[static_cast<std::size_t>(sighting.camera)]);
     if (share * share * misfit.chi_square <=
         chi_square_quantile(sighting.dimension(), reject_sigma)) {
       kept.push_back(misfit.sighting);
