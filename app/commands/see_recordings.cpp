@@ -258,7 +258,10 @@ class Joiner {
       if (k == reference) continue;
       const std::vector<Elsewhere> all = all_elsewhere(k, now);
       const Together anything = together(reference, joined(known, all));
-      if (is_clearly_better(anything, now)) require_same_robot_in(reference, k, anything);
+      if (!is_clearly_better(anything, now)) continue;
+      require_same_robot_in(reference, k, anything);
+      // What does not settle even so lacks something else, which is traced.
+      if (anything.fitted->status != CalibrationStatus::kConverged) continue;
       while (is_clearly_better(anything, now)) {
         std::optional<std::pair<Elsewhere, Together>> next = best_of(reference, known, all, now);
         if (!next) break;
@@ -346,7 +349,7 @@ class Joiner {
     return out;
   }
 
-  // One joint that hardly moves may look like the other kind; most of them do not.
+  // One joint that hardly moves may look like the other kind; half of them do not.
   void require_same_types(std::size_t reference, std::size_t k) const {
     const std::map<std::string, JointType> first = types_by_channel(reference);
     int common = 0;
@@ -357,7 +360,7 @@ class Joiner {
       ++common;
       if (there->second != type) other.push_back(channel);
     }
-    if (2 * std::ssize(other) <= common) return;
+    if (other.size() < 2 || 2 * std::ssize(other) < common) return;
     throw undetermined(
         alone_[k].recording.camera_name,
         fmt::format("joints that slide there turn in {}, or the other way round ({})",

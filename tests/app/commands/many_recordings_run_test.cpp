@@ -137,8 +137,9 @@ TEST(RunManyRecordings, AMarkerThatWasStuckOnAnewIsAnotherOneThere) {
   ASSERT_EQ(run.code, 0) << run.error;
   EXPECT_EQ(named_effects(run.read("trace.json")),
             (std::vector<std::string>{"time_offset at clock"}));
+  const json calibration = run.read("calibration.json");
   int anew = 0;
-  for (const json& recording : run.read("calibration.json").at("recordings").at("each")) {
+  for (const json& recording : calibration.at("recordings").at("each")) {
     for (const json& marker : recording.at("markers_anew")) {
       ++anew;
       EXPECT_EQ(marker.at("tag"), 12);

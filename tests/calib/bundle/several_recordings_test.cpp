@@ -141,13 +141,12 @@ PoseTracks exact_tracks(const World& world) {
   for (const Marker& marker : world.tree.markers) {
     PoseTrack track{marker.id, {}};
     for (int f = 0; f < static_cast<int>(out.times_s.size()); ++f) {
-      PoseSample sample;
+      PoseSample& sample = track.samples.emplace_back();
       sample.frame = f;
       sample.T_camera_marker =
           world.T_camera_base *
           forward_kinematics(world.tree, world.joint_values.row(f))[marker.link.index()] *
           marker.T_link_marker;
-      track.samples.push_back(sample);
     }
     out.tracks.push_back(std::move(track));
   }
