@@ -8,7 +8,6 @@
 #include "calib/bundle/hand_eye.h"
 #include "calib/bundle/place_markers.h"
 #include "kinematics/core/error.h"
-#include "kinematics/core/median.h"
 #include "kinematics/core/nearest_rotation.h"
 
 namespace kinescope {
@@ -79,15 +78,27 @@ struct CornerPairs {
   }
 };
 
-// m and rad together, of the median sighting: of how far the marker is from where it sat.
+// m and rad together, rms: of how far the marker is from where it sat.
 double misfit_of(const OnLinks& marker, const Pose& T_camera_base) {
-  std::vector<double> misfits;
-  for (const PosePair& pair : marker.pairs[marker.known->link.index()]) {
+  double sum = 0.0;
+  const std::vector<PosePair>& pairs = marker.pairs[marker.known->link.index()];
+  for (const PosePair& pair : pairs) {
     const Pose off = (T_camera_base * pair.T_base_link * marker.known->T_link_marker).inverse() *
                      pair.T_camera_marker;
-    misfits.push_back(std::hypot(log_rotation(off.rotation).norm(), off.translation.norm()));
+    sum += log_rotation(off.rotation).squaredNorm() + off.translation.squaredNorm();
   }
-  return median_of(std::move(misfits));
+  return std::sqrt(sum / static_cast<double>(pairs.size()));
+}
+
+// -2 ln of the likelihood of a marker's sightings about a base, but for a constant: where it sat,
+// or, for the price of six parameters (Schwarz 1978), elsewhere on its link.
+double deviance_about(const OnLinks& marker, const Pose& T_camera_base) {
+  constexpr double kParameters = 6.0;
+  const std::vector<PosePair>& pairs = marker.pairs[marker.known->link.index()];
+  const auto n = static_cast<double>(pairs.size());
+  const auto of = [n](double misfit) { return 2.0 * n * std::log(std::max(kLeastMisfit, misfit)); };
+  return std::min(of(misfit_of(marker, T_camera_base)),
+                  of(fit_mount(pairs, T_camera_base).misfit) + kParameters * std::log(n));
 }
 
 // Each known marker alone, all of them, and what needs none.
@@ -112,23 +123,14 @@ std::vector<Pose> proposed_bases(const KinematicTree& robot, const Eigen::Matrix
 }
 
 Pose agreed_base(const std::vector<Pose>& proposed, const std::vector<OnLinks>& known) {
-  std::vector<double> least;  // of every marker, about any of the bases
-  for (const OnLinks& marker : known) {
-    double of_marker = std::numeric_limits<double>::infinity();
-    for (const Pose& base : proposed) of_marker = std::min(of_marker, misfit_of(marker, base));
-    least.push_back(of_marker);
-  }
-  const double scale = std::max(kLeastMisfit, least.empty() ? 0.0 : median_of(least));
   Pose best = proposed.back();
-  double best_loss = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
   for (const Pose& base : proposed) {
-    double loss = 0.0;
-    for (const OnLinks& marker : known)
-      loss += std::log1p(std::pow(misfit_of(marker, base) / scale, 2));
-    if (loss < best_loss) {
-      best_loss = loss;
-      best = base;
-    }
+    double deviance = 0.0;
+    for (const OnLinks& marker : known) deviance += deviance_about(marker, base);
+    if (deviance >= least) continue;
+    least = deviance;
+    best = base;
   }
   return best;
 }

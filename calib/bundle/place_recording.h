@@ -6,8 +6,8 @@
 //         start of a calibration of several recordings.
 // Method  markers that sit where they did place the base by absolute orientation (Kabsch 1976);
 //         where none does, robot-world and hand-eye calibration (place_markers.h). Of the bases
-//         that each marker, all of them and the latter propose, the one about which most markers
-//         agree: the least sum of Cauchy losses (Holland and Welsch 1977).
+//         that each marker, all of them and the latter propose, the one about which the sightings
+//         are most probable, a marker that sits elsewhere paying for its mount (Schwarz 1978).
 // Not here: whether a marker that sits elsewhere by a little does so in truth.
 #pragma once
 
