@@ -82,6 +82,11 @@ struct Remeasured {
 Remeasured recording_again(const StoredRun& run) {
   Remeasured out;
   out.options = options_of_run(run.folder);
+  if (!out.options.further.empty()) {
+    throw bad_input(run.folder.string(),
+                    "it is of several recordings, on which models are not tried",
+                    "compare runs of one recording each");
+  }
   out.recording = read_recording(out.options.recording);
   require_same_inputs(run.folder, out.recording);
   if (!out.recording.cameras.empty()) {

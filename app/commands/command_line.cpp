@@ -61,14 +61,7 @@ void add_path(CLI::App& command, const char* name, std::optional<std::filesystem
       ->group("Files in place of those in the recording");
 }
 
-void add_recording_options(CLI::App& command, RecordingPaths& paths, const char* help,
-                           const char* type) {
-  command
-      .add_option_function<std::string>(
-          "RECORDING", [&paths](const std::string& text) { paths.folder = text; }, help)
-      ->check(refuse_empty)
-      ->required()
-      ->type_name(type);
+void add_file_options(CLI::App& command, RecordingPaths& paths) {
   add_path(command, "--video", paths.video,
            "Video file, folder of images with times.csv, bag or dataset");
   add_path(command, "--joints", paths.joints,
@@ -80,6 +73,17 @@ void add_recording_options(CLI::App& command, RecordingPaths& paths, const char*
   add_path(command, "--points", paths.points, "3-D points in place of a video (needs --nominal)");
   add_path(command, "--nominal", paths.nominal,
            "Nominal robot (URDF): the start, and the model to beat");
+}
+
+void add_recording_options(CLI::App& command, RecordingPaths& paths, const char* help,
+                           const char* type) {
+  command
+      .add_option_function<std::string>(
+          "RECORDING", [&paths](const std::string& text) { paths.folder = text; }, help)
+      ->check(refuse_empty)
+      ->required()
+      ->type_name(type);
+  add_file_options(command, paths);
 }
 
 void add_estimation_options(CLI::App& run, CommandLine& line) {
@@ -133,11 +137,18 @@ void add_detection_options(CLI::App& run, DetectOptions& detect) {
 
 void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
-  add_recording_options(
-      run, line.run.recording,
-      "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a LeRobot "
-      "dataset",
-      "PATH");
+  run.add_option_function<std::vector<std::string>>(
+         "RECORDING",
+         [&line](const std::vector<std::string>& folders) {
+           line.run.recording.folder = folders.front();
+           line.run.further.assign(folders.begin() + 1, folders.end());
+         },
+         "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a LeRobot "
+         "dataset. Several of one robot are calibrated together")
+      ->check(refuse_empty)
+      ->required()
+      ->type_name("PATH");
+  add_file_options(run, line.run.recording);
   run.add_option_function<std::string>(
          "-o,--output", [&line](const std::string& text) { line.run.output = text; },
          "Folder for the results (default: <recording>_run here)")

@@ -26,6 +26,7 @@ namespace kinescope {
 
 struct RunOptions {
   RecordingPaths recording;
+  std::vector<std::filesystem::path> further;  ///< recordings of the same robot, beside that folder
   std::filesystem::path
       output;  ///< the run folder; default: <recording's name>_run in the current folder
   DetectOptions detect;

@@ -12,6 +12,7 @@
 
 #include "app/commands/doubted_sight.h"
 #include "app/commands/see_cameras.h"
+#include "app/commands/see_recordings.h"
 #include "calib/bundle/undone.h"
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/odd_readings.h"
@@ -311,8 +312,9 @@ class Explainer {
   [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
                                        std::optional<double> allowance = {}) const {
     const std::vector<int>& cameras = evidence_.observed.measurements.camera_of_frame;
-    Structure out =
-        find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance);
+    Structure out = with_further_markers(
+        find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance),
+        recording(), evidence_.observed, tracks, evidence_.camera);
     lap("structure");
     return out;
   }

@@ -188,6 +188,20 @@ Eigen::MatrixXd at_all_frames(const Measurements& measurements, const Eigen::Mat
   return out;
 }
 
+// What all trackers measured, in the reference one's frame.
+PointObservations in_one_frame(const Observed& observed) {
+  const Measurements& measurements = observed.measurements;
+  PointObservations out = measurements.points;
+  if (observed.cameras.empty()) return out;
+  for (PointObservation& point : out.observations) {
+    const auto camera = static_cast<std::size_t>(
+        measurements.camera_of_frame[static_cast<std::size_t>(point.frame)]);
+    if (point.position_m)
+      point.position_m = observed.cameras[camera].T_reference_camera * *point.position_m;
+  }
+  return out;
+}
+
 double edge_px(const TagObservation& seen) {
   double sum = 0.0;
   const std::size_t n = seen.corners_px.size();
@@ -374,7 +388,7 @@ CheckedNominal start_from_nominal(const Recording& recording, const Observed& ob
     start.camera = camera;
     const Eigen::MatrixXd values = nominal_values(recording, tree, measurements.times_s);
     const Placement placement = recording.entry == RecordingEntry::kPoints
-                                    ? place_points(tree, values, measurements.points)
+                                    ? place_points(tree, values, in_one_frame(observed))
                                     : place_markers(tree, values, tracks);
     start.T_camera_base = placement.T_camera_base;
     start.tree.markers = placement.markers;

@@ -16,6 +16,13 @@
 
 namespace kinescope {
 
+/// A marker of one of several recordings that sits elsewhere than in the others, and is taken as
+/// another one.
+struct StuckAnew {
+  TagId id;       ///< as its picture says
+  TagId renamed;  ///< in everything that is estimated and written
+};
+
 /// One of several cameras: what it saw by its own frames, and where it stands.
 struct ObservedCamera {
   std::string name;
@@ -24,6 +31,9 @@ struct ObservedCamera {
   TagObservations tags;  ///< on its own clock
   Pose T_reference_camera;
   double ahead_s = 0.0;  ///< time of the common frames = own time + ahead
+  /// Of a recording of its own: time of the common log = its log's time + this.
+  std::optional<double> log_ahead_s = {};
+  std::vector<StuckAnew> anew = {};
 };
 
 /// What the recording shows, whichever way it enters, and how it was seen.

@@ -7,21 +7,25 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/across_recordings.h"
 #include "app/commands/commands.h"
 #include "app/commands/explain.h"
 #include "app/commands/first_look.h"
+#include "app/commands/join_recordings.h"
 #include "app/commands/limits.h"
 #include "app/commands/log_doubts.h"
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
 #include "app/commands/see_cameras.h"
+#include "app/commands/see_recordings.h"
 #include "app/commands/sighting_doubts.h"
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/effects_file.h"
 #include "app/io/products.h"
 #include "app/report/answer.h"
+#include "app/report/recordings_json.h"
 #include "app/report/report.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
@@ -117,6 +121,7 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   write_structure(run, folder);
   folder.write("robot.urdf", urdf);
   nlohmann::json calibration = calibration_json(run.calibration);
+  if (!run.recordings.empty()) calibration["recordings"] = recordings_json(run);
   calibration["effects"] = effects_json(run.effects);
   if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
   if (!run.log.unit_factors.empty()) calibration["unit_factors"] = run.log.unit_factors;
@@ -166,12 +171,14 @@ SeenAlone see(const Recording& recording, const RunOptions& options,
   return out;
 }
 
-/// Of one camera, or of all.
-SeenTogether look(const Recording& recording, const RunOptions& options, const RunFolder& folder,
-                  const Progress& progress) {
+/// Of one camera, or of all; of one recording, or of all.
+SeenTogether look(const std::vector<Recording>& given, const RunOptions& options,
+                  const RunFolder& folder, const Progress& progress) {
   const auto see_alone = [&](const Recording& one) {
     return see(one, options, folder.cached_observations(one), progress);
   };
+  if (given.size() > 1) return see_recordings(given, options, see_alone);
+  const Recording& recording = given.front();
   if (!recording.cameras.empty()) return see_cameras(recording, options, see_alone);
   SeenAlone alone = see_alone(recording);
   PoseTracks tracks =
@@ -181,12 +188,18 @@ SeenTogether look(const Recording& recording, const RunOptions& options, const R
   return {std::move(alone.observed), alone.camera, std::move(tracks), recording};
 }
 
-void keep_observations(const Recording& recording, const Observed& observed, RunFolder& folder) {
+void keep_observations(const std::vector<Recording>& given, const SeenTogether& seen,
+                       RunFolder& folder) {
+  for (std::size_t k = 0; k < seen.detected.size(); ++k)
+    folder.keep_observations(given[k], seen.detected[k]);
+  if (given.size() > 1) return;
+  const Recording& recording = given.front();
+  const Observed& observed = seen.observed;
   if (recording.cameras.empty()) folder.keep_observations(recording, observed.tags);
   for (const RecordedCamera& camera : recording.cameras) {
-    const auto seen = std::ranges::find(observed.cameras, camera.name, &ObservedCamera::name);
-    if (seen != observed.cameras.end())
-      folder.keep_observations(of_camera(recording, camera), seen->tags);
+    const auto used = std::ranges::find(observed.cameras, camera.name, &ObservedCamera::name);
+    if (used != observed.cameras.end())
+      folder.keep_observations(of_camera(recording, camera), used->tags);
   }
 }
 
@@ -241,7 +254,7 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
 void add_film(const Recording& recording, RunSummary& run) {
   constexpr std::size_t kMostStills = 24;  // with their markers about half a megabyte
   constexpr int kStillWidth = 480;         // px
-  if (recording.entry != RecordingEntry::kVideo) return;
+  if (recording.entry != RecordingEntry::kVideo || recording.video.empty()) return;
   std::map<int, int> used;
   int most = 0;
   for (const SightingResidual& residual : run.calibration.residuals)
@@ -261,6 +274,25 @@ void add_film(const Recording& recording, RunSummary& run) {
   for (Still& still : run.film) still.time_s += recording.settings.video_start_s;
 }
 
+// What is free of the robot that is exported.
+FreeGeometry exported_freedom(const Explanation& of) {
+  const auto level = std::ranges::find_if(of.levels, &FreedomLevel::exported);
+  return level == of.levels.end() ? FreeGeometry::kGeometry : level->free;
+}
+
+std::vector<RecordingSummary> across(const Evidence& evidence, const Explanation& best,
+                                     const RunOptions& options, const RunSummary& run,
+                                     const Progress& progress) {
+  if (evidence.observed.measurements.starts_s.empty()) return {};
+  report_progress(progress, "leave recordings out", 0, 1);
+  CalibrateOptions calibrate = options.calibrate;
+  calibrate.estimate_intrinsics = options.estimate_intrinsics || !run.camera_declared;
+  calibrate.free = exported_freedom(best);
+  std::vector<RecordingSummary> out = across_recordings(evidence, best, calibrate);
+  report_progress(progress, "leave recordings out", 1, 1);
+  return out;
+}
+
 // Without a nominal robot there is no geometry to hold.
 void require_nominal(const RunOptions& options, const Recording& recording) {
   if (!options.free || *options.free == FreeGeometry::kGeometry || recording.nominal) return;
@@ -274,39 +306,43 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   Stopwatch clock;
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
-  const Recording given = read_recording(options.recording);
-  require_nominal(options, given);
-  if (!given.flange.empty()) return run_hand_eye(options, given, console);
-  RunFolder folder(options, given);
-  if (options.must_trace) require_same_inputs(options.output, given);
+  const std::vector<Recording> given = read_recordings(options);
+  const Recording whole = described_together(given);
+  require_nominal(options, whole);
+  if (!whole.flange.empty()) return run_hand_eye(options, whole, console);
+  RunFolder folder(options, whole);
+  if (options.must_trace) require_same_inputs(options.output, whole);
   clock.lap("read", run.times);
 
-  auto [observed, camera, tracks, recording] = look(given, options, folder, console.progress);
+  SeenTogether seen = look(given, options, folder, console.progress);
+  const Recording& recording = seen.recording;
+  const Observed& observed = seen.observed;
   describe_recording(recording, observed, options, run);
   for (const std::string& warning : run.warnings) console.warn(warning);
   // What was found is kept also where it leads to no answer, but never over an earlier answer.
   const bool answered = folder.holds_answer();
-  if (!answered) keep_observations(given, observed, folder);
+  if (!answered) keep_observations(given, seen, folder);
   clock.lap("detect", run.times);
 
-  run.tracks = std::move(tracks);
+  run.tracks = std::move(seen.tracks);
   if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
   require_plausible_motion(recording,
                            at_common_instants(run.tracks, observed.measurements.camera_of_frame),
                            options.calibrate);
-  const Evidence evidence{recording, observed, run.tracks, camera};
+  const Evidence evidence{recording, observed, run.tracks, seen.camera};
   const std::size_t told = run.warnings.size();
   Explanation best =
       explain(evidence, explain_options(options, run, clock, console.progress), run.warnings);
+  if (best.fitted) run.recordings = across(evidence, best, options, run, console.progress);
   run.log = std::move(best.log);
   run.structure = std::move(best.structure);
   run.nominal_faults = std::move(best.nominal_faults);
   run.levels = std::move(best.levels);
   if (!answered) write_structure(run, folder);
   if (best.failure) throw Error(*best.failure);
-  run.tracks = std::move(best.tracks);
+  run.tracks = placed_again(std::move(best.tracks), observed, value_of(best.fitted).calibration);
   take(std::move(value_of(best.fitted)), recording, observed, options, run);
   for (std::size_t k = told; k < run.warnings.size(); ++k) console.warn(run.warnings[k]);
   run.tracks = with_branches_of(run.calibration, std::move(run.tracks));
@@ -324,7 +360,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
     require(answer, fmt::format("{} shows the details, the earlier answer stays",
                                 folder.file(kFailedReport).string()));
   }
-  if (answered) keep_observations(given, observed, folder);
+  if (answered) keep_observations(given, seen, folder);
   write_products(run, urdf, folder);
   clock.lap("write", run.times);
   const TorqueStages torque =

@@ -8,7 +8,9 @@ namespace kinescope {
 
 RunOptions finished_options(const CommandLine& line) {
   RunOptions out = line.run;
-  if (out.output.empty()) out.output = recording_name(out.recording.folder) + "_run";
+  // Of several recordings their names say it, once they are read.
+  if (out.output.empty() && out.further.empty())
+    out.output = recording_name(out.recording.folder) + "_run";
   out.calibrate.estimate_time_offset = !line.no_time_offset;
   out.calibrate.estimate_intrinsics = out.estimate_intrinsics;
   return out;
@@ -32,6 +34,8 @@ RunOptions options_of_run(const std::filesystem::path& folder) {
   }
   RunOptions options = finished_options(first);
   resolve_paths(options.recording, again.working_folder);
+  for (std::filesystem::path& recording : options.further)
+    if (recording.is_relative()) recording = again.working_folder / recording;
   options.output = folder;
   options.arguments = again.arguments;
   return options;

@@ -28,9 +28,10 @@ std::string observations_file(const std::string& camera, std::string_view ending
 
 std::vector<std::string> products_of(const Recording& recording) {
   std::vector<std::string> out = run_products(!recording.log.torque_columns.empty());
-  for (const RecordedCamera& camera : recording.cameras) {
-    for (const char* ending : {"csv", "json"})
-      out.push_back(observations_file(camera.name, ending));
+  std::vector<std::string> names = recording.joined;
+  for (const RecordedCamera& camera : recording.cameras) names.push_back(camera.name);
+  for (const std::string& name : names) {
+    for (const char* ending : {"csv", "json"}) out.push_back(observations_file(name, ending));
   }
   return out;
 }

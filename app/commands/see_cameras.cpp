@@ -15,13 +15,6 @@
 namespace kinescope {
 namespace {
 
-// One camera, before the others are known.
-struct LoneCamera {
-  Recording recording;
-  SeenAlone seen;
-  PoseTracks tracks;
-};
-
 std::vector<LoneCamera> look_alone(const Recording& recording,
                                    const std::function<SeenAlone(const Recording&)>& see_alone,
                                    std::vector<std::string>& warnings) {
@@ -97,7 +90,8 @@ PoseTracks renumbered(PoseTracks tracks, const std::vector<int>& frame_of) {
 }
 
 // All observations by the common frames.
-TagObservations together(const std::vector<ObservedCamera>& cameras, const CommonFrames& frames) {
+TagObservations tags_together(const std::vector<ObservedCamera>& cameras,
+                              const CommonFrames& frames) {
   TagObservations out;
   out.times_s = frames.times_s;
   out.width = cameras.front().tags.width;
@@ -135,6 +129,25 @@ ObservedCamera observed_camera(LoneCamera& lone, const CameraPlace& place,
   return out;
 }
 
+// Poses and points by the common frames, each as its own tracker has it.
+void add_untagged(const std::vector<LoneCamera>& alone, const std::vector<std::size_t>& order,
+                  const CommonFrames& frames, Measurements& out) {
+  std::vector<PoseTracks> poses;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const Measurements& own = alone[order[k]].seen.observed.measurements;
+    poses.push_back(renumbered(own.poses, frames.frame_of[k]));
+    for (PointObservation point : own.points.observations) {
+      point.frame = frames.frame_of[k][static_cast<std::size_t>(point.frame)];
+      out.points.observations.push_back(std::move(point));
+    }
+  }
+  out.poses = merged(poses, frames.times_s);
+  out.points.times_s = frames.times_s;
+  std::ranges::stable_sort(out.points.observations, {}, [](const PointObservation& point) {
+    return std::pair(point.frame, point.id.value);
+  });
+}
+
 void turn_gravity(const Recording& recording, const std::vector<ObservedCamera>& cameras,
                   Recording& out) {
   if (!recording.settings.gravity) return;
@@ -150,23 +163,14 @@ void turn_gravity(const Recording& recording, const std::vector<ObservedCamera>&
 
 }  // namespace
 
-SeenTogether see_cameras(const Recording& recording, const RunOptions& options,
-                         const std::function<SeenAlone(const Recording&)>& see_alone) {
+SeenTogether join_views(std::vector<LoneCamera> alone, const PlacedCameras& placed,
+                        const RunOptions& options) {
   SeenTogether out;
-  std::vector<LoneCamera> alone = look_alone(recording, see_alone, out.observed.warnings);
-  const PlacedCameras placed = place(alone, recording, options);
-  for (std::size_t c = 0; c < alone.size(); ++c) {
-    if (placed.places[c]) continue;
-    out.observed.warnings.push_back(
-        fmt::format("camera {} is left out: it shares no marker with the others at the same time "
-                    "(put one, best at rest, in view of both)",
-                    alone[c].recording.camera_name));
-  }
   const std::vector<std::size_t> order = order_of(placed);
   out.recording = alone[placed.reference].recording;
   std::vector<std::vector<double>> times_s;
   for (const std::size_t c : order) {
-    std::vector<double>& own = times_s.emplace_back(alone[c].tracks.times_s);
+    std::vector<double>& own = times_s.emplace_back(alone[c].seen.observed.measurements.times_s);
     for (double& t : own) t += placed.places[c]->ahead_s;
   }
   const CommonFrames frames = merge_frames(times_s);
@@ -180,10 +184,31 @@ SeenTogether see_cameras(const Recording& recording, const RunOptions& options,
   }
   out.tracks = merged(tracks, frames.times_s);
   out.camera = out.observed.cameras.front().model;
-  out.observed.tags = together(out.observed.cameras, frames);
   out.observed.measurements.times_s = frames.times_s;
-  out.observed.measurements.corners = out.observed.tags.observations;
+  if (!out.observed.cameras.front().tags.observations.empty()) {
+    out.observed.tags = tags_together(out.observed.cameras, frames);
+    out.observed.measurements.corners = out.observed.tags.observations;
+  }
+  add_untagged(alone, order, frames, out.observed.measurements);
   out.observed.measurements.camera_of_frame = frames.camera_of_frame;
+  return out;
+}
+
+SeenTogether see_cameras(const Recording& recording, const RunOptions& options,
+                         const std::function<SeenAlone(const Recording&)>& see_alone) {
+  SeenTogether out;
+  std::vector<LoneCamera> alone = look_alone(recording, see_alone, out.observed.warnings);
+  const PlacedCameras placed = place(alone, recording, options);
+  for (std::size_t c = 0; c < alone.size(); ++c) {
+    if (placed.places[c]) continue;
+    out.observed.warnings.push_back(
+        fmt::format("camera {} is left out: it shares no marker with the others at the same time "
+                    "(put one, best at rest, in view of both)",
+                    alone[c].recording.camera_name));
+  }
+  std::vector<std::string> warnings = std::move(out.observed.warnings);
+  out = join_views(std::move(alone), placed, options);
+  out.observed.warnings = std::move(warnings);
   turn_gravity(recording, out.observed.cameras, out.recording);
   return out;
 }

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "app/commands/pipeline.h"
+#include "calib/tracks/several_cameras.h"
 
 namespace kinescope {
 
@@ -26,7 +27,21 @@ struct SeenTogether {
   CameraModel camera;   ///< of the reference camera
   PoseTracks tracks;    ///< in its frame, by the common frames
   Recording recording;  ///< with the reference camera's declarations, gravity in its frame
+  /// Of several recordings: what was detected in each, as they were given.
+  std::vector<TagObservations> detected = {};
 };
+
+/// One camera (or tracker), before the others are known.
+struct LoneCamera {
+  Recording recording;  ///< of it alone, with its name
+  SeenAlone seen;
+  PoseTracks tracks;  ///< by its own frames and clock, in its frame; empty for points
+};
+
+/// What the placed ones saw, by common frames in the order of time, the reference camera's tracks
+/// first; `recording` is the reference camera's.
+[[nodiscard]] SeenTogether join_views(std::vector<LoneCamera> alone, const PlacedCameras& placed,
+                                      const RunOptions& options);
 
 /// `see_alone`: how one camera's recording is seen. Cameras that show no marker, or none in common
 /// with the others, are named in the warnings and left out. Throws undetermined when that leaves

@@ -97,6 +97,7 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
         calibrate(observed.measurements, recording.markers, recording.log, from, options, progress);
   }
   take_values(out.calibration, from.corrections, out.effects);
+  out.corrections = from.corrections;
   return out;
 }
 

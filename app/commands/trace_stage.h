@@ -13,7 +13,8 @@ struct TracedCalibration {
   Calibration calibration;  ///< with the effects that were found
   std::vector<FittedEffect> effects;
   std::optional<Eigen::Vector3d> gravity_base;
-  double stamp_jitter_s = 0.0;  ///< CalibrationTrace's
+  double stamp_jitter_s = 0.0;               ///< CalibrationTrace's
+  std::vector<Correction> corrections = {};  ///< of the effects, as the calibration began with them
 };
 
 /// What tracing begins with.

@@ -176,10 +176,9 @@ std::string residuals_csv(const Calibration& calibration) {
                             : "t,body,used,fold,rx,ry,rz,x,y,z,held_out_rx,held_out_ry,"
                               "held_out_rz,held_out_x,held_out_y,held_out_z\n";
   const bool several = calibration.cameras() > 1;
-  if (several) out.insert(0, "camera,");
+  if (several) out.insert(0, calibration.of_recordings() ? "recording," : "camera,");
   for (const SightingResidual& r : calibration.residuals) {
-    std::string head =
-        fmt::format("{},{}", calibration.times_s[static_cast<std::size_t>(r.frame)], r.id.value);
+    std::string head = fmt::format("{},{}", calibration.own_time_s(r.frame), r.id.value);
     if (several) head = calibration.name_of_camera(calibration.camera_at(r.frame)) + "," + head;
     const std::string flags = fmt::format(",{},{}", r.used ? 1 : 0, r.fold);
     if (corners) {

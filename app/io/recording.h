@@ -84,7 +84,9 @@ struct Recording {
   std::filesystem::path camera_file;  ///< that it was read from
   /// Two or more, by name, in place of `video`, `corners` and `camera`; empty: one camera.
   std::vector<RecordedCamera> cameras;
-  std::string camera_name;  ///< of a part that of_camera() gave; else empty
+  std::string camera_name;  ///< of a part that of_camera() gave, of one of several recordings; else
+                            ///< empty
+  std::vector<std::string> joined;  ///< names of the recordings that it stands for; empty: one
   MarkerSet markers;
   std::optional<KinematicTree> nominal;
   std::filesystem::path nominal_file;        ///< that it was read from

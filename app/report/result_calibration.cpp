@@ -183,6 +183,7 @@ json camera_json(const Calibration& calibration) {
 json cameras_json(const Calibration& calibration) {
   if (calibration.cameras() < 2) return nullptr;
   const std::vector<CameraErrors> errors = errors_of_cameras(calibration);
+  const std::string unit = calibration.kind == MeasurementKind::kCorners ? "px" : "m";
   json list = json::array();
   for (std::size_t c = 0; c < calibration.cameras(); ++c) {
     const CameraEstimate* further = c == 0 ? nullptr : &calibration.further_cameras[c - 1];
@@ -197,8 +198,8 @@ json cameras_json(const Calibration& calibration) {
          {"lag_expanded_s", further ? expanded(further->lag_sigma_s) : json(nullptr)},
          {"sightings_used", errors[c].used},
          {"sightings_rejected", errors[c].rejected},
-         {"final_px", number(errors[c].final_px)},
-         {"held_out_px", number(errors[c].held_out_px)}});
+         {"final_" + unit, number(errors[c].final_rms)},
+         {"held_out_" + unit, number(errors[c].held_out_rms)}});
   }
   return list;
 }

@@ -8,6 +8,7 @@
 
 #include "app/report/answer.h"
 #include "app/report/facts.h"
+#include "app/report/recordings_json.h"
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 
@@ -292,26 +293,28 @@ json nominal_levels_json(const RunSummary& run) {
 
 json make_result(const RunSummary& run, const Analysis& analysis, const Verdict& verdict) {
   const Answer answer = judge(run);
-  return {{"schema", "kinescope.result"},
-          {"schema_version", 1},
-          {"coverage_factor", kCoverageFactor},
-          {"run", run_json(run)},
-          {"verdict",
-           {{"answer", answer.given},
-            {"no_answer", answer.given ? json(nullptr) : json(text(answer.what))},
-            {"found", text(verdict.found)},
-            {"accurate", text(verdict.accurate)},
-            {"limits", text(verdict.limits)},
-            {"next", text(verdict.next)}}},
-          {"data", data_json(run, analysis)},
-          {"structure", structure_json(run)},
-          {"nominal_faults", nominal_faults_json(run)},
-          {"nominal_levels", nominal_levels_json(run)},
-          {"calibration", calibration_json(run)},
-          {"errors", errors_json(run.errors)},
-          {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},
-          {"residuals", residuals_json(analysis, run.calibration.kind)},
-          {"observability", observability_json(run.calibration)}};
+  json out{{"schema", "kinescope.result"},
+           {"schema_version", 1},
+           {"coverage_factor", kCoverageFactor},
+           {"run", run_json(run)},
+           {"verdict",
+            {{"answer", answer.given},
+             {"no_answer", answer.given ? json(nullptr) : json(text(answer.what))},
+             {"found", text(verdict.found)},
+             {"accurate", text(verdict.accurate)},
+             {"limits", text(verdict.limits)},
+             {"next", text(verdict.next)}}},
+           {"data", data_json(run, analysis)},
+           {"structure", structure_json(run)},
+           {"nominal_faults", nominal_faults_json(run)},
+           {"nominal_levels", nominal_levels_json(run)},
+           {"calibration", calibration_json(run)},
+           {"errors", errors_json(run.errors)},
+           {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},
+           {"residuals", residuals_json(analysis, run.calibration.kind)},
+           {"observability", observability_json(run.calibration)}};
+  if (!run.recordings.empty()) out["recordings"] = recordings_json(run);
+  return out;
 }
 
 }  // namespace kinescope::report

@@ -42,6 +42,28 @@ struct MarkerSummary {
   double median_sigma_px = 0.0;
 };
 
+/// A marker of one recording that is taken as another one than in the others.
+struct MarkerAnew {
+  TagId id;       ///< as its picture says
+  TagId renamed;  ///< in the robot
+  /// From where it sits in the others; absent where it sits on another link.
+  std::optional<double> shift_m, turn_rad;
+  Sigma shift_sigma_m, turn_sigma_rad;
+};
+
+/// One of several recordings that were calibrated together.
+struct RecordingSummary {
+  std::string name;
+  double time_offset_s = 0.0;  ///< its log's time = its frames' time + offset
+  Sigma time_offset_sigma_s;
+  int used = 0;               ///< sightings
+  double held_out_rms = 0.0;  ///< px or m: of postures that the model of all has not seen
+  /// Of the same sightings by the robot that the other recordings show; its camera, its markers and
+  /// its clock by its own other postures. Absent where the others do not show it.
+  std::optional<double> by_others_rms;
+  std::vector<MarkerAnew> anew;
+};
+
 struct RunSummary {
   std::string robot;                   ///< name
   std::string recording;               ///< folder name
@@ -73,6 +95,7 @@ struct RunSummary {
   std::vector<SecondColumn> second_columns;     ///< of the joints' copies; none without a trace
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   ErrorSummary errors;
+  std::vector<RecordingSummary> recordings;  ///< of several; empty: one
   std::vector<Still> film;  ///< some frames of the video, at times of the calibration's frames
   std::vector<std::string> torque;  ///< what the log's torques showed, in sentences; empty without
 };

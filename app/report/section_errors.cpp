@@ -10,6 +10,7 @@
 
 #include "app/report/html.h"
 #include "app/report/plot.h"
+#include "app/report/recordings_json.h"
 #include "app/report/sections.h"
 
 namespace kinescope::report {
@@ -88,6 +89,45 @@ std::string overall_table(const Facts& facts) {
     }
   }
   return table.str();
+}
+
+/// What recordings say beside one another.
+std::string recordings_table(const Facts& facts) {
+  const std::vector<RecordingSummary>& recordings = facts.run.recordings;
+  if (recordings.empty()) return "";
+  const bool corners = facts.run.calibration.kind == MeasurementKind::kCorners;
+  const Quantity quantity = corners ? Quantity::kPixels : Quantity::kLength;
+  const std::string unit = corners ? "px" : "mm";
+  Table table("recordings-table",
+              "The recordings: rms at postures not seen by the model of all (repeatability within "
+              "a recording), and by the robot that the other recordings show, camera, markers and "
+              "clock placed by the recording's own other postures (accuracy)",
+              facts.result);
+  table.header({"Recording", "Sightings used", "Log time = frame time + offset, ms", "U, ms",
+                "By all, " + unit, "By the others, " + unit, "Markers stuck on anew"});
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    const std::string at = fmt::format("/recordings/each/{}", k);
+    table.begin_row();
+    table.text(recordings[k].name);
+    table.number(at + "/sightings_used", Quantity::kCount);
+    table.value(at + "/time_offset_s", at + "/time_offset_expanded_s", Quantity::kDelay);
+    table.uncertainty(at + "/time_offset_expanded_s", Quantity::kDelay, "held");
+    table.number(at + "/held_out_rms", quantity);
+    table.number(at + "/by_others_rms", quantity);
+    std::string anew;
+    for (const MarkerAnew& marker : recordings[k].anew)
+      anew += fmt::format("{}tag_{} (tag_{})", anew.empty() ? "" : ", ", marker.id.value,
+                          marker.renamed.value);
+    table.text(anew);
+  }
+  const auto scatter = recording_scatter(facts.run);
+  if (!scatter) return table.str();
+  return table.str() +
+         paragraph(fmt::format(
+             "Between recordings there is a scatter of {} beyond that within them: {} against {}.",
+             text_with_unit(scatter->between_rms, quantity),
+             text_with_unit(scatter->unseen_rms, quantity),
+             text_with_unit(scatter->within_rms, quantity)));
 }
 
 std::string rows_table(const Facts& facts, std::string_view id, std::string_view caption,
@@ -183,7 +223,7 @@ std::string errors_section(const Facts& facts) {
       "Held out: predicted by a model that was fitted without that part of the recording. Outliers "
       "left out of the "
       "fit are in none of these figures; they are counted under data quality.");
-  out += levels_table(facts) + overall_table(facts);
+  out += levels_table(facts) + overall_table(facts) + recordings_table(facts);
   const std::string plot = distribution_plot(facts);
   if (!plot.empty()) out += figure(plot, "Distribution of the error's length.", "half");
   out += rows_table(facts, "errors-links-table", "Rms of the error, per link", "links",

@@ -140,13 +140,21 @@ std::string camera_table(const Facts& facts) {
 std::string cameras_table(const Facts& facts) {
   const Calibration& calibration = facts.run.calibration;
   if (calibration.cameras() < 2) return "";
+  const bool corners = calibration.kind == MeasurementKind::kCorners;
+  const std::string unit = corners ? "px" : "mm";
+  const std::string_view key = corners ? "px" : "m";
+  const Quantity quantity = corners ? Quantity::kPixels : Quantity::kLength;
   Table table("cameras-table",
-              "The cameras in the base frame; U of the length of an error. The first is the "
-              "reference camera, on whose clock the frames' times are",
+              calibration.of_recordings()
+                  ? "The recordings' cameras in the base frame; U of the length of an error. The "
+                    "first is of the reference recording; lags are beyond the clocks' offsets that "
+                    "the fit began with"
+                  : "The cameras in the base frame; U of the length of an error. The first is the "
+                    "reference camera, on whose clock the frames' times are",
               facts.result);
   table.header({"Camera", "x, mm", "y, mm", "z, mm", "U, mm", "roll, °", "pitch, °", "yaw, °",
                 "U, °", "Lag of the clock, ms", "U, ms", "Sightings used", "left out",
-                "Rms, final fit, px", "Rms, held out, px"});
+                "Rms, final fit, " + unit, "Rms, held out, " + unit});
   for (std::size_t c = 0; c < calibration.cameras(); ++c) {
     const std::string at = fmt::format("/calibration/cameras/{}", c);
     const std::string& name = calibration.name_of_camera(c);
@@ -159,8 +167,8 @@ std::string cameras_table(const Facts& facts) {
     table.uncertainty(at + "/lag_expanded_s", Quantity::kDelay, "held");
     table.number(at + "/sightings_used", Quantity::kCount);
     table.number(at + "/sightings_rejected", Quantity::kCount);
-    table.number(at + "/final_px", Quantity::kPixels);
-    table.number(at + "/held_out_px", Quantity::kPixels);
+    table.number(fmt::format("{}/final_{}", at, key), quantity);
+    table.number(fmt::format("{}/held_out_{}", at, key), quantity);
   }
   return table.str();
 }

@@ -9,6 +9,7 @@
 
 #include "app/report/facts.h"
 #include "app/report/numbers.h"
+#include "app/report/recordings_json.h"
 #include "app/report/verdict_words.h"
 
 namespace kinescope::report {
@@ -67,18 +68,67 @@ std::string level_words(const RunSummary& run) {
                      run.nominal_faults.empty() ? "" : ", mended,", text);
 }
 
-/// " By camera: front 0.10 px (1200 sightings), left 0.11 px (800)."
+/// " By camera: front 0.10 px (1200 sightings), left 0.11 px (800)." Of recordings likewise.
 std::string camera_words(const Calibration& calibration) {
   if (calibration.cameras() < 2) return "";
+  const std::string_view head = calibration.of_recordings() ? " By recording: " : " By camera: ";
+  const Quantity quantity =
+      calibration.kind == MeasurementKind::kCorners ? Quantity::kPixels : Quantity::kLength;
   const std::vector<CameraErrors> errors = errors_of_cameras(calibration);
   std::string text;
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    const double error = calibration.folds > 0 ? errors[c].held_out_px : errors[c].final_px;
-    text += fmt::format("{}{} {} ({}{})", c == 0 ? " By camera: " : ", ",
-                        calibration.name_of_camera(c), text_with_unit(error, Quantity::kPixels),
-                        errors[c].used, c == 0 ? " sightings" : "");
+    const double error = calibration.folds > 0 ? errors[c].held_out_rms : errors[c].final_rms;
+    text +=
+        fmt::format("{}{} {} ({}{})", c == 0 ? head : ", ", calibration.name_of_camera(c),
+                    text_with_unit(error, quantity), errors[c].used, c == 0 ? " sightings" : "");
   }
   return text + ".";
+}
+
+/// " A recording that had no part in the robot is predicted to 0.12 px (A 0.11 px, B 0.13 px): ..".
+std::string unseen_recording_words(const RunSummary& run) {
+  const auto scatter = recording_scatter(run);
+  if (!scatter) return "";
+  const Quantity quantity =
+      run.calibration.kind == MeasurementKind::kCorners ? Quantity::kPixels : Quantity::kLength;
+  std::string each;
+  for (const RecordingSummary& recording : run.recordings) {
+    if (!recording.by_others_rms) continue;
+    each += fmt::format("{}{} {}", each.empty() ? "" : ", ", recording.name,
+                        text_with_unit(*recording.by_others_rms, quantity));
+  }
+  return fmt::format(
+      " A recording that had no part in the robot, its camera and markers placed by itself, is "
+      "predicted to {} ({}): recordings scatter by {} beyond postures not seen.",
+      text_with_unit(scatter->unseen_rms, quantity), each,
+      text_with_unit(scatter->between_rms, quantity));
+}
+
+/// "3.1 ± 0.1 mm".
+std::string with_expanded(double value, const Sigma& sigma, Quantity quantity) {
+  if (!sigma) return text_with_unit(value, quantity);
+  return value_and_uncertainty(value, kCoverageFactor * *sigma, quantity) +
+         (quantity == Quantity::kLength ? " mm" : "°");
+}
+
+/// " tag_12 sits elsewhere in B (there tag_1012), by 3.10(5) mm and 4.0(2)°."
+std::string anew_words(const RunSummary& run) {
+  std::string text;
+  for (const RecordingSummary& recording : run.recordings) {
+    for (const MarkerAnew& anew : recording.anew) {
+      text += fmt::format(" tag_{} sits elsewhere in {} (there tag_{})", anew.id.value,
+                          recording.name, anew.renamed.value);
+      if (!anew.shift_m) {
+        text += ", on another link.";
+        continue;
+      }
+      text += ", by " + with_expanded(*anew.shift_m, anew.shift_sigma_m, Quantity::kLength);
+      if (anew.turn_rad)
+        text += " and " + with_expanded(*anew.turn_rad, anew.turn_sigma_rad, Quantity::kAngle);
+      text += '.';
+    }
+  }
+  return text;
 }
 
 std::string prediction_words(const RunSummary& run) {
@@ -102,7 +152,8 @@ std::string prediction_words(const RunSummary& run) {
   } else {
     return "No error can be given: nothing was fitted.";
   }
-  return text + "." + camera_words(run.calibration) + level_words(run);
+  return text + "." + camera_words(run.calibration) + unseen_recording_words(run) +
+         anew_words(run) + level_words(run);
 }
 
 double median(std::vector<double> values) {

@@ -64,6 +64,9 @@ struct CalibrateOptions {
   bool estimate_time_offset = true;
   bool estimate_scales = false;  ///< of channels that are declared in rad or m
   NominalSigmas nominal = {};
+  /// Neither the robot nor the start's corrections are estimated: only where base and markers are,
+  /// and the clock.
+  bool hold_robot = false;
   double reject_sigma = 4.5;  ///< sightings beyond this many standard deviations are left out
   int folds = 5;              ///< of the cross-validation; 0: none
   std::vector<int> fold_of_frame = {};  ///< below `folds`, as another calibration of the same

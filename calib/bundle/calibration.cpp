@@ -21,13 +21,20 @@ std::string_view to_string(CalibrationStatus status) {
 
 namespace {
 
-// Of distances between corners, px.
-struct CornerRms {
+// Of distances between corners, px; or between points, m.
+struct DistanceRms {
   double squares = 0.0;
   int count = 0;
-  void add(const std::vector<Eigen::Vector2d>& corners_px) {
-    for (const Eigen::Vector2d& corner : corners_px) squares += corner.squaredNorm();
-    count += static_cast<int>(corners_px.size());
+  void add(MeasurementKind kind, const std::vector<Eigen::Vector2d>& corners_px,
+           const Vector6d& displacement) {
+    if (kind == MeasurementKind::kCorners) {
+      for (const Eigen::Vector2d& corner : corners_px) squares += corner.squaredNorm();
+      count += static_cast<int>(corners_px.size());
+      return;
+    }
+    if (displacement.isZero(0.0)) return;  // nothing was predicted
+    squares += displacement.tail<3>().squaredNorm();
+    ++count;
   }
   [[nodiscard]] double value() const { return count > 0 ? std::sqrt(squares / count) : 0.0; }
 };
@@ -36,18 +43,18 @@ struct CornerRms {
 
 std::vector<CameraErrors> errors_of_cameras(const Calibration& calibration) {
   std::vector<CameraErrors> out(calibration.cameras());
-  std::vector<CornerRms> fitted(out.size());
-  std::vector<CornerRms> held_out(out.size());
+  std::vector<DistanceRms> fitted(out.size());
+  std::vector<DistanceRms> held_out(out.size());
   for (const SightingResidual& sighting : calibration.residuals) {
     const std::size_t c = calibration.camera_at(sighting.frame);
     ++(sighting.used ? out[c].used : out[c].rejected);
     if (!sighting.used) continue;
-    fitted[c].add(sighting.corners_px);
-    held_out[c].add(sighting.held_out_px);
+    fitted[c].add(calibration.kind, sighting.corners_px, sighting.displacement);
+    held_out[c].add(calibration.kind, sighting.held_out_px, sighting.held_out_displacement);
   }
   for (std::size_t c = 0; c < out.size(); ++c) {
-    out[c].final_px = fitted[c].value();
-    out[c].held_out_px = held_out[c].value();
+    out[c].final_rms = fitted[c].value();
+    out[c].held_out_rms = held_out[c].value();
   }
   return out;
 }

@@ -153,6 +153,14 @@ struct Calibration {
   std::string camera_name;  ///< of the reference camera; empty where there is one camera
   std::vector<CameraEstimate> further_cameras;  ///< 1, 2, .. of camera_of_frame
   std::vector<int> camera_of_frame;             ///< 0: the reference camera; empty: all frames
+  /// As Measurements::starts_s: cameras are of recordings of their own.
+  std::vector<double> starts_s;
+  [[nodiscard]] bool of_recordings() const { return !starts_s.empty(); }
+  /// On the clock of the frame's own recording, s.
+  [[nodiscard]] double own_time_s(int frame) const {
+    const double t = times_s[static_cast<std::size_t>(frame)];
+    return of_recordings() ? t - starts_s[camera_at(frame)] : t;
+  }
   [[nodiscard]] std::size_t camera_at(int frame) const {
     return camera_of_frame.empty()
                ? 0
@@ -171,15 +179,16 @@ struct Calibration {
   }
 };
 
-/// What one camera shows: sightings, and distances from corner to corner, rms.
+/// What one camera shows: sightings, and distances, rms: px from corner to corner, of poses and
+/// points m.
 struct CameraErrors {
   int used = 0;
   int rejected = 0;
-  double final_px = 0.0;     ///< of the fit to all frames
-  double held_out_px = 0.0;  ///< at postures that the fit has not seen
+  double final_rms = 0.0;     ///< of the fit to all frames
+  double held_out_rms = 0.0;  ///< at postures that the fit has not seen
 };
 
-/// One a camera, the reference camera first; corners only.
+/// One a camera, the reference camera first.
 [[nodiscard]] std::vector<CameraErrors> errors_of_cameras(const Calibration& calibration);
 
 }  // namespace kinescope

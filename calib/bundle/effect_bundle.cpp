@@ -542,6 +542,7 @@ std::vector<BundleCamera> EffectBundle::cameras() const {
     out.push_back({camera.name, camera.model});
   return out;
 }
+bool EffectBundle::of_recordings() const { return !impl_->spec.starts_s.empty(); }
 const std::vector<int>& EffectBundle::camera_of_frame() const {
   return impl_->spec.camera_of_frame;
 }
@@ -631,6 +632,17 @@ std::vector<int> EffectBundle::seen_markers() const {
     seen.insert(impl_->spec.sightings[static_cast<std::size_t>(index)].marker);
   }
   return {seen.begin(), seen.end()};
+}
+
+std::map<int, std::vector<int>> EffectBundle::cameras_of_markers() const {
+  std::map<int, std::set<int>> seen;
+  for (const int index : impl_->used) {
+    const Sighting& sighting = impl_->spec.sightings[static_cast<std::size_t>(index)];
+    seen[sighting.marker].insert(sighting.camera);
+  }
+  std::map<int, std::vector<int>> out;
+  for (const auto& [marker, cameras] : seen) out[marker] = {cameras.begin(), cameras.end()};
+  return out;
 }
 
 }  // namespace kinescope

@@ -106,6 +106,8 @@ class EffectBundle {
   [[nodiscard]] std::vector<BundleCamera> cameras() const;
   /// Of every frame; empty: there is one camera.
   [[nodiscard]] const std::vector<int>& camera_of_frame() const;
+  /// Cameras are of recordings of their own.
+  [[nodiscard]] bool of_recordings() const;
   /// By how much corners are off in ways that repeat, as markers at rest show it; 0 without one.
   [[nodiscard]] double corner_bias_px() const;
   /// Standard deviation of the frames' stamps about the log's clock; 0 where it does not show.
@@ -139,6 +141,8 @@ class EffectBundle {
   [[nodiscard]] double finer_than(const EffectBundle& other) const;
   /// Markers (index into the tree) that are seen.
   [[nodiscard]] std::vector<int> seen_markers() const;
+  /// Of each of them, the cameras that see it.
+  [[nodiscard]] std::map<int, std::vector<int>> cameras_of_markers() const;
 
  private:
   struct Impl;

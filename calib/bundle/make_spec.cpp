@@ -150,6 +150,13 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
   }
 }
 
+void hold_robot(Spec& spec) {
+  spec.free_joint.assign(spec.free_joint.size(), kHeld);
+  spec.free_offset.assign(spec.free_offset.size(), false);
+  spec.free_scale.assign(spec.free_scale.size(), false);
+  spec.hold_corrections = true;
+}
+
 void free_frames(const CalibrationStart& start, Spec& spec) {
   const auto anchor = first_seen_base_marker(spec);
   const bool point = spec.kind == MeasurementKind::kPoint;
@@ -158,9 +165,12 @@ void free_frames(const CalibrationStart& start, Spec& spec) {
     spec.free_mount.push_back(held ? kHeld : point ? kPointMount : kAllFree);
   }
   const bool base_is_seen = start.nominal ? !only_targets(spec) : anchor.has_value();
-  // Beside the reference camera every other one shows where it stands.
+  // Beside the reference camera every other one shows where it stands, if it shows anything.
+  std::vector<bool> sees(spec.cameras.size(), false);
+  for (const Sighting& sighting : spec.sightings)
+    sees[static_cast<std::size_t>(sighting.camera)] = true;
   for (std::size_t c = 0; c < spec.cameras.size(); ++c)
-    spec.cameras[c].free_pose = base_is_seen || c > 0 ? kAllFree : kHeld;
+    spec.cameras[c].free_pose = (c == 0 ? base_is_seen : sees[c]) ? kAllFree : kHeld;
 }
 
 void add_cameras(const Measurements& measurements, const CalibrationStart& start, Spec& spec) {
@@ -168,6 +178,7 @@ void add_cameras(const Measurements& measurements, const CalibrationStart& start
   for (const FurtherCamera& camera : start.further_cameras)
     spec.cameras.push_back({camera.name, camera.camera});
   spec.camera_of_frame = measurements.camera_of_frame;
+  spec.starts_s = measurements.starts_s;
   KINESCOPE_CHECK(
       spec.camera_of_frame.empty() || spec.camera_of_frame.size() == spec.times_s.size(),
       "a camera for every frame");
@@ -260,15 +271,19 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   }
   check_something_seen(spec);
   free_joints(start, options, spec);
+  if (options.hold_robot) hold_robot(spec);
   free_frames(start, spec);
   spec.free_time_offset = options.estimate_time_offset && !spec.postures && !log.empty();
-  if (start.nominal && options.free == FreeGeometry::kGeometry) spec.prior = options.nominal;
+  if (start.nominal && options.free == FreeGeometry::kGeometry && !options.hold_robot)
+    spec.prior = options.nominal;
   for (std::size_t c = 0; c < spec.cameras.size(); ++c) {
     SpecCamera& camera = spec.cameras[c];
-    camera.free_lag = c > 0 && options.estimate_time_offset && !spec.postures && !log.empty();
+    camera.free_lag = c > 0 && camera.free_pose != kHeld && options.estimate_time_offset &&
+                      !spec.postures && !log.empty();
     const bool estimate =
         c == 0 ? options.estimate_intrinsics : start.further_cameras[c - 1].estimate_intrinsics;
-    if (estimate && spec.kind == MeasurementKind::kCorners) free_intrinsics(camera);
+    const bool is_seen_by = c == 0 || camera.free_pose != kHeld;
+    if (estimate && is_seen_by && spec.kind == MeasurementKind::kCorners) free_intrinsics(camera);
   }
   return spec;
 }

@@ -46,6 +46,9 @@ struct Measurements {
   /// Which camera each frame is of: 0 is the reference camera, on whose clock the frames' times
   /// are. Empty: there is one camera.
   std::vector<int> camera_of_frame = {};
+  /// Cameras of recordings of their own, one after the other: what was added to each one's stamps,
+  /// s. Empty: all cameras are of one recording.
+  std::vector<double> starts_s = {};
 };
 
 /// Of markers, bodies and points, over all frames.

@@ -368,8 +368,8 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
       names.names.push_back(correction.name);
       names.units.push_back(correction.unit);
     }
-    free_numbers(corrections_at(state, block), std::vector<bool>(names.names.size(), true), names,
-                 frozen);
+    free_numbers(corrections_at(state, block),
+                 std::vector<bool>(names.names.size(), !spec.hold_corrections), names, frozen);
   }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     // The zero of a joint that no channel drives is free: its value in the first frame stays.

@@ -73,6 +73,7 @@ struct Spec {
   std::vector<TargetPair> distances;
   std::vector<SpecCamera> cameras;   ///< at least one
   std::vector<int> camera_of_frame;  ///< empty: there is one
+  std::vector<double> starts_s;      ///< as Measurements::starts_s
 
   std::vector<TangentMask> free_joint;
   std::vector<TangentMask> free_mount;
@@ -80,8 +81,9 @@ struct Spec {
   std::vector<bool> free_offset;
   std::vector<bool> free_value;  ///< joints whose value is unknown in every frame
   bool free_time_offset = false;
-  std::vector<Correction> corrections;  ///< all free
-  std::optional<NominalSigmas> prior;   ///< on the joint frames (nominal robots)
+  std::vector<Correction> corrections;
+  bool hold_corrections = false;       ///< false: all are free
+  std::optional<NominalSigmas> prior;  ///< on the joint frames (nominal robots)
 };
 
 struct CameraState {

@@ -127,6 +127,7 @@ void fill_cameras(const Spec& spec, const State& state, const Uncertainty& uncer
   out.intrinsics_estimated = std::ranges::any_of(spec.cameras.front().free_intrinsics, is_free);
   out.camera_name = spec.cameras.front().name;
   out.camera_of_frame = spec.camera_of_frame;
+  out.starts_s = spec.starts_s;
   const auto columns = pose_columns(uncertainty.blocks);
   for (std::size_t c = 1; c < spec.cameras.size(); ++c) {
     const CameraState& camera = state.cameras[c];

@@ -65,12 +65,41 @@ double robust_scale(const std::vector<double>& chi_squares, double freedom, doub
   return std::sqrt(std::max(ratio, 1e-12));
 }
 
+// Of poses: turns and shifts of each camera (tracker) have a noise of their own.
+void rescale_poses(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
+  struct Parts {
+    std::vector<double> rotation, translation;
+  };
+  std::vector<Parts> parts(spec.cameras.size() + 1);  // of all at last
+  for (const Misfit& misfit : misfits) {
+    if (!std::isfinite(misfit.chi_square)) continue;
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    for (Parts* of : {&parts[static_cast<std::size_t>(sighting.camera)], &parts.back()}) {
+      of->rotation.push_back(misfit.rotation);
+      of->translation.push_back(misfit.translation);
+    }
+  }
+  std::vector<std::pair<double, double>> scales;
+  for (const Parts& own : parts) {
+    const Parts& of = own.rotation.size() >= kMinGroup ? own : parts.back();
+    scales.emplace_back(robust_scale(of.rotation, 3.0, shrink),
+                        robust_scale(of.translation, 3.0, shrink));
+  }
+  for (Sighting& sighting : spec.sightings) {
+    const auto& [rotation, translation] = scales[static_cast<std::size_t>(sighting.camera)];
+    sighting.whitening.leftCols<3>() /= rotation;
+    sighting.whitening.rightCols<3>() /= translation;
+  }
+}
+
 // Multiplies the declared sigmas so that the misfits have the size their degrees of freedom ask
 // for.
 void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
+  if (spec.kind == MeasurementKind::kPose) {
+    rescale_poses(spec, misfits, shrink);
+    return;
+  }
   std::vector<double> all;
-  std::vector<double> rotation;
-  std::vector<double> translation;
   std::map<int, std::vector<double>> by_series;
   for (const Misfit& misfit : misfits) {
     if (!std::isfinite(misfit.chi_square)) continue;
@@ -78,19 +107,8 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
     // Per degree of freedom, so that boards and tags can be mixed.
     all.push_back(misfit.chi_square / sighting.dimension());
     by_series[sighting.series].push_back(all.back());
-    rotation.push_back(misfit.rotation);
-    translation.push_back(misfit.translation);
   }
   if (all.empty()) return;
-  if (spec.kind == MeasurementKind::kPose) {
-    const double s_rotation = robust_scale(rotation, 3.0, shrink);
-    const double s_translation = robust_scale(translation, 3.0, shrink);
-    for (Sighting& sighting : spec.sightings) {
-      sighting.whitening.leftCols<3>() /= s_rotation;
-      sighting.whitening.rightCols<3>() /= s_translation;
-    }
-    return;
-  }
   const auto scale_of = [&](const std::vector<double>& values, int series) {
     double freedom = 8.0;
     for (const Sighting& s : spec.sightings) {
@@ -130,15 +148,21 @@ double rms_sigma(const Spec& spec) {
 // then scatters by a fifth of that, and changes them once in a while.
 std::vector<int> keep_inliers(const Spec& spec, const std::vector<Misfit>& misfits,
                               double reject_sigma) {
-  std::vector<double> sigmas;
-  for (const Misfit& misfit : misfits)
-    sigmas.push_back(spec.sightings[static_cast<std::size_t>(misfit.sighting)].sigma);
-  const double usual = sigmas.empty() ? 0.0 : median_of(std::move(sigmas));
+  std::vector<std::vector<double>> sigmas(spec.cameras.size());
+  for (const Misfit& misfit : misfits) {
+    const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
+    sigmas[static_cast<std::size_t>(sighting.camera)].push_back(sighting.sigma);
+  }
+  std::vector<double> usual;  // of each camera
+  for (std::vector<double>& of_camera : sigmas)
+    usual.push_back(of_camera.empty() ? 0.0 : median_of(std::move(of_camera)));
   std::vector<int> kept;
   for (const Misfit& misfit : misfits) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(misfit.sighting)];
     const double share =
-        sighting.kind == MeasurementKind::kPose ? 1.0 : std::min(1.0, sighting.sigma / usual);
+        sighting.kind == MeasurementKind::kPose
+            ? 1.0
+            : std::min(1.0, sighting.sigma / usual[static_cast<std::size_t>(sighting.camera)]);
     if (share * share * misfit.chi_square <=
         chi_square_quantile(sighting.dimension(), reject_sigma)) {
       kept.push_back(misfit.sighting);

@@ -106,17 +106,17 @@ bool is_near(const Sighting& a, const Sighting& b) {
 }
 
 // The markers' rests that outlast a stretch of time; and the noise that was found in all other
-// sightings over the declared one, as variances.
+// sightings of each camera over the declared one, as variances.
 struct Rests {
   std::vector<Rest> rests;
-  double noise_ratio = 1.0;
+  std::vector<double> noise_ratio;
 };
 
 Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector<int>& used,
                  double stretch_s) {
   Rests out;
-  double found = 0.0;
-  double declared = 0.0;
+  std::vector<double> found(spec.cameras.size(), 0.0);
+  std::vector<double> declared(spec.cameras.size(), 0.0);
   std::map<int, Rest> open;         // by series
   std::map<int, Eigen::Index> row;  // by frame, the next sighting's
   const auto close = [&](Rest& rest) {
@@ -125,9 +125,10 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
       out.rests.push_back(std::move(rest));
       return;
     }
-    declared += rest.declared_square;
+    const auto camera = static_cast<std::size_t>(rest.first->camera);
+    declared[camera] += rest.declared_square;
     for (const Eigen::VectorXd& r : rest.residuals_px)
-      found += r.squaredNorm() / static_cast<double>(r.size());
+      found[camera] += r.squaredNorm() / static_cast<double>(r.size());
   };
   for (const int index : used) {
     const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
@@ -150,7 +151,8 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
     begin += size;
   }
   for (auto& [series, rest] : open) close(rest);
-  if (declared > 0.0) out.noise_ratio = found / declared;
+  for (std::size_t c = 0; c < found.size(); ++c)
+    out.noise_ratio.push_back(declared[c] > 0.0 ? found[c] / declared[c] : 1.0);
   return out;
 }
 
@@ -161,8 +163,8 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
 Eigen::MatrixXd scatter_of_rests(const Rests& all, Eigen::Index parameters) {
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(parameters, parameters);
   for (const Rest& rest : all.rests) {
-    const double noise =
-        all.noise_ratio * rest.declared_square / static_cast<double>(rest.residuals_px.size());
+    const double noise = all.noise_ratio[static_cast<std::size_t>(rest.first->camera)] *
+                         rest.declared_square / static_cast<double>(rest.residuals_px.size());
     const double scatter = rest.scatter();
     if (scatter < kMostScatter * noise)
       out += (noise - scatter) * rest.pull.transpose() * rest.pull;

@@ -21,11 +21,13 @@ struct EffectWorld {
   KinematicTree tree;
   std::vector<BundleCamera> cameras;  ///< the reference camera first
   std::vector<int> camera_of_frame;   ///< empty: there is one
+  bool of_recordings = false;         ///< cameras are of recordings of their own
   MeasurementKind kind = MeasurementKind::kCorners;
   bool postures = false;
-  std::vector<int> driven;  ///< joints
-  std::vector<int> moving;  ///< those of them that do, in more than one reading
-  std::vector<int> seen;    ///< markers
+  std::vector<int> driven;                  ///< joints
+  std::vector<int> moving;                  ///< those of them that do, in more than one reading
+  std::vector<int> seen;                    ///< markers
+  std::map<int, std::vector<int>> seen_by;  ///< of each of them, the cameras
   JointMotion frames;
   JointMotion loaded;  ///< at the frames, with what effects add to the values: where loads act
   /// Of joints that sag, as the last fit has it: what each of their loads does, rad or m a unit.
@@ -101,5 +103,9 @@ struct CameraEffect {
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,
 /// thermal_growth, clock_jump, zero_jump, zero_drift.
 [[nodiscard]] std::vector<CameraEffect> time_effects(const EffectWorld& world);
+
+/// Of several recordings, what is another one in one of them: recording_zero, recording_mount,
+/// recording_growth.
+[[nodiscard]] std::vector<CameraEffect> recording_effects(const EffectWorld& world);
 
 }  // namespace kinescope::effects

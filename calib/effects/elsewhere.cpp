@@ -57,6 +57,22 @@ CameraEffect at_camera(const EffectWorld& world, std::size_t camera, CameraEffec
   return of;
 }
 
+std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::VectorXd& share) {
+  constexpr double kMostShift = 1e-3;  // m
+  std::vector<Correction> out;
+  for (int axis = 0; axis < 3; ++axis) {
+    Correction shift = correct(CorrectedPart::kCarried, like, 0);
+    shift.name = fmt::format("{} held elsewhere {}", like.candidate.id.place, "xyz"[axis]);
+    shift.unit = "m";
+    shift.direction = Vector6d::Unit(3 + axis);
+    shift.share = share;
+    shift.is_nuisance = true;
+    shift.prior_sigma = kMostShift;
+    out.push_back(std::move(shift));
+  }
+  return out;
+}
+
 Eigen::VectorXd frame_times(const EffectWorld& world) {
   return Eigen::Map<const Eigen::VectorXd>(world.frames.times_s.data(),
                                            static_cast<Eigen::Index>(world.frames.times_s.size()));

@@ -25,6 +25,11 @@ namespace kinescope::effects {
 /// The effect of one camera alone: it acts in that camera's frames. `place` begins with "camera".
 [[nodiscard]] CameraEffect at_camera(const EffectWorld& world, std::size_t camera, CameraEffect of);
 
+/// Beside a growth of the robot: the base need not be held where its frame is, but up to a metre
+/// away, which by a growth of a millimetre a metre shifts all by a millimetre.
+[[nodiscard]] std::vector<Correction> held_elsewhere(const CameraEffect& like,
+                                                     const Eigen::VectorXd& share);
+
 [[nodiscard]] Eigen::VectorXd frame_times(const EffectWorld& world);  ///< s
 
 [[nodiscard]] std::string marker_name(const EffectWorld& world, int marker);

@@ -14,7 +14,7 @@ namespace {
 
 // What happens once leaves no trace too near to the ends.
 constexpr double kFewestBefore = 0.06;  // of the recording
-constexpr int kMostTimes = 120;
+constexpr std::size_t kMostTimes = 120;
 // A marker at rest repeats its corners' errors in every frame, until a bump gives it others.
 constexpr double kRestingBias = 0.05;  // px
 
@@ -34,24 +34,62 @@ std::vector<Correction> twists(const CameraEffect& like, CorrectedPart part, int
   return out;
 }
 
-// Of every frame: 0 before a time, 1 from then on.
-Eigen::VectorXd since(const Eigen::VectorXd& time, double at_s) {
-  return (time.array() >= at_s).cast<double>();
+// One recording's time.
+struct Period {
+  double first_s = 0.0;
+  double last_s = 0.0;
+  std::size_t frames = 0;
+
+  // Where something that happens once is looked for.
+  [[nodiscard]] double begin_s() const { return first_s + kFewestBefore * (last_s - first_s); }
+  [[nodiscard]] double end_s() const { return last_s - kFewestBefore * (last_s - first_s); }
+};
+
+// One after the other; of one recording all of its time.
+std::vector<Period> periods_of(const EffectWorld& world) {
+  if (!world.of_recordings) return {{world.first_s, world.last_s, world.frames.times_s.size()}};
+  std::vector<Period> out(world.cameras.size());
+  for (std::size_t f = 0; f < world.frames.times_s.size(); ++f) {
+    Period& own = out[static_cast<std::size_t>(world.camera_of_frame[f])];
+    own.last_s = world.frames.times_s[f];
+    if (own.frames++ == 0) own.first_s = own.last_s;
+  }
+  std::erase_if(out, [](const Period& period) { return period.frames == 0; });
+  std::ranges::sort(out, {}, &Period::first_s);
+  return out;
+}
+
+// Of every frame: 0 before a time, 1 from then on; of several recordings up to the end of the one
+// that the time is in.
+std::function<Eigen::VectorXd(double)> since(const EffectWorld& world) {
+  return [periods = periods_of(world), time = frame_times(world),
+          several = world.of_recordings](double at_s) -> Eigen::VectorXd {
+    if (!several) return (time.array() >= at_s).cast<double>();
+    const auto away = [at_s](const Period& p) {
+      return std::max({p.begin_s() - at_s, at_s - p.end_s(), 0.0});
+    };
+    const Period& own = *std::ranges::min_element(periods, {}, away);
+    const double from_s = std::clamp(at_s, own.begin_s(), own.end_s());
+    return (time.array() >= from_s && time.array() <= own.last_s).cast<double>();
+  };
 }
 
 // The time at which something happens once, as the value of the scan.
-void happens_once(const EffectWorld& world, Candidate& c) {
-  const double length = world.last_s - world.first_s;
-  const double begin = world.first_s + kFewestBefore * length;
-  const double end = world.last_s - kFewestBefore * length;
-  const auto count = std::min<std::size_t>(kMostTimes, world.frames.times_s.size());
-  for (std::size_t k = 0; k < count; ++k) {
-    c.scan.push_back(begin + (end - begin) * static_cast<double>(k) /
-                                 static_cast<double>(std::max<std::size_t>(1, count - 1)));
+void happens_once(const EffectWorld& world, const std::vector<Period>& periods, Candidate& c) {
+  c.scan.clear();
+  c.scan_step = 0.0;
+  for (const Period& period : periods) {
+    const auto count = std::min<std::size_t>(kMostTimes / periods.size(), period.frames);
+    for (std::size_t k = 0; k < count; ++k) {
+      c.scan.push_back(period.begin_s() +
+                       (period.end_s() - period.begin_s()) * static_cast<double>(k) /
+                           static_cast<double>(std::max<std::size_t>(1, count - 1)));
+    }
+    // A step between two frames: any time between them says the same.
+    c.scan_step =
+        std::max(c.scan_step, (period.last_s - period.first_s) /
+                                  static_cast<double>(std::max<std::size_t>(1, period.frames - 1)));
   }
-  // A step between two frames: any time between them says the same.
-  c.scan_step =
-      length / static_cast<double>(std::max<std::size_t>(1, world.frames.times_s.size() - 1));
   c.scan_name = "at";
   c.scan_unit = "s";
   if (world.postures) {
@@ -113,9 +151,9 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
   out.candidate.possible = is_a_slip(world, marker);
   if (rests(world, marker) && world.kind == MeasurementKind::kCorners)
     out.candidate.floor = kRestingBias;
-  happens_once(world, out.candidate);
-  out.corrections = [like = out, marker, time = frame_times(world)](double at_s) {
-    return twists(like, CorrectedPart::kMarker, marker, since(time, at_s));
+  happens_once(world, periods_of(world), out.candidate);
+  out.corrections = [like = out, marker, share = since(world)](double at_s) {
+    return twists(like, CorrectedPart::kMarker, marker, share(at_s));
   };
   return out;
 }
@@ -126,9 +164,9 @@ CameraEffect camera_bump(const EffectWorld& world) {
   out.candidate.size_weights.tail<3>().setZero();
   out.candidate.check = "tripod, cable pulls, screws of the base";
   out.candidate.record = "put a marker on the base, in view all the time";
-  happens_once(world, out.candidate);
-  out.corrections = [like = out, time = frame_times(world)](double at_s) {
-    return twists(like, CorrectedPart::kCamera, 0, since(time, at_s));
+  happens_once(world, periods_of(world), out.candidate);
+  out.corrections = [like = out, share = since(world)](double at_s) {
+    return twists(like, CorrectedPart::kCamera, 0, share(at_s));
   };
   return out;
 }
@@ -154,20 +192,19 @@ CameraEffect without_base(CameraEffect of) {
   return of;
 }
 
-// The base need not be held where its frame is, but up to a metre away: by a growth of a millimetre
-// a metre that shifts all by a millimetre.
-std::vector<Correction> held_elsewhere(const CameraEffect& like, const Eigen::VectorXd& share) {
-  constexpr double kMostShift = 1e-3;  // m
-  std::vector<Correction> out;
-  for (int axis = 0; axis < 3; ++axis) {
-    Correction shift = correct(CorrectedPart::kCarried, like, 0);
-    shift.name = fmt::format("{} held elsewhere {}", like.candidate.id.place, "xyz"[axis]);
-    shift.unit = "m";
-    shift.direction = Vector6d::Unit(3 + axis);
-    shift.share = share;
-    shift.is_nuisance = true;
-    shift.prior_sigma = kMostShift;
-    out.push_back(std::move(shift));
+// Each recording's camera, or the base before it, moved once.
+std::vector<CameraEffect> bumps_in_recordings(const EffectWorld& world) {
+  const std::vector<double>& times_s = world.frames.times_s;
+  std::vector<CameraEffect> out;
+  for (std::size_t c = 0; c < world.cameras.size(); ++c) {
+    std::vector<Period> own = periods_of(world);
+    const auto first = std::ranges::find(world.camera_of_frame, static_cast<int>(c));
+    if (first == world.camera_of_frame.end()) continue;
+    const double first_s = times_s[static_cast<std::size_t>(first - world.camera_of_frame.begin())];
+    std::erase_if(own, [&](const Period& period) { return period.first_s != first_s; });
+    CameraEffect bump = at_camera(world, c, camera_bump(world));
+    happens_once(world, own, bump.candidate);
+    out.push_back(std::move(bump));
   }
   return out;
 }
@@ -202,10 +239,10 @@ CameraEffect clock_jump(const EffectWorld& world) {
   out.candidate.contains = {{"time_offset", "clock"}};
   out.candidate.check = "frames that the recorder dropped or doubled, clock that was set meanwhile";
   out.candidate.record = "stamps of the exposures in place of a frame rate; move all the time";
-  happens_once(world, out.candidate);
-  out.corrections = [like = out, time = frame_times(world)](double at_s) {
+  happens_once(world, periods_of(world), out.candidate);
+  out.corrections = [like = out, share = since(world)](double at_s) {
     Correction jump = correct(CorrectedPart::kClock, like, 0);
-    jump.share = since(time, at_s);
+    jump.share = share(at_s);
     return std::vector{jump};
   };
   return out;
@@ -218,9 +255,9 @@ CameraEffect zero_jump(const EffectWorld& world, const Suspect& s) {
       "steps that the motor lost, teeth that a belt jumped, set screws, counts that an encoder "
       "lost";
   out.candidate.record = fmt::format("go to the reference of {} before and after", s.name);
-  happens_once(world, out.candidate);
-  out.corrections = [s, time = frame_times(world)](double at_s) {
-    return std::vector{turn(s, "zero jump", s.unit, since(time, at_s))};
+  happens_once(world, periods_of(world), out.candidate);
+  out.corrections = [s, share = since(world)](double at_s) {
+    return std::vector{turn(s, "zero jump", s.unit, share(at_s))};
   };
   return out;
 }
@@ -242,18 +279,23 @@ CameraEffect zero_drift(const EffectWorld& world, const Suspect& s) {
 std::vector<CameraEffect> time_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out;
   for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
-  // Of several cameras all alike: it is the robot's base that moves.
-  for (const CameraEffect& moved : {camera_bump(world), camera_drift(world)}) {
-    out.push_back(moved);
-    for (std::size_t c = 0; world.cameras.size() > 1 && c < world.cameras.size(); ++c)
-      out.push_back(at_camera(world, c, without_base(moved)));
+  if (world.of_recordings) {
+    // What creeps does so in a recording, not from one to the next: it is looked for in each alone.
+    for (CameraEffect& bump : bumps_in_recordings(world)) out.push_back(std::move(bump));
+  } else {
+    // Of several cameras all alike: it is the robot's base that moves.
+    for (const CameraEffect& moved : {camera_bump(world), camera_drift(world)}) {
+      out.push_back(moved);
+      for (std::size_t c = 0; world.cameras.size() > 1 && c < world.cameras.size(); ++c)
+        out.push_back(at_camera(world, c, without_base(moved)));
+    }
   }
-  out.push_back(thermal_growth(world));
+  if (!world.of_recordings) out.push_back(thermal_growth(world));
   if (!world.postures) out.push_back(clock_jump(world));
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);
     out.push_back(zero_jump(world, s));
-    out.push_back(zero_drift(world, s));
+    if (!world.of_recordings) out.push_back(zero_drift(world, s));
   }
   return out;
 }

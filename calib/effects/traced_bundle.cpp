@@ -77,6 +77,7 @@ class Carriers {
 std::vector<CameraEffect> all_effects(const EffectWorld& world) {
   std::vector<CameraEffect> out = camera_effects(world);
   for (CameraEffect& effect : time_effects(world)) out.push_back(std::move(effect));
+  for (CameraEffect& effect : recording_effects(world)) out.push_back(std::move(effect));
   for (CameraEffect& effect : joint_effects(world)) out.push_back(std::move(effect));
   return out;
 }
@@ -381,11 +382,13 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   world.tree = bundle_->tree();
   world.cameras = bundle_->cameras();
   world.camera_of_frame = bundle_->camera_of_frame();
+  world.of_recordings = bundle_->of_recordings();
   world.kind = bundle_->kind();
   world.postures = bundle_->postures();
   world.driven = bundle_->driven_joints();
   world.moving = bundle_->moving_joints();
   world.seen = bundle_->seen_markers();
+  if (world.of_recordings) world.seen_by = bundle_->cameras_of_markers();
   world.frames = bundle_->motion_at_frames(ahead_s);
   world.loaded = world.frames;
   if (!world.postures) world.log = bundle_->motion_of_log(ahead_s.mean());

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Claimed intervals against scatter: `coverage [WORLDS [RENDERED]]`. Random robots, first with
-// white noise on exact corners, then as pictures that go through detection and corner refinement.
+// Claimed intervals against scatter: `coverage [WORLDS [RENDERED [PAIRS]]]`. Random robots, first
+// with white noise on exact corners, then as pictures that go through detection and corner
+// refinement, then in two recordings that are calibrated together, the second with three times the
+// noise of the first.
 // For every axis the error in direction and position against twice its standard uncertainty, and
 // for the clock; the axes in the base marker's frame, where they do not depend on the gauge, and
 // among one another.
@@ -18,6 +20,8 @@
 #include "calib/vision/tag_detector.h"
 #include "tests/truth/axis_errors.h"
 #include "tests/truth/camera_world.h"
+#include "tests/truth/joined_recordings.h"
+#include "tests/truth/recordings_world.h"
 #include "tests/truth/render.h"
 
 namespace kinescope {
@@ -161,6 +165,33 @@ Measurements filmed(const World& world, std::uint64_t seed) {
   return out;
 }
 
+// One robot in two motions before two cameras.
+std::vector<World> two_recordings(int seed) {
+  truth::FilmedRobotOptions robot;
+  robot.seed = 5000 + static_cast<std::uint64_t>(seed);
+  robot.kind = truth::kRobotKinds[static_cast<std::size_t>(seed) % truth::kRobotKinds.size()];
+  robot.duration_s = 10.0;
+  robot.tag_size_m = 0.06;
+  robot.scale = 1.5;
+  robot.distance_m = 1.6;
+  std::vector<truth::RecordingOptions> recordings(2);
+  for (std::size_t k = 0; k < recordings.size(); ++k) {
+    recordings[k].name = k == 0 ? "first" : "second";
+    recordings[k].motion = 2 * static_cast<std::uint64_t>(seed) + k;
+    recordings[k].camera.rate_hz = 15.0;
+    recordings[k].camera.clock_s = kOffset;
+    recordings[k].camera.azimuth_rad = k == 0 ? 0.0 : 0.5;
+    recordings[k].camera.sigma_px = k == 0 ? 0.1 : 0.3;
+  }
+  return truth::make_recordings(robot, recordings);
+}
+
+Calibration calibrated_together(const std::vector<World>& worlds, std::uint64_t seed) {
+  const truth::JoinedRecordings joined = truth::joined_recordings(worlds);
+  return calibrate(joined.measurements, worlds.front().markers, joined.log,
+                   truth::perturbed_starts(worlds, seed));
+}
+
 }  // namespace
 }  // namespace kinescope
 
@@ -184,5 +215,16 @@ int main(int argc, char** argv) {
     judge(world, calibrated(world, pictured, key), pictures);
   }
   if (rendered > 0) pictures.print("pictures");
+  const int pairs = argc > 3 ? std::atoi(argv[3]) : 100;
+  Score together;
+  for (int seed = 0; together.worlds < pairs; ++seed) {
+    const std::vector<World> recordings = two_recordings(seed);
+    if (!std::ranges::all_of(recordings,
+                             [](const World& w) { return all_seen(w, w.measurements); }))
+      continue;
+    judge(recordings.front(), calibrated_together(recordings, static_cast<std::uint64_t>(seed)),
+          together);
+  }
+  if (pairs > 0) together.print("two recordings together");
   return 0;
 }

@@ -39,7 +39,9 @@ void turn_tags(const RigOptions& options, FilmedRobot& robot) {
   }
 }
 
-JointLog log_of(const FilmedRobot& robot, double rate_hz) {
+}  // namespace
+
+JointLog rig_log(const FilmedRobot& robot, double rate_hz) {
   JointLog log;
   log.source = "joints.csv";
   for (const Joint& joint : robot.tree.joints) log.channels.push_back(joint.channel);
@@ -51,6 +53,8 @@ JointLog log_of(const FilmedRobot& robot, double rate_hz) {
     log.values.row(static_cast<Eigen::Index>(i)) = robot.encoders(log.times_s[i]).transpose();
   return log;
 }
+
+namespace {
 
 // The corners of one marker with noise; nothing where it is not found.
 std::optional<TagObservation> seen(const World& world, const Marker& marker,
@@ -71,7 +75,9 @@ std::optional<TagObservation> seen(const World& world, const Marker& marker,
   return out;
 }
 
-World view_of(const FilmedRobot& robot, const JointLog& log, const RigCamera& camera) {
+}  // namespace
+
+World rig_view(const FilmedRobot& robot, const JointLog& log, const RigCamera& camera) {
   World world;
   world.tree = robot.tree;
   world.camera = robot.camera;
@@ -104,14 +110,12 @@ World view_of(const FilmedRobot& robot, const JointLog& log, const RigCamera& ca
   return world;
 }
 
-}  // namespace
-
 std::vector<World> make_rig_worlds(const RigOptions& options) {
   FilmedRobot robot = draw_filmed_robot(options.robot);
   turn_tags(options, robot);
-  const JointLog log = log_of(robot, options.log_rate_hz);
+  const JointLog log = rig_log(robot, options.log_rate_hz);
   std::vector<World> out;
-  for (const RigCamera& camera : options.cameras) out.push_back(view_of(robot, log, camera));
+  for (const RigCamera& camera : options.cameras) out.push_back(rig_view(robot, log, camera));
   return out;
 }
 

@@ -36,6 +36,12 @@ struct RigOptions {
   double log_rate_hz = 200.0;
 };
 
+/// What the encoders say, from half a second before the motion to as long after it.
+[[nodiscard]] JointLog rig_log(const FilmedRobot& robot, double rate_hz);
+/// What one camera sees of the robot; the log is given to the world as it is.
+[[nodiscard]] World rig_view(const FilmedRobot& robot, const JointLog& log,
+                             const RigCamera& camera);
+
 /// One for each camera; World::joint_values are those of its frames.
 [[nodiscard]] std::vector<World> make_rig_worlds(const RigOptions& options);
 

@@ -184,10 +184,13 @@ def _read(path: Path) -> str:
 
 
 def _table(text: str, source: str | os.PathLike[str]) -> dict[str, Array]:
-    """A table with a header; empty cells are NaN."""
+    """A table with a header; empty cells are NaN. A first column of names (of cameras, of
+    recordings) is left out."""
     header, *lines = text.splitlines() or [""]
     names = header.split(",")
-    rows = [[cell or "nan" for cell in line.split(",")] for line in lines]
+    first = 1 if names[0] in ("camera", "recording") else 0
+    names = names[first:]
+    rows = [[cell or "nan" for cell in line.split(",")[first:]] for line in lines]
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), len(names))
     except ValueError as error:

@@ -86,7 +86,7 @@ TEST(SeveralCameras, AreFoundWithPoseAndClock) {
   for (const CameraErrors& camera : errors) {
     EXPECT_GT(camera.used, 50);
     // Two coordinates of 0.1 px.
-    EXPECT_NEAR(camera.held_out_px, 0.1 * std::sqrt(2.0), 0.02);
+    EXPECT_NEAR(camera.held_out_rms, 0.1 * std::sqrt(2.0), 0.02);
   }
 }
 
