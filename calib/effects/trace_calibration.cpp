@@ -120,7 +120,7 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   upright.gravity_base = told_by->gravity.direction;
   const effects::TracedBundle under_gravity(bundle, upright);
   trace_options.start = elsewhere(std::move(known), sag);
-  // One fit before a whole search, which ended with nothing named (`undeclared`, 13049).
+  // Half of a search that ends with nothing named is this one (`undeclared`, 13049, 13059).
   if (!names(out.trace, sag) && !shows_effect(under_gravity, sag, trace_options)) return out;
   trace_options.start.push_back({sag, 0.0});
   CalibrationTrace again = traced(under_gravity, bundle, upright, trace_options, progress);
