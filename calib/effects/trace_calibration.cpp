@@ -118,12 +118,10 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   const EffectId& sag = told_by->id;
   CalibrationTraceOptions upright = options;
   upright.gravity_base = told_by->gravity.direction;
-  const effects::TracedBundle under_gravity(bundle, upright);
   trace_options.start = elsewhere(std::move(known), sag);
-  // Half of a search that ends with nothing named is this one (`undeclared`, 13049, 13059).
-  if (!names(out.trace, sag) && !shows_effect(under_gravity, sag, trace_options)) return out;
   trace_options.start.push_back({sag, 0.0});
-  CalibrationTrace again = traced(under_gravity, bundle, upright, trace_options, progress);
+  CalibrationTrace again =
+      traced(effects::TracedBundle(bundle, upright), bundle, upright, trace_options, progress);
   const bool says_all =
       out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
   // What predicts clearly better may need more.

@@ -48,10 +48,6 @@ std::optional<AddedEffect> first_effect(const TracedModel& model, const TraceOpt
   return trace::Tracer(model, options, {}).first();
 }
 
-bool shows_effect(const TracedModel& model, const EffectId& id, const TraceOptions& options) {
-  return trace::Tracer(model, options, {}).shows(id);
-}
-
 void size_again(const TracedModel& model, Trace& found) {
   trace::Tracer(model, {}, {}).size_again(found);
 }

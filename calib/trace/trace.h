@@ -48,10 +48,6 @@ struct TraceOptions {
 [[nodiscard]] std::optional<AddedEffect> first_effect(const TracedModel& model,
                                                       const TraceOptions& options = {});
 
-/// Whether the effect is shown by itself beside TraceOptions::start. Costs one fit.
-[[nodiscard]] bool shows_effect(const TracedModel& model, const EffectId& id,
-                                const TraceOptions& options = {});
-
 /// Sizes, intervals and scans of the effects that `found` has, none of them a curve, as `model`
 /// has them: the same measurements judged again. What was found, and what it explains, stays.
 void size_again(const TracedModel& model, Trace& found);

@@ -58,13 +58,6 @@ std::optional<AddedEffect> Tracer::first() {
   return next ? std::optional(next->added.back()) : std::nullopt;
 }
 
-bool Tracer::shows(const EffectId& id) {
-  now_ = stage_of(options_.start);
-  const std::vector<Contender> shown =
-      contenders(*now_, test_family(now_->system, now_->fit.candidates));
-  return std::ranges::find(shown, id, &Contender::id) != shown.end();
-}
-
 void Tracer::search() {
   add_step(0, "the model as it is", *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);

@@ -37,8 +37,6 @@ class Tracer {
   [[nodiscard]] Trace run();
   /// first_effect() of trace.h.
   [[nodiscard]] std::optional<AddedEffect> first();
-  /// shows_effect() of trace.h.
-  [[nodiscard]] bool shows(const EffectId& id);
   /// size_again() of trace.h.
   void size_again(Trace& found);
 
