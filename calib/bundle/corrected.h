@@ -12,8 +12,8 @@ namespace kinescope::bundle {
 /// Corrections that bear on a sighting, in its frame: indices into Spec::corrections, increasing.
 [[nodiscard]] std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting);
 
-/// Corrections side by side that bear on the same sightings: one block of unknowns. Normal
-/// equations of as many blocks of one cost twice as much (an arm with 16 corrections).
+/// Corrections side by side that bear on the same sightings: one block of unknowns. An iteration
+/// with more than 90 unknowns took 1.8 times as long in blocks of one (`undeclared`, 13049).
 struct CorrectionBlock {
   int first = 0;  ///< index into Spec::corrections
   int count = 0;

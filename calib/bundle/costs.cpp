@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/bundle/costs.h"
 
+#include <algorithm>
+
 #include <ceres/sized_cost_function.h>
 
 #include "calib/bundle/corrected.h"
