@@ -13,7 +13,7 @@
 #include "app/commands/run_again.h"
 #include "app/commands/saved_model_log.h"
 #include "app/io/nearest_name.h"
-#include "dynamics/gp/blas.h"
+#include "kinematics/core/single_threaded_blas.h"
 #include "kinematics/recorded/container.h"
 
 namespace kinescope {
@@ -233,8 +233,7 @@ void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* a
 }  // namespace
 
 int run_program(int argc, const char* const* argv) {
-  // Of the sparse factors of the bundle, too.
-  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
+  const SingleThreadedBlas same_bytes_on_any_number_of_cores;
   CLI::App app;
   CommandLine line;
   begin_line(app, line, argc, argv);
@@ -250,7 +249,7 @@ int run_program(int argc, const char* const* argv) {
 }
 
 CalledCommand call_command(const std::vector<std::string>& arguments, const Progress& progress) {
-  const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
+  const SingleThreadedBlas same_bytes_on_any_number_of_cores;
   std::vector<const char*> argv{"kinescope"};
   for (const std::string& argument : arguments) argv.push_back(argument.c_str());
   const int argc = static_cast<int>(argv.size());

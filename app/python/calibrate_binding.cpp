@@ -17,8 +17,8 @@
 #include "app/python/bindings.h"
 #include "app/report/answer.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
-#include "dynamics/gp/blas.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/single_threaded_blas.h"
 
 namespace kinescope::python {
 namespace {
@@ -179,7 +179,7 @@ py::tuple calibrate_arrays(const py::dict& given, int folds, bool intrinsics, bo
   std::vector<std::string> warnings;
   {
     const py::gil_scoped_release unlocked;
-    const gp::SingleThreadedBlas same_bytes_on_any_number_of_cores;
+    const SingleThreadedBlas same_bytes_on_any_number_of_cores;
     const Calibration found = calibrated(recording, options);
     nlohmann::json json = calibration_json(found);
     json["effects"] = nlohmann::json::array();

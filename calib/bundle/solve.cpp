@@ -12,6 +12,7 @@
 #include "kinematics/core/chi_square.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/silence_glog.h"
+#include "kinematics/core/single_threaded_blas.h"
 
 namespace kinescope::bundle {
 namespace {
@@ -252,6 +253,7 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
+  const SingleThreadedBlas same_bytes_on_any_number_of_cores;
   ceres::Solve(options, &built.problem(), &summary);
   return {summary.termination_type == ceres::CONVERGENCE, summary.message,
           static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};

@@ -2,7 +2,6 @@
 #include "dynamics/gp/blas.h"
 
 #include <algorithm>
-#include <mutex>
 #include <vector>
 
 #include <cblas.h>
@@ -23,10 +22,6 @@ void dgeqrf_(const int* m, const int* n, double* a, const int* lda, double* tau,
 
 namespace kinescope::gp {
 namespace {
-
-std::mutex guard_mutex;
-int guard_depth = 0;
-int threads_before = 0;
 
 int as_int(Eigen::Index value) {
   KINESCOPE_CHECK(value <= std::numeric_limits<int>::max(), "a matrix too large for BLAS");
@@ -68,19 +63,6 @@ void trsm(CBLAS_SIDE side, CBLAS_TRANSPOSE transposed, const ConstBlock& l, Bloc
 }
 
 }  // namespace
-
-SingleThreadedBlas::SingleThreadedBlas() {
-  const std::scoped_lock lock(guard_mutex);
-  if (guard_depth++ == 0) {
-    threads_before = openblas_get_num_threads();
-    openblas_set_num_threads(1);
-  }
-}
-
-SingleThreadedBlas::~SingleThreadedBlas() {
-  const std::scoped_lock lock(guard_mutex);
-  if (--guard_depth == 0) openblas_set_num_threads(threads_before);
-}
 
 void product_transposed(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,
                         Block c) {

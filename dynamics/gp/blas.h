@@ -10,19 +10,12 @@
 
 #include <Eigen/Core>
 
+#include "kinematics/core/single_threaded_blas.h"
+
 namespace kinescope::gp {
 
 using Block = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using ConstBlock = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-
-/// While one of these lives, OpenBLAS uses one thread a call. May nest and be used by many threads.
-class SingleThreadedBlas {
- public:
-  SingleThreadedBlas();
-  ~SingleThreadedBlas();
-  SingleThreadedBlas(const SingleThreadedBlas&) = delete;
-  SingleThreadedBlas& operator=(const SingleThreadedBlas&) = delete;
-};
 
 /// c = alpha * a * b' + beta * c.
 void product_transposed(double alpha, const ConstBlock& a, const ConstBlock& b, double beta,

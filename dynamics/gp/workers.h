@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "dynamics/gp/blas.h"
+#include "kinematics/core/single_threaded_blas.h"
 
 namespace kinescope::gp {
 

@@ -201,7 +201,7 @@ JointColumns compact_columns(const Eigen::MatrixXd& all) {
 
 Eigen::MatrixXd gram(const StackedSystem& system, const Eigen::MatrixXd& weights,
                      Eigen::Index first, Eigen::Index rows) {
-  const gp::SingleThreadedBlas guard;
+  const SingleThreadedBlas guard;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(system.parameters, system.parameters);
   for (std::size_t j = 0; j < system.joints.size(); ++j) {
     const JointColumns& joint = system.joints[j];

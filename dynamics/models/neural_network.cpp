@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/splits.h"
-#include "dynamics/gp/blas.h"
 #include "dynamics/models/standardised.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
+#include "kinematics/core/single_threaded_blas.h"
 
 namespace kinescope::models {
 namespace {
@@ -177,7 +177,7 @@ FittedTorqueModel fit_neural_network(const TorqueSamples& samples,
   constexpr double kHeldOut = 0.2;
   const Fold fold = split_last(samples, kHeldOut);
   // OpenBLAS's threads change the last bits, and such small products only wait for each other.
-  const gp::SingleThreadedBlas guard;
+  const SingleThreadedBlas guard;
   const Standardised data(samples);
   Rng rng = Rng::from_name("neural network", seed);
   const TrainedNetwork trained = train(data.inputs(samples.q, samples.dq, samples.ddq),
@@ -199,7 +199,7 @@ FittedTorqueModel fit_neural_network(const TorqueSamples& samples,
   out.predict =
       [data, net = std::make_shared<const Net>(trained.net), sigma, constant = out.constant_joints](
           const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq) {
-        const gp::SingleThreadedBlas one_thread;
+        const SingleThreadedBlas one_thread;
         Net own = *net;  // a pass through the network changes it
         Eigen::MatrixXd y = outputs(own, rows_of(data.inputs(q, dq, ddq)), q.cols());
         for (const int joint : constant) y.col(joint).setZero();  // the mean, standardised

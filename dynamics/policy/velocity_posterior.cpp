@@ -35,7 +35,7 @@ VelocityPosterior::VelocityPosterior(const VelocityProcess& process, const Physi
     : target_scale_(process.target_scale),
       factors_(process.kernel.factors),
       floor_(kFloorOfNoise * process.kernel.noise_variance) {
-  const gp::SingleThreadedBlas one_thread;
+  const SingleThreadedBlas one_thread;
   Eigen::MatrixXd matrix = kernel_matrix(process.kernel, process.inputs, process.inputs, physics);
   matrix.diagonal().array() += process.kernel.noise_variance;
   Factor factor = robust_cholesky(matrix);

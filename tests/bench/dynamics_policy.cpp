@@ -70,7 +70,7 @@ BENCHMARK(factor_products)->Arg(120)->Arg(300)->Unit(benchmark::kMillisecond);
 
 void factor_solves(benchmark::State& state) {
   Rng rng(2);
-  const gp::SingleThreadedBlas one_thread;
+  const SingleThreadedBlas one_thread;
   const Eigen::MatrixXd lower = factor(state.range(0));
   const Eigen::MatrixXd rows = random_matrix(rng, kBlock, state.range(0), 1.0);
   Eigen::MatrixXd w = rows;

@@ -59,7 +59,7 @@ TEST(Cli, WrongCommandLines) {
   expect_refusal({"run"}, code, "RECORDING");
   expect_refusal({"run", "x", "--outptu", "y"}, code,
                  "--outptu is no option of run (did you mean '--output'?");
-  expect_refusal({"run", "x", "y"}, code, "see kinescope run --help");
+  expect_refusal({"inspect", "x", "y"}, code, "see kinescope inspect --help");
   expect_refusal({"run", "x", "--free", "everything"}, code, "'everything' is not known");
   expect_refusal({"run", "x", "--threads", "0"}, code, "'0' is not a number from 1 to 256");
   expect_refusal({"run", "x", "--decimate", "nan"}, code, "'nan' is not a number");
