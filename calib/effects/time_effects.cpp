@@ -121,10 +121,14 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
 }
 
 CameraEffect camera_bump(const EffectWorld& world) {
-  CameraEffect out =
-      effect("camera_bump", "camera", "the camera (or the robot's base) was moved", kTwist, "rad");
+  const bool on_robot = world.camera_link.value != 0;
+  CameraEffect out = effect("camera_bump", "camera",
+                            on_robot ? "the camera was moved on the link that carries it"
+                                     : "the camera (or the robot's base) was moved",
+                            kTwist, "rad");
   out.candidate.size_weights.tail<3>().setZero();
-  out.candidate.check = "tripod, cable pulls, screws of the base";
+  out.candidate.check = on_robot ? "screws of the camera's bracket, cable pulls"
+                                 : "tripod, cable pulls, screws of the base";
   out.candidate.record = "put a marker on the base, in view all the time";
   happens_once(world, out.candidate);
   out.corrections = [like = out, time = frame_times(world)](double at_s) {
@@ -134,8 +138,11 @@ CameraEffect camera_bump(const EffectWorld& world) {
 }
 
 CameraEffect camera_drift(const EffectWorld& world) {
-  CameraEffect out = effect("camera_drift", "camera",
-                            "the camera (or the robot's base) moves slowly", kTwist, "rad");
+  CameraEffect out =
+      effect("camera_drift", "camera",
+             world.camera_link.value != 0 ? "the camera moves slowly on the link that carries it"
+                                          : "the camera (or the robot's base) moves slowly",
+             kTwist, "rad");
   out.candidate.size_weights.tail<3>().setZero();
   out.candidate.check = "tripod head that settles, camera and mount that warm up";
   out.candidate.record = "let the camera warm up; put a marker on the base, in view all the time";
@@ -244,11 +251,12 @@ std::vector<CameraEffect> time_effects(const EffectWorld& world) {
   for (const int marker : world.seen) out.push_back(tag_slip(world, marker));
   // Of several cameras all alike: it is the robot's base that moves.
   for (const CameraEffect& moved : {camera_bump(world), camera_drift(world)}) {
+    if (world.is_carried) break;
     out.push_back(moved);
     for (std::size_t c = 0; world.cameras.size() > 1 && c < world.cameras.size(); ++c)
       out.push_back(at_camera(world, c, without_base(moved)));
   }
-  out.push_back(thermal_growth(world));
+  if (world.camera_link.value == 0) out.push_back(thermal_growth(world));
   if (!world.postures) out.push_back(clock_jump(world));
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);

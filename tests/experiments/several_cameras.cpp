@@ -8,25 +8,17 @@
 // Clocks of the cameras are up to 0.4 s apart, their rates 30, 25 and 20 Hz, noise 0.1 px. --split:
 // every second link's marker faces the second camera. --bump: camera 1 turns by as much in the
 // middle of the recording.
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
-#include "app/io/calibration_file.h"
-#include "kinematics/core/file.h"
 #include "tests/experiments/command_line.h"
-#include "tests/truth/axis_errors.h"
+#include "tests/experiments/judged_run.h"
 #include "tests/truth/rig_world.h"
 #include "tests/truth/temporary_path.h"
 
@@ -34,7 +26,6 @@ namespace kinescope {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using truth::RobotKind;
 
 struct Request {
@@ -71,135 +62,6 @@ truth::RigOptions rig_of(RobotKind kind, int seed, const Request& request) {
   return out;
 }
 
-// Links as joints on the way to each marker: what a structure says.
-using Ways = std::map<int, std::vector<std::pair<std::string, bool>>>;
-
-Ways ways_of(const KinematicTree& tree, const std::set<int>& ids) {
-  Ways out;
-  for (const Marker& marker : tree.markers) {
-    if (!ids.contains(marker.id.value)) continue;
-    auto& way = out[marker.id.value];
-    for (const JointId id : tree.path_to(marker.link)) {
-      const Joint& joint = tree.joints[id.index()];
-      way.emplace_back(joint.channel, joint.type == JointType::kPrismatic);
-    }
-  }
-  return out;
-}
-
-// The found axes beside the true ones, every channel at zero; nothing where joints are others.
-std::optional<truth::AxisDifferences> compare(const KinematicTree& truth,
-                                              const Calibration& found) {
-  Calibration at_zero;
-  at_zero.tree = found.tree;
-  const auto anchor =
-      std::ranges::find(at_zero.tree.markers, truth.markers.front().id, &Marker::id);
-  if (anchor == at_zero.tree.markers.end()) return std::nullopt;
-  std::iter_swap(at_zero.tree.markers.begin(), anchor);
-  const auto zeros = [](const KinematicTree& tree) {
-    return Eigen::VectorXd(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tree.joints.size())));
-  };
-  at_zero.joint_values = zeros(truth).transpose();
-  const std::vector<Pose> links = forward_kinematics(found.tree, zeros(found.tree));
-  for (const Joint& joint : truth.joints) {
-    const auto same = std::ranges::find(found.tree.joints, joint.channel, &Joint::channel);
-    if (same == found.tree.joints.end()) return std::nullopt;
-    const Pose T = links[same->parent.index()] * same->T_parent_joint;
-    JointEstimate estimate;
-    estimate.axis_base = T.rotation * same->axis;
-    estimate.point_base = T.translation;
-    at_zero.joints.push_back(estimate);
-  }
-  return truth::axis_differences(truth, at_zero);
-}
-
-struct Outcome {
-  int code = 0;
-  bool structure = false;
-  double held_out_px = 0.0;
-  /// Of the turning axes' places among each other, rms: one standard uncertainty, and the error.
-  double claimed_mm = 0.0;
-  double true_mm = 0.0;
-  int within = 0;  ///< axes whose error is within twice their standard uncertainty
-  int axes = 0;
-  std::string verdict;
-  std::string effects;
-};
-
-double rms(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v * v;
-  return values.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(values.size()));
-}
-
-// Standard uncertainty of each axis' place among the axes, mm, by channel.
-std::map<std::string, double> claims_of(const json& result) {
-  std::map<std::string, double> out;
-  for (const json& joint : result.at("calibration").at("joints")) {
-    const json expanded = joint.value("among_position_expanded_m", json());
-    if (expanded.is_number())
-      out[joint.at("channel").get<std::string>()] = 1e3 * expanded.get<double>() / 2.0;
-  }
-  return out;
-}
-
-void judge_axes(const KinematicTree& truth, const Calibration& found, const json& result,
-                Outcome& out) {
-  const auto differences = compare(truth, found);
-  if (!differences) return;
-  std::vector<double> claimed, errors;
-  const std::map<std::string, double> claims = claims_of(result);
-  for (std::size_t j = 0; j < truth.joints.size(); ++j) {
-    const auto claim = claims.find(truth.joints[j].channel);
-    if (claim == claims.end() || !differences->among[j].position_m) continue;
-    claimed.push_back(claim->second);
-    errors.push_back(1e3 * *differences->among[j].position_m);
-    ++out.axes;
-    out.within += errors.back() <= 2.0 * claimed.back();
-  }
-  out.claimed_mm = rms(claimed);
-  out.true_mm = rms(errors);
-}
-
-Outcome judge(int code, const fs::path& run, const KinematicTree& truth) {
-  Outcome out;
-  out.code = code;
-  if (!fs::exists(run / "calibration.json")) return out;
-  const json result = json::parse(read_text_file(run / "result.json"));
-  const Calibration found = read_calibration(run / "calibration.json");
-  std::set<int> ids;
-  for (const Marker& marker : found.tree.markers) ids.insert(marker.id.value);
-  out.structure =
-      ids.size() == truth.markers.size() && ways_of(truth, ids) == ways_of(found.tree, ids);
-  out.held_out_px = result.at("calibration").at("held_out_rms").get<double>();
-  if (out.structure) judge_axes(truth, found, result, out);
-  const json trace = json::parse(read_text_file(run / "trace.json"));
-  out.verdict = trace.at("verdict").get<std::string>();
-  for (const json& effect : trace.at("accepted"))
-    out.effects += fmt::format(" {} at {}", effect.at("effect").get<std::string>(),
-                               effect.at("place").get<std::string>());
-  return out;
-}
-
-Outcome run(RunOptions options, const fs::path& folder, const KinematicTree& truth) {
-  options.output = folder;
-  Console console;
-  console.quiet = true;
-  try {
-    return judge(static_cast<int>(run_command(options, console)), folder, truth);
-  } catch (const Error& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return judge(static_cast<int>(error.code()), folder, truth);
-  }
-}
-
-void print_line(const std::string& what, const Outcome& o) {
-  fmt::print("TABLE {:28} {:4} {:9} {:8.4f} {:10.4f} {:8.4f} {:2}/{:<2} {}{}\n", what, o.code,
-             o.structure ? "right" : "wrong", o.held_out_px, o.claimed_mm, o.true_mm, o.within,
-             o.axes, o.verdict, o.effects);
-  std::fflush(stdout);
-}
-
 struct Sums {
   int recordings = 0, together_right = 0, alone = 0, alone_right = 0, within = 0, axes = 0;
   std::vector<double> ratios;  // of claimed uncertainties, together over the best alone
@@ -217,18 +79,19 @@ void one_recording(RobotKind kind, int seed, const Request& request, Sums& sums)
   const KinematicTree& truth = worlds.front().tree;
   RunOptions all;
   all.recording.folder = folder;
-  const Outcome together = run(all, root / (name + "_run"), truth);
+  const JudgedRun together = judged_run(all, root / (name + "_run"), truth);
   print_line(name + " together", together);
   ++sums.recordings;
   sums.together_right += together.structure;
   sums.within += together.within;
   sums.axes += together.axes;
-  std::optional<Outcome> best;
+  std::optional<JudgedRun> best;
   for (const truth::RigCamera& camera : rig.cameras) {
     RunOptions alone = all;
     alone.recording.corners = folder / fmt::format("corners_{}.csv", camera.name);
     alone.recording.camera = folder / fmt::format("camera_{}.yaml", camera.name);
-    const Outcome one = run(alone, root / fmt::format("{}_{}_run", name, camera.name), truth);
+    const JudgedRun one =
+        judged_run(alone, root / fmt::format("{}_{}_run", name, camera.name), truth);
     print_line(fmt::format("{} {}", name, camera.name), one);
     ++sums.alone;
     sums.alone_right += one.structure;
@@ -240,8 +103,7 @@ void one_recording(RobotKind kind, int seed, const Request& request, Sums& sums)
 }
 
 void run_all(const Request& request) {
-  fmt::print("TABLE {:28} {:4} {:9} {:8} {:10} {:8} {:5} {}\n", "recording", "exit", "structure",
-             "held, px", "U(k=1), mm", "true, mm", "in 2U", "trace");
+  print_header("recording");
   Sums sums;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed)
     for (const RobotKind kind : request.kinds) one_recording(kind, seed, request, sums);
