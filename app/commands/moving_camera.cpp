@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::string_view kSettingsName = "recording.yaml";
 // By as much a chain's clock is off (chain_clock_test.cpp), and a search finds the rest.
-constexpr std::array kAboutChainClock_s{0.0, 0.008, -0.008};
+constexpr std::array kAboutChainClock_s{0.0, 0.008, -0.008, 0.016, -0.016, 0.024, -0.024};
 
 bool is_on_hand(const Recording& recording) {
   return recording.settings.camera_mount == CameraMount::kOnHand;
