@@ -94,6 +94,11 @@ Remeasured recording_again(const StoredRun& run) {
                     "its recording is of several cameras, on which models are not tried",
                     "compare runs of one of its cameras (--video, --corners)");
   }
+  if (run.calibration.moving) {
+    throw bad_input(run.folder.string(),
+                    "its camera moves, and models are tried on recordings of fixed cameras",
+                    "compare the numbers alone, or runs of a camera at rest");
+  }
   std::optional<TagObservations> kept;
   if (out.recording.entry == RecordingEntry::kVideo)
     kept = read_corners(run.folder / "observations.csv", out.recording.markers);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/doubted_sight.h"
+#include "app/commands/moving_camera.h"
 #include "app/commands/see_cameras.h"
 #include "app/commands/see_recordings.h"
 #include "calib/bundle/undone.h"
@@ -274,6 +275,7 @@ class Explainer {
       require_determined(*out.structure);
       out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
       add_further_cameras(evidence_.observed, out.start);
+      add_moving_camera(recording(), *out.structure, evidence_.tracks, out.start);
       Calibration plain = calibrated(out.start, options_.calibrate.free);
       if (is_converged(plain) && take_usual_units(plain.tree, out.start))
         plain = calibrated(out.start, options_.calibrate.free);
@@ -476,7 +478,7 @@ class Explainer {
     // One bent by 1 mm moved by 7.2 mm on the link before its own and by 7.8 mm there
     // (`undeclared`, 5146).
     constexpr std::size_t kMostLinks = 2;
-    if (!now.fitted || !now.structure || !options_.trace) return now;
+    if (!now.fitted || !now.structure || !options_.trace || now.start.moving) return now;
     for (const TagId id : std::vector<TagId>(now.structure->free_markers)) {
       const auto track = std::ranges::find(evidence_.tracks.tracks, id, &PoseTrack::id);
       if (track == evidence_.tracks.tracks.end()) continue;

@@ -25,6 +25,7 @@ std::optional<Structure> structure_of(const Recording& recording, const PoseTrac
   StructureOptions structure_options;
   structure_options.scan_time_offset = options.estimate_time_offset;
   if (!log.empty()) structure_options.units = declared_units(recording);
+  structure_options.camera_on_robot = recording.settings.camera_mount == CameraMount::kOnHand;
   try {
     return find_structure(tracks, log, structure_options);
   } catch (const Error&) {

@@ -102,6 +102,8 @@ void print_inspection(const Inspection& inspection) {
     if (one.video) print_video(one.recording, *one.video);
     print_sightings(one.recording);
   }
+  if (recording.settings.camera_mount)
+    fmt::print("mount     {}, as declared\n", to_string(*recording.settings.camera_mount));
   if (inspection.log) print_log(*inspection.log);
   if (!recording.flange.empty()) print_flange(recording);
   if (recording.camera) {

@@ -12,6 +12,7 @@
 
 #include "app/commands/declared.h"
 #include "app/commands/families_in_video.h"
+#include "app/commands/moving_camera.h"
 #include "app/commands/nominal_channels.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
@@ -291,7 +292,7 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   structure_options.scan_time_offset = options.estimate_time_offset;
   structure_options.units = declared_units(recording);
   structure_options.allowance = allowance;
-  Structure structure = find_structure(tracks, recording.log, structure_options);
+  Structure structure = structure_from_base(recording, tracks, structure_options);
   for (StructureDoubt& doubt : structure.doubts) {
     if (doubt.of_model) doubt.remedy = model_remedy(recording.entry, recording.camera.has_value());
   }
@@ -341,9 +342,10 @@ std::optional<CameraModel> camera_from_motion(const Recording& recording, const 
     const PoseTracks tracks = pose_tracks_from_tags(observed.tags, camera, recording.markers);
     const Structure structure = find_robot(recording, tracks, options);
     require_determined(structure);
+    CalibrationStart start = start_from_structure(structure, recording, camera);
+    add_moving_camera(recording, structure, tracks, start);
     const Calibration calibration =
-        calibrate(observed.measurements, recording.markers, recording.log,
-                  start_from_structure(structure, recording, camera), options);
+        calibrate(observed.measurements, recording.markers, recording.log, start, options);
     if (calibration.status != CalibrationStatus::kUndetermined) return calibration.camera;
   } catch (const Error&) {
     // What is wrong will be said of the answer, not of this first look.
@@ -374,8 +376,8 @@ CheckedNominal start_from_nominal(const Recording& recording, const Observed& ob
   if (!tracks.tracks.empty()) {
     StructureOptions structure_options;
     structure_options.units = declared_units(recording);
-    const Structure structure = find_structure(
-        at_common_instants(tracks, measurements.camera_of_frame), recording.log, structure_options);
+    const Structure structure = structure_from_base(
+        recording, at_common_instants(tracks, measurements.camera_of_frame), structure_options);
     if (matched.in_order) matched = by_motion(std::move(matched), structure, recording.log);
     require_drawn_types(matched, structure, recording);
   }
@@ -387,11 +389,16 @@ CheckedNominal start_from_nominal(const Recording& recording, const Observed& ob
     start.nominal = true;
     start.camera = camera;
     const Eigen::MatrixXd values = nominal_values(recording, tree, measurements.times_s);
-    const Placement placement = recording.entry == RecordingEntry::kPoints
-                                    ? place_points(tree, values, in_one_frame(observed))
-                                    : place_markers(tree, values, tracks);
-    start.T_camera_base = placement.T_camera_base;
-    start.tree.markers = placement.markers;
+    start.tree.markers.clear();
+    if (moves_camera(recording)) {
+      place_moving_camera(recording, tracks, values, start);
+    } else {
+      const Placement placement = recording.entry == RecordingEntry::kPoints
+                                      ? place_points(tree, values, in_one_frame(observed))
+                                      : place_markers(tree, values, tracks);
+      start.T_camera_base = placement.T_camera_base;
+      start.tree.markers = placement.markers;
+    }
     place_before_held_joints(start.tree);
     for (Marker& marker : start.tree.markers) marker.size_m = recording.markers.size_m(marker.id);
     add_further_cameras(observed, start);

@@ -14,6 +14,7 @@
 #include "app/commands/join_recordings.h"
 #include "app/commands/limits.h"
 #include "app/commands/log_doubts.h"
+#include "app/commands/moving_camera.h"
 #include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
@@ -36,6 +37,7 @@
 #include "calib/tracks/several_cameras.h"
 #include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
+#include "kinematics/urdf/camera_links.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
@@ -124,6 +126,8 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   if (!run.recordings.empty()) calibration["recordings"] = recordings_json(run);
   calibration["effects"] = effects_json(run.effects);
   if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
+  if (run.calibration.moving && !run.calibration.moving->on_robot())
+    folder.write("camera_path.csv", camera_path_csv(run.calibration));
   if (!run.log.unit_factors.empty()) calibration["unit_factors"] = run.log.unit_factors;
   folder.write("calibration.json", calibration.dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));
@@ -145,6 +149,13 @@ KinematicTree with_nominal_limits(KinematicTree tree, const KinematicTree& nomin
     }
   }
   return tree;
+}
+
+/// A camera that rides on the robot is a link of it.
+KinematicTree with_camera(const Calibration& calibration) {
+  const std::optional<MovingCamera>& moving = calibration.moving;
+  if (!moving || !moving->on_robot()) return calibration.tree;
+  return with_camera_links(calibration.tree, moving->link, moving->T_camera_link.inverse());
 }
 
 /// The markers, and the camera. One that nobody declared is found from the markers' borders; then
@@ -315,7 +326,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   clock.lap("read", run.times);
 
   SeenTogether seen = look(given, options, folder, console.progress);
-  const Recording& recording = seen.recording;
+  Recording& recording = seen.recording;
   const Observed& observed = seen.observed;
   describe_recording(recording, observed, options, run);
   for (const std::string& warning : run.warnings) console.warn(warning);
@@ -328,8 +339,10 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   if (!answered) write_tracks(run, folder);
   clock.lap("track", run.times);
 
+  run.camera_motion = settle_camera(observed, run.tracks, options.calibrate, recording);
   require_plausible_motion(recording,
-                           at_common_instants(run.tracks, observed.measurements.camera_of_frame),
+                           at_common_instants(as_of_fixed_camera(recording, run.tracks),
+                                              observed.measurements.camera_of_frame),
                            options.calibrate);
   const Evidence evidence{recording, observed, run.tracks, seen.camera};
   const std::size_t told = run.warnings.size();
@@ -349,10 +362,10 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   run.errors = summarise_errors(run.calibration);
   add_film(recording, run);
 
-  const std::string urdf = run.nominal
-                               ? write_urdf(with_nominal_limits(run.calibration.tree, *run.nominal),
-                                            LimitSource::kRobotFile)
-                               : write_urdf(run.calibration.tree);
+  const std::string urdf =
+      run.nominal ? write_urdf(with_nominal_limits(with_camera(run.calibration), *run.nominal),
+                               LimitSource::kRobotFile)
+                  : write_urdf(with_camera(run.calibration));
   const Answer answer = judge(run);
   if (answered && !answer.given) {
     folder.write(kFailedReport, report_html(run, urdf));

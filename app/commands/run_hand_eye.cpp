@@ -17,38 +17,19 @@
 #include "app/report/trace_lines.h"
 #include "calib/hand_eye/hand_eye.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "kinematics/urdf/camera_links.h"
 #include "kinematics/urdf/urdf.h"
 
 namespace kinescope {
 namespace {
-
-// ROS REP 103: a body's x forward, y left, z up; an optical frame's x right, y down, z forward.
-Pose optical_in_body() {
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(R), Eigen::Vector3d::Zero()};
-}
-
-Joint fixed_joint(std::string name, int parent, int child, const Pose& T) {
-  Joint out;
-  out.name = std::move(name);
-  out.type = JointType::kFixed;
-  out.parent = LinkId{parent};
-  out.child = LinkId{child};
-  out.T_parent_joint = T;
-  return out;
-}
 
 // flange (or base), camera_link, camera_optical_frame.
 std::string hand_eye_urdf(const HandEye& result, const std::string& name) {
   const bool on_hand = result.hypothesis.mount == CameraMount::kOnHand;
   KinematicTree tree;
   tree.name = name;
-  tree.links = {{on_hand ? "flange" : "base"}, {"camera_link"}, {"camera_optical_frame"}};
-  const Pose T_body_optical = optical_in_body();
-  tree.joints = {fixed_joint("camera_joint", 0, 1, result.camera.T * T_body_optical.inverse()),
-                 fixed_joint("camera_optical_joint", 1, 2, T_body_optical)};
-  return write_urdf(tree);
+  tree.links = {{on_hand ? "flange" : "base"}};
+  return write_urdf(with_camera_links(std::move(tree), LinkId{0}, result.camera.T));
 }
 
 HandEyeInput hand_eye_input(const Recording& recording, Observed observed, const PoseTracks& tracks,

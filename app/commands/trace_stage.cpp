@@ -25,6 +25,7 @@ CalibrationStart continued(const CalibrationStart& start, const Calibration& pla
     camera.camera = found.camera;
     camera.lag_s = found.lag_s;
   }
+  out.moving = plain.moving;
   if (start.nominal) {
     out.T_camera_base = plain.T_camera_base;
     out.tree.markers = plain.tree.markers;
@@ -74,6 +75,12 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
     out.trace.reason =
         "the robot's geometry is held as declared, and its errors cannot be told from effects: "
         "trace with --free geometry";
+    return out;
+  }
+  if (start.tree.joints.empty()) {
+    TracedCalibration out{{}, plain, {}, {}, 0.0};
+    out.trace.verdict = TraceVerdict::kNothingToSay;
+    out.trace.reason = "effects are looked for in the motion of joints, and there is none";
     return out;
   }
   CalibrationTraceOptions trace_options;

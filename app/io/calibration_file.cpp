@@ -181,6 +181,17 @@ void take_parameters(const json& document, Calibration& out) {
   }
 }
 
+// The path of one that is carried stands in a table of its own.
+void take_motion(const json& motion, Calibration& out) {
+  out.moving = MovingCamera{};
+  if (motion.at("camera_mount") == "carried") return;
+  const std::string name = motion.at("link").get<std::string>();
+  const auto link = out.tree.link(name);
+  if (!link || link->value == 0) refuse(fmt::format("the camera's link '{}' is none of it", name));
+  out.moving->link = *link;
+  out.moving->T_camera_link = stored_pose(motion.at("T_camera_link"), "T_camera_link");
+}
+
 CalibrationStatus stored_status(const std::string& word) {
   for (const auto status : {CalibrationStatus::kConverged, CalibrationStatus::kNotConverged,
                             CalibrationStatus::kUndetermined})
@@ -206,6 +217,7 @@ Calibration calibration_of(const json& document) {
   out.kind = document.at("rms_unit") == "px" ? MeasurementKind::kCorners : MeasurementKind::kPose;
   take_robot(document.at("robot"), out);
   out.T_camera_base = stored_pose(document.at("T_camera_base"), "T_camera_base");
+  if (document.contains("camera_motion")) take_motion(document.at("camera_motion"), out);
   take_camera(document.at("camera"), out);
   out.time_offset_s = stored_number(document.at("time_offset_s"), "time_offset_s");
   out.time_offset_sigma_s = stored_sigma(document.at("time_offset_sigma_s"), "time_offset_sigma_s");

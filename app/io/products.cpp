@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "kinematics/core/error.h"
+
 namespace kinescope {
 namespace {
 
@@ -129,6 +131,15 @@ json further_cameras_json(const Calibration& calibration) {
   return out;
 }
 
+// How a camera that moves does.
+json camera_motion_json(const Calibration& calibration) {
+  const MovingCamera& moving = *calibration.moving;
+  if (!moving.on_robot()) return {{"camera_mount", "carried"}};
+  return {{"camera_mount", "hand"},
+          {"link", calibration.tree.links[moving.link.index()].name},
+          {"T_camera_link", pose_json(moving.T_camera_link)}};
+}
+
 void append_vector(std::string& out, const std::vector<Eigen::Vector2d>& corners, std::size_t i) {
   if (i < corners.size()) {
     fmt::format_to(std::back_inserter(out), ",{:.5f},{:.5f}", corners[i].x(), corners[i].y());
@@ -200,6 +211,20 @@ std::string residuals_csv(const Calibration& calibration) {
   return out;
 }
 
+std::string camera_path_csv(const Calibration& calibration) {
+  std::string out = "t,x,y,z,qx,qy,qz,qw\n";
+  const std::vector<Pose>& path = value_of(calibration.moving).path;
+  for (std::size_t f = 0; f < path.size(); ++f) {
+    if (!path[f].translation.allFinite()) continue;
+    const Pose camera = path[f].inverse();
+    fmt::format_to(std::back_inserter(out), "{},{},{},{},{},{},{},{}\n", calibration.times_s[f],
+                   camera.translation.x(), camera.translation.y(), camera.translation.z(),
+                   camera.rotation.x(), camera.rotation.y(), camera.rotation.z(),
+                   camera.rotation.w());
+  }
+  return out;
+}
+
 json structure_json(const Structure& structure, const JointLog& log) {
   // Joints are named as in the URDF.
   const KinematicTree tree = structure_tree(structure, log);
@@ -264,6 +289,7 @@ json calibration_json(const Calibration& calibration) {
   for (std::size_t j = 0; j < calibration.joints.size(); ++j) {
     out["robot"]["joints"][j]["parameters_at"] = number(calibration.joints[j].parameters_at);
   }
+  if (calibration.moving) out["camera_motion"] = camera_motion_json(calibration);
   if (calibration.cameras() > 1) {
     out["camera_name"] = calibration.camera_name;
     out["further_cameras"] = further_cameras_json(calibration);

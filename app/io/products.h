@@ -23,6 +23,9 @@ namespace kinescope {
 [[nodiscard]] std::string tracks_csv(const PoseTracks& tracks);
 /// One row a corner (or sighting): t,tag,corner,used,fold,residuals final, held out, before.
 [[nodiscard]] std::string residuals_csv(const Calibration& calibration);
+/// t,x,y,z,qx,qy,qz,qw: T_base_camera of a camera that a person carries, in the frames that show
+/// it.
+[[nodiscard]] std::string camera_path_csv(const Calibration& calibration);
 /// For each joint type, parent, child, channel, scale; for each tag its link; the probability of
 /// the whole.
 [[nodiscard]] nlohmann::json structure_json(const Structure& structure, const JointLog& log);

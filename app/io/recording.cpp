@@ -427,6 +427,30 @@ void require_seconds(const JointLog& log, const std::vector<double>& times_s,
       fmt::format("stamps are in s: divide them by {:.0f}", std::pow(1e3, thousands)));
 }
 
+/// What is declared of a camera that moves, beside what needs one at rest.
+void refuse_motion_of_camera(const Recording& recording) {
+  const auto& mount = recording.settings.camera_mount;
+  if (!mount || *mount == CameraMount::kFixed) return;
+  const auto refuse = [&](const std::string& what, const std::string& remedy) {
+    throw bad_input((recording.folder / "recording.yaml").string(),
+                    fmt::format("camera_mount: {} {}", to_string(*mount), what), remedy);
+  };
+  if (!recording.flange.empty()) {
+    if (*mount == CameraMount::kCarried)
+      refuse("stands beside flange.csv, whose camera is on the hand or fixed",
+             "write hand or fixed");
+    return;
+  }
+  if (!recording.cameras.empty())
+    refuse("is of a single camera, and there are several",
+           "name one with --video or --corners, and its intrinsics with --camera");
+  if (recording.entry == RecordingEntry::kPoints)
+    refuse("is of a camera, and points.csv is of a tracker at rest", "remove camera_mount");
+  if (recording.settings.gravity)
+    refuse("stands beside gravity, which is given in the frame of a camera at rest",
+           "remove gravity: where a joint sags, tracing finds where it points");
+}
+
 void require_flange_time(const Recording& recording) {
   if (recording.flange.empty()) return;
   const PoseLog& log = recording.flange.front().log;
@@ -579,6 +603,7 @@ ReadAttempt try_read_recording(const RecordingPaths& paths) {
   step([&] { read_log(recording, files); });
   step([&] { read_flange_poses(recording, files); });
   step([&] { read_sightings(recording, files); });
+  step([&] { refuse_motion_of_camera(recording); });
   step([&] { require_flange_time(recording); });
   step([&] { require_known_camera(recording, files); });
   return attempt;

@@ -50,7 +50,8 @@ struct RecordingSettings {
   /// channel: rad, deg, m, mm, ticks. read_recording() turns deg to rad and mm to m, in the log and
   /// here.
   std::map<std::string, std::string> units;
-  std::optional<CameraMount> camera_mount;  ///< "hand" or "fixed", beside a flange.csv
+  /// "hand" (on the robot), "fixed" or "carried" (by a person: not beside a flange.csv).
+  std::optional<CameraMount> camera_mount;
 };
 
 /// How far into the path the recording enters.

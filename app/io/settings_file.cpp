@@ -40,9 +40,9 @@ std::string read_unit(const YamlValue& value) {
 }
 
 CameraMount read_mount(const YamlValue& value) {
-  for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed})
+  for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed, CameraMount::kCarried})
     if (value.text() == to_string(mount)) return mount;
-  throw value.error(fmt::format("is '{}'", value.text()), "write hand or fixed");
+  throw value.error(fmt::format("is '{}'", value.text()), "write hand, fixed or carried");
 }
 
 }  // namespace

@@ -63,7 +63,9 @@ Missed missed_motion(const Calibration& calibration) {
       }
     } else {
       const Pose T = links[marker->link.index()] * marker->T_link_marker;
-      place = T.translation;
+      place = calibration.moving
+                  ? camera_from_base(calibration, sighting.frame, links) * T.translation
+                  : T.translation;
       squares = sighting.displacement.tail<3>().squaredNorm();
     }
     Places& places = markers[{sighting.id, calibration.camera_at(sighting.frame)}];

@@ -8,6 +8,7 @@
 namespace kinescope::report {
 
 bool base_is_camera(const Calibration& calibration) {
+  if (calibration.moving) return false;
   constexpr double kSame = 1e-9;  // m and rad
   return calibration.T_camera_base.translation.norm() < kSame &&
          log_rotation(calibration.T_camera_base.rotation).norm() < kSame;
@@ -67,7 +68,7 @@ std::vector<Eigen::Vector2d> Predictor::corners(const SightingResidual& sighting
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& corner : corners_base(sighting, links_base, *marker)) {
     const auto pixel = project(calibration_.model_of_camera(camera),
-                               calibration_.T_camera_base_of(camera) * corner);
+                               camera_from_base(calibration_, sighting.frame, links_base) * corner);
     if (!pixel) return {};
     pixels.push_back(*pixel);
   }
@@ -94,7 +95,7 @@ std::vector<ResidualAndRate> Predictor::rates(const SightingResidual& sighting,
   if (calibration_.kind == MeasurementKind::kCorners) {
     const std::vector<Eigen::Vector3d> corners = corners_base(sighting, links_base, *marker);
     const std::size_t camera = calibration_.camera_at(sighting.frame);
-    const Pose& T_camera_base = calibration_.T_camera_base_of(camera);
+    const Pose T_camera_base = camera_from_base(calibration_, sighting.frame, links_base);
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const auto projection = project_with_derivatives(calibration_.model_of_camera(camera),
                                                        T_camera_base * corners[k]);

@@ -160,6 +160,10 @@ json camera_json(const Calibration& calibration) {
                    {"rotation_expanded_rad", worst_of_block(calibration, "camera", "rad")},
                    {"translation_expanded_m", worst_of_block(calibration, "camera", "m")},
                    {"intrinsics", nullptr}};
+  if (calibration.moving && calibration.moving->on_robot()) {
+    document["link"] = text(calibration.tree.links[calibration.moving->link.index()].name);
+    document["pose_on_link"] = pose(calibration.moving->T_camera_link.inverse());
+  }
   if (calibration.kind != MeasurementKind::kCorners) return document;
   const CameraModel& camera = calibration.camera;
   json intrinsics = json::array();

@@ -81,6 +81,7 @@ struct RunSummary {
   std::vector<std::pair<std::string, int>> rejected;  ///< reason, count
   std::vector<std::string> warnings;                  ///< of reading and detection
   bool camera_declared = true;
+  std::string camera_motion;  ///< how it is known whether the camera moves; empty: it stands still
 
   JointLog log;
   PoseTracks tracks;                   ///< empty for points

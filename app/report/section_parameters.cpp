@@ -122,17 +122,22 @@ std::string mounts_table(const Facts& facts) {
 
 std::string camera_table(const Facts& facts) {
   const bool corners = facts.run.calibration.kind == MeasurementKind::kCorners;
-  const std::string caption =
-      fmt::format("The {} in the base frame{}", corners ? "camera" : "tracker",
-                  corners ? " (x right, y down, z along the view)" : "");
+  const std::optional<MovingCamera>& moving = facts.run.calibration.moving;
+  const bool on_robot = moving && moving->on_robot();
+  const std::string caption = fmt::format(
+      "The {} in the {} frame{}{}", corners ? "camera" : "tracker",
+      on_robot ? facts.run.calibration.tree.links[moving->link.index()].name + "'s" : "base",
+      moving && !on_robot ? ", in the middle frame" : "",
+      corners ? " (x right, y down, z along the view)" : "");
   Table table("camera-table", caption, facts.result);
   table.header({"", "x, mm", "y, mm", "z, mm", "U of each, mm", "roll, °", "pitch, °", "yaw, °",
                 "U of each, °"});
   table.begin_row();
   table.text(corners ? "camera" : "tracker");
   const std::string at = "/calibration/camera";
-  pose_cells(table, at + "/pose_in_base", at + "/translation_expanded_m",
-             at + "/rotation_expanded_rad", true, absent_word(facts, "camera"));
+  pose_cells(table, at + (on_robot ? "/pose_on_link" : "/pose_in_base"),
+             at + "/translation_expanded_m", at + "/rotation_expanded_rad", true,
+             absent_word(facts, "camera"));
   return table.str();
 }
 

@@ -198,6 +198,23 @@ std::string column_words(const KinematicTree& tree, const JointLog& log) {
   return words.empty() ? "" : " No column is named like these joints: " + joined(words) + ".";
 }
 
+// " A person carried .. Its pose in every frame is estimated, too, which ..".
+std::string camera_motion_words(const RunSummary& run) {
+  std::string text = run.camera_motion.empty() ? "" : " " + run.camera_motion;
+  const std::optional<MovingCamera>& moving = run.calibration.moving;
+  if (!moving) return text;
+  if (moving->on_robot()) {
+    return text + fmt::format(
+                      " It rides on {}, and is camera_link in the URDF; a growth of the robot is "
+                      "not looked for.",
+                      run.calibration.tree.links[moving->link.index()].name);
+  }
+  return text +
+         " Its pose in every frame is estimated, too, and takes up what would show a rolling "
+         "shutter, or a bump or drift of the camera: those are not looked for, nor what depends on "
+         "the place in the image.";
+}
+
 }  // namespace
 
 std::string joints_words(const RunSummary& run) {
@@ -223,7 +240,7 @@ std::string found_words(const RunSummary& run) {
       for (const std::string& words : fault_sentences(*run.nominal, run.nominal_faults))
         text += " " + words;
     }
-    return text;
+    return text + camera_motion_words(run);
   }
   if (moving_joint_count(tree) > 0)
     text += fmt::format(" carrying {}; {}", bodies, driving_words(run));
@@ -236,7 +253,7 @@ std::string found_words(const RunSummary& run) {
   }
   text += idle_words(run);
   text += scale_words(tree) + free_scale_words(run.calibration);
-  return text;
+  return text + camera_motion_words(run);
 }
 
 }  // namespace kinescope::report

@@ -34,10 +34,10 @@ std::optional<Axis> axis_of(const Spec& spec, const State& state, const Uncertai
   const Joint& joint = tree.joints[j];
   const Pose T_base_joint = T_base_link[joint.parent.index()] * joint.T_parent_joint;
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, uncertainty.covariance.rows());
-  for (const int up : spec.path[joint.child.index()]) {
-    const auto found = columns.find(state.joint_frames[static_cast<std::size_t>(up)].data());
+  for (const JointId up : spec.tree.path_to(joint.child)) {
+    const auto found = columns.find(state.joint_frames[up.index()].data());
     if (found == columns.end()) continue;
-    const Joint& above = tree.joints[static_cast<std::size_t>(up)];
+    const Joint& above = tree.joints[up.index()];
     const Pose T_base_above = T_base_link[above.parent.index()] * above.T_parent_joint;
     const Matrix6d carry = adjoint(T_base_joint.inverse() * T_base_above);
     for (int i = 0; i < 6; ++i) {

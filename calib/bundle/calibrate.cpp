@@ -136,7 +136,7 @@ State solve_without(const Spec& spec, const State& solution, const Split& split,
                     int max_iterations) {
   State state = solution;
   static_cast<void>(bundle::solve(spec, state, split.seen, {}, max_iterations));
-  if (std::ranges::any_of(spec.free_value, [](bool f) { return f; })) {
+  if (spec.carried || std::ranges::any_of(spec.free_value, [](bool f) { return f; })) {
     static_cast<void>(
         bundle::solve(spec, state, split.unseen, {std::nullopt, true}, max_iterations));
   }

@@ -15,6 +15,7 @@
 #include "calib/bundle/calibration.h"
 #include "calib/bundle/correction.h"
 #include "calib/bundle/measurements.h"
+#include "calib/bundle/moving_camera.h"
 #include "calib/camera/marker_set.h"
 #include "kinematics/core/progress.h"
 #include "kinematics/log/joint_log.h"
@@ -40,7 +41,7 @@ struct FurtherCamera {
 /// Where the search starts, and what is held.
 struct CalibrationStart {
   KinematicTree tree;
-  Pose T_camera_base;
+  Pose T_camera_base;  ///< of a camera that moves: anything
   CameraModel camera;
   double time_offset_s = 0.0;
   Eigen::MatrixXd joint_values;  ///< frames x joints where no channel drives; empty: none, or held
@@ -49,6 +50,7 @@ struct CalibrationStart {
   std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
   std::string camera_name = {};         ///< of the reference camera; empty where there is one
   std::vector<FurtherCamera> further_cameras = {};  ///< 1, 2, .. of Measurements::camera_of_frame
+  std::optional<MovingCamera> moving = {};          ///< of a single camera; none: it stands still
 };
 
 /// How far a robot is from its drawing: standard deviations of a prior on every joint's frame. A

@@ -41,6 +41,14 @@ struct DistanceRms {
 
 }  // namespace
 
+Pose camera_from_base(const Calibration& calibration, int frame,
+                      const std::vector<Pose>& T_base_link) {
+  if (!calibration.moving) return calibration.T_camera_base_of(calibration.camera_at(frame));
+  const MovingCamera& moving = *calibration.moving;
+  if (!moving.on_robot()) return moving.path[static_cast<std::size_t>(frame)];
+  return moving.T_camera_link * T_base_link[moving.link.index()].inverse();
+}
+
 std::vector<CameraErrors> errors_of_cameras(const Calibration& calibration) {
   std::vector<CameraErrors> out(calibration.cameras());
   std::vector<DistanceRms> fitted(out.size());

@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 
+#include "calib/bundle/moving_camera.h"
 #include "calib/camera/camera_model.h"
 #include "kinematics/model/kinematic_tree.h"
 
@@ -116,7 +117,9 @@ struct Calibration {
   MeasurementKind kind = MeasurementKind::kCorners;
 
   KinematicTree tree;  ///< base to links to markers
-  Pose T_camera_base;  ///< the (reference) camera or tracker sees the base there
+  /// The (reference) camera or tracker sees the base there; one that moves, in the middle one of
+  /// the frames in which that is known.
+  Pose T_camera_base;
   CameraModel camera;
   bool intrinsics_estimated = false;
   std::array<Sigma, kMaxIntrinsics> intrinsics_sigma{};
@@ -150,6 +153,8 @@ struct Calibration {
   double final_cost = 0.0;
   std::vector<std::string> warnings;
 
+  std::optional<MovingCamera> moving;  ///< as estimated; none: cameras stand still
+
   std::string camera_name;  ///< of the reference camera; empty where there is one camera
   std::vector<CameraEstimate> further_cameras;  ///< 1, 2, .. of camera_of_frame
   std::vector<int> camera_of_frame;             ///< 0: the reference camera; empty: all frames
@@ -178,6 +183,11 @@ struct Calibration {
     return c == 0 ? camera : further_cameras[c - 1].camera;
   }
 };
+
+/// T_camera_base in a frame, of the camera that the frame is of; `T_base_link`: the links in that
+/// frame, which a camera on the robot needs.
+[[nodiscard]] Pose camera_from_base(const Calibration& calibration, int frame,
+                                    const std::vector<Pose>& T_base_link);
 
 /// What one camera shows: sightings, and distances, rms: px from corner to corner, of poses and
 /// points m.

@@ -4,6 +4,27 @@
 #include <algorithm>
 
 namespace kinescope::bundle {
+namespace {
+
+Vector6d unit_twist(const ChainJoint& joint) {
+  Vector6d twist = Vector6d::Zero();
+  if (joint.type == JointType::kRevolute) twist.head<3>() = joint.axis;
+  if (joint.type == JointType::kPrismatic) twist.tail<3>() = joint.axis;
+  return twist;
+}
+
+// Joint k from child to parent, (T_parent_joint exp(axis q) exp(correction))^-1; `rest` is
+// everything behind it, and is led on to before it.
+void go_up(const ChainJoint& joint, std::size_t k, Pose& rest, ChainDerivatives& out) {
+  rest = joint.T_parent_joint.inverse() * rest;
+  out.d_joint[k] = -adjoint(rest.inverse());
+  out.d_value[k] = out.d_joint[k] * unit_twist(joint);
+  rest = joint_motion(joint.type, joint.axis, -joint.value) * rest;
+  if (!joint.correction.isZero(0.0)) rest = exp_pose(-joint.correction) * rest;
+  out.d_link[k] = -adjoint(rest.inverse());
+}
+
+}  // namespace
 
 ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const ChainJoint> joints,
                                      const Pose& T_link_marker) {
@@ -15,12 +36,13 @@ ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const 
   Pose rest = T_link_marker;
   for (std::size_t k = joints.size(); k-- > 0;) {
     const ChainJoint& joint = joints[k];
-    Vector6d twist = Vector6d::Zero();
-    if (joint.type == JointType::kRevolute) twist.head<3>() = joint.axis;
-    if (joint.type == JointType::kPrismatic) twist.tail<3>() = joint.axis;
+    if (joint.upward) {
+      go_up(joint, k, rest, out);
+      continue;
+    }
     out.d_link[k] = adjoint(rest.inverse());
     if (!joint.correction.isZero(0.0)) rest = exp_pose(joint.correction) * rest;
-    out.d_value[k] = adjoint(rest.inverse()) * twist;
+    out.d_value[k] = adjoint(rest.inverse()) * unit_twist(joint);
     rest = joint_motion(joint.type, joint.axis, joint.value) * rest;
     out.d_joint[k] = adjoint(rest.inverse());
     rest = joint.T_parent_joint * rest;

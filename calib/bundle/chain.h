@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The chain from the camera to a marker and its derivatives:
-//   T_camera_marker = T_camera_base * prod_k (T_parent_joint_k * exp(axis_k q_k)) * T_link_marker.
+//   T_camera_marker = T_camera_base * prod_k (T_parent_joint_k * exp(axis_k q_k)) * T_link_marker,
+// with the inverse factor of a joint on the way from a camera on the robot up to its base, and
+// T_camera_link in place of T_camera_base then.
 // Every derivative is the 6-vector d of a right perturbation of T_camera_marker.
 #pragma once
 
@@ -19,6 +21,7 @@ struct ChainJoint {
   Pose T_parent_joint;
   double value = 0.0;                      ///< rad or m
   Vector6d correction = Vector6d::Zero();  ///< a twist behind the motion, in the link's frame
+  bool upward = false;                     ///< from child to parent
 };
 
 struct ChainDerivatives {

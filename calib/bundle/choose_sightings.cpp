@@ -357,7 +357,8 @@ ChosenSightings choose_by_neighbours(Spec& spec, const State& state, const std::
     series.residuals.push_back(at->error.residual);
     series.d_time.push_back(std::move(at->d_time));
     series.d_values.push_back(d_values_of(spec, sighting, *at));
-    if (path_length(spec, sighting) == 0) series.errors.push_back(std::move(at->error));
+    if (!spec.carried && path_length(spec, sighting) == 0)
+      series.errors.push_back(std::move(at->error));
   }
   for (auto& [number, series] : all) {
     for (std::size_t i = 0; i < series.indices.size(); ++i) {

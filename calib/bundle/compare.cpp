@@ -84,11 +84,11 @@ std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& 
   for (const int c : which) values.push_back(state.corrections[static_cast<std::size_t>(c)]);
   const CorrectedSighting corrected = sum_corrections(spec, sighting, which, values);
   const auto camera = static_cast<std::size_t>(sighting.camera);
-  return corrected_error(spec, sighting, corrected, from_block(state.cameras[camera].base.data()),
-                         chain_of(spec, state, readings, sighting),
-                         rates_of(spec, state, readings, sighting),
-                         from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data()),
-                         camera_of(spec, state, camera), sighting.target >= 0 ? &target : nullptr);
+  return corrected_error(
+      spec, sighting, corrected, from_block(camera_block(state, sighting).data()),
+      chain_of(spec, state, readings, sighting), rates_of(spec, state, readings, sighting),
+      from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data()),
+      camera_of(spec, state, camera), sighting.target >= 0 ? &target : nullptr);
 }
 
 std::optional<SightingError> error_of(const Spec& spec, const State& state,

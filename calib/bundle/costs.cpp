@@ -85,7 +85,8 @@ class SightingCost final : public ceres::CostFunction {
     const double value = spec_->free_value[static_cast<std::size_t>(id)]
                              ? map[0]
                              : map[0] * readings_->value(sighting_->frame, id) + map[1];
-    return {joint.type, joint.axis, from_block(parameters[1 + 2 * k]), value};
+    return {joint.type, joint.axis,       from_block(parameters[1 + 2 * k]),
+            value,      Vector6d::Zero(), spec_->upward[static_cast<std::size_t>(id)]};
   }
 
   double rate_at(std::size_t k, double const* const* parameters) const {

@@ -9,11 +9,11 @@
 
 namespace kinescope::bundle {
 
-/// One sighting, whitened. Blocks: T_camera_base (7), then for every joint on the way its frame (7)
-/// and its map (scale, offset) or its value in this frame (1), the mount (7), the time offset (1),
-/// for a further camera its lag (1), for corners the intrinsics (12), for points in a target its
-/// place (3), each block of corrections that bears on the sighting (corrected.h). `readings` must
-/// follow the time offset.
+/// One sighting, whitened. Blocks: where the camera stands (camera_block(), 7), then for every
+/// joint on the way its frame (7) and its map (scale, offset) or its value in this frame (1), the
+/// mount (7), the time offset (1), for a further camera its lag (1), for corners the intrinsics
+/// (12), for points in a target its place (3), each block of corrections that bears on the
+/// sighting (corrected.h). `readings` must follow the time offset.
 [[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
                                                       const Readings& readings);
 /// The frame of a joint that should stay near the nominal one, but for its zero. Block: the frame

@@ -258,7 +258,8 @@ Eigen::MatrixX2d places_of(const Spec& spec, const Sighting& sighting,
 
 // What is eliminated from a frame mixes its rows: then none has a place of its own.
 bool rows_have_places(const Spec& spec, const std::vector<int>& used) {
-  if (std::ranges::find(spec.free_value, true) != spec.free_value.end()) return false;
+  if (spec.carried || std::ranges::find(spec.free_value, true) != spec.free_value.end())
+    return false;
   return std::ranges::all_of(used, [&](int index) {
     return spec.sightings[static_cast<std::size_t>(index)].kind == MeasurementKind::kCorners;
   });
@@ -543,6 +544,8 @@ std::vector<BundleCamera> EffectBundle::cameras() const {
   return out;
 }
 bool EffectBundle::of_recordings() const { return !impl_->spec.starts_s.empty(); }
+LinkId EffectBundle::camera_link() const { return impl_->spec.camera_link; }
+bool EffectBundle::is_camera_carried() const { return impl_->spec.carried; }
 const std::vector<int>& EffectBundle::camera_of_frame() const {
   return impl_->spec.camera_of_frame;
 }

@@ -104,6 +104,10 @@ class EffectBundle {
   [[nodiscard]] MeasurementKind kind() const;
   /// The reference camera first.
   [[nodiscard]] std::vector<BundleCamera> cameras() const;
+  /// Of a camera on the robot, the link that carries it; 0: it stands still, or is carried.
+  [[nodiscard]] LinkId camera_link() const;
+  /// A person carries the camera: its pose in every frame is free.
+  [[nodiscard]] bool is_camera_carried() const;
   /// Of every frame; empty: there is one camera.
   [[nodiscard]] const std::vector<int>& camera_of_frame() const;
   /// Cameras are of recordings of their own.

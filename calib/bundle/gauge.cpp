@@ -51,6 +51,8 @@ class Frames {
 
   /// Everything on a link stays in place when the link's frame takes the step g.
   [[nodiscard]] bool stay(LinkId link, const Vector6d& g, Eigen::VectorXd& direction) const {
+    const bool carries_camera = link.value != 0 && link == spec_.camera_link;
+    if (carries_camera && !move_cameras(g, direction)) return false;
     for (std::size_t m = 0; m < spec_.tree.markers.size(); ++m) {
       if (spec_.tree.markers[m].link != link || !is_seen(m)) continue;
       const Pose mount = from_block(state_.mounts[m].data());
@@ -106,14 +108,17 @@ class Frames {
     for (int i = 0; i < 6; ++i) {
       const Vector6d g = Vector6d::Unit(i);
       Freedom freedom{Eigen::VectorXd::Zero(width_), held->second[static_cast<std::size_t>(i)]};
-      if (freedom.held >= 0 && move_cameras(g, freedom.direction) &&
+      const bool on_robot = spec_.camera_link.value != 0;
+      if (freedom.held >= 0 && (on_robot || move_cameras(g, freedom.direction)) &&
           stay(LinkId{0}, g, freedom.direction))
         out.push_back(std::move(freedom));
     }
   }
 
-  /// All of them see the base's frame take the step; those without a sighting see nothing.
+  /// All of them see the frame of the link that they are on take the step; those without a sighting
+  /// see nothing, and a camera that is carried is where it must be.
   [[nodiscard]] bool move_cameras(const Vector6d& g, Eigen::VectorXd& direction) const {
+    if (spec_.carried) return true;
     return std::ranges::all_of(state_.cameras, [&](const CameraState& camera) {
       const bool further = &camera != &state_.cameras.front();
       return (further && !columns_.contains(camera.base.data())) ||

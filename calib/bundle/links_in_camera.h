@@ -8,7 +8,7 @@
 namespace kinescope::bundle {
 
 /// Links in the (reference) camera's frame, effects apart: one list a frame; empty where a joint
-/// value is unknown.
+/// value, or where a camera that moves is, is unknown.
 [[nodiscard]] std::vector<std::vector<Pose>> links_in_camera(const Calibration& calibration);
 
 }  // namespace kinescope::bundle

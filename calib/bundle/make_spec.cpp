@@ -215,6 +215,42 @@ std::vector<int> channels_of(const Spec& spec) {
   return {channels.begin(), channels.end()};
 }
 
+// From the camera's link up to where the ways part, and down from there.
+std::vector<int> path_between(const KinematicTree& tree, LinkId from, LinkId to) {
+  std::vector<JointId> up = tree.path_to(from);
+  std::vector<JointId> down = tree.path_to(to);
+  const auto [up_end, down_end] = std::ranges::mismatch(up, down);
+  up.erase(up.begin(), up_end);
+  down.erase(down.begin(), down_end);
+  std::vector<int> out;
+  for (auto joint = up.rbegin(); joint != up.rend(); ++joint) out.push_back(joint->value);
+  for (const JointId joint : down) out.push_back(joint.value);
+  return out;
+}
+
+void add_paths(const CalibrationStart& start, Spec& spec) {
+  spec.carried = start.moving && !start.moving->on_robot();
+  spec.camera_link = start.moving ? start.moving->link : LinkId{0};
+  KINESCOPE_CHECK(!start.moving || spec.cameras.size() == 1, "a camera that moves is the only one");
+  KINESCOPE_CHECK(!spec.carried || start.moving->path.size() == spec.times_s.size(),
+                  "a camera that is carried has a pose in every frame");
+  for (std::size_t l = 0; l < spec.tree.links.size(); ++l)
+    spec.path.push_back(path_between(spec.tree, spec.camera_link, LinkId{static_cast<int>(l)}));
+  spec.upward.assign(spec.tree.joints.size(), false);
+  for (const JointId joint : spec.tree.path_to(spec.camera_link)) spec.upward[joint.index()] = true;
+}
+
+// A marker that is alone in its frame says where a carried camera is, and nothing else.
+void drop_lone_sightings(const MovingCamera& moving, Spec& spec) {
+  std::erase_if(spec.sightings, [&](const Sighting& sighting) {
+    return !moving.is_known(static_cast<std::size_t>(sighting.frame));
+  });
+  std::map<int, int> count;
+  for (const Sighting& sighting : spec.sightings) ++count[sighting.frame];
+  std::erase_if(spec.sightings,
+                [&](const Sighting& sighting) { return count.at(sighting.frame) < 2; });
+}
+
 void check_something_seen(const Spec& spec) {
   if (!spec.sightings.empty()) return;
   throw undetermined("calibration", "none of the markers seen belongs to the robot's structure",
@@ -238,12 +274,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
   add_couplings(log, spec);
   spec.postures = !log.empty() && is_posture_log(log, spec.times_s, channels_of(spec));
   spec.corrections = start.corrections;
-  for (std::size_t l = 0; l < spec.tree.links.size(); ++l) {
-    std::vector<int> path;
-    for (const JointId id : spec.tree.path_to(LinkId{static_cast<int>(l)}))
-      path.push_back(id.value);
-    spec.path.push_back(std::move(path));
-  }
+  add_paths(start, spec);
   if (!measurements.corners.empty()) {
     spec.kind = MeasurementKind::kCorners;
     add_corners(measurements, markers, spec);
@@ -269,6 +300,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
       return !is_stamp(log, spec.times_s[static_cast<std::size_t>(sighting.frame)]);
     });
   }
+  if (spec.carried) drop_lone_sightings(*start.moving, spec);
   check_something_seen(spec);
   free_joints(start, options, spec);
   if (options.hold_robot) hold_robot(spec);

@@ -83,9 +83,14 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
     const CameraModel& model = spec.cameras[c].model;
     camera.base =
         to_block(c == 0 ? start.T_camera_base : start.further_cameras[c - 1].T_camera_base);
+    if (spec.camera_link.value != 0) camera.base = to_block(start.moving->T_camera_link);
     camera.lag[0] = c == 0 ? 0.0 : start.further_cameras[c - 1].lag_s;
     camera.intrinsics = {model.fx, model.fy, model.cx, model.cy};
     std::ranges::copy(model.distortion, camera.intrinsics.begin() + 4);
+  }
+  if (spec.carried) {
+    for (const Pose& T_camera_base : start.moving->path)
+      state.carried.push_back(to_block(T_camera_base));
   }
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
@@ -111,6 +116,11 @@ State initial_state(const Spec& spec, const CalibrationStart& start) {
     state.corrections.push_back(correction.value);
   }
   return state;
+}
+
+const PoseBlock& camera_block(const State& state, const Sighting& sighting) {
+  return state.carried.empty() ? state.cameras[static_cast<std::size_t>(sighting.camera)].base
+                               : state.carried[static_cast<std::size_t>(sighting.frame)];
 }
 
 Readings::Readings(const Spec& spec, const State& state) : Readings(spec, clock_of(spec, state)) {}
@@ -164,7 +174,8 @@ std::vector<ChainJoint> chain_of(const Spec& spec, const State& state, const Rea
             ? state.values[j][static_cast<std::size_t>(sighting.frame)]
             : state.joint_maps[j][0] * readings.value(sighting.frame, id) + state.joint_maps[j][1];
     joints.push_back({spec.tree.joints[j].type, spec.tree.joints[j].axis,
-                      from_block(state.joint_frames[j].data()), value});
+                      from_block(state.joint_frames[j].data()), value, Vector6d::Zero(),
+                      spec.upward[j]});
   }
   return joints;
 }
@@ -183,9 +194,11 @@ std::vector<double> rates_of(const Spec& spec, const State& state, const Reading
 
 Pose predict(const Spec& spec, const State& state, const Readings& readings,
              const Sighting& sighting) {
-  Pose pose = from_block(state.cameras[static_cast<std::size_t>(sighting.camera)].base.data());
+  Pose pose = from_block(camera_block(state, sighting).data());
   for (const ChainJoint& joint : chain_of(spec, state, readings, sighting)) {
-    pose = pose * joint.T_parent_joint * joint_motion(joint.type, joint.axis, joint.value);
+    const Pose motion = joint_motion(joint.type, joint.axis, joint.value);
+    pose = joint.upward ? pose * (joint.T_parent_joint * motion).inverse()
+                        : pose * joint.T_parent_joint * motion;
   }
   return pose * from_block(state.mounts[static_cast<std::size_t>(sighting.marker)].data());
 }
@@ -211,7 +224,9 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
   const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
   CameraState& camera = state.cameras[static_cast<std::size_t>(sighting.camera)];
-  std::vector<double*> blocks{camera.base.data()};
+  std::vector<double*> blocks{spec.carried
+                                  ? state.carried[static_cast<std::size_t>(sighting.frame)].data()
+                                  : camera.base.data()};
   for (const int id : spec.path[marker.link.index()]) {
     const auto j = static_cast<std::size_t>(id);
     blocks.push_back(state.joint_frames[j].data());
@@ -282,6 +297,19 @@ void BuiltProblem::free_pose(double* data, const TangentMask& mask, const std::s
   }
   problem_->SetManifold(data, new PoseManifold(mask));
   blocks_.push_back(std::move(out));
+}
+
+void BuiltProblem::free_camera_poses(State& state) {
+  static const std::vector<std::string> kNames{"turn x",  "turn y",  "turn z",
+                                               "shift x", "shift y", "shift z"};
+  static const std::vector<std::string> kUnits{"rad", "rad", "rad", "m", "m", "m"};
+  for (std::size_t f = 0; f < state.carried.size(); ++f) {
+    double* pose = state.carried[f].data();
+    if (!problem_->HasParameterBlock(pose)) continue;
+    problem_->SetManifold(pose, new PoseManifold({true, true, true, true, true, true}));
+    camera_poses_.push_back(pose);
+    blocks_.push_back({pose, "camera", kNames, kUnits, {0, 1, 2, 3, 4, 5}, static_cast<int>(f)});
+  }
 }
 
 void BuiltProblem::free_numbers(double* data, const std::vector<bool>& free, FreeBlock names,
@@ -371,6 +399,7 @@ void BuiltProblem::set_manifolds(const Spec& spec, State& state, const BuildOpti
     free_numbers(corrections_at(state, block),
                  std::vector<bool>(names.names.size(), !spec.hold_corrections), names, frozen);
   }
+  free_camera_poses(state);
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     // The zero of a joint that no channel drives is free: its value in the first frame stays.
     bool zero_held = frozen;

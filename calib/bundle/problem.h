@@ -67,8 +67,12 @@ struct Spec {
   std::vector<int> channel;  ///< of every joint; -1: none (value unknown, or a fixed joint)
   std::vector<std::vector<std::pair<int, double>>>
       couplings;                       ///< of every joint: further channels and their ratios
-  std::vector<std::vector<int>> path;  ///< joints from the base to each link
-  std::vector<Sighting> sightings;     ///< by frame, then marker
+  std::vector<std::vector<int>> path;  ///< joints from the base (or the camera's link) to each link
+  std::vector<bool> upward;  ///< joints that a path goes through from child to parent, of a camera
+                             ///< on the robot; the same on all paths
+  LinkId camera_link{0};     ///< that carries the camera; 0: it stands still, or is carried
+  bool carried = false;      ///< the camera has a pose of its own in every frame
+  std::vector<Sighting> sightings;  ///< by frame, then marker
   std::vector<std::string> targets;
   std::vector<TargetPair> distances;
   std::vector<SpecCamera> cameras;   ///< at least one
@@ -87,7 +91,7 @@ struct Spec {
 };
 
 struct CameraState {
-  PoseBlock base{};  ///< T_camera_base
+  PoseBlock base{};  ///< T_camera_base; of a camera on the robot T_camera_link
   std::array<double, kMaxIntrinsics> intrinsics{};
   std::array<double, 1> lag{};  ///< s that the log is further ahead of its frames' times
 };
@@ -95,6 +99,7 @@ struct CameraState {
 /// The estimated numbers. Addresses must not change while a problem built on them lives.
 struct State {
   std::vector<CameraState> cameras;  ///< beside Spec::cameras; the reference camera has no lag
+  std::vector<PoseBlock> carried;    ///< T_camera_base by frame; only where Spec::carried
   std::vector<PoseBlock> joint_frames;
   std::vector<std::array<double, 2>> joint_maps;  ///< scale, offset
   std::vector<PoseBlock> mounts;
@@ -105,6 +110,8 @@ struct State {
 };
 
 [[nodiscard]] State initial_state(const Spec& spec, const CalibrationStart& start);
+/// Where the camera of a sighting stands: before its path.
+[[nodiscard]] const PoseBlock& camera_block(const State& state, const Sighting& sighting);
 [[nodiscard]] CameraModel camera_of(const Spec& spec, const State& state, std::size_t camera);
 
 /// Frames x joints: joint-log time minus frame time, as the time offset and the cameras' lags have
@@ -177,7 +184,7 @@ struct FreeBlock {
 struct BuildOptions {
   std::optional<double>
       robust_width;  ///< Cauchy loss on a sighting's chi-square beyond this; none: squared
-  bool freeze_globals = false;  ///< only joint values per frame move
+  bool freeze_globals = false;  ///< only joint values, and poses of the camera, per frame move
 };
 
 /// A Ceres problem over some of the sightings.
@@ -189,11 +196,14 @@ class BuiltProblem {
   [[nodiscard]] const std::vector<FreeBlock>& blocks() const { return blocks_; }
   [[nodiscard]] const std::vector<ceres::ResidualBlockId>& sighting_ids() const { return ids_; }
   [[nodiscard]] const std::vector<ceres::ResidualBlockId>& prior_ids() const { return prior_ids_; }
+  /// The camera's pose in every frame; empty: it has one.
+  [[nodiscard]] const std::vector<double*>& camera_poses() const { return camera_poses_; }
 
  private:
   void add_sighting(const Spec& spec, State& state, int index, const BuildOptions& options);
   void add_priors(const Spec& spec, State& state);
   void set_manifolds(const Spec& spec, State& state, const BuildOptions& options);
+  void free_camera_poses(State& state);
   void free_pose(double* data, const TangentMask& mask, const std::string& block, bool frozen);
   void free_numbers(double* data, const std::vector<bool>& free, FreeBlock names, bool frozen);
 
@@ -203,6 +213,7 @@ class BuiltProblem {
   std::vector<ceres::ResidualBlockId> ids_;
   std::vector<ceres::ResidualBlockId> prior_ids_;
   std::vector<FreeBlock> blocks_;
+  std::vector<double*> camera_poses_;
 };
 
 }  // namespace kinescope::bundle

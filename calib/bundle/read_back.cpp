@@ -93,6 +93,30 @@ std::vector<int> shown_by(const Spec& spec, const RobustSolution& robust, std::s
   return out;
 }
 
+// The middle one of the frames in which the camera's place is known.
+Pose usual_camera_from_base(const Calibration& out) {
+  std::vector<std::pair<int, std::vector<Pose>>> known;
+  for (Eigen::Index f = 0; f < out.joint_values.rows(); ++f) {
+    const Eigen::VectorXd q = out.joint_values.row(f);
+    if (q.allFinite() && out.moving->is_known(static_cast<std::size_t>(f)))
+      known.emplace_back(static_cast<int>(f), forward_kinematics(out.tree, q));
+  }
+  if (known.empty()) return {};
+  const auto& [frame, links] = known[known.size() / 2];
+  return camera_from_base(out, frame, links);
+}
+
+void fill_place_of_camera(const Spec& spec, const State& state, Calibration& out) {
+  const Pose before_path = from_block(state.cameras.front().base.data());
+  if (!spec.carried && spec.camera_link.value == 0) {
+    out.T_camera_base = before_path;
+    return;
+  }
+  out.moving = MovingCamera{spec.camera_link, before_path, {}};
+  for (const PoseBlock& pose : state.carried) out.moving->path.push_back(from_block(pose.data()));
+  out.T_camera_base = usual_camera_from_base(out);
+}
+
 void fill_tree(const Spec& spec, const State& state, const RobustSolution& robust,
                Calibration& out) {
   out.tree = spec.tree;
@@ -117,7 +141,7 @@ void fill_tree(const Spec& spec, const State& state, const RobustSolution& robus
   for (std::size_t m = 0; m < out.tree.markers.size(); ++m) {
     out.tree.markers[m].T_link_marker = from_block(state.mounts[m].data());
   }
-  out.T_camera_base = from_block(state.cameras.front().base.data());
+  fill_place_of_camera(spec, state, out);
 }
 
 void fill_cameras(const Spec& spec, const State& state, const Uncertainty& uncertainty,

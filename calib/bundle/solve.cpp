@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include <ceres/ordered_groups.h>
 #include <ceres/solver.h>
 
 #include "kinematics/core/chi_square.h"
@@ -125,7 +126,10 @@ void rescale(Spec& spec, const std::vector<Misfit>& misfits, double shrink) {
   const double common = scale_of(all, -1);
   std::map<int, double> scale;
   for (const auto& [series, values] : by_series) {
-    scale[series] = values.size() >= kMinGroup ? scale_of(values, series) : common;
+    // Where each frame's camera follows what it is believed by most, a marker of its own noise
+    // would be believed ever more.
+    const bool own = !spec.carried && values.size() >= kMinGroup;
+    scale[series] = own ? scale_of(values, series) : common;
   }
   for (Sighting& sighting : spec.sightings) {
     const auto found = scale.find(sighting.series);
@@ -226,6 +230,22 @@ void put_back_the_larger_part(const Spec& spec, const std::vector<Misfit>& misfi
   }
 }
 
+// Poses of the camera, one a frame, are eliminated first: no two of them meet in a residual (Schur
+// complement; Triggs et al. 2000, section 6.1). Joint values of a frame would meet them.
+void eliminate_camera_poses(BuiltProblem& built, const Spec& spec,
+                            ceres::Solver::Options& options) {
+  const bool values = std::ranges::find(spec.free_value, true) != spec.free_value.end();
+  if (built.camera_poses().empty() || values) return;
+  if (built.blocks().size() == built.camera_poses().size()) return;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<double*> all;
+  built.problem().GetParameterBlocks(&all);
+  for (double* block : all) ordering->AddElementToGroup(block, 1);
+  for (double* pose : built.camera_poses()) ordering->AddElementToGroup(pose, 0);
+  options.linear_solver_ordering = std::move(ordering);
+}
+
 // Factor N / (N - P): residuals of a fit are smaller than the noise.
 double freedom_factor(const Spec& spec, State& state, const std::vector<int>& used) {
   BuiltProblem built(spec, state, used, {});
@@ -245,6 +265,7 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  eliminate_camera_poses(built, spec, options);
   options.max_num_iterations = max_iterations;
   options.initial_trust_region_radius = kFirstRadius;
   options.function_tolerance = build_options.robust_width ? kRobustTolerance : kPlainTolerance;

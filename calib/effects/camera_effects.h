@@ -22,6 +22,8 @@ struct EffectWorld {
   std::vector<BundleCamera> cameras;  ///< the reference camera first
   std::vector<int> camera_of_frame;   ///< empty: there is one
   bool of_recordings = false;         ///< cameras are of recordings of their own
+  LinkId camera_link{0};    ///< that carries the camera; 0: it stands still, or is carried
+  bool is_carried = false;  ///< by a person: the camera's pose is free in every frame
   MeasurementKind kind = MeasurementKind::kCorners;
   bool postures = false;
   std::vector<int> driven;                  ///< joints
@@ -97,11 +99,13 @@ struct CameraEffect {
 [[nodiscard]] std::vector<CameraEffect> joint_effects(const EffectWorld& world);
 
 /// Of cameras, clock and markers: time_offset, clock_drift, rolling_shutter, lens_distortion,
-/// intrinsics, blooming, tag_size, bent_tag.
+/// intrinsics, blooming, tag_size, bent_tag. Not of a camera that is carried: rolling_shutter,
+/// since how fast it moves is not known.
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,
-/// thermal_growth, clock_jump, zero_jump, zero_drift.
+/// thermal_growth, clock_jump, zero_jump, zero_drift. Not of a camera that is carried: camera_bump,
+/// camera_drift; nor with one on the robot: thermal_growth.
 [[nodiscard]] std::vector<CameraEffect> time_effects(const EffectWorld& world);
 
 /// Of several recordings, what is another one in one of them: recording_zero, recording_mount,

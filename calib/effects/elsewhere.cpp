@@ -83,7 +83,10 @@ std::string marker_name(const EffectWorld& world, int marker) {
 }
 
 bool rests(const EffectWorld& world, int marker) {
-  return world.tree.path_to(world.tree.markers[static_cast<std::size_t>(marker)].link).empty();
+  const LinkId link = world.tree.markers[static_cast<std::size_t>(marker)].link;
+  if (world.is_carried) return false;
+  if (world.camera_link.value != 0) return link == world.camera_link;
+  return world.tree.path_to(link).empty();
 }
 
 }  // namespace kinescope::effects

@@ -33,7 +33,7 @@ namespace kinescope::effects {
 [[nodiscard]] Eigen::VectorXd frame_times(const EffectWorld& world);  ///< s
 
 [[nodiscard]] std::string marker_name(const EffectWorld& world, int marker);
-/// True of a marker that no joint moves.
+/// True of a marker that nothing moves before the camera.
 [[nodiscard]] bool rests(const EffectWorld& world, int marker);
 
 }  // namespace kinescope::effects

@@ -227,7 +227,8 @@ std::vector<CameraEffect> camera_effects(const EffectWorld& world) {
   if (!world.postures) {
     if (world.clock_free) out.push_back(time_offset());
     out.push_back(clock_drift(world));
-    for (std::size_t c = 0; corners && c < world.cameras.size(); ++c)
+    const bool motion_known = corners && !world.is_carried;
+    for (std::size_t c = 0; motion_known && c < world.cameras.size(); ++c)
       out.push_back(at_camera(world, c, rolling_shutter()));
   }
   if (corners) {

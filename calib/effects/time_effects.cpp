@@ -159,10 +159,14 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
 }
 
 CameraEffect camera_bump(const EffectWorld& world) {
-  CameraEffect out =
-      effect("camera_bump", "camera", "the camera (or the robot's base) was moved", kTwist, "rad");
+  const bool on_robot = world.camera_link.value != 0;
+  CameraEffect out = effect("camera_bump", "camera",
+                            on_robot ? "the camera was moved on the link that carries it"
+                                     : "the camera (or the robot's base) was moved",
+                            kTwist, "rad");
   out.candidate.size_weights.tail<3>().setZero();
-  out.candidate.check = "tripod, cable pulls, screws of the base";
+  out.candidate.check = on_robot ? "screws of the camera's bracket, cable pulls"
+                                 : "tripod, cable pulls, screws of the base";
   out.candidate.record = "put a marker on the base, in view all the time";
   happens_once(world, periods_of(world), out.candidate);
   out.corrections = [like = out, share = since(world)](double at_s) {
@@ -172,8 +176,11 @@ CameraEffect camera_bump(const EffectWorld& world) {
 }
 
 CameraEffect camera_drift(const EffectWorld& world) {
-  CameraEffect out = effect("camera_drift", "camera",
-                            "the camera (or the robot's base) moves slowly", kTwist, "rad");
+  CameraEffect out =
+      effect("camera_drift", "camera",
+             world.camera_link.value != 0 ? "the camera moves slowly on the link that carries it"
+                                          : "the camera (or the robot's base) moves slowly",
+             kTwist, "rad");
   out.candidate.size_weights.tail<3>().setZero();
   out.candidate.check = "tripod head that settles, camera and mount that warm up";
   out.candidate.record = "let the camera warm up; put a marker on the base, in view all the time";
@@ -282,7 +289,7 @@ std::vector<CameraEffect> time_effects(const EffectWorld& world) {
   if (world.of_recordings) {
     // What creeps does so in a recording, not from one to the next: it is looked for in each alone.
     for (CameraEffect& bump : bumps_in_recordings(world)) out.push_back(std::move(bump));
-  } else {
+  } else if (!world.is_carried) {
     // Of several cameras all alike: it is the robot's base that moves.
     for (const CameraEffect& moved : {camera_bump(world), camera_drift(world)}) {
       out.push_back(moved);
@@ -290,7 +297,7 @@ std::vector<CameraEffect> time_effects(const EffectWorld& world) {
         out.push_back(at_camera(world, c, without_base(moved)));
     }
   }
-  if (!world.of_recordings) out.push_back(thermal_growth(world));
+  if (!world.of_recordings && world.camera_link.value == 0) out.push_back(thermal_growth(world));
   if (!world.postures) out.push_back(clock_jump(world));
   for (const int joint : world.driven) {
     const Suspect s = suspect(world, joint);

@@ -383,6 +383,8 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   world.cameras = bundle_->cameras();
   world.camera_of_frame = bundle_->camera_of_frame();
   world.of_recordings = bundle_->of_recordings();
+  world.camera_link = bundle_->camera_link();
+  world.is_carried = bundle_->is_camera_carried();
   world.kind = bundle_->kind();
   world.postures = bundle_->postures();
   world.driven = bundle_->driven_joints();

@@ -9,11 +9,12 @@
 namespace kinescope {
 
 /// Where the camera is: on the hand, and the markers stand still; or fixed, and they are on the
-/// hand.
-enum class CameraMount { kOnHand, kFixed };
+/// hand. Of a robot also: carried by a person.
+enum class CameraMount { kOnHand, kFixed, kCarried };
 
-/// "hand", "fixed".
+/// "hand", "fixed", "carried".
 [[nodiscard]] constexpr std::string_view to_string(CameraMount mount) {
+  if (mount == CameraMount::kCarried) return "carried";
   return mount == CameraMount::kOnHand ? "hand" : "fixed";
 }
 

@@ -51,8 +51,7 @@ class LinesOfSight {
     }
     const Pose T_base_marker = links_[marker->link.index()] * marker->T_link_marker;
     const Eigen::Vector3d place =
-        calibration_.T_camera_base_of(calibration_.camera_at(sighting.frame)) *
-        T_base_marker.translation;
+        camera_from_base(calibration_, sighting.frame, links_) * T_base_marker.translation;
     return place.norm() > 0.0 ? Eigen::Vector3d(place.normalized()) : Eigen::Vector3d::UnitZ();
   }
 

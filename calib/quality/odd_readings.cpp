@@ -29,7 +29,16 @@ bool is_read_alone(const Joint& joint) {
 
 using Frames = std::map<int, std::vector<Seen>>;
 
+// What a camera that is carried would see from its usual place.
+Pose as_if_at_rest(const Calibration& calibration, const PoseSample& sample) {
+  if (!calibration.moving) return sample.T_camera_marker;
+  const Pose& T_camera_base = calibration.moving->path[static_cast<std::size_t>(sample.frame)];
+  return calibration.T_camera_base * T_camera_base.inverse() * sample.T_camera_marker;
+}
+
 Frames frames_of(const Calibration& calibration, const PoseTracks& tracks) {
+  // Of a camera on the robot a reading moves what is seen of all that is before the joint.
+  if (calibration.moving && calibration.moving->on_robot()) return {};
   std::map<std::pair<int, TagId>, bool> used;
   for (const SightingResidual& residual : calibration.residuals)
     used[{residual.frame, residual.id}] = residual.used;
@@ -39,7 +48,8 @@ Frames frames_of(const Calibration& calibration, const PoseTracks& tracks) {
     if (marker == nullptr) continue;
     for (const PoseSample& sample : track.samples) {
       const auto at = used.find({sample.frame, track.id});
-      out[sample.frame].push_back({marker, sample.T_camera_marker, at != used.end() && at->second});
+      out[sample.frame].push_back(
+          {marker, as_if_at_rest(calibration, sample), at != used.end() && at->second});
     }
   }
   return out;

@@ -27,6 +27,7 @@ struct Readings {
   std::vector<ChannelUnit> units;  ///< as declared; empty: of none
   /// How likely a channel of unknown unit is in rad or m before its joint is looked at.
   double si_share = 0.6;
+  bool last_joint_first = false;  ///< StructureOptions::camera_on_robot
 
   [[nodiscard]] int channels() const { return static_cast<int>(mean.size()); }
   [[nodiscard]] bool moves(int channel) const {

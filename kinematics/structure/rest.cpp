@@ -10,6 +10,8 @@
 namespace kinescope::structure_search {
 namespace {
 
+constexpr double kNoiseOnly = 4.0;  // variance over the declared one
+
 // Component by component, so that views spoilt by an occlusion do not matter.
 Pose median_pose(const Motion& motion) {
   const Pose reference = motion[motion.size() / 2].pose;
@@ -80,8 +82,7 @@ std::optional<Attachment> practical_rest(const Body& body, int link, const LinkP
 bool rest_on_each_other(const Body& a, double motion_size, const Body& b,
                         const Readings& readings) {
   constexpr std::size_t kFewestRelative = 12;
-  constexpr double kNoiseOnly = 4.0;  // variance over the declared one; or
-  constexpr double kOfMotion = 0.1;   // what is left over how far they move
+  constexpr double kOfMotion = 0.1;  // what is left over how far they move
   const RelativeMotion relative = relative_motion(b, seen_path(a), readings);
   if (relative.motion.size() < kFewestRelative) return false;
   ChainModel model;
@@ -89,6 +90,20 @@ bool rest_on_each_other(const Body& a, double motion_size, const Body& b,
   const ChainFit fit = fit_chain(relative.motion, readings.value, model);
   const double left = std::hypot(fit.translation_rms, kLever * fit.rotation_rms);
   return fit.variance < kNoiseOnly || left < kOfMotion * motion_size;
+}
+
+bool keeps_pose(const Body& body, const LinkPath& path, const Readings& readings) {
+  constexpr std::size_t kFewestTogether = 8;
+  const RelativeMotion relative = relative_motion(body, path, readings);
+  if (relative.motion.size() < kFewestTogether) return false;
+  ChainModel model;
+  model.mount = median_pose(relative.motion);
+  return hardly_moves(relative.motion, model.mount, body, 1.0) ||
+         fit_chain(relative.motion, readings.value, model).variance < kNoiseOnly;
+}
+
+bool keep_relative_pose(const Body& a, const Body& b, const Readings& readings) {
+  return keeps_pose(b, seen_path(a), readings);
 }
 
 }  // namespace kinescope::structure_search

@@ -24,4 +24,10 @@ namespace kinescope::structure_search {
 [[nodiscard]] bool rest_on_each_other(const Body& a, double motion_size, const Body& b,
                                       const Readings& readings);
 
+/// Whether a body keeps its pose in a link's frame: to the noise, or for all that a robot moves by.
+[[nodiscard]] bool keeps_pose(const Body& body, const LinkPath& path, const Readings& readings);
+
+/// The same of two bodies, in each other's frame.
+[[nodiscard]] bool keep_relative_pose(const Body& a, const Body& b, const Readings& readings);
+
 }  // namespace kinescope::structure_search

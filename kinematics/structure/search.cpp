@@ -98,6 +98,7 @@ class Search {
     found.offset.value_s = offset_s;
     found.readings = readings_at(log_, series, offset_s, options_.max_gap_s);
     found.readings.units = units_of(log_, options_.units);
+    found.readings.last_joint_first = options_.camera_on_robot;
     found.readings.si_share = std::max(si_share, found.readings.si_share);
     found.tree = grow_tree(series, found.readings, growth, likely_costs_at(offset_s));
     return found;

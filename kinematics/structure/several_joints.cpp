@@ -337,6 +337,7 @@ std::optional<Problem> make_problem(const RelativeMotion& relative, const Readin
   }
   std::ranges::sort(channels, {},
                     [&](int c) { return readings.log_channel[static_cast<std::size_t>(c)]; });
+  if (readings.last_joint_first) std::ranges::reverse(channels);
   if (channels.size() < 2 || relative.motion.size() < 4 * channels.size()) return std::nullopt;
   Problem p;
   p.rms = readings.rms;

@@ -81,8 +81,11 @@ struct Structure {
   std::vector<StructureLink>
       links;  ///< links[0]: at rest in the camera's frame; may hold no marker
   std::vector<StructureJoint> joints;  ///< parents stand before children
-  std::vector<TagId> free_markers;     ///< markers that move with no joint we know (free bodies)
-  std::vector<int> idle_channels;      ///< channels that drive nothing
+  /// The link that carries the camera; other than 0 (rerooted.h): links[0] is at rest in the world,
+  /// in the frame of its first marker, and the camera is this link's reference.
+  int camera_link = 0;
+  std::vector<TagId> free_markers;  ///< markers that move with no joint we know (free bodies)
+  std::vector<int> idle_channels;   ///< channels that drive nothing
   std::vector<ChannelCopy> copied_channels;  ///< none of them is idle
   double probability = 0.0;  ///< of the whole answer against all alternatives looked at; at most
                              ///< the share of each joint's squared motion that it explains
@@ -107,6 +110,9 @@ struct StructureOptions {
   /// Declared, by channel: a turn by one in rad or a slide by one in m moves as far as its channel
   /// says, unless the motion clearly says otherwise. Channels that are absent: any unit.
   std::map<std::string, ChannelUnit> units = {};
+  /// The camera rides on the robot: of orders of joints that fit alike the one is taken in which
+  /// the log's channels stand from the far end of the chain to the camera.
+  bool camera_on_robot = false;
 };
 
 /// Cost O(bodies^2 * channels * frames). Deterministic; independent of the order of markers and

@@ -21,7 +21,7 @@
 
 #include "app/commands/commands.h"
 #include "tests/experiments/command_line.h"
-#include "tests/experiments/run_outcome.h"
+#include "tests/experiments/judged_run.h"
 #include "tests/truth/recordings_world.h"
 #include "tests/truth/temporary_path.h"
 
@@ -77,13 +77,6 @@ std::vector<RecordingOptions> recordings_of(int seed, const Request& request) {
   return out;
 }
 
-void print_line(const std::string& what, const Outcome& o) {
-  fmt::print("TABLE {:24} {:4} {:9} {:8.4f} {:10.4f} {:8.4f} {:2}/{:<2} {}{}\n", what, o.code,
-             o.structure ? "right" : "wrong", o.held_out_px, o.claimed_mm, o.true_mm, o.within,
-             o.axes, o.verdict, o.effects);
-  std::fflush(stdout);
-}
-
 struct Sums {
   int robots = 0, right = 0, alone = 0, alone_right = 0, within = 0, axes = 0;
   std::vector<double> claims, errors;  // together over the best alone
@@ -103,18 +96,18 @@ void one_robot(RobotKind kind, int seed, const Request& request, Sums& sums) {
   RunOptions all;
   all.recording.folder = folders.front();
   all.further.assign(folders.begin() + 1, folders.end());
-  const Outcome together = run_and_judge(all, root / "together_run", truth);
+  const JudgedRun together = judged_run(all, root / "together_run", truth);
   print_line(name + " together", together);
   ++sums.robots;
   sums.right += together.structure;
   sums.within += together.within;
   sums.axes += together.axes;
-  std::optional<Outcome> best;
+  std::optional<JudgedRun> best;
   double information = 0.0;
   for (std::size_t k = 0; k < folders.size(); ++k) {
     RunOptions alone;
     alone.recording.folder = folders[k];
-    const Outcome one = run_and_judge(alone, root / (recordings[k].name + "_run"), worlds[k].tree);
+    const JudgedRun one = judged_run(alone, root / (recordings[k].name + "_run"), worlds[k].tree);
     print_line(fmt::format("{} {}", name, recordings[k].name), one);
     ++sums.alone;
     sums.alone_right += one.structure;
@@ -129,8 +122,7 @@ void one_robot(RobotKind kind, int seed, const Request& request, Sums& sums) {
 }
 
 void run_all(const Request& request) {
-  fmt::print("TABLE {:24} {:4} {:9} {:8} {:10} {:8} {:5} {}\n", "recording", "exit", "structure",
-             "held, px", "u, mm", "true, mm", "in 2u", "trace");
+  print_header("recording");
   Sums sums;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed)
     for (const RobotKind kind : request.kinds) one_robot(kind, seed, request, sums);

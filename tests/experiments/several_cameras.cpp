@@ -8,7 +8,6 @@
 // Clocks of the cameras are up to 0.4 s apart, their rates 30, 25 and 20 Hz, noise 0.1 px. --split:
 // every second link's marker faces the second camera. --bump: camera 1 turns by as much in the
 // middle of the recording.
-#include <cstdio>
 #include <filesystem>
 #include <numbers>
 #include <optional>
@@ -19,7 +18,7 @@
 
 #include "app/commands/commands.h"
 #include "tests/experiments/command_line.h"
-#include "tests/experiments/run_outcome.h"
+#include "tests/experiments/judged_run.h"
 #include "tests/truth/rig_world.h"
 #include "tests/truth/temporary_path.h"
 
@@ -63,13 +62,6 @@ truth::RigOptions rig_of(RobotKind kind, int seed, const Request& request) {
   return out;
 }
 
-void print_line(const std::string& what, const Outcome& o) {
-  fmt::print("TABLE {:28} {:4} {:9} {:8.4f} {:10.4f} {:8.4f} {:2}/{:<2} {}{}\n", what, o.code,
-             o.structure ? "right" : "wrong", o.held_out_px, o.claimed_mm, o.true_mm, o.within,
-             o.axes, o.verdict, o.effects);
-  std::fflush(stdout);
-}
-
 struct Sums {
   int recordings = 0, together_right = 0, alone = 0, alone_right = 0, within = 0, axes = 0;
   std::vector<double> ratios;  // of claimed uncertainties, together over the best alone
@@ -87,19 +79,19 @@ void one_recording(RobotKind kind, int seed, const Request& request, Sums& sums)
   const KinematicTree& truth = worlds.front().tree;
   RunOptions all;
   all.recording.folder = folder;
-  const Outcome together = run_and_judge(all, root / (name + "_run"), truth);
+  const JudgedRun together = judged_run(all, root / (name + "_run"), truth);
   print_line(name + " together", together);
   ++sums.recordings;
   sums.together_right += together.structure;
   sums.within += together.within;
   sums.axes += together.axes;
-  std::optional<Outcome> best;
+  std::optional<JudgedRun> best;
   for (const truth::RigCamera& camera : rig.cameras) {
     RunOptions alone = all;
     alone.recording.corners = folder / fmt::format("corners_{}.csv", camera.name);
     alone.recording.camera = folder / fmt::format("camera_{}.yaml", camera.name);
-    const Outcome one =
-        run_and_judge(alone, root / fmt::format("{}_{}_run", name, camera.name), truth);
+    const JudgedRun one =
+        judged_run(alone, root / fmt::format("{}_{}_run", name, camera.name), truth);
     print_line(fmt::format("{} {}", name, camera.name), one);
     ++sums.alone;
     sums.alone_right += one.structure;
@@ -111,8 +103,7 @@ void one_recording(RobotKind kind, int seed, const Request& request, Sums& sums)
 }
 
 void run_all(const Request& request) {
-  fmt::print("TABLE {:28} {:4} {:9} {:8} {:10} {:8} {:5} {}\n", "recording", "exit", "structure",
-             "held, px", "U(k=1), mm", "true, mm", "in 2U", "trace");
+  print_header("recording");
   Sums sums;
   for (int seed = request.first_seed; seed < request.first_seed + request.seeds; ++seed)
     for (const RobotKind kind : request.kinds) one_recording(kind, seed, request, sums);

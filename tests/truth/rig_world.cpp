@@ -6,12 +6,12 @@
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/file.h"
 #include "tests/truth/recorded_world.h"
+#include "tests/truth/seen_tag.h"
 
 namespace kinescope::truth {
 namespace {
 
-constexpr double kSeenFromBehind = 0.25;  // cosine of the view beyond which no tag is found
-constexpr double kLogBeyond = 0.5;        // s, that the log begins before and ends after the motion
+constexpr double kLogBeyond = 0.5;  // s, that the log begins before and ends after the motion
 
 // The robot turned about the vertical through its middle, base frame.
 Pose turned_about_middle(const FilmedRobot& robot, double angle_rad) {
@@ -54,29 +54,6 @@ JointLog rig_log(const FilmedRobot& robot, double rate_hz) {
   return log;
 }
 
-namespace {
-
-// The corners of one marker with noise; nothing where it is not found.
-std::optional<TagObservation> seen(const World& world, const Marker& marker,
-                                   const Pose& T_camera_marker, double sigma_px, Rng& rng) {
-  const Eigen::Vector3d normal = T_camera_marker.rotation * Eigen::Vector3d::UnitZ();
-  if (normal.dot(T_camera_marker.translation.normalized()) < kSeenFromBehind) return std::nullopt;
-  TagObservation out;
-  out.id = marker.id;
-  out.sigma_px = sigma_px;
-  for (const Eigen::Vector3d& corner : world.markers.corners_m(marker.id)) {
-    const auto pixel = project(world.camera, T_camera_marker * corner);
-    if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() > world.camera.width - 1.0 ||
-        pixel->y() > world.camera.height - 1.0)
-      return std::nullopt;
-    out.corners_px.emplace_back(pixel->x() + rng.normal(sigma_px),
-                                pixel->y() + rng.normal(sigma_px));
-  }
-  return out;
-}
-
-}  // namespace
-
 World rig_view(const FilmedRobot& robot, const JointLog& log, const RigCamera& camera) {
   World world;
   world.tree = robot.tree;
@@ -100,8 +77,8 @@ World rig_view(const FilmedRobot& robot, const JointLog& log, const RigCamera& c
                                    : T_bumped * world.T_camera_base;
     for (const Marker& marker : robot.tree.markers) {
       auto tag =
-          seen(world, marker, T_camera_base * links[marker.link.index()] * marker.T_link_marker,
-               camera.sigma_px, rng);
+          seen_tag(world, marker, T_camera_base * links[marker.link.index()] * marker.T_link_marker,
+                   camera.sigma_px, rng);
       if (!tag) continue;
       tag->frame = f;
       world.measurements.corners.push_back(std::move(*tag));

@@ -348,7 +348,13 @@ class Calibration:
 
     def project(self, points_base: ArrayLike) -> Array:
         """Pixels, (N, 2), of points in the base frame, (N, 3), m; NaN behind the camera. Raises
-        `BadRequest` for a run without a camera, and as `forward`."""
+        `BadRequest` for a run without a camera or with one that moves (`document`'s
+        ``camera_motion``), and as `forward`."""
+        if "camera_motion" in self.document:
+            raise BadRequest(
+                "project: the camera moves (give points in its frame to the camera's own model; "
+                "document['camera_motion'] and camera_path.csv say where it is)"
+            )
         points = np.asarray(points_base)
         if points.dtype.kind in "biuf" and points.ndim in (1, 2) and points.shape[-1] == 3:
             points = points @ self.T_camera_base[:3, :3].T + self.T_camera_base[:3, 3]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `run` on a recording of a robot that is known, judged: structure, axes, error on unseen data.
+// A finished run beside its truth: structure, places of the turning axes, what was traced.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace kinescope {
 
-struct Outcome {
+struct JudgedRun {
   int code = 0;
   bool structure = false;
   double held_out_px = 0.0;
@@ -25,10 +25,17 @@ struct Outcome {
   std::string effects;
 };
 
-/// Into `folder`. The axes are compared where the structure is right; every channel at zero.
-[[nodiscard]] Outcome run_and_judge(RunOptions options, const std::filesystem::path& folder,
-                                    const KinematicTree& truth);
+enum class Markers { kAllFound, kThoseFound };
+
+/// Runs `options` into `folder`, and compares. Markers::kThoseFound: the truth has some that no
+/// camera sees.
+[[nodiscard]] JudgedRun judged_run(RunOptions options, const std::filesystem::path& folder,
+                                   const KinematicTree& truth,
+                                   Markers markers = Markers::kAllFound);
 
 [[nodiscard]] double rms(const std::vector<double>& values);
+
+void print_header(const std::string& first);
+void print_line(const std::string& what, const JudgedRun& judged);
 
 }  // namespace kinescope
