@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "kinematics/core/single_threaded_blas.h"
+#include "dynamics/gp/blas.h"
 
 namespace kinescope::gp {
 

@@ -44,6 +44,7 @@ std::vector<int> remove_links_without_founder(GrownTree& tree) {
   tree.links = std::move(kept);
   for (GrownBody& body : tree.bodies) {
     body.alternatives.clear();
+    rename(body.rests_on, renamed);
     if (body.link < 0) continue;
     rename(body.link, renamed);
     rename(body.attachment.parent, renamed);
@@ -69,8 +70,10 @@ std::vector<int> sort_links(GrownTree& tree) {
   }
   tree.links = std::move(sorted);
   for (GrownBody& body : tree.bodies) {
+    // What a body hung on before it was released may be gone.
+    if (body.link >= 0) rename(body.attachment.parent, renamed);
     rename(body.link, renamed);
-    rename(body.attachment.parent, renamed);
+    rename(body.rests_on, renamed);
     for (Attachment& a : body.alternatives) rename(a.parent, renamed);
   }
   return renamed;

@@ -65,7 +65,6 @@ std::vector<int> remove_released(GrownTree& tree) {
   };
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     GrownBody& body = tree.bodies[b];
-    body.rests_on = now(body.rests_on);
     for (Attachment& a : known[b]) {
       a.parent = now(a.parent);
       if (a.parent >= 0) body.alternatives.push_back(std::move(a));

@@ -52,9 +52,14 @@ AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& 
   const Pose T_found_truth =
       found.tree.markers.front().T_link_marker * truth.markers.front().T_link_marker.inverse();
   std::vector<Line> lines;
-  for (const Joint& joint : truth.joints) {
+  for (std::size_t j = 0; j < truth.joints.size(); ++j) {
+    const Joint& joint = truth.joints[j];
     const Pose T = T_found_truth * links[joint.parent.index()] * joint.T_parent_joint;
-    lines.push_back({T.rotation * joint.axis, T.translation, joint.type == JointType::kRevolute});
+    const Eigen::Vector3d direction = T.rotation * joint.axis;
+    // Where the found point stands: a turn of the whole moves the points of an axis differently.
+    const double along_m = direction.dot(found.joints[j].point_base - T.translation);
+    lines.push_back(
+        {direction, T.translation + along_m * direction, joint.type == JointType::kRevolute});
   }
   const double angle_m = extent_m(lines);
   // By a motion (turn, shift) of the whole: turn across the axis, shift + turn x point across it.
