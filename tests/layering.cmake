@@ -54,7 +54,7 @@ set(third_parties
     "libsw: calib/vision"
     "ceres/: calib/tracks calib/bundle calib/hand_eye dynamics/identify dynamics/gp"
     "glog/: kinematics/core"
-    "cblas: dynamics/gp"
+    "cblas: dynamics/gp kinematics/core"
     "urdf_: kinematics/urdf"
     "console_bridge/: kinematics/urdf"
     "tinyxml: kinematics/urdf calib/camera"

@@ -65,25 +65,13 @@ std::optional<truth::AxisDifferences> compare_by(TagId base_id, KinematicTree tr
   return truth::axis_differences(truth, at_zero);
 }
 
-double sum_of_squares(const truth::AxisDifferences& differences) {
-  double sum = 0.0;
-  for (const truth::AxisDifference& axis : differences.among)
-    sum += axis.direction_rad * axis.direction_rad;
-  return sum;
-}
-
-// By the marker of the base that is known best: the motion that brings the axes together is taken
-// as small, and one that is seen in a few frames is off by degrees.
 std::optional<truth::AxisDifferences> compare(const KinematicTree& truth,
                                               const Calibration& found) {
-  std::optional<truth::AxisDifferences> out;
-  for (const Marker& marker : truth.markers) {
-    if (marker.link.value != 0 || found.tree.marker(marker.id) == nullptr) continue;
-    auto by_this = compare_by(marker.id, truth, found);
-    if (by_this && (!out || sum_of_squares(*by_this) < sum_of_squares(*out)))
-      out = std::move(by_this);
-  }
-  return out;
+  const auto base = std::ranges::find_if(truth.markers, [&](const Marker& marker) {
+    return marker.link.value == 0 && found.tree.marker(marker.id) != nullptr;
+  });
+  if (base == truth.markers.end()) return std::nullopt;
+  return compare_by(base->id, truth, found);
 }
 
 // Standard uncertainty of each axis' place among the axes, mm, by channel.

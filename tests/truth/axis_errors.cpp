@@ -43,14 +43,11 @@ double extent_m(const std::vector<Line>& lines) {
   return std::max(0.1, std::sqrt(square / std::max(1.0, count)));
 }
 
-}  // namespace
-
-AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& found) {
+std::vector<Line> lines_of(const KinematicTree& truth, const Calibration& found,
+                           const Pose& T_found_truth) {
   Eigen::VectorXd mean(found.joint_values.cols());
   for (Eigen::Index j = 0; j < mean.size(); ++j) mean[j] = found.joint_values.col(j).mean();
   const auto links = forward_kinematics(truth, mean);
-  const Pose T_found_truth =
-      found.tree.markers.front().T_link_marker * truth.markers.front().T_link_marker.inverse();
   std::vector<Line> lines;
   for (std::size_t j = 0; j < truth.joints.size(); ++j) {
     const Joint& joint = truth.joints[j];
@@ -61,10 +58,15 @@ AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& 
     lines.push_back(
         {direction, T.translation + along_m * direction, joint.type == JointType::kRevolute});
   }
+  return lines;
+}
+
+// The motion of the true lines that brings them nearest: turn across the axis, shift + turn x point
+// across it.
+Pose motion_towards(const Calibration& found, const std::vector<Line>& lines) {
   const double angle_m = extent_m(lines);
-  // By a motion (turn, shift) of the whole: turn across the axis, shift + turn x point across it.
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+  Matrix6d normal = Matrix6d::Zero();
+  Vector6d right = Vector6d::Zero();
   for (std::size_t j = 0; j < lines.size(); ++j) {
     const Line& line = lines[j];
     const Eigen::Matrix3d P =
@@ -79,19 +81,31 @@ AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& 
     normal += by.transpose() * by;
     right += by.transpose() * shift(line, found.joints[j].point_base);
   }
-  const Eigen::Matrix<double, 6, 1> motion = normal.completeOrthogonalDecomposition().solve(right);
-  AxisDifferences out;
+  const Vector6d motion = normal.completeOrthogonalDecomposition().solve(right);
+  return {exp_rotation(motion.head<3>()), motion.tail<3>()};
+}
+
+std::vector<AxisDifference> differences(const Calibration& found, const std::vector<Line>& lines) {
+  std::vector<AxisDifference> out;
   for (std::size_t j = 0; j < lines.size(); ++j) {
-    const Line& line = lines[j];
-    const Eigen::Vector3d turned = turn(line, found.joints[j].axis_base);
-    const Eigen::Vector3d moved = shift(line, found.joints[j].point_base);
-    out.in_base.push_back({turned.norm(), {}});
-    out.among.push_back({(turned - across(line.direction, motion.head<3>())).norm(), {}});
-    if (!line.turns) continue;
-    out.in_base.back().position_m = moved.norm();
-    const Eigen::Vector3d carried = motion.tail<3>() + motion.head<3>().cross(line.point);
-    out.among.back().position_m = (moved - across(line.direction, carried)).norm();
+    AxisDifference& axis = out.emplace_back();
+    axis.direction_rad = turn(lines[j], found.joints[j].axis_base).norm();
+    if (lines[j].turns) axis.position_m = shift(lines[j], found.joints[j].point_base).norm();
   }
+  return out;
+}
+
+}  // namespace
+
+AxisDifferences axis_differences(const KinematicTree& truth, const Calibration& found) {
+  constexpr int kSteps = 5;  // a marker that is seen in a few frames is off by degrees
+  Pose T_found_truth =
+      found.tree.markers.front().T_link_marker * truth.markers.front().T_link_marker.inverse();
+  AxisDifferences out;
+  out.in_base = differences(found, lines_of(truth, found, T_found_truth));
+  for (int step = 0; step < kSteps; ++step)
+    T_found_truth = motion_towards(found, lines_of(truth, found, T_found_truth)) * T_found_truth;
+  out.among = differences(found, lines_of(truth, found, T_found_truth));
   return out;
 }
 

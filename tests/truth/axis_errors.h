@@ -16,7 +16,7 @@ struct AxisDifference {
 };
 
 /// One a joint, at the calibration's mean joint values. In the base that the first marker of either
-/// tree gives; and among the axes: after the small motion that brings all axes nearest to the true
+/// tree gives; and among the axes: after the motion that brings all axes nearest to the true
 /// ones, an angle counting as much as a shift of as many times the extent of the robot (root mean
 /// square of the turning axes' origins about their middle, at least 0.1 m).
 struct AxisDifferences {
