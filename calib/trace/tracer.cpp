@@ -163,6 +163,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   StagePtr best;
   for (const TestedMember* hint : hints) {
     if (!may_go_on()) return best;
+    if (!shows_another(*now, *hint)) continue;
     std::vector<AddedEffect> effects = now->added;
     effects.push_back({now->fit.candidates[hint->index].id, hint->scan});
     now_ = with_sizes_for_scans(stage_of(effects));
@@ -191,6 +192,13 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
       best = std::move(several);
   }
   return best;
+}
+
+bool Tracer::shows_another(const Stage& stage, const TestedMember& hint) const {
+  const Linearisation beside = extend(stage.fit.linear, hint.columns, {});
+  const NormalSystem system(beside, stage.system.partition());
+  const std::vector<Candidate>& candidates = stage.fit.candidates;
+  return !contenders(system, candidates, test_family(system, candidates)).empty();
 }
 
 // What is below the floors is not looked for, but it is there: several effects together may stand
@@ -365,20 +373,21 @@ bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const 
          std::ranges::count(now_->added, candidate.id, &AddedEffect::id) < kMostAlike;
 }
 
-std::vector<Tracer::Contender> Tracer::contenders(const Stage& stage,
+std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,
+                                                  const std::vector<Candidate>& candidates,
                                                   const std::vector<TestedMember>& family) const {
   std::vector<Contender> out;
   for (const TestedMember& member : family) {
-    const Candidate& candidate = stage.fit.candidates[member.index];
+    const Candidate& candidate = candidates[member.index];
     if (member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
     const EffectId& id = candidate.id;
-    const Score confirmed = jackknife_test(stage.system, member.columns);
+    const Score confirmed = jackknife_test(system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;
-    out.push_back({member, id, held_out_instants(stage.system, member.columns).whitened});
+    out.push_back({member, id, held_out_instants(system, member.columns).whitened});
   }
   const std::vector<Contender> all = out;
   std::erase_if(out, [&](const Contender& contender) {
-    const Candidate& candidate = stage.fit.candidates[contender.member.index];
+    const Candidate& candidate = candidates[contender.member.index];
     return std::ranges::any_of(
         all, [&](const Contender& other) { return refines(candidate, other.id); });
   });

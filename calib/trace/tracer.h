@@ -66,8 +66,16 @@ class Tracer {
   [[nodiscard]] bool is_large(const Candidate& candidate, const Score& score) const;
   /// Seen at all, large enough, possible, and not taken out before; significance apart.
   [[nodiscard]] bool may_be_added(const Candidate& candidate, const Score& score) const;
-  [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
+  /// Of a family of the system, those that are shown for certain.
+  [[nodiscard]] std::vector<Contender> contenders(const NormalSystem& system,
+                                                  const std::vector<Candidate>& candidates,
                                                   const std::vector<TestedMember>& family) const;
+  [[nodiscard]] std::vector<Contender> contenders(const Stage& stage,
+                                                  const std::vector<TestedMember>& family) const {
+    return contenders(stage.system, stage.fit.candidates, family);
+  }
+  /// To first order, beside the hint: no refit.
+  [[nodiscard]] bool shows_another(const Stage& stage, const TestedMember& hint) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
   [[nodiscard]] bool is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family);
