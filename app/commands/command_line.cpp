@@ -9,6 +9,7 @@
 
 #include "app/commands/command_options.h"
 #include "app/commands/experiment_command_line.h"
+#include "app/commands/export_command_line.h"
 #include "app/commands/policy_command_line.h"
 #include "app/commands/simulation_command_line.h"
 #include "app/commands/torque_command_line.h"

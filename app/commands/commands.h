@@ -21,6 +21,7 @@
 #include "dynamics/models/torque_model.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/progress.h"
+#include "kinematics/model/denavit_hartenberg.h"
 
 namespace kinescope {
 
@@ -159,11 +160,18 @@ struct ControlOptions {
 
 [[nodiscard]] ExitCode control_command(const ControlOptions& options, const Console& console);
 
+/// What is written is what is named; at least one.
 struct ExportOptions {
   std::filesystem::path source;                 ///< folder of run or dynamics, or a URDF
   std::filesystem::path mjcf;                   ///< file for MuJoCo
   std::optional<Eigen::Vector3d> gravity_m_s2;  ///< in the base frame; default: the folder's
-  bool force = false;                           ///< replace a file that is there
+  std::filesystem::path tum;                    ///< folder of trajectories, of a run
+  bool tum_in_camera = false;                   ///< in the camera's frame; else in the base's
+  std::filesystem::path dh;                     ///< Denavit-Hartenberg table, of a run or a URDF
+  DhConvention dh_convention = DhConvention::kModified;
+  std::filesystem::path mcap;  ///< recording for viewers, of a run
+  std::string tip;             ///< link that its chain ends at; empty: all chains
+  bool force = false;          ///< replace a file that is there
 };
 
 [[nodiscard]] ExitCode export_command(const ExportOptions& options, const Console& console);

@@ -1,146 +1,84 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `kinescope export`: the robot for other programs.
+// `kinescope export`: a robot, or what a run saw of it, for other programs.
 #include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "app/commands/commands.h"
+#include "app/commands/export_form.h"
 #include "app/commands/output_folder.h"
-#include "app/io/torque_effects_file.h"
-#include "app/report/result_values.h"
 #include "kinematics/core/file.h"
-#include "kinematics/urdf/dynamic_urdf.h"
-#include "kinematics/urdf/mjcf.h"
 
 namespace kinescope {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// What is exported, and which files say so.
-struct Exported {
-  fs::path urdf;
-  DynamicModel model;
-  MjcfOptions mjcf;
-  std::vector<fs::path> inputs;
-  std::vector<std::string> left_out;  ///< effects that MJCF has no element for
-};
-
-/// The trace of torques of a folder of `dynamics` or `run`; none where there is none.
-std::optional<fs::path> trace_of(const fs::path& folder) {
-  for (const char* name : {"dynamics_trace.json", "trace.json"}) {
-    fs::path path = folder / name;
-    if (!fs::exists(path)) continue;
-    const auto document = nlohmann::json::parse(read_text_file(path), nullptr, false);
-    if (document.is_object() && document.contains("base")) return path;
-  }
-  return std::nullopt;
+std::vector<ExportForm> forms_of(const ExportOptions& options) {
+  std::vector<ExportForm> out;
+  if (!options.mjcf.empty()) out.push_back(export_mjcf(options));
+  if (!options.tum.empty()) out.push_back(export_tum(options));
+  if (!options.dh.empty()) out.push_back(export_dh(options));
+  if (!options.mcap.empty()) out.push_back(export_mcap(options));
+  if (!out.empty()) return out;
+  throw bad_request("export", "nothing is named that is to be written",
+                    "name it with --mjcf, --tum, --dh or --mcap");
 }
 
-/// robot_traced.urdf where its masses are those that the torques were traced on.
-fs::path urdf_of(const fs::path& folder, bool traced) {
-  const std::vector<const char*> names =
-      traced ? std::vector{"robot_traced.urdf", "robot_dynamics.urdf", "robot.urdf"}
-             : std::vector{"robot_dynamics.urdf", "robot.urdf"};
-  for (const char* name : names) {
-    if (fs::exists(folder / name)) return folder / name;
-  }
-  throw bad_input(folder.string(), "holds no robot_dynamics.urdf and no robot.urdf",
-                  "give the folder of kinescope run or dynamics, or a URDF");
-}
-
-void put_spring(const TorqueEffect& effect, MjcfOptions& mjcf) {
-  const auto value = [&effect](const char* name) {
-    const auto found = std::ranges::find(effect.parameters, name, &EffectParameter::name);
-    return found == effect.parameters.end() ? 0.0
-                                            : effect.values[found - effect.parameters.begin()];
-  };
-  const double stiffness = value("stiffness");
-  if (stiffness == 0.0) return;
-  mjcf.springs[effect.id.place] = {stiffness, -value("torque_at_zero") / stiffness};
-}
-
-/// Gravity as the folder's dynamics.json has it.
-void read_gravity(const fs::path& folder, DynamicModel& model, std::vector<fs::path>& inputs) {
-  const fs::path path = folder / "dynamics.json";
-  if (!fs::exists(path)) return;
-  const auto document = nlohmann::json::parse(read_text_file(path), nullptr, false);
-  if (!document.is_object()) throw bad_input(path.string(), "is no JSON", "run dynamics again");
-  inputs.push_back(path);
-  for (const char* key : {"gravity_m_s2", "traced_gravity_m_s2"}) {
-    const auto found = document.find(key);
-    if (found == document.end() || !found->is_array() || found->size() != 3) continue;
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!(*found)[k].is_number())
-        throw bad_input(path.string(), "a gravity that is no number", "run dynamics again");
-      model.gravity_m_s2[static_cast<Eigen::Index>(k)] = (*found)[k].get<double>();
+// One file under two options would be what was written last.
+void require_different_files(const std::vector<ExportForm>& forms) {
+  std::vector<std::filesystem::path> named;
+  for (const ExportForm& form : forms) {
+    if (!form.folder.empty()) continue;
+    for (const ExportedFile& file : form.files) {
+      const auto same = [&](const auto& other) { return same_place(file.path, other); };
+      if (std::ranges::any_of(named, same))
+        throw bad_request(file.path.string(), "is named twice", "name different files");
+      named.push_back(file.path);
     }
   }
 }
 
-Exported from_folder(const fs::path& folder) {
-  Exported out;
-  const std::optional<fs::path> trace = trace_of(folder);
-  ListedEffects listed;
-  if (trace) {
-    listed = read_listed_effects(*trace);
-    out.inputs.push_back(*trace);
-  }
-  const bool traced = trace && !listed.identified_masses;
-  out.urdf = urdf_of(folder, traced);
-  out.model = read_dynamic_urdf(out.urdf);
-  read_gravity(folder, out.model, out.inputs);
-  for (const ListedEffect& entry : listed.effects) {
-    const TorqueEffect& effect = entry.effect;
-    const bool in_model = entry.in_urdf || effect.id.effect == "gravity_direction";
-    if (effect.id.effect == "spring") {
-      put_spring(effect, out.mjcf);
-    } else if (!in_model) {
-      out.left_out.push_back(fmt::format("{} at {}", effect.id.effect, effect.id.place));
-    }
-  }
-  return out;
+OutputFolder folder_of(const ExportForm& form, bool force) {
+  Writer writer{.command = "export", .products = {}, .inputs = form.inputs, .force = force};
+  for (const ExportedFile& file : form.files) writer.products.push_back(file.path.string());
+  return {form.folder, std::move(writer)};
 }
 
-Exported what_to_export(const ExportOptions& options) {
-  Exported out;
-  if (fs::is_directory(options.source)) {
-    out = from_folder(options.source);
-  } else {
-    out.urdf = options.source;
-    out.model = read_dynamic_urdf(options.source);
+// What an earlier export wrote there goes with it.
+void write_into(const OutputFolder& folder, const ExportForm& form) {
+  for (const std::string& earlier : folder.own_products()) {
+    const std::filesystem::path path = earlier;
+    if (std::ranges::find(form.files, path, &ExportedFile::path) == form.files.end())
+      folder.remove(earlier);
   }
-  out.inputs.push_back(out.urdf);
-  if (options.gravity_m_s2) out.model.gravity_m_s2 = *options.gravity_m_s2;
-  out.mjcf.notes.push_back(fmt::format("Written by Kinescope {} from {}. SI units.",
-                                       program_version(), out.urdf.filename().string()));
-  for (const std::string& effect : out.left_out) {
-    out.mjcf.notes.push_back("Traced, but MuJoCo has no element for it: " + effect);
-  }
-  return out;
+  for (const ExportedFile& file : form.files) folder.write(file.path.string(), file.bytes);
 }
 
 }  // namespace
 
 ExitCode export_command(const ExportOptions& options, const Console& console) {
-  const Exported exported = what_to_export(options);
-  require_new_file(options.mjcf, "--mjcf", exported.inputs, options.force);
-  write_file_atomically(options.mjcf, write_mjcf(exported.model, exported.mjcf));
-  const std::size_t joints = moving_joints(exported.model.tree).size();
+  const std::vector<ExportForm> forms = forms_of(options);
+  require_different_files(forms);
+  std::vector<std::optional<OutputFolder>> folders;
+  for (const ExportForm& form : forms) {
+    folders.emplace_back();
+    if (!form.folder.empty()) folders.back() = folder_of(form, options.force);
+  }
+  nlohmann::json result = nlohmann::json::object();
+  for (std::size_t k = 0; k < forms.size(); ++k) {
+    const ExportForm& form = forms[k];
+    if (folders[k]) write_into(*folders[k], form);
+    if (!folders[k])
+      for (const ExportedFile& file : form.files) write_file_atomically(file.path, file.bytes);
+    result.update(form.result);
+    for (const std::string& warning : form.warnings) console.warn(warning);
+  }
   if (console.json) {
-    console.print({{"urdf", report::text(exported.urdf.string())},
-                   {"mjcf", report::text(options.mjcf.string())},
-                   {"joints", joints},
-                   {"left_out", report::texts(exported.left_out)}});
+    console.print(result);
     return ExitCode::kDone;
   }
-  for (const std::string& effect : exported.left_out) {
-    console.warn(fmt::format("{} is left out: MuJoCo has no element for it", effect));
-  }
-  fmt::print("{} joints of {}\nmjcf    {}\n", joints, exported.urdf.string(),
-             options.mjcf.string());
+  for (const ExportForm& form : forms)
+    for (const std::string& line : form.lines) fmt::print("{}\n", line);
   return ExitCode::kDone;
 }
 

@@ -265,9 +265,9 @@ std::string settle_undeclared(const Observed& observed, const PoseTracks& tracks
 // Mean of what the base's markers, or where none is seen the best known of the others, say.
 std::vector<Pose> path_beside(const CalibrationStart& start, const PoseTracks& tracks,
                               const Eigen::MatrixXd& values) {
-  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   Pose unknown;
-  unknown.translation.setConstant(kUnknown);
+  unknown.translation.setConstant(kNotKnown);
   std::vector<Pose> out(tracks.times_s.size(), unknown);
   std::vector<double> least(out.size(), std::numeric_limits<double>::infinity());
   for (const PoseTrack& track : tracks.tracks) {

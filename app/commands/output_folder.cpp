@@ -130,11 +130,11 @@ void require_own(const fs::path& folder, const Writer& writer) {
 std::string program_version() { return KINESCOPE_VERSION; }
 
 std::vector<std::string> run_products(bool torques) {
-  std::vector<std::string> out{"report.html",      "result.json",       "robot.urdf",
-                               "structure.json",   "calibration.json",  "trace.json",
-                               "observations.csv", "observations.json", "tracks.csv",
-                               "residuals.csv",    "run.json",          "failed_report.html",
-                               "hand_eye.json",    "hand_eye.urdf",     "camera_path.csv"};
+  std::vector<std::string> out{
+      "report.html",      "result.json",   "robot.urdf",       "structure.json",
+      "calibration.json", "trace.json",    "observations.csv", "observations.json",
+      "tracks.csv",       "residuals.csv", "run.json",         "failed_report.html",
+      "hand_eye.json",    "hand_eye.urdf", "camera_path.csv",  "joint_values.csv"};
   if (!torques) return out;
   append(out, dynamics_products("dynamics_trace.json"));
   append(out, contact_products());

@@ -24,6 +24,7 @@
 #include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
 #include "app/io/effects_file.h"
+#include "app/io/joint_values_file.h"
 #include "app/io/products.h"
 #include "app/report/answer.h"
 #include "app/report/recordings_json.h"
@@ -128,6 +129,7 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   if (run.gravity_base) calibration["gravity_base"] = *run.gravity_base;
   if (run.calibration.moving && !run.calibration.moving->on_robot())
     folder.write("camera_path.csv", camera_path_csv(run.calibration));
+  folder.write("joint_values.csv", joint_values_csv(run.calibration));
   if (!run.log.unit_factors.empty()) calibration["unit_factors"] = run.log.unit_factors;
   folder.write("calibration.json", calibration.dump(1) + "\n");
   folder.write("residuals.csv", residuals_csv(run.calibration));

@@ -247,23 +247,4 @@ void add_simulate(CLI::App& app, CommandLine& line) {
       kExitCodes));
 }
 
-void add_export(CLI::App& app, CommandLine& line) {
-  CLI::App& command =
-      *app.add_subcommand("export", "The learned robot with its masses and friction for MuJoCo");
-  ExportOptions& exported = line.exported;
-  add_file(command, "SOURCE", exported.source,
-           "Folder of kinescope run or dynamics, or a URDF with masses")
-      ->required();
-  add_file(command, "--mjcf", exported.mjcf,
-           "Model for MuJoCo: masses, damping, frictionloss, armature, ranges, a motor a joint")
-      ->required();
-  add_gravity(command, exported.gravity_m_s2);
-  add_force(command, exported.force, kReplaceFile);
-  add_output_options(command, line.output);
-  command.footer(
-      fmt::format("Example:\n  kinescope dynamics log.csv --robot robot.urdf\n"
-                  "  kinescope export log_dynamics --mjcf robot.xml\n\n{}",
-                  kExitCodes));
-}
-
 }  // namespace kinescope

@@ -92,7 +92,7 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       *app.add_subcommand("dynamics", "From a log with torques and a URDF to a torque model");
   DynamicsOptions& dynamics = line.dynamics;
   add_files(command, "LOG", dynamics.logs,
-            "Joint logs with torques: CSV, also gzipped, bags, datasets", true);
+            "Joint logs with torques: CSV, also gzipped, MAT-files, bags, datasets", true);
   add_robot(command, dynamics.robot);
   add_files(command, "--test", dynamics.test_logs,
             "Logs to judge on (default: the last part of the log)", false);
@@ -179,7 +179,7 @@ void add_predict(CLI::App& app, CommandLine& line) {
       "predict", "From a log and a learned torque model to predicted torques, bands and residuals");
   PredictOptions& predict = line.predict;
   add_files(command, "LOG", predict.logs,
-            "Joint logs with torques: CSV, also gzipped, bags, datasets", true);
+            "Joint logs with torques: CSV, also gzipped, MAT-files, bags, datasets", true);
   command
       .add_option_function<std::string>(
           "--model", [&predict](const std::string& text) { predict.model = text; },
@@ -205,7 +205,7 @@ void add_contact(CLI::App& app, CommandLine& line) {
       *app.add_subcommand("contact", "From a log with torques and a robot to the contacts in it");
   ContactCommandOptions& contact = line.contact;
   add_files(command, "LOG", contact.logs,
-            "Joint logs with torques: CSV, also gzipped, bags, datasets", true);
+            "Joint logs with torques: CSV, also gzipped, MAT-files, bags, datasets", true);
   add_robot(command, contact.robot);
   add_files(command, "--learn", contact.learn_logs,
             "Logs of free motion to learn from beside the log itself (default: none)", false);

@@ -219,6 +219,7 @@ Calibration calibration_of(const json& document) {
   out.T_camera_base = stored_pose(document.at("T_camera_base"), "T_camera_base");
   if (document.contains("camera_motion")) take_motion(document.at("camera_motion"), out);
   take_camera(document.at("camera"), out);
+  out.camera_name = document.value("camera_name", "");
   out.time_offset_s = stored_number(document.at("time_offset_s"), "time_offset_s");
   out.time_offset_sigma_s = stored_sigma(document.at("time_offset_sigma_s"), "time_offset_sigma_s");
   out.gauge = document.at("gauge").get<std::string>();

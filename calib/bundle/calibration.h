@@ -126,7 +126,10 @@ struct Calibration {
   double time_offset_s = 0.0;  ///< joint-log time = frame time + offset
   Sigma time_offset_sigma_s;
   Eigen::MatrixXd joint_values;  ///< frames x joints, rad or m; NaN where the log has a gap
-  std::vector<double> times_s;   ///< of the frames
+  /// The same with what corrections turn or shift each joint by along its own axis: where the robot
+  /// stood. What else they do to it (an axis that wobbles) no joint value can say.
+  Eigen::MatrixXd corrected_values;
+  std::vector<double> times_s;  ///< of the frames
 
   std::vector<JointEstimate> joints;    ///< beside tree.joints
   std::vector<MarkerEstimate> markers;  ///< beside tree.markers

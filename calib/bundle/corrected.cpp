@@ -22,11 +22,6 @@ double share_at(const Correction& correction, int frame) {
   return correction.share.size() == 0 ? 1.0 : correction.share[frame];
 }
 
-Vector6d twist_at(const Correction& correction, int frame) {
-  if (correction.twists.rows() > 0) return correction.twists.row(frame).transpose();
-  return share_at(correction, frame) * correction.direction;
-}
-
 CameraModel changed(CameraModel camera, const std::array<double, kMaxIntrinsics>& by) {
   camera.fx += by[0];
   camera.fy += by[1];
@@ -127,6 +122,11 @@ double rows_from_middle(const Spec& spec, const Sighting& sighting, std::size_t 
 }
 
 }  // namespace
+
+Vector6d twist_at(const Correction& correction, int frame) {
+  if (correction.twists.rows() > 0) return correction.twists.row(frame).transpose();
+  return share_at(correction, frame) * correction.direction;
+}
 
 std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
   const std::vector<int>& path = path_of(spec, sighting);

@@ -23,6 +23,9 @@ struct CorrectionBlock {
 [[nodiscard]] std::vector<CorrectionBlock> correction_blocks_of(const Spec& spec,
                                                                 const Sighting& sighting);
 
+/// Rotation, then translation, of a correction whose value is 1, in a frame.
+[[nodiscard]] Vector6d twist_at(const Correction& correction, int frame);
+
 struct CorrectedSighting {
   Vector6d camera = Vector6d::Zero();
   std::vector<Vector6d> joints;  ///< beside the path

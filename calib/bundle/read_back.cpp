@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "calib/bundle/axis_uncertainty.h"
+#include "calib/bundle/corrected.h"
 #include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
 
@@ -68,6 +69,20 @@ void fill_joint_values(const Spec& spec, const State& state, const Readings& rea
                     : kUnknown;
       }
       out.joint_values(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(j)) = value;
+    }
+  }
+}
+
+void fill_corrected_values(const Spec& spec, const State& state, Calibration& out) {
+  out.corrected_values = out.joint_values;
+  for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
+    const Correction& correction = spec.corrections[c];
+    if (correction.part != CorrectedPart::kJoint) continue;
+    const Joint& joint = spec.tree.joints[static_cast<std::size_t>(correction.index)];
+    for (Eigen::Index f = 0; f < out.corrected_values.rows(); ++f) {
+      const Vector6d twist = state.corrections[c] * twist_at(correction, static_cast<int>(f));
+      out.corrected_values(f, correction.index) +=
+          joint.axis.dot(joint.type == JointType::kRevolute ? twist.head<3>() : twist.tail<3>());
     }
   }
 }
@@ -254,6 +269,7 @@ void read_back(const Spec& spec, const State& state, const RobustSolution& robus
   out.observability = uncertainty.observability;
   out.correlation_time_s = uncertainty.correlation_time_s;
   fill_joint_values(spec, state, readings, out);
+  fill_corrected_values(spec, state, out);
   fill_tree(spec, state, robust, out);
   fill_joints(spec, state, uncertainty, out);
   fill_markers(spec, state, robust, uncertainty, out);

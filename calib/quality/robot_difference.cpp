@@ -2,7 +2,6 @@
 #include "calib/quality/robot_difference.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -10,15 +9,11 @@
 
 #include <fmt/format.h>
 
+#include "calib/quality/robot_parameters.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {
-
-// Of central differences, in the parameter's unit (rad, m, rad per unit: relative to the scale).
-constexpr double kParameterStep = 1e-6;
-// Of derivatives by the parameters: rounding.
-constexpr double kNoInfluence = 1e-7;
 
 std::vector<int> moving_joints(const KinematicTree& tree) {
   std::vector<int> out;
@@ -120,51 +115,13 @@ Model model_of(const Calibration& run) {
   return out;
 }
 
-// Which of (rx ry rz tx ty tz), by the words that the bundle has for them; -1: none.
-int component_of(std::string_view words) {
-  static constexpr std::array<std::string_view, 6> kWords{"turn x",  "turn y",  "turn z",
-                                                          "shift x", "shift y", "shift z"};
-  const auto found = std::ranges::find(kWords, words);
-  return found == kWords.end() ? -1 : static_cast<int>(found - kWords.begin());
-}
-
-// Moves what a parameter of the joint moves. False: nothing of the robot.
-bool move_joint(Joint& joint, const Parameter& parameter, double parameters_at, double step) {
-  if (parameter.block != joint.name || !parameter.name.starts_with(joint.name + " ")) return false;
-  const std::string_view words = std::string_view(parameter.name).substr(joint.name.size() + 1);
-  if (words == "scale") {
-    joint.scale += step;
-    return true;
-  }
-  Pose moved = joint_motion(joint.type, joint.axis, step);  // "offset"
-  if (const int component = component_of(words); component >= 0) {
-    const Pose there = joint_motion(joint.type, joint.axis, parameters_at);
-    moved = there * exp_pose(step * Vector6d::Unit(component)) * there.inverse();
-  } else if (words != "offset") {
-    return false;
-  }
-  joint.T_parent_joint = joint.T_parent_joint * moved;
-  return true;
-}
-
-// Steps of scales are relative: their units are whatever a channel counts in.
-double step_of(const KinematicTree& tree, const Parameter& parameter) {
-  for (const Joint& joint : tree.joints)
-    if (parameter.block == joint.name && parameter.name == joint.name + " scale")
-      return kParameterStep * std::abs(joint.scale);
-  return kParameterStep;
-}
-
 bool move_model(Model& model, const Calibration& run, const Parameter& parameter, double step) {
   for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
-    Joint& joint = model.tree.joints[j];
-    if (is_encoder_scale(parameter, joint)) {
-      model.stretch[static_cast<Eigen::Index>(j)] += step;
-      return true;
-    }
-    if (move_joint(joint, parameter, run.joints[j].parameters_at, step)) return true;
+    if (!is_encoder_scale(parameter, model.tree.joints[j])) continue;
+    model.stretch[static_cast<Eigen::Index>(j)] += step;
+    return true;
   }
-  return false;
+  return move_robot(model.tree, run, parameter, step);
 }
 
 // The axes in the order of the layout, at its readings; each points to where its channel grows.
@@ -214,7 +171,7 @@ Eigen::MatrixXd jacobian_of(const RobotLayout& layout, const Calibration& run,
   Eigen::MatrixXd out =
       Eigen::MatrixXd::Zero(std::ssize(layout.quantities), std::ssize(run.parameters));
   for (std::size_t p = 0; p < run.parameters.size(); ++p) {
-    const double step = step_of(run.tree, run.parameters[p]);
+    const double step = parameter_step(run.tree, run.parameters[p]);
     const auto moved = [&](double by) -> Eigen::VectorXd {
       Model other = model;
       if (!move_model(other, run, run.parameters[p], by)) return {};
@@ -230,17 +187,6 @@ Eigen::MatrixXd jacobian_of(const RobotLayout& layout, const Calibration& run,
     }
   }
   return out;
-}
-
-NumberState state_of(const Eigen::MatrixXd& jacobian, Eigen::Index row, const Calibration& run) {
-  bool any = false;
-  for (std::size_t p = 0; p < run.parameters.size(); ++p) {
-    const double unit = step_of(run.tree, run.parameters[p]) / kParameterStep;
-    if (std::abs(jacobian(row, static_cast<Eigen::Index>(p))) * unit < kNoInfluence) continue;
-    if (!run.parameters[p].sigma) return NumberState::kUndetermined;
-    any = true;
-  }
-  return any ? NumberState::kEstimated : NumberState::kHeld;
 }
 
 std::string quantity_words(AxisQuantityKind kind, const Joint& axis, const Joint& next) {
@@ -452,7 +398,7 @@ RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
     return !joint_at(run.tree, match.joint_of[static_cast<std::size_t>(first)]).channel.empty();
   };
   for (Eigen::Index i = 0; i < out.values.size(); ++i) {
-    NumberState state = state_of(J, i, run);
+    NumberState state = number_state(J.row(i), run);
     const auto at = static_cast<std::size_t>(i);
     if (i < n && !(has_channel(layout.axes.quantities[at].axis) &&
                    has_channel(layout.axes.quantities[at].next)))

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "calib/bundle/calibration.h"
+#include "calib/quality/robot_parameters.h"
 #include "kinematics/model/axis_geometry.h"
 
 namespace kinescope {
@@ -31,14 +32,6 @@ struct RobotMatch {
 /// same place in the tree. Empty `joint_of` where the two are not one robot: neither the channels
 /// nor the types of the joints agree.
 [[nodiscard]] RobotMatch match_robots(const KinematicTree& first, const KinematicTree& other);
-
-/// Whether a number was estimated, and if not why.
-enum class NumberState {
-  kEstimated,
-  kHeld,          ///< as declared
-  kUndetermined,  ///< the recording does not show it
-  kNoChannel      ///< of a joint that no channel drives: nothing says where it stood
-};
 
 struct RobotQuantity {
   std::string name;   ///< "distance joint2 - joint3", in words

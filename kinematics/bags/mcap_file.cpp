@@ -3,48 +3,31 @@
 #include <map>
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include "kinematics/bags/chunked_file.h"
+#include "kinematics/bags/mcap_format.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::bags {
 namespace {
 
-constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
-
-/// Opcodes of https://mcap.dev/spec; those that are not named here are passed over.
-enum class Record : std::uint8_t {
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kDataEnd = 0x0F
-};
-
-bool is_read(Record kind) {
-  return kind == Record::kSchema || kind == Record::kChannel || kind == Record::kMessage ||
-         kind == Record::kChunk;
-}
-
-std::uint32_t checksum(std::string_view bytes) {
-  const auto* data = reinterpret_cast<const Bytef*>(bytes.data());  // NOLINT(*-reinterpret-cast)
-  return static_cast<std::uint32_t>(crc32_z(0, data, bytes.size()));
+bool is_read(McapRecord kind) {
+  return kind == McapRecord::kSchema || kind == McapRecord::kChannel ||
+         kind == McapRecord::kMessage || kind == McapRecord::kChunk;
 }
 
 class McapFile final : public ChunkedFile {
  public:
   explicit McapFile(const NamedFile& file) : ChunkedFile(file) {
-    if (!begins_with(kMagic))
+    if (!begins_with(kMcapMagic))
       throw bad_input(file_.name(), "is no MCAP file", "check what it is, or copy it again");
   }
 
  private:
   std::optional<Message> next_of_chunk(ByteReader& records) override {
-    const auto kind = static_cast<Record>(records.u8());
+    const auto kind = static_cast<McapRecord>(records.u8());
     const std::string_view content = records.take(records.u64());
-    return kind == Record::kChunk ? std::nullopt : read(kind, content);
+    return kind == McapRecord::kChunk ? std::nullopt : read(kind, content);
   }
 
   std::optional<Message> next_of_file() override {
@@ -57,9 +40,9 @@ class McapFile final : public ChunkedFile {
     try {
       const std::string head = file_.read(9);
       ByteReader reader(head);
-      const auto kind = static_cast<Record>(reader.u8());
+      const auto kind = static_cast<McapRecord>(reader.u8());
       const std::uint64_t size = reader.u64();
-      if (kind == Record::kDataEnd || kind == Record::kFooter) {
+      if (kind == McapRecord::kDataEnd || kind == McapRecord::kFooter) {
         end();
         return std::nullopt;
       }
@@ -68,11 +51,11 @@ class McapFile final : public ChunkedFile {
         return std::nullopt;
       }
       const bool cut = size > file_.left();
-      if (cut && kind != Record::kChunk) throw CutOff{};
+      if (cut && kind != McapRecord::kChunk) throw CutOff{};
       record_ = file_.read(cut ? file_.left() : size);
       if (cut) finished_ = true;
       doubtful_ = false;
-      if (kind != Record::kChunk) return read(kind, record_);
+      if (kind != McapRecord::kChunk) return read(kind, record_);
       read_chunk(start, cut);
     } catch (const CutOff&) {
       end();
@@ -82,19 +65,19 @@ class McapFile final : public ChunkedFile {
   }
 
   /// A schema, a channel or a message.
-  std::optional<Message> read(Record kind, std::string_view content) {
+  std::optional<Message> read(McapRecord kind, std::string_view content) {
     ByteReader reader(content);
-    if (kind == Record::kSchema) {
+    if (kind == McapRecord::kSchema) {
       const std::uint16_t id = reader.u16();
       schemas_.try_emplace(id, reader.string());
-    } else if (kind == Record::kChannel) {
+    } else if (kind == McapRecord::kChannel) {
       const std::uint16_t id = reader.u16();
       const auto schema = schemas_.find(reader.u16());
       const std::string name(reader.string());
       const std::string encoding(reader.string());
       const std::string type = schema == schemas_.end() ? "" : plain_type(schema->second);
       table_.add(id, {name, type, encoding, encoding_of(encoding)});
-    } else if (kind == Record::kMessage && !doubtful_) {
+    } else if (kind == McapRecord::kMessage && !doubtful_) {
       const auto topic = table_.index_of(reader.u16());
       static_cast<void>(reader.u32());  // its number in the channel
       const auto received_ns = static_cast<std::int64_t>(reader.u64());
@@ -118,7 +101,7 @@ class McapFile final : public ChunkedFile {
         reader.take(std::min<std::uint64_t>(packed_size, reader.size()));
     const bool whole = open_chunk(packing, packed, size, start, cut,
                                   "zstd, lz4 and none are read: mcap compress --compression zstd");
-    doubtful_ = whole && crc != 0 && checksum(chunk()) != crc;
+    doubtful_ = whole && crc != 0 && mcap_checksum(chunk()) != crc;
     if (doubtful_ && !cut)
       warn(fmt::format("the chunk at byte {} is damaged (checksum) and left out", start));
   }

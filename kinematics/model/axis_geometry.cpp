@@ -6,16 +6,11 @@
 #include <numbers>
 
 #include "kinematics/core/error.h"
+#include "kinematics/model/common_normal.h"
 
 namespace kinescope {
 namespace {
 
-// Sine of the angle below which axes count as parallel. Robots are drawn with 0 or 30 degrees and
-// more; both descriptions hold in between (axis_geometry_test compares them at 10 and at 20).
-constexpr double kParallel = 0.25;
-// Parallel axes nearer than this have no direction from one to the other that a calibration, exact
-// to tenths of a millimetre, could say to a tenth of a radian.
-constexpr double kOneLine_m = 5e-3;
 // Of the numbers that only say where the start was put: they follow it one to one.
 constexpr double kFollowsStart = 0.5;
 // Of central differences, rad and m: rounding and curvature both leave 1e-9.
@@ -26,37 +21,12 @@ struct AxisFrame {
   Eigen::Vector3d origin, x, z;
 };
 
-struct Feet {
-  double along_first = 0.0;   // from the origin
-  double along_second = 0.0;  // from the point
-};
-
-// Of the common normal of the line through `origin` along z and an axis that is not parallel.
-Feet feet(const Eigen::Vector3d& origin, const Eigen::Vector3d& z, const PlacedAxis& axis) {
-  const Eigen::Vector3d across = z.cross(axis.direction);
-  const Eigen::Vector3d between = axis.point - origin;
-  const double square = across.squaredNorm();
-  return {between.cross(axis.direction).dot(across) / square,
-          between.cross(z).dot(across) / square};
-}
-
-double angle_about(const Eigen::Vector3d& z, const Eigen::Vector3d& from,
-                   const Eigen::Vector3d& to) {
-  return std::atan2(z.dot(from.cross(to)), from.dot(to));
-}
-
 Eigen::Vector3d across(const Eigen::Vector3d& v, const Eigen::Vector3d& direction) {
   return (v - direction * direction.dot(v)).normalized();
 }
 
-bool is_parallel(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return a.cross(b).norm() < kParallel;
-}
-
-// From where the axis meets the plane across z through the origin.
 Eigen::Vector3d in_plane(const AxisFrame& frame, const PlacedAxis& axis) {
-  const double along = frame.z.dot(frame.origin - axis.point) / frame.z.dot(axis.direction);
-  return axis.point + along * axis.direction - frame.origin;
+  return in_plane_across(frame.origin, frame.z, axis);
 }
 
 // Walks from axis to axis and gathers what lies between them.
@@ -108,7 +78,7 @@ class Walk {
     add(AxisQuantityKind::kTwist, std::atan2(across_both.norm(), frame.z.dot(axis.direction)));
     AxisFrame next{frame.origin, n, axis.direction};
     if (axis.type == JointType::kRevolute) {
-      const Feet at = feet(frame.origin, frame.z, axis);
+      const NormalFeet at = normal_feet(frame.origin, frame.z, axis);
       add(AxisQuantityKind::kOffset, at.along_first);
       add(AxisQuantityKind::kDistance, n.dot(axis.point - frame.origin));
       next.origin = axis.point + at.along_second * axis.direction;
@@ -165,8 +135,8 @@ AxisFrame start_frame(const AxisLayout& layout, std::span<const PlacedAxis> axes
     const PlacedAxis& line = axes[static_cast<std::size_t>(layout.first_line)];
     out.origin = line.point;
     if (layout.foot_towards >= 0) {
-      const Feet at =
-          feet(line.point, line.direction, axes[static_cast<std::size_t>(layout.foot_towards)]);
+      const NormalFeet at = normal_feet(line.point, line.direction,
+                                        axes[static_cast<std::size_t>(layout.foot_towards)]);
       out.origin += at.along_first * line.direction;
     }
   }
@@ -183,11 +153,11 @@ void choose_start(std::span<const PlacedAxis> axes, AxisLayout& layout) {
     if (!turns(k)) continue;
     if (layout.first_line < 0) layout.first_line = static_cast<int>(k);
     const PlacedAxis& line = axes[static_cast<std::size_t>(layout.first_line)];
-    if (layout.foot_towards < 0 && !is_parallel(line.direction, axes[k].direction))
+    if (layout.foot_towards < 0 && !is_nearly_parallel(line.direction, axes[k].direction))
       layout.foot_towards = static_cast<int>(k);
   }
   for (std::size_t k = 1; k < axes.size() && layout.turn_towards < 0; ++k) {
-    if (!is_parallel(axes.front().direction, axes[k].direction))
+    if (!is_nearly_parallel(axes.front().direction, axes[k].direction))
       layout.turn_towards = static_cast<int>(k);
   }
   if (layout.turn_towards >= 0) return;
@@ -206,7 +176,7 @@ void choose_steps(std::span<const PlacedAxis> axes, AxisLayout& layout) {
     walk.start(start_frame(layout, axes));
     const AxisFrame& frame = walk.before(k);
     const bool has_place = axes[k].type == JointType::kRevolute;
-    layout.steps[k] = !is_parallel(frame.z, axes[k].direction) ? AxisStep::kNormal
+    layout.steps[k] = !is_nearly_parallel(frame.z, axes[k].direction) ? AxisStep::kNormal
                       : has_place && in_plane(frame, axes[k]).norm() >= kOneLine_m
                           ? AxisStep::kParallel
                           : AxisStep::kCoaxial;

@@ -6,6 +6,7 @@
 #include "kinematics/bags/bag_log.h"
 #include "kinematics/datasets/dataset_log.h"
 #include "kinematics/log/joint_log_table.h"
+#include "kinematics/mat/mat_log.h"
 
 namespace kinescope::recorded {
 
@@ -18,6 +19,10 @@ LogTable read_log_table(const std::filesystem::path& path) {
     datasets::JointSignals signals = datasets::read_signals(*dataset);
     return {datasets::joint_table(signals), std::move(signals.warnings),
             datasets::joined_at_s(signals)};
+  }
+  if (mat::is_mat(path)) {
+    mat::LogTable read = mat::joint_table(path);
+    return {std::move(read.table), std::move(read.warnings), {}};
   }
   return {read_csv(path, RaggedRows::kSetAside), {}, {}};
 }
@@ -35,6 +40,7 @@ ChannelTable read_channel_table(const std::filesystem::path& path) {
   if (const auto bag = bags::bag_source(path)) return bags::channel_table(*bag);
   if (const auto dataset = datasets::dataset_source(path))
     return datasets::channel_table(datasets::read_signals(*dataset));
+  if (mat::is_mat(path)) return mat::channel_table(path);
   return kinescope::read_channel_table(path);
 }
 

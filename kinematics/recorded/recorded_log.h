@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a log's path: a table (CSV, also packed with gzip), a bag, a LeRobot dataset.
+// Takes   a log's path: a table (CSV, also packed with gzip), a MAT-file, a bag, a LeRobot dataset.
 // Gives   the log.
 // Units   t in s; values as recorded.
 #pragma once
@@ -17,12 +17,12 @@ namespace kinescope::recorded {
 
 /// The table of a joint log, and what was wrong with what it is from.
 struct LogTable {
-  CsvTable table;  ///< of a bag or dataset: lines the rows, from 1
+  CsvTable table;  ///< of a bag or dataset: or MAT-file: lines the rows, from 1
   std::vector<std::string> warnings;
   std::vector<double> joined_at_s;  ///< as JointLog's
 };
 
-/// Throws as read_csv(), bags::joint_table() and datasets::read_signals().
+/// Throws as read_csv(), mat::joint_table(), bags::joint_table() and datasets::read_signals().
 [[nodiscard]] LogTable read_log_table(const std::filesystem::path& path);
 /// As kinescope::read_joint_log(), also from a bag or dataset.
 [[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,

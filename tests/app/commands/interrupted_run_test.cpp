@@ -59,7 +59,7 @@ class InterruptedRun : public testing::Test {
 
   void expect_same_products(const fs::path& a, const fs::path& b) const {
     for (const char* name : {"robot.urdf", "structure.json", "calibration.json", "tracks.csv",
-                             "residuals.csv", "trace.json"}) {
+                             "residuals.csv", "joint_values.csv", "trace.json"}) {
       ASSERT_TRUE(fs::exists(a / name) && fs::exists(b / name)) << name;
       EXPECT_EQ(read_text_file(a / name), read_text_file(b / name)) << name;
     }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
+#include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/urdf.h"
 #include "tests/truth/moving_camera_world.h"
@@ -66,6 +69,26 @@ Ran ran_on(const MovingCameraWorld& world, const std::string& name, const std::s
   return out;
 }
 
+// Rows of camera_optical_frame.tum, of `kinescope export`.
+std::vector<std::vector<double>> exported_camera_path(const Ran& run) {
+  const fs::path folder = run.folder.string() + "_tum";
+  ExportOptions options;
+  options.source = run.folder;
+  options.tum = folder;
+  options.force = true;
+  EXPECT_EQ(export_command(options, Console{}), ExitCode::kDone);
+  std::vector<std::vector<double>> out;
+  std::ifstream file(folder / "camera_optical_frame.tum");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with('#')) continue;
+    std::istringstream words(line);
+    std::vector<double>& row = out.emplace_back();
+    for (double value = 0.0; words >> value;) row.push_back(value);
+    EXPECT_EQ(row.size(), 8U);
+  }
+  return out;
+}
+
 std::vector<std::string> joints_to(const KinematicTree& tree, const std::string& link) {
   std::vector<std::string> out;
   for (const JointId joint : tree.path_to(tree.link(link).value()))
@@ -85,6 +108,19 @@ TEST(MovingCameraRun, OnTheRobotIsFoundByTheOrderOfTheColumns) {
   const KinematicTree tree = parse_urdf(read_text_file(run.folder / "robot.urdf"), "robot.urdf");
   EXPECT_EQ(joints_to(tree, "camera_optical_frame"),
             (std::vector<std::string>{"q1", "q2", "q3", "camera_joint", "camera_optical_joint"}));
+  // Its path is that of the URDF's link.
+  const auto path = exported_camera_path(run);
+  const CsvTable values = read_csv(run.folder / "joint_values.csv");
+  ASSERT_EQ(path.size(), values.rows.size());
+  for (std::size_t row = 0; row < path.size(); row += 50) {
+    Eigen::VectorXd q = Eigen::VectorXd::Zero(std::ssize(tree.joints));
+    for (const char* joint : {"q1", "q2", "q3"})
+      q[tree.joint(joint).value().value] = values.number(row, values.require_column(joint));
+    const Pose expected =
+        forward_kinematics(tree, q)[tree.link("camera_optical_frame").value().index()];
+    for (Eigen::Index i = 0; i < 3; ++i)
+      EXPECT_NEAR(path[row][static_cast<std::size_t>(1 + i)], expected.translation[i], 1e-9);
+  }
 }
 
 TEST(MovingCameraRun, CarriedIsFoundOut) {
@@ -92,7 +128,11 @@ TEST(MovingCameraRun, CarriedIsFoundOut) {
   ASSERT_EQ(run.code, 0) << run.error;
   EXPECT_NE(run.found().find("A person carried the camera"), std::string::npos) << run.found();
   EXPECT_EQ(run.read("calibration.json").at("camera_motion").at("camera_mount"), "carried");
-  EXPECT_TRUE(fs::exists(run.folder / "camera_path.csv"));
+  const CsvTable stored = read_csv(run.folder / "camera_path.csv");
+  const auto path = exported_camera_path(run);
+  ASSERT_EQ(path.size(), stored.rows.size());
+  for (std::size_t column = 0; column < 4; ++column)
+    EXPECT_EQ(path[7][column], stored.number(7, column));
   const json calibration = run.read("calibration.json");
   std::vector<std::string> base;
   for (const json& marker : calibration.at("robot").at("markers"))

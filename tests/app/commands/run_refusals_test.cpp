@@ -181,9 +181,10 @@ TEST_F(RunRefusals, StaleProductsGo) {
       "run", folder_.path().string(), "--output", output(), "--quiet", "--no-trace"};
   ASSERT_EQ(run(words).code, 0);
   nlohmann::json earlier = nlohmann::json::parse(read_text_file(out / "run.json"));
-  EXPECT_EQ(earlier.at("products"),
-            nlohmann::json({"calibration.json", "report.html", "residuals.csv", "result.json",
-                            "robot.urdf", "run.json", "structure.json", "tracks.csv"}));
+  EXPECT_EQ(
+      earlier.at("products"),
+      nlohmann::json({"calibration.json", "joint_values.csv", "report.html", "residuals.csv",
+                      "result.json", "robot.urdf", "run.json", "structure.json", "tracks.csv"}));
   for (const char* name :
        {"trace.json", "dynamics.json", "failed_report.html", "../nominal.urdf", "notes.txt"}) {
     earlier["products"].push_back(name);

@@ -8,11 +8,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/io/check_products.h"
 #include "tests/app/io/recording_folder.h"
+#include "tests/kinematics/mat/mat_writer.h"
 #include "tests/truth/random_dynamics.h"
 
 namespace kinescope {
@@ -150,6 +152,39 @@ TEST_F(Simulate, AServoGivesTheLogOfARobotThatSticks) {
     EXPECT_GT(joint.at("tracking_error").get<double>(), 0.0);
     EXPECT_LT(joint.at("tracking_error").get<double>(), 0.05);
   }
+}
+
+// The commands that take torque logs read them alike.
+TEST_F(Simulate, ALogMayBeAMatFile) {
+  ASSERT_EQ(run(words({"--torque-noise", "0.1"})).code, 0);
+  const CsvTable table = read_csv(path("log.csv"));
+  mat::MatWriter writer({.big_endian = false, .packed = true});
+  for (std::size_t column = 0; column < table.header.size(); ++column) {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < table.rows.size(); ++row)
+      values.push_back(table.number(row, column));
+    writer.doubles(table.header[column], 1, static_cast<std::int32_t>(values.size()), values);
+  }
+  folder_.write("log.mat", writer.bytes());
+  const auto seen = [&](const std::string& log) {
+    const Outcome outcome =
+        run({"inspect", path(log), "--robot", path("robot.urdf"), "--json", "--quiet"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    auto out = nlohmann::json::parse(outcome.out, nullptr, false);
+    out.erase("torque_log");
+    return out;
+  };
+  EXPECT_EQ(seen("log.mat"), seen("log.csv"));
+  const auto contacts = [&](const std::string& log) {
+    const Outcome outcome = run(
+        {"contact", path(log), "--robot", path("robot.urdf"), "-o", path(log + "_out"), "--quiet"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return read_text_file(folder_.path() / (log + "_out") / "contacts.csv");
+  };
+  EXPECT_EQ(contacts("log.mat"), contacts("log.csv"));
+  folder_.write("new.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00");
+  expect_refusal({"dynamics", path("new.mat"), "--robot", path("robot.urdf"), "-o", path("out")},
+                 ExitCode::kBadInput, "save -v7");
 }
 
 TEST_F(Simulate, TheSameSeedGivesTheSameBytes) {

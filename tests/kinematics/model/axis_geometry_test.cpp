@@ -14,7 +14,7 @@ namespace {
 constexpr double kSameNumber = 1e-9;  // some tens of products of numbers of order one
 
 // One chain by Denavit and Hartenberg: distance, twist, offset and angle at each axis.
-struct DhStep {
+struct GivenStep {
   double distance = 0.0, twist = 0.0, offset = 0.0, angle = 0.0;
 };
 
@@ -24,13 +24,13 @@ Pose moved(double angle, double along_z, double along_x, double twist) {
   return about_z * about_x;
 }
 
-std::vector<PlacedAxis> chain_of(const std::vector<DhStep>& steps,
+std::vector<PlacedAxis> chain_of(const std::vector<GivenStep>& steps,
                                  const std::vector<JointType>& types) {
   std::vector<PlacedAxis> out;
   Pose T;
   for (std::size_t k = 0; k < types.size(); ++k) {
     if (k > 0) {
-      const DhStep& s = steps[k - 1];
+      const GivenStep& s = steps[k - 1];
       T = T * moved(s.angle, s.offset, s.distance, s.twist);
     }
     out.push_back(
@@ -39,8 +39,8 @@ std::vector<PlacedAxis> chain_of(const std::vector<DhStep>& steps,
   return out;
 }
 
-std::vector<DhStep> random_steps(std::size_t axes, Rng& rng) {
-  std::vector<DhStep> out;
+std::vector<GivenStep> random_steps(std::size_t axes, Rng& rng) {
+  std::vector<GivenStep> out;
   for (std::size_t k = 0; k + 1 < axes; ++k)
     out.push_back({rng.uniform(0.1, 0.4), rng.uniform(0.5, 2.5), rng.uniform(-0.3, 0.3),
                    rng.uniform(-3.0, 3.0)});
@@ -58,12 +58,12 @@ const std::vector<JointType> kFiveTurns(5, JointType::kRevolute);
 
 TEST(AxisGeometry, GivesBackTheNumbersThatAChainWasMadeOf) {
   Rng rng = Rng::from_name("axis geometry dh");
-  const std::vector<DhStep> steps = random_steps(5, rng);
+  const std::vector<GivenStep> steps = random_steps(5, rng);
   const std::vector<PlacedAxis> axes = chain_of(steps, kFiveTurns);
   const AxisLayout layout = axis_layout(axes);
   const Eigen::VectorXd values = axis_values(layout, axes);
   for (int k = 0; k < 4; ++k) {
-    const DhStep& step = steps[static_cast<std::size_t>(k)];
+    const GivenStep& step = steps[static_cast<std::size_t>(k)];
     EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kDistance, k, k + 1}), step.distance,
                 kSameNumber);
     EXPECT_NEAR(value_at(layout, values, {AxisQuantityKind::kTwist, k, k + 1}), step.twist,
@@ -84,7 +84,7 @@ TEST(AxisGeometry, HasAsManyNumbersAsTheRobotHasFreedoms) {
     return axis_layout(chain_of(random_steps(types.size(), rng), types)).quantities.size();
   };
   EXPECT_EQ(count({kRevolute, kRevolute}), 2U);
-  std::vector<DhStep> begins_parallel = random_steps(5, rng);
+  std::vector<GivenStep> begins_parallel = random_steps(5, rng);
   begins_parallel[0].twist = 0.1;
   begins_parallel[0].distance = 0.1;
   EXPECT_EQ(axis_layout(chain_of(begins_parallel, kFiveTurns)).quantities.size(), 14U);
@@ -109,7 +109,7 @@ std::vector<PlacedAxis> seen_from_elsewhere(std::vector<PlacedAxis> axes, Rng& r
 TEST(AxisGeometry, KnowsNeitherTheBaseNorWhereOnItsAxisAFrameStands) {
   Rng rng = Rng::from_name("axis geometry frames");
   using enum JointType;
-  std::vector<DhStep> parallel = random_steps(4, rng);
+  std::vector<GivenStep> parallel = random_steps(4, rng);
   parallel[0].twist = 0.02;
   parallel[1].twist = std::numbers::pi - 0.01;
   const std::vector<std::vector<PlacedAxis>> robots{
@@ -144,9 +144,9 @@ TEST(AxisGeometry, DistancesOfParallelAxesFollowTheHeightByTheirTilt) {
 // Both descriptions of a pair agree on the distance at its nearest, and stay smooth in between.
 TEST(AxisGeometry, AShiftOfAnAxisIsAShiftOfItsDistanceInEitherDescription) {
   for (const double degrees : {0.0, 5.0, 10.0, 20.0, 90.0}) {
-    DhStep step{0.3, degrees * std::numbers::pi / 180.0, 0.1, 0.4};
-    const std::vector<DhStep> steps{step, {0.2, 1.5, 0.0, 0.3}, {0.2, 1.5, 0.1, 0.2}};
-    std::vector<DhStep> longer = steps;
+    GivenStep step{0.3, degrees * std::numbers::pi / 180.0, 0.1, 0.4};
+    const std::vector<GivenStep> steps{step, {0.2, 1.5, 0.0, 0.3}, {0.2, 1.5, 0.1, 0.2}};
+    std::vector<GivenStep> longer = steps;
     longer[0].distance += 1e-3;
     const std::vector<JointType> types(4, JointType::kRevolute);
     const auto axes = chain_of(steps, types);
