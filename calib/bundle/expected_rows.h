@@ -45,9 +45,8 @@ struct ExpectedRows {
 
 /// How well each axis is known with this covariance of `parameters`, all joints at `values`; one
 /// entry a joint of the tree, only the sigmas of axes are filled (axis_uncertainty.h).
-[[nodiscard]] std::vector<JointEstimate> axes_by_covariance(const Calibration& calibration,
-                                                            const std::vector<Parameter>& parameters,
-                                                            const Eigen::MatrixXd& covariance,
-                                                            const Eigen::VectorXd& values);
+[[nodiscard]] std::vector<JointEstimate> axes_by_covariance(
+    const Calibration& calibration, const std::vector<Parameter>& parameters,
+    const Eigen::MatrixXd& covariance, const Eigen::VectorXd& values);
 
 }  // namespace kinescope

@@ -16,7 +16,7 @@ namespace {
 // arm's range differs by 3 % from draw to draw, and the design by less.
 constexpr int kWorkspace = 100;
 constexpr int kMostDraws = 100000;
-constexpr int kFirstPoint = 1 << 24;  // ids of points on axes, beyond those of any family
+constexpr int kFirstPoint = 1 << 24;   // ids of points on axes, beyond those of any family
 constexpr double kLeastLever_m = 0.1;  // as of directions against places in axis_uncertainty.cpp
 constexpr double kNothing = 1e-12;     // of the largest eigenvalue: rounding
 
@@ -72,7 +72,8 @@ NamedRows named(const ExpectedRows& expected, const std::vector<Parameter>& para
 
 // root root' = rows' rows / points, the common motion taken out.
 Eigen::MatrixXd root_of(const NamedRows& stack, double points) {
-  const Eigen::MatrixXd rest = stack.rows - stack.by_base * least_squares(stack.by_base, stack.rows);
+  const Eigen::MatrixXd rest =
+      stack.rows - stack.by_base * least_squares(stack.by_base, stack.rows);
   const SymmetricEigen eigen = symmetric_eigen(rest.transpose() * rest / points);
   const double least = kNothing * std::max(eigen.values[eigen.values.size() - 1], 0.0);
   std::vector<Eigen::Index> kept;
@@ -121,7 +122,8 @@ double lever(const KinematicTree& tree, const std::vector<Pose>& T_base_link) {
     count += 1.0;
   }
   if (count == 0.0) return kLeastLever_m;
-  return std::max(kLeastLever_m, std::sqrt(std::max(0.0, square / count - (sum / count).squaredNorm())));
+  return std::max(kLeastLever_m,
+                  std::sqrt(std::max(0.0, square / count - (sum / count).squaredNorm())));
 }
 
 // What moves a point of an axis sideways, two rows each: of the two points on it, of a slide of

@@ -58,7 +58,8 @@ JointSpace::JointSpace(KinematicTree tree, MotionLimits limits)
     const auto add = [&](const std::string& channel, double ratio) {
       const std::size_t at = index_of(channels_, channel);
       if (at == channels_.size()) {
-        throw bad_input(joint.name, "the channel '" + channel + "' moves it and no joint of its own",
+        throw bad_input(joint.name,
+                        "the channel '" + channel + "' moves it and no joint of its own",
                         "plan for a robot whose channels drive one joint each");
       }
       by_reading_(row, static_cast<Eigen::Index>(at)) += joint.scale * ratio;
@@ -79,7 +80,8 @@ double JointSpace::reading_for(std::size_t channel, double value,
                                const Eigen::VectorXd& readings) const {
   const auto row = static_cast<Eigen::Index>(leaders_[channel]);
   const auto column = static_cast<Eigen::Index>(channel);
-  const double others = by_reading_.row(row).dot(readings) - by_reading_(row, column) * readings[column];
+  const double others =
+      by_reading_.row(row).dot(readings) - by_reading_(row, column) * readings[column];
   return (value - at_zero_[row] - others) / by_reading_(row, column);
 }
 
@@ -134,8 +136,7 @@ RestToRestPath::RestToRestPath(const JointSpace& space, std::vector<Eigen::Vecto
   KINESCOPE_CHECK(duration_s >= shortest, "a motion no faster than the limits allow");
   const double slower = shortest > 0.0 ? duration_s / shortest : 1.0;
   for (std::size_t i = 1; i < postures_.size(); ++i)
-    ends_s_.push_back(ends_s_.back() +
-                      slower * space.shortest_s(postures_[i - 1], postures_[i]));
+    ends_s_.push_back(ends_s_.back() + slower * space.shortest_s(postures_[i - 1], postures_[i]));
 }
 
 double RestToRestPath::shortest_s(const JointSpace& space,

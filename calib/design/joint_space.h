@@ -57,10 +57,10 @@ class JointSpace {
   KinematicTree tree_;
   MotionLimits limits_;
   std::vector<std::string> channels_;
-  std::vector<std::size_t> leaders_;    // the joint that each channel is drawn for
+  std::vector<std::size_t> leaders_;     // the joint that each channel is drawn for
   std::vector<std::size_t> draw_order_;  // of channels: those that others depend on first
-  Eigen::MatrixXd by_reading_;          // joints x channels: d value / d reading
-  Eigen::VectorXd at_zero_;             // joint values where all channels read 0
+  Eigen::MatrixXd by_reading_;           // joints x channels: d value / d reading
+  Eigen::VectorXd at_zero_;              // joint values where all channels read 0
 };
 
 /// A motion through postures, from rest to rest between any two.

@@ -88,7 +88,8 @@ class Planner {
   std::vector<NamedEffect> effects_, rivals_;
 };
 
-std::vector<NamedEffect> named_effects(const PlannedRobot& robot, const ExpectedRecording& recording,
+std::vector<NamedEffect> named_effects(const PlannedRobot& robot,
+                                       const ExpectedRecording& recording,
                                        const std::vector<ConsideredEffect>& effects) {
   std::vector<NamedEffect> out;
   for (const ConsideredEffect& effect : effects) {
@@ -107,8 +108,7 @@ void Planner::draw_candidates() {
     ++draws;
     auto readings = space_.draw(rng_);
     if (!readings) continue;
-    if (expected_sightings(robot_.calibration, space_.values(*readings), robot_.sight,
-                           robot_.noise)
+    if (expected_sightings(robot_.calibration, space_.values(*readings), robot_.sight, robot_.noise)
             .empty())
       continue;
     ++seen;
@@ -126,8 +126,8 @@ Rows Planner::rows_at(const std::vector<Eigen::VectorXd>& postures) const {
   std::vector<ExpectedRows> part(parts);
   parallel_for(parts, [&](std::size_t p) {
     const auto first = postures.begin() + static_cast<std::ptrdiff_t>(p * kAtATime);
-    const auto last =
-        postures.begin() + static_cast<std::ptrdiff_t>(std::min(postures.size(), (p + 1) * kAtATime));
+    const auto last = postures.begin() +
+                      static_cast<std::ptrdiff_t>(std::min(postures.size(), (p + 1) * kAtATime));
     part[p] = expected_rows(robot_.calibration, recording_at(robot_, space_, {first, last}));
   });
   Rows out{part.front().parameters, {}};
@@ -232,7 +232,8 @@ void Planner::judge_rivals(const Rows& rows, RecordingPlan& plan) const {
 void Planner::judge(const ExpectedRecording& recording, RecordingPlan& plan) const {
   ExpectedRows expected = expected_rows(robot_.calibration, recording);
   Rows rows{std::move(expected.parameters), {}};
-  for (const Eigen::MatrixXd& J : expected.J) rows.information.push_back(information_of(J, widening_));
+  for (const Eigen::MatrixXd& J : expected.J)
+    rows.information.push_back(information_of(J, widening_));
   const std::vector<Eigen::Index> own = own_columns(rows.parameters);
   plan.parameters = subset(rows.parameters, own);
   const Eigen::MatrixXd known = known_information(robot_.calibration, plan.parameters);
@@ -278,8 +279,8 @@ std::vector<Eigen::VectorXd> Planner::stops_in_time(std::size_t count) const {
                       options_.seconds, shortest_s),
           "give more --seconds, or higher --velocity and --acceleration");
     }
-    const auto fitting = static_cast<std::size_t>(static_cast<double>(count) * options_.seconds /
-                                                  shortest_s);
+    const auto fitting =
+        static_cast<std::size_t>(static_cast<double>(count) * options_.seconds / shortest_s);
     count = std::max(kFewestStops, std::min(count - 1, fitting));
   }
 }

@@ -25,8 +25,8 @@ namespace kinescope::design {
 
 struct PlanOptions {
   Goal goal = Goal::kTip;
-  int postures = 0;       ///< of a plan of postures at rest, one frame each
-  double seconds = 0.0;   ///< else of a motion
+  int postures = 0;      ///< of a plan of postures at rest, one frame each
+  double seconds = 0.0;  ///< else of a motion
   double frame_rate_hz = 30.0;
   int candidates = 500;  ///< postures that are looked at; more is slower and hardly better
   std::uint64_t seed = 1;
@@ -35,7 +35,8 @@ struct PlanOptions {
 /// What is known, or will be.
 struct Promise {
   double goal_m = 0.0;  ///< root mean square error of a point of the goal
-  std::vector<JointEstimate> axes;  ///< beside the joints: sigmas alone, in the middle of the ranges
+  std::vector<JointEstimate>
+      axes;  ///< beside the joints: sigmas alone, in the middle of the ranges
 };
 
 struct RivalPromise {

@@ -67,8 +67,8 @@ void add_corrections(const PlannedRobot& robot, ExpectedRecording& recording) {
 void see(const PlannedRobot& robot, const JointSpace& space, const Eigen::VectorXd& readings,
          Measurements& measurements) {
   const auto frame = static_cast<int>(measurements.times_s.size()) - 1;
-  for (TagObservation& seen : expected_sightings(robot.calibration, space.values(readings),
-                                                 robot.sight, robot.noise)) {
+  for (TagObservation& seen :
+       expected_sightings(robot.calibration, space.values(readings), robot.sight, robot.noise)) {
     seen.frame = frame;
     measurements.corners.push_back(std::move(seen));
   }

@@ -15,8 +15,8 @@ namespace {
 constexpr double kBorder = 0.125;
 
 // In the image, in front of the camera.
-std::vector<Eigen::Vector2d> projected_square(const CameraModel& camera, const Pose& T_camera_marker,
-                                              double size_m) {
+std::vector<Eigen::Vector2d> projected_square(const CameraModel& camera,
+                                              const Pose& T_camera_marker, double size_m) {
   std::vector<Eigen::Vector2d> out;
   for (const Eigen::Vector3d& corner : square_corners(size_m)) {
     const auto pixel = project(camera, T_camera_marker * corner);

@@ -22,7 +22,7 @@ struct SightLimits {
 
 /// What is expected of one marker's corners.
 struct MarkerNoise {
-  double all_px = 0.1;               ///< standard deviation of a coordinate
+  double all_px = 0.1;                ///< standard deviation of a coordinate
   std::map<TagId, double> of_marker;  ///< where it is known by itself
   [[nodiscard]] double of(TagId id) const {
     const auto found = of_marker.find(id);
