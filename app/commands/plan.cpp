@@ -58,7 +58,9 @@ std::string plan_csv(const PlannedRun& run, const design::RecordingPlan& plan) {
       out += fmt::format(",{:.12g}", readings[static_cast<Eigen::Index>(c)] / factors[c]);
   };
   if (plan.path) {
-    const auto rows = static_cast<int>(std::ceil(plan.path->duration_s() * kCommandRate_hz));
+    constexpr double kRounding = 1e-6;  // rows: of a duration that is a sum
+    const auto rows =
+        static_cast<int>(std::ceil(plan.path->duration_s() * kCommandRate_hz - kRounding));
     for (int i = 0; i <= rows; ++i)
       add(i / kCommandRate_hz, plan.path->readings(i / kCommandRate_hz));
   } else {

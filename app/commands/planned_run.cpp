@@ -47,6 +47,27 @@ void require_fixed_camera(const fs::path& folder, const Calibration& calibration
   }
 }
 
+// A promise is no better than the covariance that it begins with.
+void require_covariance(const fs::path& folder, const Calibration& calibration) {
+  constexpr double kDigits = 1e-6;  // of the file
+  bool of_robot = false;
+  for (std::size_t i = 0; i < calibration.parameters.size(); ++i) {
+    const Parameter& parameter = calibration.parameters[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    of_robot = of_robot || (parameter.sigma && calibration.tree.joint(parameter.block));
+    if (!parameter.sigma) continue;
+    const double variance = *parameter.sigma * *parameter.sigma;
+    if (std::abs(calibration.covariance(at, at) - variance) > kDigits * variance)
+      throw bad_input((folder / "calibration.json").string(),
+                      "its covariance contradicts the sigma of " + parameter.name,
+                      "run the recording again");
+  }
+  if (!of_robot) {
+    throw undetermined(folder.string(), "the run knows nothing of the robot's joints to build on",
+                       "run it with --free geometry");
+  }
+}
+
 // Corner noise by marker, and the rate of the frames.
 struct SeenCorners {
   design::MarkerNoise noise;
@@ -248,6 +269,7 @@ PlannedRun read_planned_run(const PlanCommandOptions& options) {
   const StoredRun run = read_stored_run(options.source);
   const Calibration& calibration = run.calibration;
   require_fixed_camera(options.source, calibration);
+  require_covariance(options.source, calibration);
   design::MotionLimits limits = recorded_limits(calibration, options.range);
   std::vector<std::string> warnings;
   std::string why_not;

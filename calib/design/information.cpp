@@ -31,6 +31,22 @@ std::vector<Eigen::Index> places_of(const Calibration& calibration,
   return out;
 }
 
+// Pseudo-inverse: a covariance has no variance along what was not determined at all, which is no
+// knowledge (uncertainty.cpp inverts its information likewise).
+Eigen::MatrixXd inverse_of_known(const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd scale = unit_scale(covariance);
+  const SymmetricEigen eigen =
+      symmetric_eigen(scale.asDiagonal() * covariance * scale.asDiagonal());
+  const auto n = static_cast<double>(eigen.values.size());
+  const double rounding =
+      n * std::numeric_limits<double>::epsilon() * eigen.values[eigen.values.size() - 1];
+  Eigen::VectorXd inverse = Eigen::VectorXd::Zero(eigen.values.size());
+  for (Eigen::Index k = 0; k < inverse.size(); ++k)
+    if (eigen.values[k] > rounding) inverse[k] = 1.0 / eigen.values[k];
+  return scale.asDiagonal() * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() *
+         scale.asDiagonal();
+}
+
 }  // namespace
 
 Eigen::MatrixXd known_information(const Calibration& calibration,
@@ -46,7 +62,7 @@ Eigen::MatrixXd known_information(const Calibration& calibration,
     own.push_back(i);
     there.push_back(places[static_cast<std::size_t>(i)]);
   }
-  if (!own.empty()) out(own, own) += covariance_of(calibration.covariance(there, there));
+  if (!own.empty()) out(own, own) += inverse_of_known(calibration.covariance(there, there));
   return out;
 }
 

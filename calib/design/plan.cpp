@@ -277,7 +277,7 @@ std::vector<Eigen::VectorXd> Planner::stops_in_time(std::size_t count) const {
           "plan",
           fmt::format("{:g} s are too short for a motion from one posture to another ({:.1f} s)",
                       options_.seconds, shortest_s),
-          "give more --seconds, or higher --velocity and --acceleration");
+          "give more --seconds, or a higher --speed");
     }
     const auto fitting =
         static_cast<std::size_t>(static_cast<double>(count) * options_.seconds / shortest_s);

@@ -139,7 +139,7 @@ void one_pair(RobotKind kind, int seed, double size) {
 int main(int argc, char** argv) {
   using namespace kinescope;
   int robots = 2;
-  double size = 0.002;
+  double size = 0.02;
   CLI::App app("Rival effects before and after a planned recording");
   app.add_option("--robots", robots);
   app.add_option("--size", size);

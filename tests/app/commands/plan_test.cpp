@@ -137,8 +137,9 @@ TEST_F(PlanCommand, RefusesWhatItCannotPlan) {
   expect_refusal({"plan", run_folder(), "--seconds", "5", "--postures", "3"}, ExitCode::kBadRequest,
                  "postures or of a motion");
   expect_refusal({"plan", run_folder(), "--seconds", "nan"}, ExitCode::kBadRequest, "--seconds");
-  expect_refusal({"plan", run_folder(), "-o", output(), "--seconds", "1", "--speed", "0.01"},
-                 ExitCode::kUndetermined, "too short");
+  expect_refusal(
+      {"plan", run_folder(), "-o", output(), "--seconds", "1", "--speed", "0.01", "--quiet"},
+      ExitCode::kUndetermined, "too short");
   expect_refusal({"plan", run_folder(), "-o", run_folder()}, ExitCode::kBadRequest, "");
   // A run whose recording is gone knows no speeds; postures need none.
   const fs::path moved = folder_.path() / "moved";
@@ -147,6 +148,17 @@ TEST_F(PlanCommand, RefusesWhatItCannotPlan) {
   expect_refusal({"plan", moved.string(), "-o", output()}, ExitCode::kBadRequest,
                  "how fast the joints may move is not known");
   EXPECT_EQ(run({"plan", moved.string(), "-o", output(), "--postures", "4", "--quiet"}).code, 0);
+  PlanJson damaged = PlanJson::parse(read_text_file(moved / "calibration.json"));
+  damaged["covariance"][0][0] = 0.0;
+  folder_.write("moved/calibration.json", damaged.dump());
+  expect_refusal({"plan", moved.string(), "-o", output(), "--postures", "4"}, ExitCode::kBadInput,
+                 "its covariance contradicts");
+  damaged["covariance"] = damaged["parameters"] = PlanJson::array();
+  folder_.write("moved/calibration.json", damaged.dump());
+  expect_refusal({"plan", moved.string(), "-o", output(), "--postures", "4"},
+                 ExitCode::kUndetermined, "knows nothing of the robot's joints");
+  fs::copy_file(fs::path(run_folder()) / "calibration.json", moved / "calibration.json",
+                fs::copy_options::overwrite_existing);
   folder_.write("moved/residuals.csv", "t,tag\n");
   EXPECT_EQ(run({"plan", moved.string(), "-o", output(), "--postures", "4", "--quiet"}).code, 3);
 }

@@ -87,6 +87,23 @@ TEST(Information, IsScaledBeforeItIsInverted) {
   EXPECT_LT((back - plain.inverse()).norm(), 1e-12);
 }
 
+// What a calibration did not determine at all has no variance in its covariance.
+TEST(Information, OfNothingIsNoKnowledge) {
+  Calibration calibration;
+  calibration.tree.links = {{"base"}};
+  calibration.parameters = {{"tag_1 shift x", "tag_1", "m", 0.0, 1e-3, 1e-3},
+                            {"tag_1 shift y", "tag_1", "m", 0.0, 1e-3, 1e-3},
+                            {"camera turn x", "camera", "rad", 0.0, 1e-3, 1e-3}};
+  // x + y is known, x - y is not.
+  calibration.covariance = Eigen::Matrix3d::Zero();
+  calibration.covariance.topLeftCorner<2, 2>().setConstant(1e-6);
+  const Eigen::MatrixXd information = known_information(calibration, calibration.parameters);
+  const Eigen::Vector3d sum(1.0, 1.0, 0.0), difference(1.0, -1.0, 0.0);
+  EXPECT_NEAR(sum.dot(information * sum), 1e6 + 2.0, 1.0);
+  EXPECT_NEAR(difference.dot(information * difference), 2.0, 1e-3);
+  EXPECT_DOUBLE_EQ(information(2, 2), 1.0);  // of a recording of its own
+}
+
 // Two columns at an angle: the rival leaves the sine of it (Atkinson and Fedorov 1975, eq. 2.2).
 TEST(Rivals, AreAsFarApartAsTheAngleBetweenTheirColumns) {
   constexpr double kAngle = 0.3, kSize = 2.5;
