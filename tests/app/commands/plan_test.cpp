@@ -115,7 +115,8 @@ TEST_F(PlanCommand, KeepsToTheLimitsOfAUrdf) {
   }
   folder_.write("limits.urdf", urdf + "</robot>");
   const std::string limits = (folder_.path() / "limits.urdf").string();
-  const Outcome outcome = planned({"--limits", limits, "--seconds", "20"});
+  const Outcome outcome =
+      run({"plan", run_folder(), "-o", output(), "--quiet", "--limits", limits, "--seconds", "20"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("was recorded beyond the limits"), std::string::npos) << outcome.err;
   const JointLog motion = read_joint_log(fs::path(output()) / "plan.csv");
