@@ -22,6 +22,7 @@ set(rooms
     "calib/bundle: kinematics/* calib/camera"
     "calib/trace: kinematics/core"
     "calib/effects: kinematics/* calib/camera calib/bundle calib/trace"
+    "calib/design: kinematics/* calib/camera calib/bundle calib/trace calib/effects"
     "calib/quality: kinematics/* calib/camera calib/bundle"
     "calib/hand_eye: kinematics/* calib/camera calib/bundle calib/trace"
     "dynamics/data: kinematics/*"

@@ -69,7 +69,8 @@ std::string parse_error_words(const CLI::App& app, const CLI::ParseError& error,
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, compare, dynamics, predict, simulate, control, export, contact, "
+        "run, trace, correct, compare, plan, dynamics, predict, simulate, control, export, "
+        "contact, "
         "experiment, "
         "policy, inspect, camera or markers; see kinescope --help";
   } else {
@@ -107,6 +108,10 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
   if (app.got_subcommand("trace")) return run_again(line, console);
   if (app.got_subcommand("correct")) return correct_command(line.correct, console);
   if (app.got_subcommand("compare")) return compare_command(line.compare, console);
+  if (app.got_subcommand("plan")) {
+    if (line.plan.output.empty()) line.plan.output = recording_name(line.plan.source) + "_plan";
+    return plan_command(line.plan, console);
+  }
   if (app.got_subcommand("dynamics")) {
     if (line.dynamics.output.empty()) {
       line.dynamics.output = log_name(line.dynamics.logs.front()) + "_dynamics";
@@ -227,6 +232,7 @@ void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* a
   line.policy.command_line = line.run.command_line;
   line.control.command_line = line.run.command_line;
   line.compare.command_line = line.run.command_line;
+  line.plan.command_line = line.run.command_line;
   add_commands(app, line);
 }
 

@@ -253,6 +253,67 @@ void add_compare(CLI::App& app, CommandLine& line) {
       kExitCodes));
 }
 
+void add_plan_limits(CLI::App& plan, PlanCommandOptions& options) {
+  const char* group = "What the robot may do";
+  plan.add_option_function<std::string>(
+          "--limits", [&options](const std::string& text) { options.limits = text; },
+          "URDF whose joints, named as in the run, have the ranges and highest speeds to keep to "
+          "(default: what the run recorded)")
+      ->check(refuse_empty)
+      ->type_name("FILE")
+      ->group(group);
+  plan.add_option("--range", options.range,
+                  "Without limits: the recorded range of every joint times this, about its middle")
+      ->check(number_in(0.1, 10.0))
+      ->capture_default_str()
+      ->type_name("FACTOR")
+      ->group(group);
+  plan.add_option("--speed", options.speed,
+                  "Highest speed of every joint, of the highest that the run recorded; "
+                  "accelerations by its square")
+      ->check(number_in(0.01, 10.0))
+      ->capture_default_str()
+      ->type_name("FACTOR")
+      ->group(group);
+}
+
+void add_plan(CLI::App& app, CommandLine& line) {
+  static const std::map<std::string, PlanPurpose> kPurposes = {{"tip", PlanPurpose::kTip},
+                                                               {"axes", PlanPurpose::kAxes}};
+  CLI::App& plan = *app.add_subcommand(
+      "plan", "The next recording that tells most of a robot, and the uncertainty after it");
+  PlanCommandOptions& options = line.plan;
+  add_path_argument(plan, "RUN_FOLDER", options.source, "Folder of a finished run", "FOLDER");
+  add_choice(plan, "--for", kPurposes, options.purpose,
+             "What is to be known best: tip (where the last links are, over the joints' ranges; "
+             "default), axes (where the axes are)")
+      ->type_name("WHAT");
+  plan.add_option("--seconds", options.seconds, "Length of the motion [20]")
+      ->check(number_in(1.0, 3600.0))
+      ->type_name("S");
+  plan.add_option("--postures", options.postures,
+                  "As many postures at rest, one image each, in place of a motion [20, where the "
+                  "run's recording is of such]")
+      ->check(number_in(1, 200))
+      ->type_name("N");
+  add_plan_limits(plan, options);
+  plan.add_option("--rate", options.rate_hz, "Frames of the camera, 1/s [as in the run]")
+      ->check(number_in(0.1, 1000.0))
+      ->type_name("HZ");
+  plan.add_option("--seed", options.seed, "Of the postures that are looked at")
+      ->capture_default_str()
+      ->type_name("N");
+  plan.add_option_function<std::string>(
+          "-o,--output", [&options](const std::string& text) { options.output = text; },
+          "Folder for plan.csv and plan.json (default: <run>_plan here)")
+      ->type_name("FOLDER");
+  add_force(plan, options.force, kReplaceOthers);
+  add_output_options(plan, line.output);
+  plan.footer(fmt::format(
+      "Example:\n  kinescope plan ur6_run --limits ur6.urdf --seconds 15 --output next\n\n{}",
+      kExitCodes));
+}
+
 void add_inspect(CLI::App& app, CommandLine& line) {
   CLI::App& inspect = *app.add_subcommand(
       "inspect", "What a recording or a torque log holds and what is wrong with it, in seconds");
@@ -413,6 +474,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_trace(app, line);
   add_correct(app, line);
   add_compare(app, line);
+  add_plan(app, line);
   add_dynamics(app, line);
   add_predict(app, line);
   add_simulate(app, line);

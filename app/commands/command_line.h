@@ -38,6 +38,7 @@ struct CommandLine {
   TraceCommandOptions trace;
   CorrectOptions correct;
   CompareOptions compare;
+  PlanCommandOptions plan;
   std::optional<std::filesystem::path> settings;  ///< recording.yaml of a torque log
   OutputOptions output;
   bool no_time_offset = false;

@@ -81,6 +81,30 @@ struct CompareOptions {
 
 [[nodiscard]] ExitCode compare_command(const CompareOptions& options, const Console& console);
 
+/// What a planned recording is for.
+enum class PlanPurpose {
+  kTip,  ///< where the last links are, over the ranges of the joints
+  kAxes  ///< where the axes are
+};
+
+struct PlanCommandOptions {
+  std::filesystem::path source;  ///< run folder
+  PlanPurpose purpose = PlanPurpose::kTip;
+  std::optional<int> postures;  ///< at rest, in place of a motion
+  /// Of a motion; neither: of a run of postures 20 postures, else 20 s.
+  std::optional<double> seconds;
+  std::optional<std::filesystem::path> limits;  ///< URDF with limits of the joints
+  double range = 1.0;             ///< what the run recorded of each joint's range, times this
+  double speed = 1.0;             ///< the fastest that the run recorded, times this
+  std::optional<double> rate_hz;  ///< of the camera's frames; none: as in the run
+  std::uint64_t seed = 1;
+  std::filesystem::path output;  ///< folder
+  bool force = false;            ///< replace what others wrote
+  std::string command_line;      ///< for the products
+};
+
+[[nodiscard]] ExitCode plan_command(const PlanCommandOptions& options, const Console& console);
+
 struct DynamicsOptions {
   std::vector<std::filesystem::path> logs;
   std::vector<std::filesystem::path> test_logs;  ///< judged on; empty: the logs' last part

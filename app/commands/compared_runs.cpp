@@ -204,7 +204,7 @@ StoredRun read_stored_run(const fs::path& folder) {
     throw undetermined(file.string(),
                        fmt::format("the calibration is {}: {}", to_string(out.calibration.status),
                                    out.calibration.status_reason),
-                       "give runs that have an answer");
+                       "give a run that has an answer");
   }
   out.effects = read_effects(file);
   out.trace = read_trace(folder / "trace.json");

@@ -17,10 +17,24 @@ using nlohmann::json;
 // Half of a 95 % interval over its standard deviation.
 constexpr double kNormal95 = 1.959964;
 
+EffectId effect_of(const json& entry) {
+  return {entry.at("effect").get<std::string>(), entry.at("place").get<std::string>()};
+}
+
+void take_rivals(const json& document, StoredTrace& out) {
+  for (const json& entry : document.value("ambiguous", json::array())) {
+    std::vector<EffectId>& rivals = out.ambiguous.emplace_back();
+    for (const json& effect : entry.at("effects")) rivals.push_back(effect_of(effect));
+  }
+  for (const json& entry : document.value("candidates", json::array()))
+    if (entry.at("at").is_number()) out.scans[effect_of(entry)] = entry.at("at").get<double>();
+}
+
 StoredTrace stored_trace_of(const json& document) {
   StoredTrace out;
   out.stretches = document.value("stretches", 0);
   out.unexplained = document.at("verdict") == "unknown";
+  take_rivals(document, out);
   for (const json& entry : document.at("accepted")) {
     const json& interval = entry.at("interval");
     if (!entry.at("size").is_number() || !interval.at(0).is_number() || !interval.at(1).is_number())

@@ -4,9 +4,12 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "calib/trace/traced_model.h"
 
 namespace kinescope {
 
@@ -28,7 +31,10 @@ struct StoredTrace {
   std::vector<StoredEffect> found;
   std::vector<StoredAbsence> absent;
   bool unexplained = false;  ///< something is left that no known effect has the shape of
-  int stretches = 0;         ///< independent stretches of the recording; 0: not known
+  /// Effects each of which explains what the others do; the one that is in the model first.
+  std::vector<std::vector<EffectId>> ambiguous = {};
+  std::map<EffectId, double> scans = {};  ///< of what was tested: the value that fits best
+  int stretches = 0;                      ///< independent stretches of the recording; 0: not known
 };
 
 /// Nothing where there is no such file (a run with --no-trace). Throws bad_input where it is none

@@ -12,6 +12,11 @@
 
 namespace kinescope {
 
+/// px, of a marker's edge; below, no family's cells can be told apart.
+inline constexpr double kLeastEdge_px = 5.0;
+/// Shortest to longest edge of a marker: seen at more than 80 degrees.
+inline constexpr double kLeastEdgeRatio = 0.15;
+
 /// One marker in one frame.
 struct TagObservation {
   int frame = 0;  ///< index into TagObservations::times_s

@@ -15,8 +15,6 @@
 namespace kinescope {
 namespace {
 
-constexpr double kMinEdge = 5.0;        // px; below, no family's cells can be told apart
-constexpr double kMinEdgeRatio = 0.15;  // shortest to longest edge: seen at more than 80 degrees
 constexpr double kJumpOfEdge = 0.75;    // a jump is further than this share of the marker's edge ..
 constexpr double kJumpOfMotion = 0.75;  // .. and of its motion between the neighbours ..
 constexpr double kJumpLeast = 5.0;      // .. and than this many px
@@ -242,8 +240,8 @@ std::optional<std::string> impossible_shape(const std::vector<Eigen::Vector2d>& 
   // lb, rb, rt, lt turn to the left on the screen (y down).
   if (right == 4) return "mirrored";
   if (left != 4) return "corners are not convex";
-  if (shortest < kMinEdge) return "too small";
-  if (shortest < kMinEdgeRatio * longest) return "too oblique";
+  if (shortest < kLeastEdge_px) return "too small";
+  if (shortest < kLeastEdgeRatio * longest) return "too oblique";
   return std::nullopt;
 }
 
