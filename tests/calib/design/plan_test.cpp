@@ -178,10 +178,7 @@ TEST(Sight, FromBehindTooSmallOrCutOffIsNotSeen) {
   Calibration one;
   one.tree.links = {{"base"}};
   one.camera = pinhole_guess(640, 480, 500.0);
-  Marker marker;
-  marker.id = TagId{3};
-  marker.size_m = 0.1;
-  one.tree.markers = {marker};
+  one.tree.markers = {{TagId{3}, LinkId{0}, {}, 0.1}};
   one.T_camera_base.translation << 0.0, 0.0, 1.0;  // its z, into the tag, away from the camera
   const auto count = [&] {
     return expected_sightings(one, Eigen::VectorXd(0), SightLimits{}, MarkerNoise{}).size();
