@@ -44,8 +44,6 @@ double scale_of(const ChainFit& fit, const Readings& readings) {
 std::optional<Attachment> as_other_type(const Attachment& now, const Body& body,
                                         const LinkPath& parent, const Readings& readings) {
   const RelativeMotion relative = relative_motion(body, parent, readings);
-  // Seen with its parent by the unit it had, and maybe never by another one's.
-  if (relative.motion.empty()) return std::nullopt;
   std::vector<char> only(static_cast<std::size_t>(readings.channels()), 0);
   only[static_cast<std::size_t>(now.channel())] = 1;
   const JointType type = now.fit.model.joints.front().type;
