@@ -283,6 +283,7 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
                                      const std::vector<char>& usable,
                                      const ScreeningOptions& options) {
   std::vector<Candidate> out;
+  if (motion.empty()) return out;  // of bodies that were never seen together
   LinearMotion linear = linear_motion(motion);
   const Eigen::MatrixXd q = readings_of(motion, readings);
   Regression r = regress(linear, q, usable);

@@ -30,7 +30,7 @@ struct ScreeningOptions {
   int max_channels = 3;         ///< best channels kept
 };
 
-/// By cost. `usable[c]`: channel c may be used.
+/// By cost; none where there is no motion. `usable[c]`: channel c may be used.
 [[nodiscard]] std::vector<Candidate> screen_motion(const Motion& motion,
                                                    const Eigen::MatrixXd& readings,
                                                    const std::vector<char>& usable,

@@ -107,6 +107,10 @@ TEST_P(OneJoint, WithoutNoiseIsExact) {
   EXPECT_LT(fit.cost, 1.0);
 }
 
+TEST(ScreenMotion, OfBodiesNeverSeenTogetherOffersNothing) {
+  EXPECT_TRUE(screen_motion({}, sines(1), {1}).empty());
+}
+
 TEST_P(OneJoint, WithoutAChannelGivesItsCoordinates) {
   Rng rng = Rng::from_name("OneJointFree", static_cast<std::uint64_t>(GetParam()));
   const Eigen::MatrixXd q = sines(1);
