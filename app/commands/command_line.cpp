@@ -278,13 +278,13 @@ void add_plan_limits(CLI::App& plan, PlanCommandOptions& options) {
 }
 
 void add_plan(CLI::App& app, CommandLine& line) {
-  static const std::map<std::string, PlanPurpose> kPurposes = {{"tip", PlanPurpose::kTip},
-                                                               {"axes", PlanPurpose::kAxes}};
+  static const std::map<std::string, PlanGoal> kGoals = {{"tip", PlanGoal::kTip},
+                                                         {"axes", PlanGoal::kAxes}};
   CLI::App& plan = *app.add_subcommand(
       "plan", "The next recording that tells most of a robot, and the uncertainty after it");
   PlanCommandOptions& options = line.plan;
   add_path_argument(plan, "RUN_FOLDER", options.source, "Folder of a finished run", "FOLDER");
-  add_choice(plan, "--for", kPurposes, options.purpose,
+  add_choice(plan, "--goal", kGoals, options.goal,
              "What is to be known best: tip (where the last links are, over the joints' ranges; "
              "default), axes (where the axes are)")
       ->type_name("WHAT");

@@ -82,14 +82,14 @@ struct CompareOptions {
 [[nodiscard]] ExitCode compare_command(const CompareOptions& options, const Console& console);
 
 /// What a planned recording is for.
-enum class PlanPurpose {
+enum class PlanGoal {
   kTip,  ///< where the last links are, over the ranges of the joints
   kAxes  ///< where the axes are
 };
 
 struct PlanCommandOptions {
   std::filesystem::path source;  ///< run folder
-  PlanPurpose purpose = PlanPurpose::kTip;
+  PlanGoal goal = PlanGoal::kTip;
   std::optional<int> postures;  ///< at rest, in place of a motion
   /// Of a motion; neither: of a run of postures 20 postures, else 20 s.
   std::optional<double> seconds;

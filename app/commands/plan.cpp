@@ -22,7 +22,7 @@ constexpr double kCommandRate_hz = 100.0;  // rows of plan.csv of a motion
 
 design::PlanOptions design_options(const PlanCommandOptions& options, const PlannedRun& run) {
   design::PlanOptions out;
-  out.goal = options.purpose == PlanPurpose::kAxes ? design::Goal::kAxes : design::Goal::kTip;
+  out.goal = options.goal == PlanGoal::kAxes ? design::Goal::kAxes : design::Goal::kTip;
   out.seed = options.seed;
   out.frame_rate_hz = run.frame_rate_hz;
   const bool postures = options.postures || (!options.seconds && run.of_postures);
@@ -109,7 +109,7 @@ PlanSummary plan_summary_of(const PlanCommandOptions& options, const PlannedRun&
   out.inputs = hashed_inputs({{options.source / "calibration.json"}});
   out.source = options.source.string();
   out.robot = run.robot.calibration.tree.name;
-  out.purpose = asked.goal == design::Goal::kTip ? "tip" : "axes";
+  out.goal = asked.goal == design::Goal::kTip ? "tip" : "axes";
   out.seconds = asked.seconds;
   out.rate_hz = asked.seconds > 0.0 ? asked.frame_rate_hz : 0.0;
   out.postures = static_cast<int>(plan.postures.size());

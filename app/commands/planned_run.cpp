@@ -28,6 +28,9 @@ constexpr double kFew = 0.01;
 constexpr double kHalf_s = 0.1;
 // Highest speed and acceleration: this share of the log is below.
 constexpr double kNearlyAll = 0.99;
+// A marker at rest whose residuals have less than this share of the others' variance: what else it
+// errs by is the same in all frames (as the uncertainty of the bundle has it).
+constexpr double kMostOfOneError = 0.5;
 
 double quantile_of(std::vector<double> values, double share) {
   std::ranges::sort(values);
@@ -49,6 +52,11 @@ void require_fixed_camera(const fs::path& folder, const Calibration& calibration
 
 // A promise is no better than the covariance that it begins with.
 void require_covariance(const fs::path& folder, const Calibration& calibration) {
+  if (!calibration.noise_widening) {
+    throw bad_input((folder / "calibration.json").string(),
+                    "it does not say noise_widening: it is of an earlier version",
+                    "run the recording again");
+  }
   constexpr double kDigits = 1e-6;  // of the file
   bool of_robot = false;
   for (std::size_t i = 0; i < calibration.parameters.size(); ++i) {
@@ -74,7 +82,7 @@ struct SeenCorners {
   std::vector<double> times_s;
 };
 
-SeenCorners read_seen_corners(const fs::path& residuals_csv) {
+SeenCorners read_seen_corners(const fs::path& residuals_csv, const KinematicTree& tree) {
   const CsvTable table = read_csv(residuals_csv);
   const std::size_t time = table.require_column("t"), tag = table.require_column("tag"),
                     used = table.require_column("used"), du = table.require_column("du"),
@@ -101,6 +109,12 @@ SeenCorners read_seen_corners(const fs::path& residuals_csv) {
   out.noise.all_px = std::sqrt(all.first / all.second);
   for (const auto& [id, sum] : squares)
     if (sum.first > 0.0) out.noise.of_marker[id] = std::sqrt(sum.first / sum.second);
+  for (const auto& [id, noise] : out.noise.of_marker) {
+    const Marker* marker = tree.marker(id);
+    const bool rests = marker != nullptr && marker->link == LinkId{0};
+    if (rests && noise * noise < kMostOfOneError * out.noise.all_px * out.noise.all_px)
+      out.noise.at_rest.insert(id);
+  }
   return out;
 }
 
@@ -274,7 +288,7 @@ PlannedRun read_planned_run(const PlanCommandOptions& options) {
   std::vector<std::string> warnings;
   std::string why_not;
   const std::optional<JointLog> log = recorded_log(options.source, why_not);
-  const SeenCorners seen = read_seen_corners(options.source / "residuals.csv");
+  const SeenCorners seen = read_seen_corners(options.source / "residuals.csv", calibration.tree);
   const bool of_postures =
       log && !log->empty() &&
       is_posture_log(*log, seen.times_s, driving_channels(calibration.tree, *log));

@@ -223,6 +223,8 @@ Calibration calibration_of(const json& document) {
   out.time_offset_s = stored_number(document.at("time_offset_s"), "time_offset_s");
   out.time_offset_sigma_s = stored_sigma(document.at("time_offset_sigma_s"), "time_offset_sigma_s");
   out.gauge = document.at("gauge").get<std::string>();
+  if (document.contains("noise_widening"))
+    out.noise_widening = stored_sigma(document.at("noise_widening"), "noise_widening");
   out.training_rms = error_or_unknown(document.at("training_rms"));
   out.held_out_rms = error_or_unknown(document.at("held_out_rms"));
   out.before_rms = error_or_unknown(document.at("before_rms"));

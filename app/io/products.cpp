@@ -279,6 +279,7 @@ json calibration_json(const Calibration& calibration) {
            {"time_offset_sigma_s", number(calibration.time_offset_sigma_s)},
            {"gauge", calibration.gauge},
            {"sigma_scale", number(calibration.sigma_scale)},
+           {"noise_widening", number(calibration.noise_widening)},
            {"training_rms", number(calibration.training_rms)},
            {"held_out_rms", number(calibration.held_out_rms)},
            {"before_rms", number(calibration.before_rms)},

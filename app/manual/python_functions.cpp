@@ -39,8 +39,12 @@ std::string argument_name(const OptionEntry& option) {
   std::ranges::transform(out, out.begin(), [](unsigned char c) {
     return c == '-' ? '_' : static_cast<char>(std::tolower(c));
   });
-  constexpr std::array<std::string_view, 8> kTaken{"from", "import", "lambda", "in",
-                                                   "is",   "class",  "pass",   "progress"};
+  // Its lower-case keywords (The Python Language Reference, 2.3.1), and the last argument of all.
+  constexpr std::array<std::string_view, 33> kTaken{
+      "and",    "as",   "assert", "async",  "await",    "break",   "class", "continue", "def",
+      "del",    "elif", "else",   "except", "finally",  "for",     "from",  "global",   "if",
+      "import", "in",   "is",     "lambda", "nonlocal", "not",     "or",    "pass",     "raise",
+      "return", "try",  "while",  "with",   "yield",    "progress"};
   KINESCOPE_CHECK(std::ranges::find(kTaken, out) == kTaken.end(),
                   "an option with a word of Python");
   return out;

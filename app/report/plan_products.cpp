@@ -129,7 +129,7 @@ std::string plan_verdict(const PlanSummary& plan) {
       plan.seconds > 0.0
           ? fmt::format("A motion of {:.1f} s through {} postures", plan.seconds, plan.postures)
           : fmt::format("{} postures at rest", plan.postures);
-  const std::string point = plan.purpose == "tip" ? "the tip is" : "points on the axes are";
+  const std::string point = plan.goal == "tip" ? "the tip is" : "points on the axes are";
   return fmt::format(
       "{}: {} known to {} after it, {} now (rms over the joints' ranges, among the robot's parts; "
       "expanded uncertainty, k = 2).",
@@ -167,7 +167,7 @@ json plan_json(const PlanSummary& plan) {
           {"inputs", report::inputs_json(plan.inputs)},
           {"source", text(plan.source)},
           {"robot", text(plan.robot)},
-          {"for", text(plan.purpose)},
+          {"goal", text(plan.goal)},
           {"seconds", plan.seconds > 0.0 ? number(plan.seconds) : json()},
           {"rate_hz", plan.rate_hz > 0.0 ? number(plan.rate_hz) : json()},
           {"postures", plan.postures},

@@ -43,13 +43,13 @@ struct PlanSummary {
   std::string version, command;
   std::vector<InputFile> inputs;
   std::string source, robot;
-  std::string purpose;   ///< "tip", "axes"
+  std::string goal;      ///< "tip", "axes"
   double seconds = 0.0;  ///< 0: postures at rest
   double rate_hz = 0.0;  ///< of the frames; 0 likewise
   int postures = 0;      ///< that it stands in, or stops at
   int frames = 0;
   double noise_px = 0.0;
-  double before_m = 0.0, after_m = 0.0;  ///< of a point of the purpose, rms
+  double before_m = 0.0, after_m = 0.0;  ///< of a point of the goal, rms
   std::vector<PlannedJoint> joints;
   std::vector<PlannedRivals> rivals;
   std::vector<PlannedMarker> markers;

@@ -151,6 +151,9 @@ struct Calibration {
   double before_rotation_rms_rad = 0.0;
   int folds = 0;
   double correlation_time_s = 0.0;  ///< over which residuals are alike; widens the uncertainties
+  /// Variances over those of independent noise, mean over the parameters; what markers at rest add
+  /// not counted in. Absent: read from a file that does not say.
+  std::optional<double> noise_widening;
   int iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;

@@ -268,6 +268,7 @@ void read_back(const Spec& spec, const State& state, const RobustSolution& robus
   out.gauge = gauge_in_words(spec);
   out.observability = uncertainty.observability;
   out.correlation_time_s = uncertainty.correlation_time_s;
+  out.noise_widening = uncertainty.noise_widening;
   fill_joint_values(spec, state, readings, out);
   fill_corrected_values(spec, state, out);
   fill_tree(spec, state, robust, out);

@@ -56,8 +56,13 @@ Stretches stretches(const Spec& spec, const LinearBundle& linear, double correla
 }
 
 // Factors by which the variances grow because the residuals are not independent.
-Eigen::VectorXd inflation(const LinearBundle& linear, const Stretches& stretch,
-                          const Eigen::MatrixXd& covariance) {
+struct Inflation {
+  Eigen::VectorXd of_parameter;
+  double pooled = 1.0;
+};
+
+Inflation inflation(const LinearBundle& linear, const Stretches& stretch,
+                    const Eigen::MatrixXd& covariance) {
   std::map<int, Eigen::VectorXd> scores;
   const Eigen::Index n = covariance.rows();
   for (const auto& [frame, rows] : linear.frames) {
@@ -67,7 +72,7 @@ Eigen::VectorXd inflation(const LinearBundle& linear, const Stretches& stretch,
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
   for (const auto& [key, g] : scores) meat += g * g.transpose();
   const auto count = static_cast<double>(scores.size());
-  if (count < 3.0) return Eigen::VectorXd::Ones(n);
+  if (count < 3.0) return {Eigen::VectorXd::Ones(n)};
   const Eigen::MatrixXd sandwich =
       covariance * meat * covariance * (stretch.widening * count / (count - 1.0));
   Eigen::VectorXd ratio(n);
@@ -76,7 +81,7 @@ Eigen::VectorXd inflation(const LinearBundle& linear, const Stretches& stretch,
   }
   // The ratio of one parameter scatters by sqrt(2 / stretches); half of it is taken from the pool.
   const double pooled = ratio.mean();
-  return (0.5 * (ratio.array() + pooled)).max(1.0);
+  return {(0.5 * (ratio.array() + pooled)).max(1.0), std::max(1.0, pooled)};
 }
 
 // A marker at rest in the image: what its sightings say together.
@@ -275,7 +280,9 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
   const Eigen::MatrixXd white = inverse_of(data + linear.prior_information, unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
   const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
-  const Eigen::VectorXd factor = inflation(linear, stretch, white).cwiseSqrt();
+  const Inflation inflated = inflation(linear, stretch, white);
+  out.noise_widening = inflated.pooled;
+  const Eigen::VectorXd factor = inflated.of_parameter.cwiseSqrt();
   out.covariance = factor.asDiagonal() * white * factor.asDiagonal();
   if (spec.kind == MeasurementKind::kCorners) {
     out.covariance +=

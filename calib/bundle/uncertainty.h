@@ -16,6 +16,9 @@ struct Uncertainty {
   Eigen::MatrixXd covariance;         ///< widened for noise that is correlated in time
   Observability observability;
   double correlation_time_s = 0.0;  ///< integral time of the residuals' autocorrelation
+  /// Variances over those of independent noise, mean over the parameters; markers at rest, whose
+  /// noise is one error in all frames, not counted in.
+  double noise_widening = 1.0;
   double chi_square = 0.0;
   int rows = 0;
 };

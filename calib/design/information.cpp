@@ -8,7 +8,6 @@
 
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
-#include "kinematics/core/median.h"
 
 namespace kinescope::design {
 namespace {
@@ -64,18 +63,6 @@ Eigen::MatrixXd known_information(const Calibration& calibration,
   }
   if (!own.empty()) out(own, own) += inverse_of_known(calibration.covariance(there, there));
   return out;
-}
-
-double widening_of(const Calibration& calibration) {
-  std::vector<double> ratios;
-  for (const Parameter& parameter : calibration.parameters) {
-    const bool of_joint = calibration.tree.joint(parameter.block).has_value();
-    if (!of_joint || !parameter.sigma || !parameter.sigma_white) continue;
-    if (*parameter.sigma_white > 0.0)
-      ratios.push_back(*parameter.sigma * *parameter.sigma /
-                       (*parameter.sigma_white * *parameter.sigma_white));
-  }
-  return ratios.empty() ? 1.0 : std::max(1.0, median_of(std::move(ratios)));
 }
 
 Eigen::MatrixXd information_of(const Eigen::MatrixXd& J, double widening) {

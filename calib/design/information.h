@@ -21,11 +21,7 @@ namespace kinescope::design {
 [[nodiscard]] Eigen::MatrixXd known_information(const Calibration& calibration,
                                                 const std::vector<Parameter>& parameters);
 
-/// By how much the calibration's variances exceed those of white noise: the median over the
-/// parameters of its joints; 1 where nothing says.
-[[nodiscard]] double widening_of(const Calibration& calibration);
-
-/// J'J.
+/// J'J, less by Calibration::noise_widening.
 [[nodiscard]] Eigen::MatrixXd information_of(const Eigen::MatrixXd& J, double widening);
 
 /// Inverse of an information matrix, scaled first: units differ by many powers of ten. Throws

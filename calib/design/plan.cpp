@@ -50,7 +50,7 @@ class Planner {
         space_(space),
         pairs_(pairs),
         options_(options),
-        widening_(widening_of(robot.calibration)),
+        widening_(robot.calibration.noise_widening.value_or(1.0)),
         rng_(Rng::from_name("plan", options.seed)) {}
 
   [[nodiscard]] RecordingPlan plan(const Progress& progress);

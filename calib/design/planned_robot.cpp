@@ -64,12 +64,15 @@ void add_corrections(const PlannedRobot& robot, ExpectedRecording& recording) {
                         std::back_inserter(recording.corrections));
 }
 
+// In the next of so many frames.
 void see(const PlannedRobot& robot, const JointSpace& space, const Eigen::VectorXd& readings,
-         Measurements& measurements) {
+         std::size_t frames, Measurements& measurements) {
+  const double alike_px = robot.noise.all_px * std::sqrt(static_cast<double>(frames));
   const auto frame = static_cast<int>(measurements.times_s.size()) - 1;
   for (TagObservation& seen :
        expected_sightings(robot.calibration, space.values(readings), robot.sight, robot.noise)) {
     seen.frame = frame;
+    if (robot.noise.at_rest.contains(seen.id)) seen.sigma_px = alike_px;
     measurements.corners.push_back(std::move(seen));
   }
 }
@@ -100,7 +103,7 @@ ExpectedRecording recording_at(const PlannedRobot& robot, const JointSpace& spac
     out.log.times_s.push_back(time_s);
     out.log.values.row(static_cast<Eigen::Index>(i)) = postures[i];
     out.measurements.times_s.push_back(time_s);
-    see(robot, space, postures[i], out.measurements);
+    see(robot, space, postures[i], postures.size(), out.measurements);
   }
   add_corrections(robot, out);
   return out;
@@ -120,7 +123,8 @@ ExpectedRecording recording_along(const PlannedRobot& robot, const JointSpace& s
   const auto frames = static_cast<int>(std::floor(path.duration_s() * frame_rate_hz)) + 1;
   for (int f = 0; f < frames; ++f) {
     out.measurements.times_s.push_back(f / frame_rate_hz);
-    see(robot, space, path.readings(f / frame_rate_hz), out.measurements);
+    see(robot, space, path.readings(f / frame_rate_hz), static_cast<std::size_t>(frames),
+        out.measurements);
   }
   add_corrections(robot, out);
   return out;

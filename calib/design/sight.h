@@ -6,6 +6,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <vector>
 
 #include "calib/bundle/calibration.h"
@@ -24,6 +25,8 @@ struct SightLimits {
 struct MarkerNoise {
   double all_px = 0.1;                ///< standard deviation of a coordinate
   std::map<TagId, double> of_marker;  ///< where it is known by itself
+  /// Those that rest and err by the same in all frames: together one sighting, of `all_px`.
+  std::set<TagId> at_rest;
   [[nodiscard]] double of(TagId id) const {
     const auto found = of_marker.find(id);
     return found == of_marker.end() ? all_px : found->second;

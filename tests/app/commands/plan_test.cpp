@@ -86,12 +86,12 @@ TEST_F(PlanCommand, SameSeedSameBytes) {
 }
 
 TEST_F(PlanCommand, PlansPosturesForTheAxes) {
-  const Outcome outcome = run({"plan", run_folder(), "-o", output(), "--postures", "7", "--for",
+  const Outcome outcome = run({"plan", run_folder(), "-o", output(), "--postures", "7", "--goal",
                                "axes", "--range", "1.5", "--json", "--quiet"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const PlanJson plan = PlanJson::parse(outcome.out);
   EXPECT_EQ(plan.at("postures"), 7);
-  EXPECT_EQ(plan.at("for"), "axes");
+  EXPECT_EQ(plan.at("goal"), "axes");
   EXPECT_EQ(plan.at("seconds"), nullptr);
   for (const PlanJson& joint : plan.at("joints")) {
     const double allowed =
