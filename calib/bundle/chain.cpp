@@ -52,12 +52,34 @@ ChainDerivatives differentiate_chain(const Pose& T_camera_base, std::span<const 
   return out;
 }
 
+Pose compose_chain(const Pose& T_camera_base, std::span<const ChainJoint> joints,
+                   const Pose& T_link_marker) {
+  Pose rest = T_link_marker;
+  for (std::size_t k = joints.size(); k-- > 0;) {
+    const ChainJoint& joint = joints[k];
+    const bool corrected = !joint.correction.isZero(0.0);
+    if (joint.upward) {
+      rest = joint_motion(joint.type, joint.axis, -joint.value) *
+             (joint.T_parent_joint.inverse() * rest);
+      if (corrected) rest = exp_pose(-joint.correction) * rest;
+      continue;
+    }
+    if (corrected) rest = exp_pose(joint.correction) * rest;
+    rest = joint.T_parent_joint * (joint_motion(joint.type, joint.axis, joint.value) * rest);
+  }
+  return T_camera_base * rest;
+}
+
+Pose grown(const Growth& growth, const Pose& T_camera_base, const Pose& T_camera_marker) {
+  Pose T_base_marker = T_camera_base.inverse() * T_camera_marker;
+  T_base_marker.translation = (1.0 + growth.relative) * T_base_marker.translation + growth.shift_m;
+  return T_camera_base * T_base_marker;
+}
+
 void grow(const Growth& growth, const Pose& T_camera_base, ChainDerivatives& chain) {
-  Pose T_base_marker = T_camera_base.inverse() * chain.T_camera_marker;
   const double factor = 1.0 + growth.relative;
-  T_base_marker.translation = factor * T_base_marker.translation + growth.shift_m;
-  chain.T_camera_marker = T_camera_base * T_base_marker;
-  chain.d_camera_base = adjoint(T_base_marker.inverse());
+  chain.T_camera_marker = grown(growth, T_camera_base, chain.T_camera_marker);
+  chain.d_camera_base = adjoint(chain.T_camera_marker.inverse() * T_camera_base);
   // What moves the marker by a turn and a shift moves it by that turn and a larger shift.
   const auto enlarge = [factor](auto& d) { d.template bottomRows<3>() *= factor; };
   std::ranges::for_each(chain.d_joint, enlarge);

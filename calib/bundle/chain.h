@@ -38,6 +38,10 @@ struct ChainDerivatives {
                                                    std::span<const ChainJoint> joints,
                                                    const Pose& T_link_marker);
 
+/// T_camera_marker alone.
+[[nodiscard]] Pose compose_chain(const Pose& T_camera_base, std::span<const ChainJoint> joints,
+                                 const Pose& T_link_marker);
+
 /// All that joints carry, larger by a factor as seen from the base's origin, and shifted.
 struct Growth {
   double relative = 0.0;                              ///< of distances, minus 1
@@ -45,7 +49,10 @@ struct Growth {
   [[nodiscard]] bool operator==(const Growth&) const = default;
 };
 
-/// Moves the marker as a growth does, with all derivatives.
+/// The marker as a growth moves it.
+[[nodiscard]] Pose grown(const Growth& growth, const Pose& T_camera_base,
+                         const Pose& T_camera_marker);
+/// The same with all derivatives.
 void grow(const Growth& growth, const Pose& T_camera_base, ChainDerivatives& chain);
 
 }  // namespace kinescope::bundle

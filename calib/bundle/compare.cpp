@@ -72,6 +72,25 @@ std::optional<SightingError> compare(const Sighting& sighting, const Pose& T_cam
   return std::nullopt;
 }
 
+std::optional<Eigen::VectorXd> residual_of(const Sighting& sighting, const Pose& T_camera_marker,
+                                           const CameraModel& camera,
+                                           const Eigen::Vector3d* target_m,
+                                           const MarkerShape& shape) {
+  if (sighting.kind != MeasurementKind::kCorners) {
+    auto error = compare(sighting, T_camera_marker, camera, target_m, shape);
+    if (!error) return std::nullopt;
+    return std::move(error->residual);
+  }
+  Eigen::VectorXd out(sighting.dimension());
+  for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {
+    const auto pixel = project(camera, T_camera_marker * shape.corner_m(sighting.geometry_m[i]));
+    if (!pixel) return std::nullopt;
+    out.segment<2>(static_cast<Eigen::Index>(2 * i)) =
+        (sighting.corners_px[i] - *pixel) / sighting.sigma;
+  }
+  return out;
+}
+
 std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& state,
                                                  const Readings& readings,
                                                  const Sighting& sighting) {

@@ -277,6 +277,29 @@ std::optional<CorrectedError> corrected_error(
   return out;
 }
 
+std::optional<Eigen::VectorXd> corrected_residual(
+    const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
+    const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m) {
+  // Rows of the image are read one after the other: that moves corners by the slope in time.
+  if (corrected.line_delay_s != 0.0) {
+    auto at = corrected_error(spec, sighting, corrected, T_camera_base, std::move(joints),
+                              std::move(rates), T_link_marker, camera, target_m);
+    if (!at) return std::nullopt;
+    return std::move(at->error.residual);
+  }
+  for (std::size_t k = 0; k < joints.size(); ++k) joints[k].correction = corrected.joints[k];
+  const Pose corrected_camera = exp_pose(corrected.camera) * T_camera_base;
+  Pose T_camera_marker =
+      compose_chain(corrected_camera, joints, T_link_marker * exp_pose(corrected.marker));
+  if (corrected.growth != Growth{})
+    T_camera_marker = grown(corrected.growth, corrected_camera, T_camera_marker);
+  auto out = residual_of(sighting, T_camera_marker, changed(camera, corrected.intrinsics), target_m,
+                         corrected.shape);
+  if (out && corrected.bloom_px != 0.0) *out += corrected.bloom_px * d_bloom(sighting);
+  return out;
+}
+
 Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
                              const Correction& correction, const CorrectedError& at) {
   const double share = share_at(correction, sighting.frame);

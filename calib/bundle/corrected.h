@@ -59,7 +59,13 @@ struct CorrectedError {
     const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
     const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m);
 
-/// The same at a state.
+/// Its residual alone: the same but for rounding.
+[[nodiscard]] std::optional<Eigen::VectorXd> corrected_residual(
+    const Spec& spec, const Sighting& sighting, const CorrectedSighting& corrected,
+    const Pose& T_camera_base, std::vector<ChainJoint> joints, std::vector<double> rates,
+    const Pose& T_link_marker, const CameraModel& camera, const Eigen::Vector3d* target_m);
+
+/// Of corrected_error() at a state.
 [[nodiscard]] std::optional<CorrectedError> corrected_error_of(const Spec& spec, const State& state,
                                                                const Readings& readings,
                                                                const Sighting& sighting);

@@ -65,13 +65,23 @@ class SightingCost final : public ceres::CostFunction {
     if (sighting_->target >= 0) target = Eigen::Vector3d(parameters[behind_clock_]);
     const CorrectedSighting corrected =
         sum_corrections(*spec_, *sighting_, corrections_, values_of_corrections(parameters));
-    const auto at =
-        corrected_error(*spec_, *sighting_, corrected, from_block(parameters[0]), std::move(joints),
-                        std::move(rates), from_block(parameters[mount]), camera,
-                        sighting_->target >= 0 ? &target : nullptr);
-    if (!at || !at->error.residual.allFinite()) return false;
-    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = at->error.residual;
-    if (jacobians != nullptr) fill_jacobians(parameters, corrected, *at, jacobians);
+    const Eigen::Vector3d* measured = sighting_->target >= 0 ? &target : nullptr;
+    const Pose T_camera_base = from_block(parameters[0]);
+    const Pose T_link_marker = from_block(parameters[mount]);
+    const auto take = [&](const Eigen::VectorXd& residual) {
+      Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = residual;
+      return residual.allFinite();
+    };
+    if (jacobians == nullptr) {
+      const auto residual =
+          corrected_residual(*spec_, *sighting_, corrected, T_camera_base, std::move(joints),
+                             std::move(rates), T_link_marker, camera, measured);
+      return residual && take(*residual);
+    }
+    const auto at = corrected_error(*spec_, *sighting_, corrected, T_camera_base, std::move(joints),
+                                    std::move(rates), T_link_marker, camera, measured);
+    if (!at || !take(at->error.residual)) return false;
+    fill_jacobians(parameters, corrected, *at, jacobians);
     return true;
   }
 

@@ -165,6 +165,12 @@ struct SightingError {
                                                    const CameraModel& camera,
                                                    const Eigen::Vector3d* target_m,
                                                    const MarkerShape& shape = {});
+/// The residual alone.
+[[nodiscard]] std::optional<Eigen::VectorXd> residual_of(const Sighting& sighting,
+                                                         const Pose& T_camera_marker,
+                                                         const CameraModel& camera,
+                                                         const Eigen::Vector3d* target_m,
+                                                         const MarkerShape& shape);
 
 /// The error of one sighting at a state.
 [[nodiscard]] std::optional<SightingError> error_of(const Spec& spec, const State& state,
