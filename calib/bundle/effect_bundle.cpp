@@ -18,6 +18,21 @@
 
 namespace kinescope {
 
+// Where a fit ended.
+struct bundle::End {
+  bool time_offset = false;
+  std::vector<std::string> corrections;
+  std::vector<std::size_t> without_couplings;
+  bundle::State state;
+  double cost = 0.0;
+
+  [[nodiscard]] bool is_of_the_same(const End& other) const {
+    return time_offset == other.time_offset && corrections == other.corrections &&
+           without_couplings == other.without_couplings;
+  }
+};
+
+using bundle::End;
 using bundle::FreeBlock;
 using bundle::LinearBundle;
 using bundle::Readings;
@@ -80,15 +95,6 @@ void remove_coupling(const DesignCoupling& coupling, Spec& spec) {
                 [&](const auto& share) { return share.first == channel; });
 }
 
-// Where a fit ended.
-struct End {
-  bool time_offset = false;
-  std::vector<std::string> corrections;
-  std::vector<std::size_t> without_couplings;
-  State state;
-  double cost = 0.0;
-};
-
 std::vector<std::string> names_of(const std::vector<Correction>& corrections) {
   std::vector<std::string> out;
   for (const Correction& correction : corrections) out.push_back(correction.name);
@@ -111,6 +117,71 @@ std::optional<std::vector<std::size_t>> matching(const std::vector<std::string>&
   return out;
 }
 
+using Ends = std::vector<std::shared_ptr<const End>>;
+
+void remember_in(Ends& ends, std::shared_ptr<const End> end) {
+  const auto known =
+      std::ranges::find_if(ends, [&](const auto& other) { return other->is_of_the_same(*end); });
+  if (known != ends.end()) {
+    *known = std::move(end);
+  } else {
+    ends.push_back(std::move(end));
+  }
+}
+
+// Where the best fit ended whose freedom the change has, too.
+std::optional<State> end_with_less(const Ends& ends, const BundleChange& change,
+                                   const State& state) {
+  const std::vector<std::string> names = names_of(change.corrections);
+  const End* best = nullptr;
+  std::vector<std::size_t> best_places;
+  for (const auto& end : ends) {
+    if (end->time_offset && !change.time_offset) continue;
+    if (end->without_couplings != change.without_couplings) continue;
+    if (best != nullptr && end->cost > best->cost) continue;
+    auto places = matching(end->corrections, names);
+    if (!places) continue;
+    best = end.get();
+    best_places = std::move(*places);
+  }
+  if (best == nullptr) return std::nullopt;
+  State out = best->state;
+  if (!best->time_offset) out.time_offset = state.time_offset;
+  out.corrections = state.corrections;
+  for (std::size_t k = 0; k < best_places.size(); ++k)
+    out.corrections[best_places[k]] = best->state.corrections[k];
+  return out;
+}
+
+// Where the best fit ended that has the change's freedom and the least beyond it.
+std::optional<State> end_with_more(const Ends& ends, const BundleChange& change,
+                                   const State& state) {
+  const std::vector<std::string> names = names_of(change.corrections);
+  const auto freedom_of = [](const End& end) {
+    return end.corrections.size() + static_cast<std::size_t>(end.time_offset);
+  };
+  const End* best = nullptr;
+  std::vector<std::size_t> best_places;
+  for (const auto& end : ends) {
+    if (change.time_offset && !end->time_offset) continue;
+    if (end->without_couplings != change.without_couplings) continue;
+    if (best != nullptr &&
+        std::pair(freedom_of(*end), end->cost) >= std::pair(freedom_of(*best), best->cost))
+      continue;
+    auto places = matching(names, end->corrections);
+    if (!places) continue;
+    best = end.get();
+    best_places = std::move(*places);
+  }
+  if (best == nullptr) return std::nullopt;
+  State out = best->state;
+  if (!change.time_offset) out.time_offset = state.time_offset;
+  out.corrections.clear();
+  for (const std::size_t place : best_places)
+    out.corrections.push_back(best->state.corrections[place]);
+  return out;
+}
+
 }  // namespace
 
 struct EffectBundle::Impl {
@@ -122,21 +193,15 @@ struct EffectBundle::Impl {
   std::vector<DesignCoupling> couplings;
   double bias_px = 0.0;
   double jitter_s = 0.0;
-  mutable std::vector<End> ends;
+  mutable std::vector<std::shared_ptr<const End>> ends;  // the last of the same change
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  /// Where the best fit ended whose freedom the change has, too.
-  [[nodiscard]] std::optional<State> end_with_less(const BundleChange& change,
-                                                   const State& state) const;
-  /// Where the best fit ended that has the change's freedom and the least beyond it.
-  [[nodiscard]] std::optional<State> end_with_more(const BundleChange& change,
-                                                   const State& state) const;
-  /// From there, `state` moved to the minimum.
-  [[nodiscard]] bundle::SolveSummary solve_from(const BundleChange& change, const Spec& with,
-                                                State& state) const;
-  void remember(const BundleChange& change, const State& state, double cost) const;
-  [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
+  /// `state` moved to the minimum, from where the best of `known` ended that fits.
+  [[nodiscard]] bundle::SolveSummary solve_from(const Ends& known, const BundleChange& change,
+                                                const Spec& with, State& state) const;
+  [[nodiscard]] BundleSolution solve(const Ends& known, const BundleChange& change, Spec& with,
+                                     State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s,
                                    const Eigen::MatrixXd& ahead_s) const;
   void add_copies(const Spec& at, const Eigen::MatrixXd& ahead_s, JointMotion& out) const;
@@ -296,66 +361,20 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
   }
 }
 
-std::optional<State> EffectBundle::Impl::end_with_less(const BundleChange& change,
-                                                       const State& state) const {
-  const std::vector<std::string> names = names_of(change.corrections);
-  const End* best = nullptr;
-  std::vector<std::size_t> best_places;
-  for (const End& end : ends) {
-    if (end.time_offset && !change.time_offset) continue;
-    if (end.without_couplings != change.without_couplings) continue;
-    if (best != nullptr && end.cost > best->cost) continue;
-    auto places = matching(end.corrections, names);
-    if (!places) continue;
-    best = &end;
-    best_places = std::move(*places);
-  }
-  if (best == nullptr) return std::nullopt;
-  State out = best->state;
-  if (!best->time_offset) out.time_offset = state.time_offset;
-  out.corrections = state.corrections;
-  for (std::size_t k = 0; k < best_places.size(); ++k)
-    out.corrections[best_places[k]] = best->state.corrections[k];
-  return out;
-}
-
-std::optional<State> EffectBundle::Impl::end_with_more(const BundleChange& change,
-                                                       const State& state) const {
-  const std::vector<std::string> names = names_of(change.corrections);
-  const auto freedom_of = [](const End& end) {
-    return end.corrections.size() + static_cast<std::size_t>(end.time_offset);
-  };
-  const End* best = nullptr;
-  std::vector<std::size_t> best_places;
-  for (const End& end : ends) {
-    if (change.time_offset && !end.time_offset) continue;
-    if (end.without_couplings != change.without_couplings) continue;
-    if (best != nullptr &&
-        std::pair(freedom_of(end), end.cost) >= std::pair(freedom_of(*best), best->cost))
-      continue;
-    auto places = matching(names, end.corrections);
-    if (!places) continue;
-    best = &end;
-    best_places = std::move(*places);
-  }
-  if (best == nullptr) return std::nullopt;
-  State out = best->state;
-  if (!change.time_offset) out.time_offset = state.time_offset;
-  out.corrections.clear();
-  for (const std::size_t place : best_places)
-    out.corrections.push_back(best->state.corrections[place]);
-  return out;
-}
-
-bundle::SolveSummary EffectBundle::Impl::solve_from(const BundleChange& change, const Spec& with,
-                                                    State& state) const {
+bundle::SolveSummary EffectBundle::Impl::solve_from(const Ends& known, const BundleChange& change,
+                                                    const Spec& with, State& state) const {
   constexpr int kIterations = 60;
+  // From where an earlier fit ended whole Gauss-Newton steps are best: two thirds of the iterations
+  // of the usual radius (`undeclared`, 13049).
+  constexpr double kNearRadius = 1e9;
   const State begin = state;
-  state = end_with_less(change, begin).value_or(begin);
-  bundle::SolveSummary out = bundle::solve(with, state, used, {}, kIterations);
+  const std::optional<State> near = end_with_less(known, change, begin);
+  state = near.value_or(begin);
+  bundle::SolveSummary out =
+      bundle::solve(with, state, used, {}, kIterations, near ? kNearRadius : bundle::kFirstRadius);
   if (out.converged) return out;
   // Far from where it ends: with more freedom another one may have come near.
-  if (std::optional<State> nearer = end_with_more(change, begin)) {
+  if (std::optional<State> nearer = end_with_more(known, change, begin)) {
     const bundle::SolveSummary other = bundle::solve(with, *nearer, used, {}, kIterations);
     if (other.converged) {
       state = *std::move(nearer);
@@ -369,26 +388,11 @@ bundle::SolveSummary EffectBundle::Impl::solve_from(const BundleChange& change, 
   return bundle::solve(with, state, used, {}, kIterations);
 }
 
-void EffectBundle::Impl::remember(const BundleChange& change, const State& state,
-                                  double cost) const {
-  End end{change.time_offset, names_of(change.corrections), change.without_couplings, state, cost};
-  const auto known = std::ranges::find_if(ends, [&](const End& other) {
-    return other.time_offset == end.time_offset && other.corrections == end.corrections &&
-           other.without_couplings == end.without_couplings;
-  });
-  if (known != ends.end()) {
-    *known = std::move(end);
-  } else {
-    ends.push_back(std::move(end));
-  }
-}
-
 // The least squares fit; `with` and `state` are left with the change in them.
-BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
+BundleSolution EffectBundle::Impl::solve(const Ends& known, const BundleChange& change, Spec& with,
                                          State& state) const {
   change_model(change, with, state);
-  const bundle::SolveSummary summary = solve_from(change, with, state);
-  if (summary.converged) remember(change, state, summary.final_cost);
+  const bundle::SolveSummary summary = solve_from(known, change, with, state);
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;
@@ -404,14 +408,23 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
     out.values.conservativeResize(out.values.size() + 1);
     out.values[out.values.size() - 1] = state.time_offset[0];
   }
-  out.end = std::make_shared<const State>(state);
+  out.end = std::make_shared<const End>(End{change.time_offset, names_of(change.corrections),
+                                            change.without_couplings, state, summary.final_cost});
   return out;
 }
 
-BundleSolution EffectBundle::solve(const BundleChange& change) const {
+BundleSolution EffectBundle::solve(const BundleChange& change,
+                                   std::span<const BundleSolution> since) const {
+  Ends known = impl_->ends;
+  for (const BundleSolution& solution : since)
+    if (solution.converged) remember_in(known, solution.end);
   Spec spec;
   State state;
-  return impl_->solve(change, spec, state);
+  return impl_->solve(known, change, spec, state);
+}
+
+void EffectBundle::remember(const BundleSolution& solution) const {
+  if (solution.converged) remember_in(impl_->ends, solution.end);
 }
 
 BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correction>& probes,
@@ -421,10 +434,10 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   BundleFit out;
   if (solved != nullptr) {
     impl_->change_model(change, spec, state);
-    state = *solved->end;
+    state = solved->end->state;
     static_cast<BundleSolution&>(out) = *solved;
   } else {
-    static_cast<BundleSolution&>(out) = impl_->solve(change, spec, state);
+    static_cast<BundleSolution&>(out) = impl_->solve(impl_->ends, change, spec, state);
   }
 
   // Probes stand beside the corrections, at zero.

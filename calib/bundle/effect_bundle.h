@@ -11,6 +11,7 @@
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,7 @@ struct DesignCoupling {
 };
 
 namespace bundle {
-struct State;
+struct End;
 }
 
 struct BundleSolution {
@@ -52,7 +53,8 @@ struct BundleSolution {
   double variance = 0.0;    ///< of a whitened row, priors' squares counted in
   /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
   KinematicTree tree;
-  std::shared_ptr<const bundle::State> end;  ///< for fit(), which then need not solve again
+  /// For fit(), which then need not solve again, and for remember().
+  std::shared_ptr<const bundle::End> end;
 };
 
 /// A solution, and how its residual answers to the parameters and to probes.
@@ -93,7 +95,12 @@ class EffectBundle {
   EffectBundle(const EffectBundle&) = delete;
   EffectBundle& operator=(const EffectBundle&) = delete;
 
-  [[nodiscard]] BundleSolution solve(const BundleChange& change) const;
+  /// Begins where the best of the remembered solutions ended that fits, or of those `since`.
+  /// Threads may call it at the same time, and fit(); not remember().
+  [[nodiscard]] BundleSolution solve(const BundleChange& change,
+                                     std::span<const BundleSolution> since = {}) const;
+  /// Later ones may begin there.
+  void remember(const BundleSolution& solution) const;
   /// Shares of corrections and probes have one entry a frame of the measurements. `solved`: of this
   /// change, where it is known.
   [[nodiscard]] BundleFit fit(const BundleChange& change, const std::vector<Correction>& probes,

@@ -10,6 +10,7 @@
 #include "calib/effects/elsewhere.h"
 #include "calib/effects/suspect.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::effects {
 namespace {
@@ -19,59 +20,50 @@ bool depends_on_its_size(const AddedEffect& added) {
   return is_sag(added.id) || is_bend(added.id, added.scan);
 }
 
-// Probes without a share, each once: what columns of candidates act through.
+// Probes without a share, each once: what columns of candidates act through. A direction that
+// changes with time is a probe of its own.
 class Carriers {
  public:
-  // The column of a correction: a carrier, and the share of each instant.
-  EffectColumn column(const Correction& correction, const std::vector<int>& frames) {
-    EffectColumn out;
-    if (correction.twists.rows() > 0) {
-      // A direction that changes is a carrier of its own; the same one comes once.
-      for (const auto& [index, twists] : moving_) {
-        if (same_part(probes_[static_cast<std::size_t>(index)], correction) &&
-            twists == correction.twists) {
-          out.carrier = index;
-          return out;
-        }
-      }
-      out.carrier = static_cast<int>(probes_.size());
-      moving_.emplace_back(out.carrier, correction.twists);
-      probes_.push_back(correction);
-      return out;
+  int add(Correction correction) {
+    if (const auto known = place_of(correction)) return *known;
+    if (correction.twists.rows() == 0) {
+      correction.share.resize(0);
+      correction.value = 0.0;
     }
-    out.carrier = still(correction);
-    if (correction.share.size() > 0) {
-      out.share.resize(static_cast<Eigen::Index>(frames.size()));
-      for (std::size_t i = 0; i < frames.size(); ++i) {
-        out.share[static_cast<Eigen::Index>(i)] = correction.share[frames[i]];
-      }
-    }
-    return out;
-  }
-
-  int still(Correction correction) {
-    for (std::size_t i = 0; i < probes_.size(); ++i) {
-      const Correction& known = probes_[i];
-      if (known.twists.rows() == 0 && same_part(known, correction) &&
-          known.direction == correction.direction) {
-        return static_cast<int>(i);
-      }
-    }
-    correction.share.resize(0);
-    correction.value = 0.0;
     probes_.push_back(std::move(correction));
     return static_cast<int>(probes_.size()) - 1;
+  }
+
+  // The column of a correction that was added: a carrier, and the share of each instant.
+  [[nodiscard]] EffectColumn column(const Correction& correction,
+                                    const std::vector<int>& frames) const {
+    const auto known = place_of(correction);
+    KINESCOPE_CHECK(known.has_value(), "a fit knows the carriers of all its candidates");
+    EffectColumn out;
+    out.carrier = *known;
+    if (correction.twists.rows() > 0 || correction.share.size() == 0) return out;
+    out.share.resize(static_cast<Eigen::Index>(frames.size()));
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      out.share[static_cast<Eigen::Index>(i)] = correction.share[frames[i]];
+    return out;
   }
 
   [[nodiscard]] const std::vector<Correction>& probes() const { return probes_; }
 
  private:
-  static bool same_part(const Correction& a, const Correction& b) {
-    return a.part == b.part && a.index == b.index;
+  [[nodiscard]] std::optional<int> place_of(const Correction& correction) const {
+    const auto is_same = [&](const Correction& known) {
+      if (known.part != correction.part || known.index != correction.index) return false;
+      if (known.twists.rows() != correction.twists.rows()) return false;
+      if (known.twists.rows() > 0) return known.twists == correction.twists;
+      return known.direction == correction.direction;
+    };
+    const auto found = std::ranges::find_if(probes_, is_same);
+    if (found == probes_.end()) return std::nullopt;
+    return static_cast<int>(found - probes_.begin());
   }
 
   std::vector<Correction> probes_;
-  std::vector<std::pair<int, Eigen::Matrix<double, Eigen::Dynamic, 6>>> moving_;
 };
 
 std::vector<CameraEffect> all_effects(const EffectWorld& world) {
@@ -217,7 +209,7 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
     value.index = joint;
     const bool turns = j.type == JointType::kRevolute;
     (turns ? value.direction.head<3>() : value.direction.tail<3>()) = j.axis;
-    RestPlace place{j.name, turns ? "rad" : "m", carriers.still(value), 0.0, 0.0};
+    RestPlace place{j.name, turns ? "rad" : "m", carriers.add(value), 0.0, 0.0};
     if (const auto found = world.unsteady.find(joint); found != world.unsteady.end()) {
       // Where a motion took the place of the reading, any part of the error may be left.
       if (world.postures) place.reading_error_least = kAtLeast * found->second.error;
@@ -233,7 +225,7 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
       shift.index = marker;
       shift.direction = Vector6d::Unit(3 + axis);
       out.push_back({fmt::format("tag_{} along {}", m.id.value, "xy"[axis]), "m",
-                     carriers.still(shift), 0.0, 0.0});
+                     carriers.add(shift), 0.0, 0.0});
     }
   }
   return out;
@@ -244,7 +236,7 @@ int clock_carrier(Carriers& carriers) {
   Correction time;
   time.part = CorrectedPart::kClock;
   time.index = kEverywhere;
-  return carriers.still(time);
+  return carriers.add(time);
 }
 
 // The carriers' places are filled in when the fit has told which rows have one.
@@ -257,7 +249,7 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
     Correction shift;
     shift.part = CorrectedPart::kIntrinsic;
     shift.index = kFirstOfCentre + axis;
-    image.carriers[static_cast<std::size_t>(axis)] = carriers.still(shift);
+    image.carriers[static_cast<std::size_t>(axis)] = carriers.add(shift);
   }
   std::vector<RestField> out;
   for (std::size_t c = 0; c < world.cameras.size(); ++c) {
@@ -403,9 +395,24 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
 }
 
 // The clock as the last fit with an effect of it had it: the next is near.
-Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effects) const {
+Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effects,
+                                           const Memory& news) const {
   if (std::ranges::none_of(effects, is_of_clock, &AddedEffect::id)) return clock_ahead(0.0);
-  return last_ahead_s_ ? *last_ahead_s_ : clock_ahead(bundle_->start_time_offset_s());
+  const std::optional<Eigen::MatrixXd>& last = news.ahead_s ? news.ahead_s : last_.ahead_s;
+  return last ? *last : clock_ahead(bundle_->start_time_offset_s());
+}
+
+void TracedBundle::Memory::take(Memory later) {
+  if (later.ahead_s) ahead_s = std::move(later.ahead_s);
+  if (later.sizes) sizes = std::move(later.sizes);
+  for (const auto& [joint, start] : later.play_starts) play_starts.insert_or_assign(joint, start);
+  std::ranges::move(later.solutions, std::back_inserter(solutions));
+}
+
+void TracedBundle::remember(Memory news) const {
+  for (const BundleSolution& solution : news.solutions) bundle_->remember(solution);
+  news.solutions.clear();
+  last_.take(std::move(news));
 }
 
 Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
@@ -413,17 +420,21 @@ Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
 }
 
 TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
-                                           const std::vector<AddedEffect>& effects) const {
+                                           const std::vector<AddedEffect>& effects,
+                                           const Memory& news) const {
   Ready out;
   out.world = world_at(ahead_s);
-  if (last_sizes_ && last_sizes_->effects == sized(effects)) {
-    out.world.tree = last_sizes_->tree;
-    out.world.loaded.value += last_sizes_->added;
-    out.world.sags = last_sizes_->sags;
-    out.world.bends = last_sizes_->bends;
+  const std::optional<Sized>& sizes = news.sizes ? news.sizes : last_.sizes;
+  if (sizes && sizes->effects == sized(effects)) {
+    out.world.tree = sizes->tree;
+    out.world.loaded.value += sizes->added;
+    out.world.sags = sizes->sags;
+    out.world.bends = sizes->bends;
   }
   // Of one that is asked for again, too: it is compared with others as it was found.
-  out.world.play_starts = last_play_starts_;
+  out.world.play_starts = last_.play_starts;
+  for (const auto& [joint, start] : news.play_starts)
+    out.world.play_starts.insert_or_assign(joint, start);
   for (const AddedEffect& added : effects) {
     if (!is_play(added.id)) continue;
     const std::optional<JointId> joint = out.world.tree.joint(added.id.place);
@@ -436,8 +447,9 @@ TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
   return out;
 }
 
-void TracedBundle::keep_sizes(const std::vector<AddedEffect>& effects, const Ready& ready,
-                              const BundleSolution& solution) const {
+TracedBundle::Sized TracedBundle::sizes_of(const std::vector<AddedEffect>& effects,
+                                           const Ready& ready,
+                                           const BundleSolution& solution) const {
   const std::vector<Correction>& corrections = ready.change.corrections;
   const auto places =
       parameter_places(ready.library, effects, static_cast<Eigen::Index>(corrections.size()));
@@ -460,13 +472,13 @@ void TracedBundle::keep_sizes(const std::vector<AddedEffect>& effects, const Rea
           corrections[static_cast<std::size_t>(places[i][k])].reference;
     out.sags.insert_or_assign(joint, std::move(values));
   }
-  last_sizes_ = std::move(out);
+  return out;
 }
 
-bool TracedBundle::keep_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
-                                    const BundleSolution& solution) const {
+bool TracedBundle::find_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
+                                    const BundleSolution& solution, Memory& news) const {
   constexpr double kSameStart = 1e-3;  // of the gap; chosen, not measured
-  bool news = false;
+  bool are_new = false;
   for (const AddedEffect& added : effects) {
     if (!is_play(added.id)) continue;
     const std::string name = fmt::format("{} {}", added.id.place, kPlayStart);
@@ -476,39 +488,45 @@ bool TracedBundle::keep_play_starts(const std::vector<AddedEffect>& effects, con
     const double before = ready.world.play_starts.at(further->index);
     const double start = std::clamp(before + solution.values[further - corrections.begin()],
                                     -0.5 * added.scan, 0.5 * added.scan);
-    news = news || std::abs(start - before) > kSameStart * added.scan;
-    last_play_starts_.insert_or_assign(further->index, start);
+    are_new = are_new || std::abs(start - before) > kSameStart * added.scan;
+    news.play_starts.insert_or_assign(further->index, start);
   }
-  return news;
+  return are_new;
 }
 
 // Shares are taken where the joints are by the clock that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
-TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
+TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects,
+                                            Memory& news) const {
   constexpr int kRounds = 2;           // each leaves of its error what the effect's size is, in rad
   constexpr double kSameTime = 20e-6;  // s: no joint moves noticeably
   const bool clock = std::ranges::any_of(effects, is_of_clock, &AddedEffect::id);
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
-  Eigen::MatrixXd ahead_s = likely_clock(effects);
-  Ready out = ready_at(ahead_s, effects);
+  Eigen::MatrixXd ahead_s = likely_clock(effects, news);
+  Ready out = ready_at(ahead_s, effects, news);
   const bool play = std::ranges::any_of(effects, is_play, &AddedEffect::id);
   const int rounds = by_size || play ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
-    BundleSolution solution = bundle_->solve(out.change);
-    if (clock && solution.converged) last_ahead_s_ = solution.ahead_s;
-    if (by_size && solution.converged) keep_sizes(effects, out, solution);
+    BundleSolution solution = bundle_->solve(out.change, news.solutions);
+    news.solutions.push_back(solution);
+    if (clock && solution.converged) news.ahead_s = solution.ahead_s;
+    if (by_size && solution.converged) news.sizes = sizes_of(effects, out, solution);
     const bool starts_elsewhere =
-        play && solution.converged && keep_play_starts(effects, out, solution);
+        play && solution.converged && find_play_starts(effects, out, solution, news);
     const bool same_time = (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime;
     ahead_s = solution.ahead_s;
     std::optional<Ready> next;
     if (solution.converged && (by_size || starts_elsewhere || !same_time))
-      next = ready_at(ahead_s, effects);
+      next = ready_at(ahead_s, effects, news);
     if (!next || std::ranges::equal(next->change.corrections, out.change.corrections, are_alike)) {
       out.solved = std::move(solution);
       break;
     }
     out = std::move(*next);
+  }
+  if (!out.solved) {
+    out.solved = bundle_->solve(out.change, news.solutions);
+    news.solutions.push_back(*out.solved);
   }
   return out;
 }
@@ -524,30 +542,44 @@ std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects
 }
 
 EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) const {
-  return ready_for(effects).world;
+  Memory news;
+  Ready ready = ready_for(effects, news);
+  remember(std::move(news));
+  return std::move(ready.world);
 }
 
 TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
-  auto [world, library, change, solved] = ready_for(effects);
+  return std::move(fit_all({effects}).front());
+}
+
+std::vector<TracedFit> TracedBundle::fit_all(
+    const std::vector<std::vector<AddedEffect>>& lists) const {
+  std::vector<TracedFit> out(lists.size());
+  std::vector<Memory> news(lists.size());
+  parallel_for(lists.size(), [&](std::size_t i) { out[i] = fit(lists[i], news[i]); });
+  for (Memory& one : news) remember(std::move(one));
+  return out;
+}
+
+TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects, Memory& news) const {
+  auto [world, library, change, solved] = ready_for(effects, news);
   // Carriers of all candidates at one value of their scans: the same for the others, unless a
   // direction changes with the scan.
   Carriers carriers;
-  std::vector<int> no_frames;
   for (const CameraEffect& effect : library) {
     const std::vector<double> scan =
         effect.candidate.scan.empty() ? std::vector<double>{0.0} : effect.candidate.scan;
     const std::size_t values = effect.candidate.scan_listed ? scan.size() : 1;
     for (std::size_t v = 0; v < values; ++v) {
-      for (const Correction& correction : effect.corrections(scan[v])) {
-        static_cast<void>(carriers.column(correction, no_frames));
-      }
+      for (Correction& correction : effect.corrections(scan[v]))
+        carriers.add(std::move(correction));
     }
   }
   TracedFit out;
   out.rest_places = rest_places_of(world, carriers);
   out.rest_fields = rest_fields_of(world, options_.trace.floor, carriers);
   if (!world.postures) out.clock = clock_carrier(carriers);
-  BundleFit fit = bundle_->fit(change, carriers.probes(), solved ? &*solved : nullptr);
+  BundleFit fit = bundle_->fit(change, carriers.probes(), &*solved);
   if (fit.place_px.size() == 0) out.rest_fields.clear();
   for (std::size_t c = 0; c < out.rest_fields.size(); ++c)
     out.rest_fields[c].at = places_in_image(world, c, fit);
@@ -591,7 +623,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
     linear.time_s[static_cast<Eigen::Index>(i)] = world.frames.times_s[frame];
     linear.fold.push_back(bundle_->fold_of_frame()[frame]);
   }
-  const auto shared = std::make_shared<Carriers>(std::move(carriers));
+  const auto shared = std::make_shared<const Carriers>(std::move(carriers));
   for (CameraEffect& effect : library) {
     Candidate candidate = effect.candidate;
     candidate.columns = [shared, frames = fit.frames,
@@ -612,8 +644,10 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
                                                 const std::vector<TracedEffect>& traced) const {
   Corrected out;
   if (effects.empty()) return out;
-  const auto [world, library, change, solved] = ready_for(effects);
-  const BundleSolution fit = solved ? *solved : bundle_->solve(change);
+  Memory news;
+  const auto [world, library, change, solved] = ready_for(effects, news);
+  remember(std::move(news));
+  const BundleSolution& fit = *solved;
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {
     const CameraEffect& effect = effect_of(library, added.id);

@@ -13,7 +13,11 @@ class TracedBundle final : public TracedModel {
   /// Keeps a reference to `bundle`, whose couplings by design it has, but for those named.
   TracedBundle(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                std::vector<std::size_t> without_couplings = {});
+  /// Begins where earlier fits ended, and ends at the same minimum but for the solver's tolerance.
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
+  /// At the same time, none beginning where another of them ended.
+  [[nodiscard]] std::vector<TracedFit> fit_all(
+      const std::vector<std::vector<AddedEffect>>& lists) const override;
 
   /// The same with its numbers: the corrections that stand for the effects, at their values.
   struct Corrected {
@@ -40,7 +44,7 @@ class TracedBundle final : public TracedModel {
     EffectWorld world;
     std::vector<CameraEffect> library;
     BundleChange change;
-    std::optional<BundleSolution> solved;  ///< of the change, where that is known
+    std::optional<BundleSolution> solved;  ///< of the change; ready_for() knows it
   };
   /// What depends on how large effects are, as a fit left it.
   struct Sized {
@@ -50,19 +54,30 @@ class TracedBundle final : public TracedModel {
     std::map<int, Eigen::VectorXd> sags;  ///< as EffectWorld has them
     std::map<int, Eigen::Vector2d> bends;
   };
-  [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
+  /// What fits found that later ones begin with.
+  struct Memory {
+    std::optional<Eigen::MatrixXd> ahead_s;  ///< by the last with an effect of the clock
+    std::optional<Sized> sizes;
+    std::map<int, double> play_starts;      ///< as EffectWorld has them
+    std::vector<BundleSolution> solutions;  ///< that the bundle does not remember yet
+    void take(Memory later);
+  };
+  /// What it found goes into `news`, and what is there counts beside what is remembered.
+  [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects, Memory& news) const;
   [[nodiscard]] Ready ready_at(const Eigen::MatrixXd& ahead_s,
-                               const std::vector<AddedEffect>& effects) const;
-  /// Remembers the sizes of a solution of `ready`.
-  void keep_sizes(const std::vector<AddedEffect>& effects, const Ready& ready,
-                  const BundleSolution& solution) const;
-  /// Remembers where the links with play began. True where that is news.
-  bool keep_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
-                        const BundleSolution& solution) const;
+                               const std::vector<AddedEffect>& effects, const Memory& news) const;
+  [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects, Memory& news) const;
+  void remember(Memory news) const;
+  [[nodiscard]] Sized sizes_of(const std::vector<AddedEffect>& effects, const Ready& ready,
+                               const BundleSolution& solution) const;
+  /// Where the links with play began. True where that is news.
+  [[nodiscard]] bool find_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
+                                      const BundleSolution& solution, Memory& news) const;
   /// `ahead_s`: frames x joints, joint-log time minus frame time.
   [[nodiscard]] EffectWorld world_at(const Eigen::MatrixXd& ahead_s) const;
   [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
-  [[nodiscard]] Eigen::MatrixXd likely_clock(const std::vector<AddedEffect>& effects) const;
+  [[nodiscard]] Eigen::MatrixXd likely_clock(const std::vector<AddedEffect>& effects,
+                                             const Memory& news) const;
   [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
                                        const std::vector<AddedEffect>& effects) const;
 
@@ -70,9 +85,7 @@ class TracedBundle final : public TracedModel {
   CalibrationTraceOptions options_;
   std::vector<std::size_t> without_couplings_;
   std::map<int, UnsteadyReading> unsteady_;
-  mutable std::optional<Eigen::MatrixXd> last_ahead_s_;
-  mutable std::optional<Sized> last_sizes_;
-  mutable std::map<int, double> last_play_starts_;  ///< as EffectWorld has them
+  mutable Memory last_;
 };
 
 }  // namespace kinescope::effects

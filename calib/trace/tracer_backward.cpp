@@ -93,7 +93,10 @@ bool Tracer::backward() {
     details_.assign(now_->added.size(), {});
     trace_.ambiguities.clear();
     if (drop_without_size()) return true;
+    ahead_.clear();
     for (std::size_t i = 0; i < now_->added.size(); ++i) {
+      // Two at a time: what one of them changes makes the others useless.
+      if (i % 2 == 0 && i + 1 < now_->added.size()) fit_without_ahead(*now_, {i, i + 1});
       if (check(i)) return true;
     }
   } while (search_again(std::nullopt));
@@ -103,10 +106,10 @@ bool Tracer::backward() {
 // An effect that bends the model can be significant where it is absent and of no certain size where
 // it is fitted: a gain of 7 that may be -5, a camera that turned by 0.5 deg or by nothing. Several
 // parameters may be uncertain one by one and yet predict: they stay if they clearly do.
-bool Tracer::drop_without_size() {
+std::optional<std::size_t> Tracer::one_without_size() {
   Eigen::Index all = 0;
   for (const Eigen::VectorXd& values : now_->fit.values) all += values.size();
-  if (all == 0) return false;
+  if (all == 0) return std::nullopt;
   const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, all);
   const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
   std::vector<std::pair<double, std::size_t>> weak;  // size in sigmas, index
@@ -123,19 +126,22 @@ bool Tracer::drop_without_size() {
   }
   std::ranges::sort(weak);
   for (const auto& [ratio, index] : weak) {
-    StagePtr stage = stage_of(kinescope::trace::without(now_->added, index));
-    if (now_->fit.values[index].size() > 1 &&
-        predicts_clearly_worse(stage->held_out.whitened, now_->held_out.whitened)) {
-      continue;
-    }
-    const EffectId id = now_->added[index].id;
-    removed_.insert(id);
-    now_ = std::move(stage);
-    mark(round_, id, CandidateState::kRemoved, now_->error.value);
-    add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
-    return true;
+    if (now_->fit.values[index].size() == 1) return index;
+    const StagePtr less = stage_of(kinescope::trace::without(now_->added, index));
+    if (!predicts_clearly_worse(less->held_out.whitened, now_->held_out.whitened)) return index;
   }
-  return false;
+  return std::nullopt;
+}
+
+bool Tracer::drop_without_size() {
+  const std::optional<std::size_t> index = one_without_size();
+  if (!index) return false;
+  const EffectId id = now_->added[*index].id;
+  removed_.insert(id);
+  now_ = stage_of(kinescope::trace::without(now_->added, *index));
+  mark(round_, id, CandidateState::kRemoved, now_->error.value);
+  add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
+  return true;
 }
 
 void Tracer::compare_without(const Stage& without, TracedEffect& detail) const {
