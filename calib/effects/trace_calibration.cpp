@@ -72,6 +72,12 @@ bool names(const Trace& trace, const EffectId& id) {
   return std::ranges::find(trace.accepted, id, &TracedEffect::id) != trace.accepted.end();
 }
 
+// One cause that leaves nothing: with gravity known, no sag is plainer or clearly better.
+bool is_told_by_one_other(const Trace& trace) {
+  return trace.verdict == TraceVerdict::kEffects && trace.accepted.size() == 1 &&
+         !effects::is_sag(trace.accepted.front().id);
+}
+
 void take_corrections(const effects::TracedBundle& model, const CalibrationTraceOptions& options,
                       CalibrationTrace& out) {
   effects::TracedBundle::Corrected corrected = model.corrected(out.trace.added, out.trace.accepted);
@@ -106,7 +112,7 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
   }
   CalibrationTrace out = traced(model, bundle, options, trace_options, progress);
-  if (options.gravity_base) return out;
+  if (options.gravity_base || is_told_by_one_other(out.trace)) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects, or leaves nothing that no effect explains.
   std::vector<AddedEffect> known = trace_options.start;
