@@ -364,14 +364,9 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
 bundle::SolveSummary EffectBundle::Impl::solve_from(const Ends& known, const BundleChange& change,
                                                     const Spec& with, State& state) const {
   constexpr int kIterations = 60;
-  // From where an earlier fit ended whole Gauss-Newton steps are best: two thirds of the iterations
-  // of the usual radius (`undeclared`, 13049).
-  constexpr double kNearRadius = 1e9;
   const State begin = state;
-  const std::optional<State> near = end_with_less(known, change, begin);
-  state = near.value_or(begin);
-  bundle::SolveSummary out =
-      bundle::solve(with, state, used, {}, kIterations, near ? kNearRadius : bundle::kFirstRadius);
+  state = end_with_less(known, change, begin).value_or(begin);
+  bundle::SolveSummary out = bundle::solve(with, state, used, {}, kIterations);
   if (out.converged) return out;
   // Far from where it ends: with more freedom another one may have come near.
   if (std::optional<State> nearer = end_with_more(known, change, begin)) {

@@ -25,6 +25,9 @@ constexpr double kOffsetMargin = 0.03;
 // Width of the Cauchy loss in units of the square root of a sighting's degrees of freedom.
 constexpr double kLossWidth = 3.0;
 
+// Starts are good enough for nearly whole Gauss-Newton steps. With 1e8 what cannot be told apart
+// wanders in its null space; with 1e9 where an earlier fit ended, too.
+constexpr double kFirstRadius = 1e6;
 // RMS share of a marker's motion: with less than that left the robot describes where it goes.
 constexpr double kUndescribed = 0.25;
 // A robust solution only tells the noise level and what stands out.
@@ -256,7 +259,7 @@ double freedom_factor(const Spec& spec, State& state, const std::vector<int>& us
 }  // namespace
 
 SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
-                   const BuildOptions& build_options, int max_iterations, double first_radius) {
+                   const BuildOptions& build_options, int max_iterations) {
   silence_glog();
   BuiltProblem built(spec, state, sightings, build_options);
   if (built.blocks().empty()) return {true, "nothing is free", 0, 0.0, 0.0};
@@ -264,7 +267,7 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   eliminate_camera_poses(built, spec, options);
   options.max_num_iterations = max_iterations;
-  options.initial_trust_region_radius = first_radius;
+  options.initial_trust_region_radius = kFirstRadius;
   options.function_tolerance = build_options.robust_width ? kRobustTolerance : kPlainTolerance;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-14;

@@ -19,15 +19,10 @@ struct SolveSummary {
   double final_cost = 0.0;
 };
 
-/// Of the trust region at first. Starts are good enough for nearly whole Gauss-Newton steps; with
-/// 1e8 what cannot be told apart wanders in its null space.
-inline constexpr double kFirstRadius = 1e6;
-
 /// Least squares over the given sightings; moves `state`. Single-threaded, so that the bits are the
 /// same.
 [[nodiscard]] SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sightings,
-                                 const BuildOptions& options, int max_iterations,
-                                 double first_radius = kFirstRadius);
+                                 const BuildOptions& options, int max_iterations);
 
 /// Robust solve, noise level per marker (per rotation and translation for poses), and once more:
 /// moves `state` to where no outlier pulls it. Rescales the sigmas in `spec`.
