@@ -24,22 +24,40 @@ std::vector<ExportForm> forms_of(const ExportOptions& options) {
                     "name it with --mjcf, --tum, --dh or --mcap");
 }
 
-// One file under two options would be what was written last.
-void require_different_files(const std::vector<ExportForm>& forms) {
-  std::vector<std::filesystem::path> named;
+// One path under two options would be what was written last. Before anything is written.
+void require_different_places(const std::vector<ExportForm>& forms) {
+  std::vector<std::filesystem::path> taken;
+  const auto take = [&](const std::filesystem::path& path) {
+    const auto same = [&](const auto& other) { return same_place(path, other); };
+    if (std::ranges::any_of(taken, same))
+      throw bad_request(path.string(), "is named twice", "name different files");
+    taken.push_back(path);
+  };
+  for (const ExportForm& form : forms) {
+    if (!form.folder.empty()) take(form.folder);
+    for (const ExportedFile& file : form.files) take(form.folder / file.path);
+  }
+}
+
+void require_folders_of_files(const std::vector<ExportForm>& forms) {
   for (const ExportForm& form : forms) {
     if (!form.folder.empty()) continue;
     for (const ExportedFile& file : form.files) {
-      const auto same = [&](const auto& other) { return same_place(file.path, other); };
-      if (std::ranges::any_of(named, same))
-        throw bad_request(file.path.string(), "is named twice", "name different files");
-      named.push_back(file.path);
+      const std::filesystem::path parent = std::filesystem::absolute(file.path).parent_path();
+      std::error_code error;
+      if (std::filesystem::is_directory(parent, error)) continue;
+      throw bad_request(file.path.string(), "there is no folder " + parent.string(),
+                        "make it, or name another file");
     }
   }
 }
 
 OutputFolder folder_of(const ExportForm& form, bool force) {
-  Writer writer{.command = "export", .products = {}, .inputs = form.inputs, .force = force};
+  Writer writer{.command = "export",
+                .products = {},
+                .inputs = form.inputs,
+                .force = force,
+                .option = "--tum"};
   for (const ExportedFile& file : form.files) writer.products.push_back(file.path.string());
   return {form.folder, std::move(writer)};
 }
@@ -58,7 +76,8 @@ void write_into(const OutputFolder& folder, const ExportForm& form) {
 
 ExitCode export_command(const ExportOptions& options, const Console& console) {
   const std::vector<ExportForm> forms = forms_of(options);
-  require_different_files(forms);
+  require_different_places(forms);
+  require_folders_of_files(forms);
   std::vector<std::optional<OutputFolder>> folders;
   for (const ExportForm& form : forms) {
     folders.emplace_back();

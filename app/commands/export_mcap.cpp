@@ -116,7 +116,8 @@ class McapOfRun {
     for (const auto& [t, frame] : residuals.at) {
       if (!(t >= recorded_.joints.times_s.front() && t <= recorded_.joints.times_s.back()))
         continue;
-      json numbers{{"rms_" + unit, frame.rms}, {"used", frame.used}, {"rejected", frame.rejected}};
+      json numbers{{"used", frame.used}, {"rejected", frame.rejected}};
+      if (frame.rms) numbers["rms_" + unit] = *frame.rms;
       if (frame.held_out_rms) numbers["held_out_rms_" + unit] = *frame.held_out_rms;
       json markers = json::object();
       for (const auto& [id, rms] : frame.of_id) markers[fmt::format("tag_{}", id)] = rms;
@@ -187,10 +188,12 @@ class McapOfRun {
   }
 
   [[nodiscard]] std::vector<foxglove::FrameTransform> transforms_in(std::size_t frame) const {
-    const std::vector<Pose>& links = recorded_.T_base_link[frame];
     std::vector<foxglove::FrameTransform> out;
-    for (const Joint& joint : calibration_.tree.joints) {
-      const Pose T = links[joint.parent.index()].inverse() * links[joint.child.index()];
+    for (std::size_t j = 0; j < calibration_.tree.joints.size(); ++j) {
+      const Joint& joint = calibration_.tree.joints[j];
+      const double value =
+          recorded_.joints.values(static_cast<Eigen::Index>(frame), static_cast<Eigen::Index>(j));
+      const Pose T = joint.T_parent_joint * joint_motion(joint.type, joint.axis, value);
       if (is_known(T)) out.push_back({link_name(joint.parent), link_name(joint.child), T});
     }
     if (calibration_.moving && is_known(recorded_.T_base_camera[frame]))

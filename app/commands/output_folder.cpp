@@ -121,7 +121,7 @@ void require_own(const fs::path& folder, const Writer& writer) {
         owner.empty()
             ? fmt::format("would be replaced, and kinescope {} did not write it", writer.command)
             : fmt::format("would be replaced, and kinescope {} wrote it", owner),
-        "name another folder with --output, or replace it with --force");
+        fmt::format("name another folder with {}, or replace it with --force", writer.option));
   }
 }
 
@@ -155,7 +155,7 @@ OutputFolder::OutputFolder(fs::path folder, Writer writer)
     : folder_(std::move(folder)), command_(std::move(writer.command)) {
   writer.command = command_;
   for (const std::string& name : writer.products) {
-    require_no_input(folder_ / name, writer.inputs, "--output");
+    require_no_input(folder_ / name, writer.inputs, writer.option);
   }
   if (!writer.force) require_own(folder_, writer);
   require_writable_folder(folder_);

@@ -29,6 +29,7 @@ struct Writer {
   std::vector<std::string> products;          ///< names of what it may write
   std::vector<std::filesystem::path> inputs;  ///< what it reads
   bool force = false;                         ///< replace also what it did not write
+  std::string option = "--output";            ///< that names the folder
 };
 
 /// A folder of products under their names, each whole or not there.

@@ -146,6 +146,13 @@ ExitCode plan_command(const PlanCommandOptions& options, const Console& console)
                       "leave out --postures or --seconds");
   }
   const PlannedRun run = read_planned_run(options);
+  constexpr double kMostFrames = 1e5;
+  if (options.seconds.value_or(0.0) * run.frame_rate_hz > kMostFrames) {
+    throw bad_request("--seconds",
+                      fmt::format("{:g} s at {:g} frames/s are more than {:g} frames",
+                                  *options.seconds, run.frame_rate_hz, kMostFrames),
+                      "give less --seconds, or a lower --rate");
+  }
   for (const std::string& warning : run.warnings) console.warn(warning);
   const design::PlanOptions asked = design_options(options, run);
   const std::vector<fs::path> inputs{options.source / "calibration.json"};

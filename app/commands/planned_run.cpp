@@ -70,6 +70,16 @@ void require_covariance(const fs::path& folder, const Calibration& calibration) 
                       "its covariance contradicts the sigma of " + parameter.name,
                       "run the recording again");
   }
+  // Zeros that only their sums with markers are known of: what those sums say would be lost.
+  for (const Joint& joint : calibration.tree.joints) {
+    const auto zero =
+        std::ranges::find(calibration.parameters, joint.name + " offset", &Parameter::name);
+    if (zero == calibration.parameters.end() || zero->sigma) continue;
+    throw undetermined(
+        folder.string(),
+        fmt::format("it does not tell the zero of {} from its marker's place", joint.name),
+        "run it with --free geometry");
+  }
   if (!of_robot) {
     throw undetermined(folder.string(), "the run knows nothing of the robot's joints to build on",
                        "run it with --free geometry");
@@ -82,16 +92,20 @@ struct SeenCorners {
   std::vector<double> times_s;
 };
 
-SeenCorners read_seen_corners(const fs::path& residuals_csv, const KinematicTree& tree) {
+SeenCorners read_seen_corners(const fs::path& residuals_csv, const Calibration& calibration) {
   const CsvTable table = read_csv(residuals_csv);
   const std::size_t time = table.require_column("t"), tag = table.require_column("tag"),
                     used = table.require_column("used"), du = table.require_column("du"),
                     dv = table.require_column("dv");
   std::map<TagId, std::pair<double, double>> squares;  // sum, count
   std::pair<double, double> all;
+  auto column = table.column("camera");
+  if (!column) column = table.column("recording");
   std::set<double> times;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    times.insert(table.number(row, time));
+    // Each has times of its own: those of the reference camera, or of the first recording.
+    if (!column || table.rows[row][*column] == calibration.camera_name)
+      times.insert(table.number(row, time));
     const auto x = table.optional_number(row, du), y = table.optional_number(row, dv);
     if (table.integer(row, used) == 0 || !x || !y) continue;
     auto& one = squares[TagId{table.integer(row, tag)}];
@@ -110,7 +124,7 @@ SeenCorners read_seen_corners(const fs::path& residuals_csv, const KinematicTree
   for (const auto& [id, sum] : squares)
     if (sum.first > 0.0) out.noise.of_marker[id] = std::sqrt(sum.first / sum.second);
   for (const auto& [id, noise] : out.noise.of_marker) {
-    const Marker* marker = tree.marker(id);
+    const Marker* marker = calibration.tree.marker(id);
     const bool rests = marker != nullptr && marker->link == LinkId{0};
     if (rests && noise * noise < kMostOfOneError * out.noise.all_px * out.noise.all_px)
       out.noise.at_rest.insert(id);
@@ -165,21 +179,35 @@ design::MotionLimits recorded_limits(const Calibration& calibration, double rang
 void take_urdf_limits(const fs::path& urdf, const Calibration& calibration,
                       design::MotionLimits& limits, std::vector<std::string>& warnings) {
   const KinematicTree declared = read_urdf(urdf);
-  std::vector<std::string> names;
+  std::vector<std::string> names, unlimited;
   int found = 0;
   for (std::size_t j = 0; j < calibration.tree.joints.size(); ++j) {
     const Joint& joint = calibration.tree.joints[j];
     if (joint.type == JointType::kFixed) continue;
     names.push_back(joint.name);
     const auto own = declared.joint(joint.name);
-    if (!own) continue;
+    if (!own) {
+      unlimited.push_back(joint.name);
+      continue;
+    }
     ++found;
     const Joint& there = declared.joints[own->index()];
+    if (there.type != joint.type) {
+      throw bad_input(urdf.string(), joint.name + " is of another type there than in the run",
+                      "give the URDF of this robot, its joints named as in the run");
+    }
+    if (there.velocity && !(*there.velocity > 0.0)) {
+      throw bad_input(urdf.string(), joint.name + " may not move: its velocity is 0",
+                      "give its highest speed, rad/s or m/s");
+    }
     if (there.velocity) {
       const auto at = static_cast<Eigen::Index>(j);
       limits.velocity[at] = std::min(limits.velocity[at], *there.velocity);
     }
-    if (!there.limits) continue;
+    if (!there.limits) {
+      unlimited.push_back(joint.name);
+      continue;
+    }
     limits.range[j] = *there.limits;
     const JointLimits& recorded = calibration.joints[j].range;
     if (recorded.lower < there.limits->lower || recorded.upper > there.limits->upper)
@@ -187,6 +215,10 @@ void take_urdf_limits(const fs::path& urdf, const Calibration& calibration,
           fmt::format("{} was recorded beyond the limits that {} declares: are its "
                       "zero and unit those of the log?",
                       joint.name, urdf.filename().string()));
+  }
+  if (found > 0 && !unlimited.empty()) {
+    warnings.push_back(fmt::format("{} declares no range of {}: what the run recorded is taken",
+                                   urdf.filename().string(), fmt::join(unlimited, ", ")));
   }
   if (found == 0) {
     throw bad_input(
@@ -288,7 +320,7 @@ PlannedRun read_planned_run(const PlanCommandOptions& options) {
   std::vector<std::string> warnings;
   std::string why_not;
   const std::optional<JointLog> log = recorded_log(options.source, why_not);
-  const SeenCorners seen = read_seen_corners(options.source / "residuals.csv", calibration.tree);
+  const SeenCorners seen = read_seen_corners(options.source / "residuals.csv", calibration);
   const bool of_postures =
       log && !log->empty() &&
       is_posture_log(*log, seen.times_s, driving_channels(calibration.tree, *log));
@@ -304,6 +336,8 @@ PlannedRun read_planned_run(const PlanCommandOptions& options) {
     warnings.push_back(
         "the joints' limits are not declared: what the run recorded of each joint is its range "
         "(--limits robot.urdf, --range)");
+  if (calibration.cameras() > 1 && !calibration.of_recordings())
+    warnings.push_back("the plan is for the camera " + calibration.camera_name + " alone");
   PlannedRun out{{}, {calibration.tree, limits}, {}, {}, 0.0, false, false, {}, {}};
   out.robot.calibration = calibration;
   out.robot.noise = seen.noise;

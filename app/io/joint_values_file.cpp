@@ -92,9 +92,13 @@ JointValues read_joint_values(const std::filesystem::path& path, const Calibrati
   require_increasing(table, rows, out.times_s);
   out.values = Eigen::MatrixXd::Zero(std::ssize(rows), std::ssize(tree.joints));
   const std::vector<std::size_t> joints = moving_columns(tree);
-  if (table.header.size() != time + 1 + joints.size()) {
+  std::set<std::string> taken{"t", "camera", "recording"};
+  bool as_written = table.header.size() == time + 1 + joints.size();
+  for (std::size_t k = 0; as_written && k < joints.size(); ++k)
+    as_written = table.header[time + 1 + k] == column_name(tree.joints[joints[k]].name, taken);
+  if (!as_written) {
     throw bad_input(fmt::format("{}:{}", table.source, table.header_line),
-                    fmt::format("its columns are not t and {} joints", joints.size()),
+                    fmt::format("its columns are not t and the robot's {} joints", joints.size()),
                     kJointValuesRemedy);
   }
   for (std::size_t k = 0; k < joints.size(); ++k) {

@@ -79,7 +79,7 @@ FrameResiduals read_frame_residuals(const std::filesystem::path& path,
   }
   for (const auto& [t, frame] : sums) {
     FrameResidual& one = out.at[t];
-    one.rms = frame.all.rms();
+    if (frame.all.count > 0) one.rms = frame.all.rms();
     one.used = frame.all.count;
     one.rejected = frame.rejected;
     if (frame.held_out.count > 0) one.held_out_rms = frame.held_out.rms();

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include "calib/bundle/calibration.h"
 
@@ -13,7 +14,7 @@ namespace kinescope {
 /// What the calibration leaves in one frame: rms of the distances observed - predicted, px of
 /// corners, m of poses and points. Of what was used.
 struct FrameResidual {
-  double rms = 0.0;
+  std::optional<double> rms;    ///< none: nothing of the frame was used
   Sigma held_out_rms;           ///< by the fit that has not seen the frame
   std::map<int, double> of_id;  ///< by marker
   int used = 0;                 ///< corners, or sightings

@@ -48,7 +48,8 @@ std::vector<std::size_t> choose_candidates(const DesignProblem& problem, std::si
     for (std::size_t k = held.size(); k < chosen.size(); ++k) {
       const Eigen::MatrixXd without = information - problem.candidates[chosen[k]];
       const Best best = best_beside(problem, without);
-      if (!(best.criterion < now * (1.0 - kBetter))) continue;
+      const double least_gain = std::isfinite(now) ? kBetter * std::abs(now) : 0.0;
+      if (!(best.criterion < now - least_gain)) continue;
       chosen[k] = best.candidate;
       information = without + problem.candidates[best.candidate];
       now = best.criterion;

@@ -28,8 +28,7 @@ struct MotionLimits {
 
 class JointSpace {
  public:
-  /// Throws bad_input: a joint that moves and has no channel, a range that is none or that no
-  /// coupled reading can keep.
+  /// Throws bad_input: a joint that moves and has no channel, a range that is none.
   JointSpace(KinematicTree tree, MotionLimits limits);
 
   [[nodiscard]] const KinematicTree& tree() const { return tree_; }

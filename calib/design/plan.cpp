@@ -31,15 +31,15 @@ struct NamedEffect {
   Eigen::VectorXd values;
 };
 
-// Rows by posture or frame, summed up by whoever needs it.
+// Of the robot's effects and of their rivals, by what a recording shows of them.
+struct Names {
+  std::vector<NamedEffect> effects, rivals;
+};
+
+// By posture.
 struct Rows {
   std::vector<Parameter> parameters;
   std::vector<Eigen::MatrixXd> information;  // of each
-  [[nodiscard]] Eigen::MatrixXd sum() const {
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(std::ssize(parameters), std::ssize(parameters));
-    for (const Eigen::MatrixXd& one : information) out += one;
-    return out;
-  }
 };
 
 class Planner {
@@ -50,7 +50,8 @@ class Planner {
         space_(space),
         pairs_(pairs),
         options_(options),
-        widening_(robot.calibration.noise_widening.value_or(1.0)),
+        // Postures at rest are far apart: their noise is not alike.
+        widening_(options.postures > 0 ? 1.0 : robot.calibration.noise_widening.value_or(1.0)),
         rng_(Rng::from_name("plan", options.seed)) {}
 
   [[nodiscard]] RecordingPlan plan(const Progress& progress);
@@ -66,14 +67,17 @@ class Planner {
   [[nodiscard]] std::size_t usual_stops() const;
   [[nodiscard]] std::vector<Eigen::VectorXd> stops_in_time(std::size_t count) const;
   void judge(const ExpectedRecording& recording, RecordingPlan& plan) const;
-  void judge_rivals(const Rows& rows, RecordingPlan& plan) const;
+  void judge_rivals(const std::vector<Parameter>& parameters, const Eigen::MatrixXd& information,
+                    const Names& names, RecordingPlan& plan) const;
   [[nodiscard]] Promise promise_of(const std::vector<Parameter>& parameters,
                                    const Eigen::MatrixXd& covariance) const;
   // Without the columns of rivals, which the model does not have.
-  [[nodiscard]] std::vector<Eigen::Index> own_columns(const std::vector<Parameter>& all) const;
+  [[nodiscard]] static std::vector<Eigen::Index> own_columns(const std::vector<Parameter>& all,
+                                                             const Names& names);
   [[nodiscard]] std::vector<Parameter> subset(const std::vector<Parameter>& all,
                                               const std::vector<Eigen::Index>& chosen) const;
-  [[nodiscard]] std::vector<RivalColumns> columns_of_pairs(const std::vector<Parameter>& all) const;
+  [[nodiscard]] std::vector<RivalColumns> columns_of_pairs(const std::vector<Parameter>& all,
+                                                           const Names& names) const;
 
   const PlannedRobot& robot_;
   const JointSpace& space_;
@@ -85,7 +89,7 @@ class Planner {
   std::vector<Eigen::VectorXd> postures_;  // candidates
   Rows candidates_;
   Eigen::MatrixXd root_;  // of the goal, by the candidates' own parameters
-  std::vector<NamedEffect> effects_, rivals_;
+  Names names_;           // by the candidates
 };
 
 std::vector<NamedEffect> named_effects(const PlannedRobot& robot,
@@ -102,23 +106,28 @@ std::vector<NamedEffect> named_effects(const PlannedRobot& robot,
 }
 
 void Planner::draw_candidates() {
-  int draws = 0, seen = 0;
+  int draws = 0, within = 0, seen = 0;
   while (std::ssize(postures_) < options_.candidates &&
          draws < kDrawsACandidate * options_.candidates) {
     ++draws;
     auto readings = space_.draw(rng_);
     if (!readings) continue;
+    ++within;
     if (expected_sightings(robot_.calibration, space_.values(*readings), robot_.sight, robot_.noise)
             .empty())
       continue;
     ++seen;
     postures_.push_back(std::move(*readings));
   }
+  if (within == 0) {
+    throw undetermined("plan", "no posture keeps the ranges of joints that one channel moves",
+                       "give wider ranges with --limits or --range");
+  }
   if (postures_.empty()) {
     throw undetermined("plan", "no posture within the joints' ranges shows a marker",
                        "give wider limits, or move the camera and record anew");
   }
-  seen_share_ = static_cast<double>(seen) / draws;
+  seen_share_ = static_cast<double>(seen) / within;
 }
 
 Rows Planner::rows_at(const std::vector<Eigen::VectorXd>& postures) const {
@@ -136,10 +145,11 @@ Rows Planner::rows_at(const std::vector<Eigen::VectorXd>& postures) const {
   return out;
 }
 
-std::vector<Eigen::Index> Planner::own_columns(const std::vector<Parameter>& all) const {
+std::vector<Eigen::Index> Planner::own_columns(const std::vector<Parameter>& all,
+                                               const Names& names) {
   std::vector<Eigen::Index> out;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const bool is_rival = std::ranges::any_of(rivals_, [&](const NamedEffect& rival) {
+    const bool is_rival = std::ranges::any_of(names.rivals, [&](const NamedEffect& rival) {
       return std::ranges::find(rival.names, all[i].name) != rival.names.end();
     });
     if (!is_rival) out.push_back(static_cast<Eigen::Index>(i));
@@ -155,17 +165,19 @@ std::vector<Parameter> Planner::subset(const std::vector<Parameter>& all,
 }
 
 // Empty columns: the effects say nothing in such a recording.
-std::vector<RivalColumns> Planner::columns_of_pairs(const std::vector<Parameter>& all) const {
+std::vector<RivalColumns> Planner::columns_of_pairs(const std::vector<Parameter>& all,
+                                                    const Names& names) const {
   std::vector<RivalColumns> out;
   for (const auto& [believed, other] : pairs_) {
-    const NamedEffect& own = effects_[believed];
+    const NamedEffect& own = names.effects[believed];
     RivalColumns& columns = out.emplace_back();
-    if (own.names.empty() || rivals_[other].names.empty() ||
+    if (own.names.empty() || names.rivals[other].names.empty() ||
         own.values.size() != std::ssize(own.names))
       continue;
     std::vector<std::string> others;
-    for (std::size_t r = 0; r < rivals_.size(); ++r)
-      if (r != other) others.insert(others.end(), rivals_[r].names.begin(), rivals_[r].names.end());
+    for (std::size_t r = 0; r < names.rivals.size(); ++r)
+      if (r != other)
+        others.insert(others.end(), names.rivals[r].names.begin(), names.rivals[r].names.end());
     columns = rival_columns(all, own.names, own.values, others);
   }
   return out;
@@ -174,7 +186,7 @@ std::vector<RivalColumns> Planner::columns_of_pairs(const std::vector<Parameter>
 // The search counts what is known of the robot, so that the first postures have a value; the
 // promise does not (judge_rivals).
 std::vector<std::size_t> Planner::parting_rivals(std::size_t count, double frames_each) const {
-  std::vector<RivalColumns> pairs = columns_of_pairs(candidates_.parameters);
+  std::vector<RivalColumns> pairs = columns_of_pairs(candidates_.parameters, names_);
   std::erase_if(pairs, [](const RivalColumns& one) { return one.believed.empty(); });
   if (pairs.empty() || count == 0) return {};
   std::vector<Parameter> robot = candidates_.parameters;
@@ -192,7 +204,7 @@ std::vector<std::size_t> Planner::parting_rivals(std::size_t count, double frame
 
 std::vector<Eigen::VectorXd> Planner::chosen(std::size_t count, double frames_each) const {
   const std::vector<std::size_t> first = parting_rivals(count / 2, frames_each);
-  const std::vector<Eigen::Index> own = own_columns(candidates_.parameters);
+  const std::vector<Eigen::Index> own = own_columns(candidates_.parameters, names_);
   DesignProblem problem{
       known_information(robot_.calibration, subset(candidates_.parameters, own)), {}, {}};
   for (const Eigen::MatrixXd& one : candidates_.information)
@@ -218,9 +230,10 @@ Promise Planner::promise_of(const std::vector<Parameter>& parameters,
   return out;
 }
 
-void Planner::judge_rivals(const Rows& rows, RecordingPlan& plan) const {
-  const Eigen::MatrixXd information = rows.sum();
-  const std::vector<RivalColumns> columns = columns_of_pairs(rows.parameters);
+void Planner::judge_rivals(const std::vector<Parameter>& parameters,
+                           const Eigen::MatrixXd& information, const Names& names,
+                           RecordingPlan& plan) const {
+  const std::vector<RivalColumns> columns = columns_of_pairs(parameters, names);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     RivalPromise& one = plan.rivals.emplace_back();
     one.believed = robot_.effects[pairs_[p].first].id;
@@ -230,17 +243,23 @@ void Planner::judge_rivals(const Rows& rows, RecordingPlan& plan) const {
 }
 
 void Planner::judge(const ExpectedRecording& recording, RecordingPlan& plan) const {
+  // A motion shows effects that postures do not: its rivals have names of its own.
+  const Names names{named_effects(robot_, recording, robot_.effects),
+                    named_effects(robot_, recording, robot_.rivals)};
   ExpectedRows expected = expected_rows(robot_.calibration, recording);
-  Rows rows{std::move(expected.parameters), {}};
-  for (const Eigen::MatrixXd& J : expected.J)
-    rows.information.push_back(information_of(J, widening_));
-  const std::vector<Eigen::Index> own = own_columns(rows.parameters);
-  plan.parameters = subset(rows.parameters, own);
+  const auto width = std::ssize(expected.parameters);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(width, width);
+  for (Eigen::MatrixXd& J : expected.J) {
+    information += information_of(J, widening_);
+    J.resize(0, 0);
+  }
+  const std::vector<Eigen::Index> own = own_columns(expected.parameters, names);
+  plan.parameters = subset(expected.parameters, own);
   const Eigen::MatrixXd known = known_information(robot_.calibration, plan.parameters);
-  plan.covariance = covariance_of(known + rows.sum()(own, own));
+  plan.covariance = covariance_of(known + information(own, own));
   plan.before = promise_of(plan.parameters, covariance_of(known));
   plan.after = promise_of(plan.parameters, plan.covariance);
-  judge_rivals(rows, plan);
+  judge_rivals(expected.parameters, information, names, plan);
   plan.frames = static_cast<int>(recording.measurements.times_s.size());
   for (const Marker& marker : robot_.calibration.tree.markers) plan.sightings[marker.id] = 0;
   for (const TagObservation& seen : recording.measurements.corners) ++plan.sightings[seen.id];
@@ -270,6 +289,12 @@ std::vector<Eigen::VectorXd> Planner::stops_in_time(std::size_t count) const {
   for (;;) {
     const double frames = options_.seconds * options_.frame_rate_hz / static_cast<double>(count);
     std::vector<Eigen::VectorXd> stops = in_short_order(space_, chosen(count, frames));
+    // One that is chosen twice stands beside itself.
+    stops.erase(std::unique(stops.begin(), stops.end()), stops.end());
+    if (stops.size() < kFewestStops) {
+      throw undetermined("plan", "no second posture tells more than one and the same",
+                         "give wider ranges with --limits or --range, or plan --postures");
+    }
     const double shortest_s = RestToRestPath::shortest_s(space_, stops);
     if (shortest_s <= options_.seconds) return stops;
     if (count <= kFewestStops) {
@@ -306,12 +331,12 @@ RecordingPlan Planner::motion_plan(const Progress& progress) const {
 RecordingPlan Planner::plan(const Progress& progress) {
   draw_candidates();
   const ExpectedRecording first = recording_at(robot_, space_, {postures_.front()});
-  effects_ = named_effects(robot_, first, robot_.effects);
-  rivals_ = named_effects(robot_, first, robot_.rivals);
+  names_ = {named_effects(robot_, first, robot_.effects),
+            named_effects(robot_, first, robot_.rivals)};
   candidates_ = rows_at(postures_);
   Rng rng = Rng::from_name("goal", options_.seed);
   const std::vector<Parameter> own =
-      subset(candidates_.parameters, own_columns(candidates_.parameters));
+      subset(candidates_.parameters, own_columns(candidates_.parameters, names_));
   root_ = goal_root(options_.goal, robot_, space_, own, rng);
   return options_.postures > 0 ? postures_plan() : motion_plan(progress);
 }

@@ -138,6 +138,8 @@ std::vector<Correction> corrections_of(const PlannedRobot& robot,
   std::ranges::move(effects::camera_effects(world), std::back_inserter(library));
   for (const effects::CameraEffect& one : library) {
     if (one.candidate.id != effect.id || one.is_time_offset || !one.corrections) continue;
+    const std::vector<double>& scan = one.candidate.scan;
+    if (one.candidate.scan_listed && std::ranges::find(scan, effect.scan) == scan.end()) return {};
     std::vector<Correction> out = one.corrections(effect.scan);
     const bool is_known = effect.values.size() == std::ssize(out);
     for (std::size_t k = 0; k < out.size(); ++k) {

@@ -95,6 +95,11 @@ DhUncertainty dh_uncertainty(const Calibration& calibration, const DhChain& chai
   out.base_translation_m = length_of(J, n + 3, calibration);
   out.tool_rotation_rad = length_of(J, n + kPoseNumbers, calibration);
   out.tool_translation_m = length_of(J, n + kPoseNumbers + 3, calibration);
+  // They take back the turn that nearly common lines leave to chance.
+  const std::size_t count = chain.steps.size();
+  if (count > 0 && chain.steps.front().normal == DhNormal::kOneLine) out.base_rotation_rad.reset();
+  if (count > 1 && chain.steps[count - 2].normal == DhNormal::kOneLine)
+    out.tool_rotation_rad.reset();
   return out;
 }
 

@@ -146,8 +146,10 @@ std::string inflated(std::string_view packed, std::size_t most) {
   InflateStream stream(packed);
   std::array<char, kStep> room{};
   std::string out;
-  while (!stream.advance(room, out))
+  for (bool ended = false; !ended;) {
+    ended = stream.advance(room, out);
     if (out.size() > most) throw Damage{"it unpacks to more than 1 GiB"};
+  }
   return out;
 }
 

@@ -26,7 +26,8 @@ enum class ArrayClass : std::uint8_t {
   kChar = 4,
   kSparse = 5,
   kDouble = 6,
-  kUint64 = 15
+  kUint64 = 15,
+  kOpaque = 17  // tables, times, strings: not in the format's description, which ends before
 };
 constexpr std::uint32_t kComplexFlag = 0x0800;
 
@@ -57,6 +58,7 @@ std::string class_words(ArrayClass kind) {
     case ArrayClass::kStruct:
       return "a struct";
     case ArrayClass::kObject:
+    case ArrayClass::kOpaque:
       return "an object";
     case ArrayClass::kChar:
       return "a text";
@@ -87,11 +89,13 @@ MatrixHead read_head(ElementReader& elements) {
   const std::uint64_t word = unsigned_of(flags.data.substr(0, 4), elements.big_endian());
   out.kind = static_cast<ArrayClass>(word & 0xFFU);
   out.is_complex = (word & kComplexFlag) != 0;
-  const Element sizes = elements.need("sizes");
-  if (sizes.type != ElementType::kInt32) throw Damage{"a variable's sizes are none"};
-  out.sizes = numbers_of(sizes, elements.big_endian());
-  if (out.sizes.size() < 2 || std::ranges::any_of(out.sizes, [](double n) { return n < 0.0; }))
-    throw Damage{"a variable's sizes are none"};
+  if (out.kind != ArrayClass::kOpaque) {
+    const Element sizes = elements.need("sizes");
+    if (sizes.type != ElementType::kInt32) throw Damage{"a variable's sizes are none"};
+    out.sizes = numbers_of(sizes, elements.big_endian());
+    if (out.sizes.size() < 2 || std::ranges::any_of(out.sizes, [](double n) { return n < 0.0; }))
+      throw Damage{"a variable's sizes are none"};
+  }
   const Element name = elements.need("name");
   if (name.type != ElementType::kInt8) throw Damage{"a variable's name is none"};
   out.name = std::string(name.data.substr(0, name.data.find('\0')));
@@ -100,11 +104,11 @@ MatrixHead read_head(ElementReader& elements) {
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-// As MATLAB has names.
+// As MATLAB and Octave have names.
 bool is_variable_name(std::string_view name) {
-  return !name.empty() && is_letter(name.front()) && std::ranges::all_of(name, [](char c) {
-    return is_letter(c) || (c >= '0' && c <= '9') || c == '_';
-  });
+  if (name.empty() || (!is_letter(name.front()) && name.front() != '_')) return false;
+  return std::ranges::all_of(
+      name, [](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; });
 }
 
 class VariableReader {

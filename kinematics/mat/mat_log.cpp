@@ -32,7 +32,8 @@ Eigen::Index longer_side(const Variable& variable) {
 // How many samples the log has; 0: no variable has any.
 Eigen::Index samples_of(const std::vector<Variable>& variables) {
   for (const Variable& variable : variables)
-    if (is_time_name(variable.name) && variable.values.size() == longer_side(variable))
+    if (is_time_name(variable.name) && variable.values.size() > 1 &&
+        variable.values.size() == longer_side(variable))
       return variable.values.size();
   std::map<Eigen::Index, int> votes;
   for (const Variable& variable : variables)

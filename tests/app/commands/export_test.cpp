@@ -250,6 +250,12 @@ TEST_F(Export, RefusesNonsense) {
                  "--dh");
   expect_refusal({"export", source, "--dh", path("t"), "--dh-convention", "craig"},
                  ExitCode::kBadRequest, "craig");
+  expect_refusal({"export", source, "--tum", path("t"), "--dh", path("t/link1.tum")},
+                 ExitCode::kBadRequest, "is named twice");
+  expect_refusal({"export", source, "--tum", path("t"), "--dh", path("t")}, ExitCode::kBadRequest,
+                 "is named twice");
+  expect_refusal({"export", source, "--tum", path("t"), "--dh", path("no/x.csv")},
+                 ExitCode::kBadRequest, "there is no folder");
   EXPECT_FALSE(fs::exists(path("t")));
 }
 

@@ -40,6 +40,19 @@ TEST(Exchange, HeldOnesStayAndCount) {
   EXPECT_EQ(chosen, (std::vector<std::size_t>{2, 2}));
 }
 
+// What is greatest is least with its sign turned.
+TEST(Exchange, EndsWhereNothingIsBetterAlsoOfNegativeNumbers) {
+  int asked = 0;
+  DesignProblem problem = line_problem({-1.0, 1.0});
+  problem.criterion = [&asked](const Eigen::MatrixXd& information) {
+    ++asked;
+    return -information.trace();
+  };
+  static_cast<void>(choose_candidates(problem, 2));
+  // All candidates are alike: at first, for each of two, and once more to see that none is better.
+  EXPECT_EQ(asked, 1 + 2 * 2 + 2 * 2);
+}
+
 TEST(Exchange, IsNoWorseThanAnyOtherChoiceOfAFewRandomOnes) {
   Rng rng(3);
   DesignProblem problem;

@@ -86,6 +86,32 @@ TEST(MatFile, WhatIsNoMatrixOfNumbersIsLeftOut) {
     EXPECT_NE(table.warnings[0].find(part), std::string::npos) << table.warnings[0];
 }
 
+// Tables, times and strings of MATLAB have no sizes element (class 17); Octave has names that begin
+// with an underscore.
+TEST(MatFile, ObjectsOfMatlabAreLeftOutAndNamesOfOctaveAreNames) {
+  for (const MatFormat& format : kFormats) {
+    MatWriter writer(format);
+    writer.doubles("t", 3, 1, {0, 1, 2})
+        .variable(writer.element(6, writer.number(17U) + writer.number(0U)) +
+                  writer.element(1, "when") + writer.element(1, "MCOS") +
+                  writer.element(1, "datetime"))
+        .doubles("_q", 3, 1, {4, 5, 6});
+    const Contents read = parse_variables(writer.bytes(), "log.mat");
+    ASSERT_EQ(read.variables.size(), 2U);
+    EXPECT_EQ(read.variables[1].name, "_q");
+    ASSERT_EQ(read.left_out.size(), 1U);
+    EXPECT_EQ(read.left_out[0].name, "when");
+    EXPECT_EQ(read.left_out[0].what, "an object");
+  }
+}
+
+TEST(MatLog, AScalarTimeIsNoColumn) {
+  MatWriter writer;
+  writer.doubles("t", 1, 1, {4.0}).doubles("time", 3, 1, {0, 1, 2}).doubles("q", 3, 1, {1, 2, 3});
+  const ChannelTable table = table_of(parse_variables(writer.bytes(), "log.mat"), "log.mat");
+  EXPECT_EQ(table.names, (std::vector<std::string>{"time", "q"}));
+}
+
 TEST(MatLog, MatricesAreAColumnAJointWhicheverWayTheyStand) {
   MatWriter writer;
   writer.doubles("t", 1, 4, {0, 1, 2, 3})
@@ -186,6 +212,7 @@ TEST(MatFile, APackedVariableDoesNotFillTheMemory) {
   const std::string packed = MatWriter().packed(zeros).substr(kTag);
   EXPECT_EQ(inflated(packed, zeros.size()), zeros);
   EXPECT_THROW(static_cast<void>(inflated(packed, zeros.size() / 2)), Damage);
+  EXPECT_THROW(static_cast<void>(inflated(packed, zeros.size() - 1)), Damage);
 }
 
 }  // namespace
