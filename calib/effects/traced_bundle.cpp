@@ -10,7 +10,6 @@
 #include "calib/effects/elsewhere.h"
 #include "calib/effects/suspect.h"
 #include "kinematics/core/error.h"
-#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::effects {
 namespace {
@@ -549,15 +548,9 @@ EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) cons
 }
 
 TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
-  return std::move(fit_all({effects}).front());
-}
-
-std::vector<TracedFit> TracedBundle::fit_all(
-    const std::vector<std::vector<AddedEffect>>& lists) const {
-  std::vector<TracedFit> out(lists.size());
-  std::vector<Memory> news(lists.size());
-  parallel_for(lists.size(), [&](std::size_t i) { out[i] = fit(lists[i], news[i]); });
-  for (Memory& one : news) remember(std::move(one));
+  Memory news;
+  TracedFit out = fit(effects, news);
+  remember(std::move(news));
   return out;
 }
 

@@ -15,9 +15,6 @@ class TracedBundle final : public TracedModel {
                std::vector<std::size_t> without_couplings = {});
   /// Begins where earlier fits ended, and ends at the same minimum but for the solver's tolerance.
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
-  /// At the same time, none beginning where another of them ended.
-  [[nodiscard]] std::vector<TracedFit> fit_all(
-      const std::vector<std::vector<AddedEffect>>& lists) const override;
 
   /// The same with its numbers: the corrections that stand for the effects, at their values.
   struct Corrected {

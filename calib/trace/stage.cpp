@@ -3,11 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <fmt/format.h>
-
-#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::trace {
 
@@ -44,16 +41,6 @@ double held_out_sum_without(const Stage& stage, std::size_t index) {
 StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects) {
   TracedFit fit = model.fit(effects);
   return std::make_shared<const Stage>(std::move(effects), std::move(fit));
-}
-
-std::vector<StagePtr> make_stages(const TracedModel& model,
-                                  std::vector<std::vector<AddedEffect>> lists) {
-  std::vector<TracedFit> fits = model.fit_all(lists);
-  std::vector<StagePtr> out(lists.size());
-  parallel_for(out.size(), [&](std::size_t i) {
-    out[i] = std::make_shared<const Stage>(std::move(lists[i]), std::move(fits[i]));
-  });
-  return out;
 }
 
 const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {

@@ -34,9 +34,6 @@ using StagePtr = std::shared_ptr<const Stage>;
 [[nodiscard]] double held_out_sum_without(const Stage& stage, std::size_t index);
 
 [[nodiscard]] StagePtr make_stage(const TracedModel& model, std::vector<AddedEffect> effects);
-/// Several, at the same time where the model can.
-[[nodiscard]] std::vector<StagePtr> make_stages(const TracedModel& model,
-                                                std::vector<std::vector<AddedEffect>> lists);
 
 /// Nothing where the fit does not name it.
 [[nodiscard]] const Candidate* find_candidate(const TracedFit& fit, const EffectId& id);

@@ -175,14 +175,6 @@ class TracedModel {
   virtual ~TracedModel() = default;
   /// Least squares over everything. Throws nothing for effects that `candidates` named.
   [[nodiscard]] virtual TracedFit fit(const std::vector<AddedEffect>& effects) const = 0;
-  /// Several, at the same time where the model can: in their order, and the same whatever threads
-  /// there are.
-  [[nodiscard]] virtual std::vector<TracedFit> fit_all(
-      const std::vector<std::vector<AddedEffect>>& lists) const {
-    std::vector<TracedFit> out;
-    for (const std::vector<AddedEffect>& effects : lists) out.push_back(fit(effects));
-    return out;
-  }
 
  protected:
   TracedModel() = default;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <string>
@@ -89,35 +88,9 @@ StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
     if (stage->added == effects) return stage;
   }
   ++fits_;
-  const auto known =
-      std::ranges::find_if(ahead_, [&](const StagePtr& stage) { return stage->added == effects; });
-  if (known != ahead_.end()) {
-    last_.push_front(std::move(*known));
-    ahead_.erase(known);
-  } else {
-    last_.push_front(make_stage(*model_, std::move(effects)));
-  }
+  last_.push_front(make_stage(*model_, std::move(effects)));
   if (last_.size() > kKept) last_.pop_back();
   return last_.front();
-}
-
-void Tracer::fit_without_ahead(const Stage& stage, const std::vector<std::size_t>& indices) {
-  std::vector<std::vector<AddedEffect>> lists;
-  for (const std::size_t index : indices)
-    lists.push_back(kinescope::trace::without(stage.added, index));
-  fit_ahead(std::move(lists));
-}
-
-void Tracer::fit_ahead(std::vector<std::vector<AddedEffect>> lists) {
-  const auto is_known = [](const auto& stages, const std::vector<AddedEffect>& effects) {
-    return std::ranges::any_of(stages,
-                               [&](const StagePtr& stage) { return stage->added == effects; });
-  };
-  std::erase_if(lists, [&](const std::vector<AddedEffect>& effects) {
-    return is_known(last_, effects) || is_known(ahead_, effects);
-  });
-  if (lists.size() < 2) return;  // one alone is no earlier for it
-  std::ranges::move(make_stages(*model_, std::move(lists)), std::back_inserter(ahead_));
 }
 
 void Tracer::say_nothing(std::string reason) {
@@ -152,7 +125,6 @@ bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
 void Tracer::forward() {
   while (static_cast<int>(now_->added.size()) < options_.max_effects && may_go_on()) {
     ++round_;
-    ahead_.clear();
     report_progress(progress_, "trace", round_, 0);
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
@@ -190,21 +162,12 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   std::ranges::stable_sort(hints, std::greater{},
                            [](const TestedMember* hint) { return hint->score.gain; });
   if (hints.size() > kMostHints) hints.resize(kMostHints);
-  const auto with = [&](const TestedMember* hint) {
+  StagePtr best;
+  for (const TestedMember* hint : hints) {
+    if (!may_go_on()) return best;
+    if (!shows_another(*now, *hint)) continue;
     std::vector<AddedEffect> effects = now->added;
     effects.push_back({now->fit.candidates[hint->index].id, hint->scan});
-    return effects;
-  };
-  std::vector<const TestedMember*> showing;
-  std::ranges::copy_if(hints, std::back_inserter(showing),
-                       [&](const TestedMember* hint) { return shows_another(*now, *hint); });
-  std::vector<std::vector<AddedEffect>> wanted;
-  std::ranges::transform(showing, std::back_inserter(wanted), with);
-  if (may_go_on()) fit_ahead(std::move(wanted));
-  StagePtr best;
-  for (const TestedMember* hint : showing) {
-    if (!may_go_on()) return best;
-    const std::vector<AddedEffect> effects = with(hint);
     now_ = with_sizes_for_scans(stage_of(effects));
     StagePtr both;
     if (now_->fit.converged)
@@ -274,12 +237,7 @@ bool Tracer::all_needed(const Stage& stage, std::size_t known) {
   for (std::size_t i = known; i < stage.added.size(); ++i)
     order.emplace_back(held_out_sum_without(stage, i), i);
   std::ranges::sort(order);
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    if (k % 2 == 1 && k + 1 < order.size())
-      fit_without_ahead(stage, {order[k].second, order[k + 1].second});
-    if (!is_needed(stage, order[k].second)) return false;
-  }
-  return true;
+  return std::ranges::all_of(order, [&](const auto& one) { return is_needed(stage, one.second); });
 }
 
 bool Tracer::is_needed(const Stage& stage, std::size_t index) {
@@ -441,27 +399,15 @@ std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,
 }
 
 StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round) {
-  const auto with = [this](const Contender& contender) {
-    std::vector<AddedEffect> effects = now_->added;
-    effects.push_back({contender.id, contender.member.scan});
-    return effects;
-  };
-  const auto is_behind = [&](const Contender& contender) {
-    return predicts_clearly_worse(contender.held_out, contenders.front().held_out);
-  };
-  std::vector<std::vector<AddedEffect>> wanted;
-  for (const Contender& contender : contenders) {
-    if (std::ssize(wanted) >= options_.refits || is_behind(contender)) break;
-    wanted.push_back(with(contender));
-  }
-  fit_ahead(std::move(wanted));
   StagePtr best;
   int refits = 0;
   for (const Contender& contender : contenders) {
     if (refits >= options_.refits) break;
-    if (best && is_behind(contender)) break;
+    if (best && predicts_clearly_worse(contender.held_out, contenders.front().held_out)) break;
     ++refits;
-    StagePtr stage = with_sizes_for_scans(stage_of(with(contender)));
+    std::vector<AddedEffect> effects = now_->added;
+    effects.push_back({contender.id, contender.member.scan});
+    StagePtr stage = with_sizes_for_scans(stage_of(std::move(effects)));
     mark(round, contender.id, CandidateState::kRefitted, stage->error.value);
     const double bar = best ? best->held_out_sum() : now_->held_out_sum();
     if (stage->fit.converged && stage->held_out_sum() < bar) best = std::move(stage);

@@ -56,10 +56,6 @@ class Tracer {
 
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
-  /// Fits at the same time what stage_of() is about to be asked for.
-  void fit_ahead(std::vector<std::vector<AddedEffect>> lists);
-  /// The same without each of these effects.
-  void fit_without_ahead(const Stage& stage, const std::vector<std::size_t>& indices);
   [[nodiscard]] bool can_look(const Stage& stage);
   /// TraceOptions::most_fits.
   [[nodiscard]] bool may_go_on() const;
@@ -181,7 +177,6 @@ class Tracer {
   Progress progress_;
   double level_ = 0.0;  // of all tests of known effects; the same again for the rest
   std::deque<StagePtr> last_;
-  std::vector<StagePtr> ahead_;  // not asked for yet
   StagePtr base_;
   StagePtr now_;
   std::vector<Detail> details_;  // beside now_->added, filled by the backward check

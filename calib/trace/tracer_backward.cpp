@@ -93,10 +93,7 @@ bool Tracer::backward() {
     details_.assign(now_->added.size(), {});
     trace_.ambiguities.clear();
     if (drop_without_size()) return true;
-    ahead_.clear();
     for (std::size_t i = 0; i < now_->added.size(); ++i) {
-      // Two at a time: what one of them changes makes the others useless.
-      if (i % 2 == 0 && i + 1 < now_->added.size()) fit_without_ahead(*now_, {i, i + 1});
       if (check(i)) return true;
     }
   } while (search_again(std::nullopt));
