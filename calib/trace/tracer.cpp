@@ -61,9 +61,14 @@ std::optional<AddedEffect> Tracer::first() {
 void Tracer::search() {
   add_step(0, "the model as it is", *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
-  do {
+  for (bool again = true; again;) {
     forward();
-  } while (backward());
+    again = backward();
+    if (!again && look_ahead_put_off_) {
+      checked_ = now_;
+      again = true;
+    }
+  }
   if (!may_go_on())
     add_step(round_, fmt::format("nothing more is looked for after {} fits", fits_), *now_);
   if (!now_->fit.converged) {
@@ -123,6 +128,7 @@ bool Tracer::predicts_clearly_worse(const Eigen::VectorXd& one,
 }
 
 void Tracer::forward() {
+  look_ahead_put_off_ = false;
   while (static_cast<int>(now_->added.size()) < options_.max_effects && may_go_on()) {
     ++round_;
     report_progress(progress_, "trace", round_, 0);
@@ -131,7 +137,8 @@ void Tracer::forward() {
     StagePtr next = refit_best(contenders(*now_, family), round_);
     // What hides behind others is looked for where all of these are beyond doubt: the backward
     // check takes out the others first.
-    if (!next && !one_without_size()) {
+    look_ahead_put_off_ = !next && now_ != checked_ && one_without_size();
+    if (!next && !look_ahead_put_off_) {
       next = look_ahead(family);
       if (next && is_of_the_sensor(*next, family)) return;
     }

@@ -187,6 +187,8 @@ class Tracer {
   std::vector<FoundRest> rests_;
   int round_ = 0;
   int fits_ = 0;
+  bool look_ahead_put_off_ = false;  // by the last forward()
+  StagePtr checked_;  // the backward check left it as it is, after a look ahead was put off
   Trace trace_;
 };
 
