@@ -110,6 +110,7 @@ enum class CalibrationStatus { kNotRun, kConverged, kNotConverged, kUndetermined
 /// "not_run", "converged", "not_converged", "undetermined".
 [[nodiscard]] std::string_view to_string(CalibrationStatus status);
 
+// NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): ordered by meaning, and there are few
 struct Calibration {
   CalibrationStatus status = CalibrationStatus::kNotRun;
   std::string status_reason;
