@@ -73,6 +73,20 @@ TEST(Chain, DerivativesAgreeWithDifferences) {
   }
 }
 
+TEST(Chain, ItsPoseAloneIsTheSame) {
+  Rng rng = Rng::from_name("chain alone");
+  for (int trial = 0; trial < 20; ++trial) {
+    Chain chain = random_chain(rng);
+    for (ChainJoint& joint : chain.joints) {
+      joint.upward = rng.uniform() < 0.5;
+      for (int i = 0; i < 6; ++i) joint.correction[i] = 0.1 * rng.normal();
+    }
+    chain.joints.front().correction.setZero();
+    const Pose alone = compose_chain(chain.camera_base, chain.joints, chain.mount);
+    EXPECT_LT(log_pose(chain.end().inverse() * alone).norm(), 1e-12);
+  }
+}
+
 TEST(PoseManifold, PlusAndMinusAreInverse) {
   Rng rng = Rng::from_name("pose manifold");
   const PoseManifold full({true, true, true, true, true, true});

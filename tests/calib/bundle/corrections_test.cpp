@@ -118,6 +118,21 @@ class Derivatives : public ::testing::Test {
     return (above - below) / (2.0 * cases_[c].step);
   }
 
+  [[nodiscard]] Eigen::VectorXd residual_alone() const {
+    const Readings readings(spec_, state_);
+    const std::vector<int> which = corrections_of(spec_, *sighting_);
+    std::vector<double> values;
+    for (const int c : which) values.push_back(state_.corrections[static_cast<std::size_t>(c)]);
+    return corrected_residual(
+               spec_, *sighting_, sum_corrections(spec_, *sighting_, which, values),
+               from_block(camera_block(state_, *sighting_).data()),
+               chain_of(spec_, state_, readings, *sighting_),
+               rates_of(spec_, state_, readings, *sighting_),
+               from_block(state_.mounts[static_cast<std::size_t>(sighting_->marker)].data()),
+               camera_of(spec_, state_, 0), nullptr)
+        .value();
+  }
+
   void compare_at(std::size_t c, double tolerance) {
     const Eigen::VectorXd differences = numeric(c);
     ASSERT_GT(differences.norm(), 0.05) << spec_.corrections[c].name;
@@ -155,6 +170,13 @@ TEST_F(Derivatives, AgreeWithDifferencesBesideAllOthers) {
 TEST_F(Derivatives, HoldToFirstOrderBesideARollingShutter) {
   for (std::size_t c = 0; c < cases_.size(); ++c) state_.corrections[c] = cases_[c].value;
   for (std::size_t c = 0; c < cases_.size(); ++c) compare_at(c, kFirstOrder);
+}
+
+TEST_F(Derivatives, OfNoUseAreLeftOutOfTheSameResidual) {
+  for (std::size_t c = 0; c < cases_.size(); ++c) {
+    state_.corrections[c] = cases_[c].value;
+    EXPECT_LT((residual_alone() - residual()).norm(), 1e-9) << spec_.corrections[c].name;
+  }
 }
 
 TEST_F(Derivatives, CorrectionsBearOnWhatTheyMove) {
