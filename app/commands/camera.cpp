@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/file.h"
 

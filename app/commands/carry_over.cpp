@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/pipeline.h"
 #include "app/commands/run_again.h"
 #include "app/commands/run_folder.h"
+#include "app/explain/pipeline.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/effects/corrected_log.h"
 #include "calib/trace/held_out.h"

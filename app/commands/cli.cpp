@@ -11,8 +11,8 @@
 #include "app/commands/command_line.h"
 #include "app/commands/progress_line.h"
 #include "app/commands/run_again.h"
-#include "app/commands/saved_model_log.h"
 #include "app/io/nearest_name.h"
+#include "app/torque/saved_model_log.h"
 #include "kinematics/core/single_threaded_blas.h"
 #include "kinematics/recorded/container.h"
 

@@ -9,9 +9,10 @@
 #include "app/commands/carry_over.h"
 #include "app/commands/commands.h"
 #include "app/commands/compared_runs.h"
-#include "app/commands/output_folder.h"
-#include "app/commands/torque_inputs.h"
+#include "app/io/output_folder.h"
+#include "app/io/same_place.h"
 #include "app/report/compare_summary.h"
+#include "app/torque/torque_inputs.h"
 
 namespace kinescope {
 namespace {

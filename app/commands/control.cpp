@@ -6,10 +6,10 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/control_bench.h"
-#include "app/commands/model_of_robot.h"
 #include "app/commands/simulated_robot.h"
-#include "app/commands/torque_stages.h"
 #include "app/io/torque_model_file.h"
+#include "app/torque/model_of_robot.h"
+#include "app/torque/model_torque.h"
 #include "dynamics/experiments/logged_runs.h"
 #include "kinematics/core/file.h"
 

@@ -11,9 +11,9 @@
 #include <string>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
-#include "app/commands/torque_inputs.h"
+#include "app/io/output_folder.h"
 #include "app/report/control_summary.h"
+#include "app/torque/torque_inputs.h"
 
 namespace kinescope {
 

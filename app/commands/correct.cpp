@@ -11,8 +11,8 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/log_range.h"
-#include "app/commands/output_folder.h"
 #include "app/io/effects_file.h"
+#include "app/io/output_folder.h"
 #include "calib/effects/corrected_log.h"
 #include "kinematics/core/file.h"
 #include "kinematics/log/header_units.h"

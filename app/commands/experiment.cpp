@@ -9,9 +9,9 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
-#include "app/commands/torque_inputs.h"
 #include "app/experiments/experiments.h"
+#include "app/io/output_folder.h"
+#include "app/torque/torque_inputs.h"
 #include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
 

@@ -7,7 +7,8 @@
 #include <fmt/format.h>
 
 #include "app/commands/export_form.h"
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
+#include "app/io/same_place.h"
 #include "kinematics/core/file.h"
 
 namespace kinescope {

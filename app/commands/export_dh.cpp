@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "app/commands/export_form.h"
-#include "app/commands/output_folder.h"
 #include "app/io/dh_file.h"
 #include "app/io/nearest_name.h"
+#include "app/io/output_folder.h"
 #include "app/report/result_values.h"
 #include "kinematics/urdf/urdf.h"
 

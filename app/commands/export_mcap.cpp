@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "app/commands/export_form.h"
-#include "app/commands/output_folder.h"
 #include "app/io/foxglove_json.h"
+#include "app/io/output_folder.h"
 #include "app/io/residuals_file.h"
 #include "app/report/result_values.h"
 

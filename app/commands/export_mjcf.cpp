@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/export_form.h"
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "app/io/torque_effects_file.h"
 #include "app/report/result_values.h"
 #include "kinematics/core/file.h"

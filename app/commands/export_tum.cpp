@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/export_form.h"
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "app/report/result_values.h"
 
 namespace kinescope {

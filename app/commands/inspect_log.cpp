@@ -8,7 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/inspection.h"
-#include "app/commands/log_doubts.h"
+#include "app/explain/log_doubts.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/readings_apart.h"
 

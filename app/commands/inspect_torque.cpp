@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/inspection.h"
-#include "app/commands/torque_inputs.h"
+#include "app/torque/torque_inputs.h"
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"

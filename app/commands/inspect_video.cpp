@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "app/commands/families_in_video.h"
 #include "app/commands/inspection.h"
+#include "app/explain/families_in_video.h"
 #include "calib/camera/camera_file.h"
 #include "calib/vision/double_ids.h"
 #include "calib/vision/sightings.h"

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "app/report/result_values.h"
 #include "kinematics/core/file.h"
 

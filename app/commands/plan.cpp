@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
 #include "app/commands/planned_run.h"
-#include "app/commands/torque_inputs.h"
+#include "app/io/output_folder.h"
 #include "app/report/plan_summary.h"
+#include "app/torque/torque_inputs.h"
 
 namespace kinescope {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/torque_inputs.h"
 #include "app/io/policy_system_file.h"
+#include "app/torque/torque_inputs.h"
 #include "dynamics/policy/systems/library.h"
 #include "kinematics/core/error.h"
 

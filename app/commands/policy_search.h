@@ -4,8 +4,8 @@
 // after every trial.
 #pragma once
 
-#include "app/commands/output_folder.h"
 #include "app/commands/policy.h"
+#include "app/io/output_folder.h"
 #include "app/io/policy_files.h"
 #include "app/report/policy_report.h"
 

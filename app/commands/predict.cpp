@@ -8,12 +8,12 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
-#include "app/commands/saved_model_log.h"
-#include "app/commands/torque_inputs.h"
+#include "app/io/output_folder.h"
 #include "app/io/torque_model_file.h"
 #include "app/report/motion_words.h"
 #include "app/report/result_values.h"
+#include "app/torque/saved_model_log.h"
+#include "app/torque/torque_inputs.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 

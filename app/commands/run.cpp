@@ -7,28 +7,28 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/across_recordings.h"
 #include "app/commands/commands.h"
-#include "app/commands/explain.h"
-#include "app/commands/first_look.h"
-#include "app/commands/join_recordings.h"
 #include "app/commands/limits.h"
-#include "app/commands/log_doubts.h"
-#include "app/commands/moving_camera.h"
-#include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
-#include "app/commands/see_cameras.h"
-#include "app/commands/see_recordings.h"
-#include "app/commands/sighting_doubts.h"
-#include "app/commands/stopwatch.h"
 #include "app/commands/torque_stages.h"
+#include "app/explain/across_recordings.h"
+#include "app/explain/explain.h"
+#include "app/explain/first_look.h"
+#include "app/explain/join_recordings.h"
+#include "app/explain/log_doubts.h"
+#include "app/explain/moving_camera.h"
+#include "app/explain/pipeline.h"
+#include "app/explain/see_cameras.h"
+#include "app/explain/see_recordings.h"
+#include "app/explain/sighting_doubts.h"
 #include "app/io/effects_file.h"
 #include "app/io/joint_values_file.h"
 #include "app/io/products.h"
 #include "app/report/answer.h"
 #include "app/report/recordings_json.h"
 #include "app/report/report.h"
+#include "app/report/stopwatch.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
 #include "calib/bundle/branches.h"
@@ -319,7 +319,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   Stopwatch clock;
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
-  const std::vector<Recording> given = read_recordings(options);
+  const std::vector<Recording> given = read_recordings(options.recording, options.further);
   const Recording whole = described_together(given);
   require_nominal(options, whole);
   if (!whole.flange.empty()) return run_hand_eye(options, whole, console);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/io/products.h"
+#include "app/io/same_place.h"
 #include "app/io/sha256.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/core/file.h"

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
-#include "app/commands/pipeline.h"
+#include "app/explain/pipeline.h"
+#include "app/io/output_folder.h"
 #include "app/report/run_summary.h"
 #include "calib/camera/tag_observations.h"
 

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "app/commands/limits.h"
-#include "app/commands/pipeline.h"
 #include "app/commands/run_folder.h"
-#include "app/commands/stopwatch.h"
+#include "app/explain/pipeline.h"
 #include "app/io/products.h"
 #include "app/report/hand_eye_summary.h"
+#include "app/report/stopwatch.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
 #include "calib/hand_eye/hand_eye.h"

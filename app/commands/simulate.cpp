@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
-#include "app/commands/output_folder.h"
 #include "app/commands/simulated_robot.h"
+#include "app/io/output_folder.h"
 #include "app/report/result_values.h"
 #include "kinematics/core/file.h"
 

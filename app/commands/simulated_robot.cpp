@@ -7,7 +7,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
+#include "app/io/same_place.h"
 #include "app/io/torque_effects_file.h"
 #include "dynamics/data/log_checks.h"
 #include "dynamics/simulation/plant.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "app/commands/console.h"
-#include "app/commands/torque_inputs.h"
+#include "app/torque/torque_inputs.h"
 #include "dynamics/effects/trace_torque.h"
 
 namespace kinescope {

@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/output_folder.h"
 #include "app/io/dynamics_settings.h"
+#include "app/io/output_folder.h"
+#include "app/torque/find_contacts.h"
+#include "app/torque/model_torque.h"
 #include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/command_line.h"
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "app/manual/command_page.h"
 #include "app/manual/completion.h"
 #include "app/manual/man_page.h"

@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
-#include "app/commands/first_look.h"
-#include "app/commands/pipeline.h"
+#include "app/explain/first_look.h"
+#include "app/explain/pipeline.h"
 #include "app/io/products.h"
 #include "app/python/arrays.h"
 #include "app/python/bindings.h"

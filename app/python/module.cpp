@@ -7,7 +7,7 @@
 // Not here: names, signatures and help, which the package has.
 #include <utility>
 
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 #include "app/python/bindings.h"
 #include "kinematics/core/error.h"
 

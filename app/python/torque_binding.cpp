@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
-#include "app/commands/saved_model_log.h"
 #include "app/io/torque_model_file.h"
 #include "app/python/arrays.h"
 #include "app/python/bindings.h"
+#include "app/torque/saved_model_log.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::python {

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "app/commands/torque_stages.h"
+#include "app/torque/find_contacts.h"
 #include "dynamics/experiments/contact_world.h"
 #include "dynamics/experiments/reference_arms.h"
 #include "kinematics/core/error.h"

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/pipeline.h"
+#include "app/explain/pipeline.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/urdf/urdf.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/commands/nominal_channels.h"
+#include "app/explain/nominal_channels.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 //
 // What a command did not write it neither replaces nor removes, and no input is written over: the
 // rule by itself, and every command that writes.
-#include "app/commands/output_folder.h"
+#include "app/io/output_folder.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

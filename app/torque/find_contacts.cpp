@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/torque/find_contacts.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/io/output_folder.h"
+#include "app/torque/contact_model.h"
+#include "app/torque/contact_predictor.h"
+#include "app/torque/torque_inputs.h"
+#include "dynamics/contact/momentum_observer.h"
+#include "kinematics/recorded/recorded_log.h"
+
+namespace kinescope {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kObserverGain = 25.0;  // 1/s, of the report's time line
+
+TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel& model,
+                         const TorqueDataOptions& options) {
+  TorqueLogReport log =
+      look_at_torque_log(recorded::read_channel_tables(files), wanted_joints(model.tree), options);
+  throw_refusals(log.findings);
+  if (log.log.torque.cols() == 0) {
+    throw bad_input(files.front().string(), "has no torque columns",
+                    "name them with --torque, or log motor currents with --torque-unit A");
+  }
+  return log;
+}
+
+// What contact detection looks at: the trajectories of a log on one clock.
+struct LogBalance {
+  std::vector<BalanceSample> samples;
+  LogClock clock;
+};
+
+// Far enough apart that detection begins anew in each, and what is left out around a contact stays
+// in its own.
+OneClock apart(const std::vector<TorqueSamples>& parts, double guard_s) {
+  Eigen::Index rows = 0;
+  for (const TorqueSamples& part : parts) rows += part.size();
+  Eigen::VectorXd t_s(rows);
+  Eigen::VectorXi trajectory(rows);
+  Eigen::Index at = 0;
+  for (const TorqueSamples& part : parts) {
+    t_s.segment(at, part.size()) = part.t_s;
+    trajectory.segment(at, part.size()) = part.trajectory;
+    at += part.size();
+  }
+  const double gap_s = 1.0 + guard_s;
+  return {t_s, trajectory, {.least_gap_s = gap_s, .gap_s = gap_s}};
+}
+
+// What detection looks at, and what it learns from where that is another log.
+struct Balances {
+  LogBalance looked_at;
+  std::optional<LogBalance> learned;
+};
+
+LogBalance on_one_clock(const std::vector<TorqueSamples>& parts,
+                        const std::vector<std::vector<BalanceSample>>& samples,
+                        const TorqueLog& log, double guard_s) {
+  LogBalance out;
+  out.clock = {apart(parts, guard_s), log.trajectory_names};
+  for (const auto& part : samples) {
+    out.samples.insert(out.samples.end(), part.begin(), part.end());
+  }
+  for (std::size_t i = 0; i < out.samples.size(); ++i) {
+    out.samples[i].stamp_s = out.clock.clock.time_s()[static_cast<Eigen::Index>(i)];
+  }
+  return out;
+}
+
+LogBalance balance_of(const ContactModel& model, const TorqueLogReport& report,
+                      const TorqueDataOptions& options, double guard_s) {
+  const TorqueLog& log = report.log;
+  const ModelDoubt doubt = model_doubt(model, report, options);
+  const std::vector<TorqueSamples> parts = unfiltered(log, model.gains);
+  std::vector<std::vector<BalanceSample>> samples;
+  for (const TorqueSamples& part : parts) {
+    samples.push_back(balance_samples(model, part, doubt, log.dq.cols() > 0));
+  }
+  return on_one_clock(parts, samples, log, guard_s);
+}
+
+LogBalance balance_of(const TorqueModelFile& file, const std::vector<PredictedFriction>& friction,
+                      const PredictedLog& predicted, const TorqueLog& log, double guard_s) {
+  std::vector<std::vector<BalanceSample>> samples;
+  for (std::size_t m = 0; m < predicted.motions.size(); ++m) {
+    samples.push_back(
+        predicted_balance(file.model.rigid, friction, predicted.motions[m], predicted.torques[m]));
+  }
+  return on_one_clock(predicted.motions, samples, log, guard_s);
+}
+
+struct DetectedContacts {
+  ContactCalibration calibration;
+  std::vector<ContactEvent> events;
+};
+
+DetectedContacts detect(const Balances& balances, const ContactOptions& options) {
+  DetectedContacts out;
+  const std::vector<BalanceSample>& samples = balances.looked_at.samples;
+  out.calibration = balances.learned
+                        ? calibrate_contacts(balances.learned->samples, samples, options)
+                        : calibrate_contacts(samples, options);
+  out.events = detect_contacts(out.calibration, samples);
+  return out;
+}
+
+// External torques and their noise as the log would show them.
+void apply_gains(const Eigen::VectorXd& gains, std::vector<ContactEvent>& events) {
+  for (ContactEvent& event : events) {
+    event.torque = event.torque.cwiseProduct(gains);
+    event.torque_covariance = gains.asDiagonal() * event.torque_covariance * gains.asDiagonal();
+  }
+}
+
+void apply_gains(const Eigen::VectorXd& gains, ContactSummary& summary) {
+  apply_gains(gains, summary.events);
+  summary.external_torque = gains.asDiagonal() * summary.external_torque;
+  BalanceNoise& noise = summary.calibration.noise;
+  noise.torque_sigma = noise.torque_sigma.cwiseProduct(gains);
+  noise.model_sigma = noise.model_sigma.cwiseProduct(gains);
+}
+
+// The logs as they were read.
+struct Logs {
+  TorqueLogReport looked_at;
+  std::optional<TorqueLogReport> learn;
+
+  [[nodiscard]] const TorqueLogReport& to_learn_from() const { return learn ? *learn : looked_at; }
+};
+
+Logs read_logs(const ContactCommandOptions& options, const DynamicModel& model) {
+  Logs out{.looked_at = read_log(options.logs, model, options.data), .learn = {}};
+  if (options.learn_logs.empty()) return out;
+  out.learn = read_log(options.learn_logs, model, options.data);
+  const std::string& unit = out.looked_at.log.torque_unit;
+  if (out.learn->log.torque_unit != unit) {
+    throw bad_input(options.learn_logs.front().string(),
+                    fmt::format("is in {}, the log in {}", out.learn->log.torque_unit, unit),
+                    "learn from a log of the same signals");
+  }
+  return out;
+}
+
+void report_detection(const Balances& balances, DetectedContacts found, ContactSummary& summary) {
+  const LogBalance& looked_at = balances.looked_at;
+  summary.clock = looked_at.clock;
+  summary.learn_clock = balances.learned ? balances.learned->clock : looked_at.clock;
+  summary.calibration = std::move(found.calibration);
+  summary.events = std::move(found.events);
+  std::vector<TimeSpan> spans;
+  spans.reserve(summary.events.size());
+  for (const ContactEvent& event : summary.events) spans.push_back({event.onset_s, event.end_s});
+  summary.check = check_false_alarms(summary.calibration, looked_at.samples, spans);
+  summary.external_torque = observe_momentum(looked_at.samples, kObserverGain);
+  summary.t_s = summary.clock.clock.time_s();
+}
+
+Balances momentum_balances(const ContactModel& expected, const Logs& logs,
+                           const ContactCommandOptions& options, double guard_s) {
+  Balances out{.looked_at = balance_of(expected, logs.looked_at, options.data, guard_s),
+               .learned = {}};
+  if (logs.learn) out.learned = balance_of(expected, *logs.learn, options.data, guard_s);
+  return out;
+}
+
+void find_by_momentum(const ContactCommandOptions& options, const DynamicModel& model,
+                      const Logs& logs, const ContactOptions& contact, ContactSummary& summary) {
+  const ContactModel expected =
+      make_contact_model(options, model, logs.looked_at, logs.to_learn_from());
+  summary.model = expected.words;
+  summary.findings.insert(summary.findings.begin(), expected.findings.begin(),
+                          expected.findings.end());
+  const Balances balances = momentum_balances(expected, logs, options, contact.guard_s);
+  report_detection(balances, detect(balances, contact), summary);
+  apply_gains(expected.gains, summary);
+}
+
+// Beside a torque model, where it can be computed.
+MomentumComparison compare_with_momentum(const ContactCommandOptions& options,
+                                         const DynamicModel& model, const Logs& logs,
+                                         const ContactOptions& contact) {
+  MomentumComparison out;
+  try {
+    const ContactModel expected =
+        make_contact_model(options, model, logs.looked_at, logs.to_learn_from());
+    const Balances balances = momentum_balances(expected, logs, options, contact.guard_s);
+    DetectedContacts found = detect(balances, contact);
+    out.events = std::move(found.events);
+    apply_gains(expected.gains, out.events);
+    out.excluded = std::move(found.calibration.excluded);
+    out.clock = balances.looked_at.clock;
+    out.learn_clock = balances.learned ? balances.learned->clock : balances.looked_at.clock;
+    out.model = expected.words;
+  } catch (const Error& error) {
+    out.reason = error.what();
+  }
+  return out;
+}
+
+// What looks like contact to the momentum balance, in the log to learn from.
+std::vector<TrajectorySpan> spans_to_leave_out(const MomentumComparison& momentum, double guard_s) {
+  std::vector<TrajectorySpan> out;
+  for (const TimeSpan& span : momentum.excluded) {
+    out.push_back({.trajectory = momentum.learn_clock.trajectory(span.begin_s),
+                   .begin_s = momentum.learn_clock.time_s(span.begin_s) - guard_s,
+                   .end_s = momentum.learn_clock.time_s(span.end_s) + guard_s});
+  }
+  return out;
+}
+
+const std::vector<fs::path>& files_to_learn_from(const ContactCommandOptions& options) {
+  return options.learn_logs.empty() ? options.logs : options.learn_logs;
+}
+
+void find_by_prediction(const ContactCommandOptions& options, const DynamicModel& model,
+                        ContactModelChoice choice, const Logs& logs, const ContactOptions& contact,
+                        ContactSummary& summary) {
+  summary.momentum = compare_with_momentum(options, model, logs, contact);
+  summary.method = to_string(choice.kind);
+  const std::string origin =
+      choice.file ? fs::path(options.model).filename().string()
+                  : file_list(files_to_learn_from(options)) + ", outside what looks like contact";
+  if (!choice.file) {
+    choice.file =
+        learn_contact_model(choice.kind, model, logs.to_learn_from(),
+                            spans_to_leave_out(*summary.momentum, contact.guard_s), options.data);
+  }
+  const TorqueModelFile& file = *choice.file;
+  summary.model = fmt::format(
+      "the {} model{} of {} ({} samples), drift of friction and offsets of "
+      "the log",
+      summary.method, file.traced ? " with what tracing found" : "", origin, file.model.samples);
+  PredictedLog looked_at = predict_log(file, logs.looked_at, options.logs, options.data);
+  std::optional<PredictedLog> learn;
+  if (logs.learn) learn = predict_log(file, *logs.learn, options.learn_logs, options.data);
+  keep_usable_inertia(file, looked_at, learn);
+  const std::vector<PredictedFriction> friction = friction_beside(file, learn ? *learn : looked_at);
+  Balances balances{
+      .looked_at = balance_of(file, friction, looked_at, logs.looked_at.log, contact.guard_s),
+      .learned = {}};
+  if (learn)
+    balances.learned = balance_of(file, friction, *learn, logs.learn->log, contact.guard_s);
+  summary.new_motion = std::move(looked_at.new_motion);
+  report_detection(balances, detect(balances, contact), summary);
+}
+
+Writer writer_of(const ContactCommandOptions& options,
+                 const std::optional<ContactModelChoice>& choice) {
+  std::vector<fs::path> inputs{options.robot};
+  if (choice && choice->file) inputs.emplace_back(options.model);
+  for (const auto* logs : {&options.logs, &options.learn_logs}) {
+    inputs.insert(inputs.end(), logs->begin(), logs->end());
+  }
+  return {.command = options.owner,
+          .products = contact_products(),
+          .inputs = std::move(inputs),
+          .force = options.force};
+}
+
+}  // namespace
+
+ContactSummary find_contacts(const ContactCommandOptions& options) {
+  ContactSummary summary;
+  const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
+  const DynamicModel& model = robot.model;
+  validate(options.contact);
+  std::optional<ContactModelChoice> choice;
+  if (!options.model.empty()) choice = choose_contact_model(options, model);
+  const Writer writer = writer_of(options, choice);
+  const OutputFolder folder(options.output, writer);
+  summary.robot = model.tree.name;
+  summary.log = "Log " + file_list(options.logs);
+  summary.version = program_version();
+  summary.command = options.command_line;
+  summary.inputs = hashed_inputs({options.logs, options.learn_logs, {options.robot}});
+  summary.joints = robot.joints;
+  summary.types = robot.types;
+  summary.links = robot.links;
+  const Logs logs = read_logs(options, model);
+  summary.torque_unit = logs.looked_at.log.torque_unit;
+  summary.learned =
+      logs.learn ? file_list(options.learn_logs) + " and the log itself" : "the log itself";
+  summary.findings = logs.looked_at.findings;
+
+  ContactOptions contact = options.contact;
+  for (const RigidBody& body : make_rigid_model(model).bodies) {
+    contact.parents.push_back(body.parent);
+  }
+  if (choice) {
+    if (choice->file) {
+      summary.inputs.push_back(hashed_inputs({{options.model}}).front());
+      require_unit_of(*choice->file, logs.looked_at, options.logs);
+    }
+    find_by_prediction(options, model, std::move(*choice), logs, contact, summary);
+  } else {
+    find_by_momentum(options, model, logs, contact, summary);
+  }
+
+  folder.write("contacts.csv", contacts_csv(summary));
+  folder.write("contacts.json", contact_json(summary).dump(1) + "\n");
+  folder.write("contact.html", contact_report_html(summary));
+  return summary;
+}
+
+}  // namespace kinescope
