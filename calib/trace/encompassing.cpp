@@ -28,7 +28,8 @@ double added_beside(const NormalSystem& system, const std::vector<EffectColumn>&
 Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
                            const Rivalling& second) {
   const double stretches = std::max(2, system.partition().stretches);
-  const double price = (second.freedom - first.freedom) * std::log(stretches);
+  const double clear = std::min(first.statistic, second.statistic);
+  const double price = (second.freedom - first.freedom) * std::log(std::max(stretches, clear));
   const double odds = added_beside(system, second.columns, first.columns) -
                       added_beside(system, first.columns, second.columns) - price;
   if (odds <= -kClearly) return Comparison::kFirst;

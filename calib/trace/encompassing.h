@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Of two effects that both explain the residual: which one is it? Each is tested beside the other
-// (Mizon and Richard 1986), and the one with more freedom pays for it (Schwarz 1978).
+// (Mizon and Richard 1986), and the one with more freedom pays for it: as many independent stretches
+// as there are (Schwarz 1978), or as clear as they both are, where that is more (George and Foster
+// 2000).
 #pragma once
 
 #include "calib/trace/family.h"
@@ -14,10 +16,12 @@ enum class Comparison {
   kInterchangeable  ///< this recording cannot tell
 };
 
-/// An effect at a value of its scan, and how many numbers it was fitted with.
+/// An effect at a value of its scan, how many numbers it was fitted with, and how clear it is where
+/// the other one is not.
 struct Rivalling {
   const std::vector<EffectColumn>& columns;
   double freedom = 1.0;
+  double statistic = 0.0;  ///< F
 };
 
 /// `system` has neither in it.

@@ -273,7 +273,8 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const Candidate& candidate = without.fit.candidates[rival.index];
     const double freedom = freedom_of(candidate, rival.score);
     const Comparison comparison =
-        compare_effects(without.system, {own.columns, own_freedom}, {rival.columns, freedom});
+        compare_effects(without.system, {own.columns, own_freedom, own.score.statistic},
+                        {rival.columns, freedom, rival.score.statistic});
     if (comparison == Comparison::kFirst) continue;
     // Of two that say the same the plainer one comes first.
     const bool plainer = freedom < own_freedom && !needed_.contains(effect.id);
