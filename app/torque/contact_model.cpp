@@ -15,6 +15,7 @@
 #include "dynamics/identify/prediction.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope {
 namespace {

@@ -13,6 +13,7 @@
 #include "app/torque/contact_predictor.h"
 #include "app/torque/torque_inputs.h"
 #include "dynamics/contact/momentum_observer.h"
+#include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {

@@ -24,6 +24,7 @@
 #include "app/torque/traced_score.h"
 #include "dynamics/identify/gravity_from_torques.h"
 #include "dynamics/identify/torque_terms.h"
+#include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 #include "kinematics/recorded/recorded_log.h"
 #include "kinematics/urdf/dynamic_urdf.h"

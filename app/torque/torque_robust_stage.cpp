@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "app/torque/torque_inputs.h"
+#include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
 
 namespace kinescope {
