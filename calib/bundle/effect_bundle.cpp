@@ -197,11 +197,10 @@ struct EffectBundle::Impl {
 
   /// The model with the change in it, before a fit.
   void change_model(const BundleChange& change, Spec& with, State& state) const;
-  /// `state` moved to the minimum, from where the best of `known` ended that fits.
-  [[nodiscard]] bundle::SolveSummary solve_from(const Ends& known, const BundleChange& change,
-                                                const Spec& with, State& state) const;
-  [[nodiscard]] BundleSolution solve(const Ends& known, const BundleChange& change, Spec& with,
-                                     State& state) const;
+  /// `state` moved to the minimum, from where the best of `ends` that fits is.
+  [[nodiscard]] bundle::SolveSummary solve_from(const BundleChange& change, const Spec& with,
+                                                State& state) const;
+  [[nodiscard]] BundleSolution solve(const BundleChange& change, Spec& with, State& state) const;
   [[nodiscard]] JointMotion motion(const std::vector<double>& times_s,
                                    const Eigen::MatrixXd& ahead_s) const;
   void add_copies(const Spec& at, const Eigen::MatrixXd& ahead_s, JointMotion& out) const;
@@ -361,15 +360,15 @@ void EffectBundle::Impl::change_model(const BundleChange& change, Spec& with, St
   }
 }
 
-bundle::SolveSummary EffectBundle::Impl::solve_from(const Ends& known, const BundleChange& change,
-                                                    const Spec& with, State& state) const {
+bundle::SolveSummary EffectBundle::Impl::solve_from(const BundleChange& change, const Spec& with,
+                                                    State& state) const {
   constexpr int kIterations = 60;
   const State begin = state;
-  state = end_with_less(known, change, begin).value_or(begin);
+  state = end_with_less(ends, change, begin).value_or(begin);
   bundle::SolveSummary out = bundle::solve(with, state, used, {}, kIterations);
   if (out.converged) return out;
   // Far from where it ends: with more freedom another one may have come near.
-  if (std::optional<State> nearer = end_with_more(known, change, begin)) {
+  if (std::optional<State> nearer = end_with_more(ends, change, begin)) {
     const bundle::SolveSummary other = bundle::solve(with, *nearer, used, {}, kIterations);
     if (other.converged) {
       state = *std::move(nearer);
@@ -384,10 +383,10 @@ bundle::SolveSummary EffectBundle::Impl::solve_from(const Ends& known, const Bun
 }
 
 // The least squares fit; `with` and `state` are left with the change in them.
-BundleSolution EffectBundle::Impl::solve(const Ends& known, const BundleChange& change, Spec& with,
+BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
                                          State& state) const {
   change_model(change, with, state);
-  const bundle::SolveSummary summary = solve_from(known, change, with, state);
+  const bundle::SolveSummary summary = solve_from(change, with, state);
   BundleSolution out;
   out.converged = summary.converged;
   out.reason = summary.message;
@@ -408,18 +407,12 @@ BundleSolution EffectBundle::Impl::solve(const Ends& known, const BundleChange& 
   return out;
 }
 
-BundleSolution EffectBundle::solve(const BundleChange& change,
-                                   std::span<const BundleSolution> since) const {
-  Ends known = impl_->ends;
-  for (const BundleSolution& solution : since)
-    if (solution.converged) remember_in(known, solution.end);
+BundleSolution EffectBundle::solve(const BundleChange& change) const {
   Spec spec;
   State state;
-  return impl_->solve(known, change, spec, state);
-}
-
-void EffectBundle::remember(const BundleSolution& solution) const {
-  if (solution.converged) remember_in(impl_->ends, solution.end);
+  BundleSolution out = impl_->solve(change, spec, state);
+  if (out.converged) remember_in(impl_->ends, out.end);
+  return out;
 }
 
 BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correction>& probes,
@@ -432,7 +425,7 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
     state = solved->end->state;
     static_cast<BundleSolution&>(out) = *solved;
   } else {
-    static_cast<BundleSolution&>(out) = impl_->solve(impl_->ends, change, spec, state);
+    static_cast<BundleSolution&>(out) = impl_->solve(change, spec, state);
   }
 
   // Probes stand beside the corrections, at zero.

@@ -11,7 +11,6 @@
 
 #include <map>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -53,7 +52,7 @@ struct BundleSolution {
   double variance = 0.0;    ///< of a whitened row, priors' squares counted in
   /// As fitted; joints stand in their zeros where motion_at_frames() says 0.
   KinematicTree tree;
-  /// For fit(), which then need not solve again, and for remember().
+  /// For fit(), which then need not solve again.
   std::shared_ptr<const bundle::End> end;
 };
 
@@ -95,12 +94,8 @@ class EffectBundle {
   EffectBundle(const EffectBundle&) = delete;
   EffectBundle& operator=(const EffectBundle&) = delete;
 
-  /// Begins where the best of the remembered solutions ended that fits, or of those `since`.
-  /// Threads may call it at the same time, and fit(); not remember().
-  [[nodiscard]] BundleSolution solve(const BundleChange& change,
-                                     std::span<const BundleSolution> since = {}) const;
-  /// Later ones may begin there.
-  void remember(const BundleSolution& solution) const;
+  /// Begins where the best of earlier ones ended that fits, and where it ends later ones may begin.
+  [[nodiscard]] BundleSolution solve(const BundleChange& change) const;
   /// Shares of corrections and probes have one entry a frame of the measurements. `solved`: of this
   /// change, where it is known.
   [[nodiscard]] BundleFit fit(const BundleChange& change, const std::vector<Correction>& probes,

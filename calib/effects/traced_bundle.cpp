@@ -394,24 +394,9 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
 }
 
 // The clock as the last fit with an effect of it had it: the next is near.
-Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effects,
-                                           const Memory& news) const {
+Eigen::MatrixXd TracedBundle::likely_clock(const std::vector<AddedEffect>& effects) const {
   if (std::ranges::none_of(effects, is_of_clock, &AddedEffect::id)) return clock_ahead(0.0);
-  const std::optional<Eigen::MatrixXd>& last = news.ahead_s ? news.ahead_s : last_.ahead_s;
-  return last ? *last : clock_ahead(bundle_->start_time_offset_s());
-}
-
-void TracedBundle::Memory::take(Memory later) {
-  if (later.ahead_s) ahead_s = std::move(later.ahead_s);
-  if (later.sizes) sizes = std::move(later.sizes);
-  for (const auto& [joint, start] : later.play_starts) play_starts.insert_or_assign(joint, start);
-  std::ranges::move(later.solutions, std::back_inserter(solutions));
-}
-
-void TracedBundle::remember(Memory news) const {
-  for (const BundleSolution& solution : news.solutions) bundle_->remember(solution);
-  news.solutions.clear();
-  last_.take(std::move(news));
+  return memory_.ahead_s ? *memory_.ahead_s : clock_ahead(bundle_->start_time_offset_s());
 }
 
 Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
@@ -419,11 +404,10 @@ Eigen::MatrixXd TracedBundle::clock_ahead(double time_offset_s) const {
 }
 
 TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
-                                           const std::vector<AddedEffect>& effects,
-                                           const Memory& news) const {
+                                           const std::vector<AddedEffect>& effects) const {
   Ready out;
   out.world = world_at(ahead_s);
-  const std::optional<Sized>& sizes = news.sizes ? news.sizes : last_.sizes;
+  const std::optional<Sized>& sizes = memory_.sizes;
   if (sizes && sizes->effects == sized(effects)) {
     out.world.tree = sizes->tree;
     out.world.loaded.value += sizes->added;
@@ -431,9 +415,7 @@ TracedBundle::Ready TracedBundle::ready_at(const Eigen::MatrixXd& ahead_s,
     out.world.bends = sizes->bends;
   }
   // Of one that is asked for again, too: it is compared with others as it was found.
-  out.world.play_starts = last_.play_starts;
-  for (const auto& [joint, start] : news.play_starts)
-    out.world.play_starts.insert_or_assign(joint, start);
+  out.world.play_starts = memory_.play_starts;
   for (const AddedEffect& added : effects) {
     if (!is_play(added.id)) continue;
     const std::optional<JointId> joint = out.world.tree.joint(added.id.place);
@@ -475,7 +457,7 @@ TracedBundle::Sized TracedBundle::sizes_of(const std::vector<AddedEffect>& effec
 }
 
 bool TracedBundle::find_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
-                                    const BundleSolution& solution, Memory& news) const {
+                                    const BundleSolution& solution) const {
   constexpr double kSameStart = 1e-3;  // of the gap; chosen, not measured
   bool are_new = false;
   for (const AddedEffect& added : effects) {
@@ -488,45 +470,40 @@ bool TracedBundle::find_play_starts(const std::vector<AddedEffect>& effects, con
     const double start = std::clamp(before + solution.values[further - corrections.begin()],
                                     -0.5 * added.scan, 0.5 * added.scan);
     are_new = are_new || std::abs(start - before) > kSameStart * added.scan;
-    news.play_starts.insert_or_assign(further->index, start);
+    memory_.play_starts.insert_or_assign(further->index, start);
   }
   return are_new;
 }
 
 // Shares are taken where the joints are by the clock that the fit finds, and loads where the
 // effects leave them: a sag of q under k sin(q + sag) is not one under k sin(q).
-TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects,
-                                            Memory& news) const {
+TracedBundle::Ready TracedBundle::ready_for(const std::vector<AddedEffect>& effects) const {
   constexpr int kRounds = 2;           // each leaves of its error what the effect's size is, in rad
   constexpr double kSameTime = 20e-6;  // s: no joint moves noticeably
   const bool clock = std::ranges::any_of(effects, is_of_clock, &AddedEffect::id);
   const bool by_size = std::ranges::any_of(effects, depends_on_its_size);
-  Eigen::MatrixXd ahead_s = likely_clock(effects, news);
-  Ready out = ready_at(ahead_s, effects, news);
+  Eigen::MatrixXd ahead_s = likely_clock(effects);
+  Ready out = ready_at(ahead_s, effects);
   const bool play = std::ranges::any_of(effects, is_play, &AddedEffect::id);
   const int rounds = by_size || play ? kRounds : clock ? 1 : 0;
   for (int round = 0; round < rounds; ++round) {
-    BundleSolution solution = bundle_->solve(out.change, news.solutions);
-    news.solutions.push_back(solution);
-    if (clock && solution.converged) news.ahead_s = solution.ahead_s;
-    if (by_size && solution.converged) news.sizes = sizes_of(effects, out, solution);
+    BundleSolution solution = bundle_->solve(out.change);
+    if (clock && solution.converged) memory_.ahead_s = solution.ahead_s;
+    if (by_size && solution.converged) memory_.sizes = sizes_of(effects, out, solution);
     const bool starts_elsewhere =
-        play && solution.converged && find_play_starts(effects, out, solution, news);
+        play && solution.converged && find_play_starts(effects, out, solution);
     const bool same_time = (solution.ahead_s - ahead_s).cwiseAbs().maxCoeff() < kSameTime;
     ahead_s = solution.ahead_s;
     std::optional<Ready> next;
     if (solution.converged && (by_size || starts_elsewhere || !same_time))
-      next = ready_at(ahead_s, effects, news);
+      next = ready_at(ahead_s, effects);
     if (!next || std::ranges::equal(next->change.corrections, out.change.corrections, are_alike)) {
       out.solved = std::move(solution);
       break;
     }
     out = std::move(*next);
   }
-  if (!out.solved) {
-    out.solved = bundle_->solve(out.change, news.solutions);
-    news.solutions.push_back(*out.solved);
-  }
+  if (!out.solved) out.solved = bundle_->solve(out.change);
   return out;
 }
 
@@ -541,21 +518,11 @@ std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects
 }
 
 EffectWorld TracedBundle::world_of(const std::vector<AddedEffect>& effects) const {
-  Memory news;
-  Ready ready = ready_for(effects, news);
-  remember(std::move(news));
-  return std::move(ready.world);
+  return std::move(ready_for(effects).world);
 }
 
 TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
-  Memory news;
-  TracedFit out = fit(effects, news);
-  remember(std::move(news));
-  return out;
-}
-
-TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects, Memory& news) const {
-  auto [world, library, change, solved] = ready_for(effects, news);
+  auto [world, library, change, solved] = ready_for(effects);
   // Carriers of all candidates at one value of their scans: the same for the others, unless a
   // direction changes with the scan.
   Carriers carriers;
@@ -637,9 +604,7 @@ TracedBundle::Corrected TracedBundle::corrected(const std::vector<AddedEffect>& 
                                                 const std::vector<TracedEffect>& traced) const {
   Corrected out;
   if (effects.empty()) return out;
-  Memory news;
-  const auto [world, library, change, solved] = ready_for(effects, news);
-  remember(std::move(news));
+  const auto [world, library, change, solved] = ready_for(effects);
   const BundleSolution& fit = *solved;
   Eigen::Index next = 0;
   for (const AddedEffect& added : effects) {

@@ -55,26 +55,20 @@ class TracedBundle final : public TracedModel {
   struct Memory {
     std::optional<Eigen::MatrixXd> ahead_s;  ///< by the last with an effect of the clock
     std::optional<Sized> sizes;
-    std::map<int, double> play_starts;      ///< as EffectWorld has them
-    std::vector<BundleSolution> solutions;  ///< that the bundle does not remember yet
-    void take(Memory later);
+    std::map<int, double> play_starts;  ///< as EffectWorld has them
   };
-  /// What it found goes into `news`, and what is there counts beside what is remembered.
-  [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects, Memory& news) const;
+  [[nodiscard]] Ready ready_for(const std::vector<AddedEffect>& effects) const;
   [[nodiscard]] Ready ready_at(const Eigen::MatrixXd& ahead_s,
-                               const std::vector<AddedEffect>& effects, const Memory& news) const;
-  [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects, Memory& news) const;
-  void remember(Memory news) const;
+                               const std::vector<AddedEffect>& effects) const;
   [[nodiscard]] Sized sizes_of(const std::vector<AddedEffect>& effects, const Ready& ready,
                                const BundleSolution& solution) const;
   /// Where the links with play began. True where that is news.
   [[nodiscard]] bool find_play_starts(const std::vector<AddedEffect>& effects, const Ready& ready,
-                                      const BundleSolution& solution, Memory& news) const;
+                                      const BundleSolution& solution) const;
   /// `ahead_s`: frames x joints, joint-log time minus frame time.
   [[nodiscard]] EffectWorld world_at(const Eigen::MatrixXd& ahead_s) const;
   [[nodiscard]] Eigen::MatrixXd clock_ahead(double time_offset_s) const;
-  [[nodiscard]] Eigen::MatrixXd likely_clock(const std::vector<AddedEffect>& effects,
-                                             const Memory& news) const;
+  [[nodiscard]] Eigen::MatrixXd likely_clock(const std::vector<AddedEffect>& effects) const;
   [[nodiscard]] BundleChange change_of(const std::vector<CameraEffect>& library,
                                        const std::vector<AddedEffect>& effects) const;
 
@@ -82,7 +76,7 @@ class TracedBundle final : public TracedModel {
   CalibrationTraceOptions options_;
   std::vector<std::size_t> without_couplings_;
   std::map<int, UnsteadyReading> unsteady_;
-  mutable Memory last_;
+  mutable Memory memory_;
 };
 
 }  // namespace kinescope::effects
