@@ -278,8 +278,8 @@ void add_plan_limits(CLI::App& plan, PlanCommandOptions& options) {
 }
 
 void add_plan(CLI::App& app, CommandLine& line) {
-  static const std::map<std::string, PlanGoal> kGoals = {{"tip", PlanGoal::kTip},
-                                                         {"axes", PlanGoal::kAxes}};
+  static const std::map<std::string, design::Goal> kGoals = {{"tip", design::Goal::kTip},
+                                                             {"axes", design::Goal::kAxes}};
   CLI::App& plan = *app.add_subcommand(
       "plan", "The next recording that tells most of a robot, and the uncertainty after it");
   PlanCommandOptions& options = line.plan;

@@ -14,6 +14,7 @@
 #include "app/explain/sight_options.h"
 #include "app/io/recording.h"
 #include "app/torque/torque_options.h"
+#include "calib/design/goal.h"
 #include "calib/vision/board.h"
 #include "dynamics/control/servo.h"
 #include "dynamics/data/torque_data.h"
@@ -74,15 +75,9 @@ struct CompareOptions {
 
 [[nodiscard]] ExitCode compare_command(const CompareOptions& options, const Console& console);
 
-/// What a planned recording is for.
-enum class PlanGoal {
-  kTip,  ///< where the last links are, over the ranges of the joints
-  kAxes  ///< where the axes are
-};
-
 struct PlanCommandOptions {
   std::filesystem::path source;  ///< run folder
-  PlanGoal goal = PlanGoal::kTip;
+  design::Goal goal = design::Goal::kTip;
   std::optional<int> postures;  ///< at rest, in place of a motion
   /// Of a motion; neither: of a run of postures 20 postures, else 20 s.
   std::optional<double> seconds;

@@ -22,7 +22,7 @@ constexpr double kCommandRate_hz = 100.0;  // rows of plan.csv of a motion
 
 design::PlanOptions design_options(const PlanCommandOptions& options, const PlannedRun& run) {
   design::PlanOptions out;
-  out.goal = options.goal == PlanGoal::kAxes ? design::Goal::kAxes : design::Goal::kTip;
+  out.goal = options.goal;
   out.seed = options.seed;
   out.frame_rate_hz = run.frame_rate_hz;
   const bool postures = options.postures || (!options.seconds && run.of_postures);
