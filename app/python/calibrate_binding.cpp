@@ -146,7 +146,7 @@ Recording recording_of(const py::dict& given) {
 }
 
 // As `kinescope run` judges it, too.
-Calibration calibrated(const Recording& recording, const RunOptions& options) {
+Calibration calibrated(const Recording& recording, const SightOptions& options) {
   RunSummary run;
   run.log = recording.log;
   const Observed observed = observe(recording, options, recording.camera, std::nullopt, {});
@@ -170,7 +170,7 @@ py::tuple calibrate_arrays(const py::dict& given, int folds, bool intrinsics, bo
   constexpr int kMostFolds = 50;  // as of the command
   if (folds < 0 || folds > kMostFolds)
     throw bad_request("folds", fmt::format("{} is out of range", folds), "0 to 50");
-  RunOptions options;
+  SightOptions options;
   options.calibrate.folds = folds;
   options.calibrate.estimate_intrinsics = intrinsics || !recording.camera;
   options.calibrate.estimate_time_offset = time_offset;

@@ -19,9 +19,10 @@ int main(int argc, char** argv) {
   }
   try {
     using namespace kinescope;
-    RunOptions options;
-    options.recording.folder = argv[1];
-    const Recording recording = read_recording(options.recording);
+    RecordingPaths paths;
+    paths.folder = argv[1];
+    const Recording recording = read_recording(paths);
+    const SightOptions options;
     const Observed observed = observe(recording, options, recording.camera, std::nullopt, {});
     const CameraModel camera = choose_camera(recording, observed.tags);
     const PoseTracks tracks = pose_tracks_from_tags(observed.tags, camera, recording.markers);
