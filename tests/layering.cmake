@@ -45,7 +45,7 @@ set(rooms
     "app/commands: kinematics/* calib/* dynamics/* app/config app/io app/report app/experiments app/explain app/torque"
     "app/manual: kinematics/core app/io app/commands"
     "app/python: kinematics/* calib/camera calib/bundle calib/tracks dynamics/data dynamics/gp dynamics/effects dynamics/models app/io app/report app/explain app/torque app/commands"
-    "app/examples: kinematics/* calib/* dynamics/control app/io app/explain app/commands"
+    "app/examples: kinematics/* calib/* dynamics/control app/io app/explain"
     "app: app/commands")
 
 # Third parties stop at a room's border: the beginning of an include, and the rooms it is for.
