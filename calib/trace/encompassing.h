@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Of two effects that both explain the residual: which one is it? Each is tested beside the other
-// (Mizon and Richard 1986), and the one with more freedom pays for it: as many independent stretches
-// as there are (Schwarz 1978), or as clear as they both are, where that is more (George and Foster
-// 2000).
+// (Mizon and Richard 1986), and the one with more freedom pays for it: as many independent
+// stretches as there are (Schwarz 1978), or as clear as they both are, where that is more (George
+// and Foster 2000).
 #pragma once
 
 #include "calib/trace/family.h"
