@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 
 #include <fmt/format.h>
@@ -38,7 +39,8 @@ std::string in_one_line(std::string text) {
 }
 
 void print_error(const std::string& message) {
-  fmt::print(stderr, "kinescope: {}\n", in_one_line(message));
+  // fmt throws where standard error is closed.
+  std::fputs(fmt::format("kinescope: {}\n", in_one_line(message)).c_str(), stderr);
 }
 
 /// Names of the subcommands, or of a subcommand's options.
@@ -170,14 +172,31 @@ struct Outcome {
   std::string message;  ///< of what was thrown
 };
 
+/// What is empty was a variable of the shell that is not set.
+void require_words(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      if (std::ranges::count(option->results(), std::string()) > 0)
+        throw bad_request(option->get_name(), "is empty", "name something, or leave it out");
+    }
+  }
+}
+
 /// All that is thrown ends here.
 Outcome run_guarded(const CLI::App& app, CommandLine& line, const Console& console) {
   Outcome out;
   try {
+    require_words(app);
     out.code = run_parsed(app, line, console);
   } catch (const Error& error) {
     out.code = error.code();
     out.message = error.what();
+  } catch (const std::filesystem::filesystem_error& error) {
+    out.code = ExitCode::kBadRequest;
+    out.message = fmt::format(
+        "{}: cannot be reached: {} (check the path, and that the current "
+        "folder is still there)",
+        error.path1().empty() ? "." : error.path1().string(), error.code().message());
   } catch (const std::bad_alloc&) {
     out.message = "out of memory (a shorter video, or a machine with more of it)";
   } catch (const std::exception& error) {

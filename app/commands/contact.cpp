@@ -5,11 +5,13 @@
 
 #include "app/commands/commands.h"
 #include "app/torque/find_contacts.h"
+#include "app/torque/saved_model_log.h"
 
 namespace kinescope {
 
 ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
   const ContactSummary summary = find_contacts(options);
+  for (const std::string& warning : warnings_of(summary.findings)) console.warn(warning);
   if (console.json) {
     console.print(contact_json(summary));
     return ExitCode::kDone;

@@ -8,6 +8,7 @@
 #include "app/commands/commands.h"
 #include "app/report/trace_lines.h"
 #include "app/torque/model_torque.h"
+#include "app/torque/saved_model_log.h"
 
 namespace kinescope {
 namespace {
@@ -35,11 +36,12 @@ void print_scores(const TorqueSummary& summary) {
 
 ExitCode dynamics_command(const DynamicsOptions& options, const Console& console) {
   const TorqueSummary summary = model_torque(options, console.progress);
+  for (const std::string& warning : summary.warnings) console.warn(warning);
+  for (const std::string& warning : warnings_of(summary.data.findings)) console.warn(warning);
   if (console.json) {
     console.print(torque_json(summary));
     return ExitCode::kDone;
   }
-  for (const std::string& warning : summary.warnings) console.warn(warning);
   const TorqueVerdict verdict = torque_verdict(summary);
   fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
   if (!verdict.payload.empty()) fmt::print("{}\n", verdict.payload);

@@ -92,6 +92,17 @@ TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& ro
   const Eigen::VectorXd t_s =
       Eigen::Map<const Eigen::VectorXd>(log.times_s.data(), std::ssize(log.times_s));
   const double span_s = t_s[t_s.size() - 1] - t_s[0];
+  // Of memory, and of minutes that nobody means to wait.
+  constexpr double kMostValues = 4e6;
+  const double values_asked = span_s * rate_hz * static_cast<double>(channels.size());
+  if (!(values_asked <= kMostValues)) {
+    throw bad_input(
+        log.source,
+        fmt::format("lasts {:.3g} s: {:.3g} joint values at {:.6g} Hz are more than the "
+                    "{:.3g} that are simulated",
+                    span_s, values_asked, rate_hz, kMostValues),
+        "give stamps in seconds, a shorter trajectory, or a lower --rate");
+  }
   // Smooth enough to be followed, near enough to pass through the rows: a quarter of their rate.
   constexpr double kOfRate = 0.25;
   const double cutoff_hz = kOfRate * static_cast<double>(t_s.size() - 1) / span_s;

@@ -202,8 +202,8 @@ void require_new_file(const fs::path& file, std::string_view option,
   std::error_code error;
   const fs::file_status status = fs::symlink_status(file, error);
   if (!fs::exists(status)) return;
+  require_replaceable(file);
   const std::string remedy = fmt::format("name another file with {}", option);
-  if (fs::is_directory(file, error)) throw bad_request(file.string(), "is a folder", remedy);
   const fs::path folder = fs::absolute(file).parent_path();
   const std::string owner = owner_of(file.filename().string(), owners_in(folder));
   if (!owner.empty()) {

@@ -38,24 +38,38 @@ void refuse(const std::vector<int>& turned, const TorqueSamples& samples,
                   list));
 }
 
+/// Offset, viscous and Coulomb friction: N x 3.
+Eigen::MatrixXd friction_of(const TorqueSamples& samples, Eigen::Index joint) {
+  const double width = std::max(narrow_width(samples.dq.col(joint)), 1e-12);
+  Eigen::MatrixXd out(samples.size(), 3);
+  out << Eigen::VectorXd::Ones(samples.size()), samples.dq.col(joint),
+      (samples.dq.col(joint).array() / width).tanh().matrix();
+  return out;
+}
+
+/// Correlation of what two columns have beyond the nuisance; 0 where the first has nothing.
+double correlation_beyond(const Eigen::MatrixXd& nuisance, const Eigen::VectorXd& expected,
+                          const Eigen::VectorXd& measured) {
+  constexpr double kNothing = 1e-9;  // of the model's torque
+  Eigen::MatrixXd both(expected.size(), 2);
+  both << expected, measured;
+  const Eigen::MatrixXd rest = both - nuisance * least_squares(nuisance, both);
+  if (rest.col(0).norm() <= kNothing * expected.norm()) return 0.0;
+  return rest.col(0).dot(rest.col(1)) / (rest.col(0).norm() * rest.col(1).norm());
+}
+
 /// Correlation of a joint's torque with the masses' beyond friction and beyond what the last link
 /// may carry, which the URDF need not know; 0 where all is that.
 double correlation_beyond_load(const RigidModel& rigid, const TorqueSamples& samples,
                                Eigen::Index joint) {
-  constexpr double kNothing = 1e-9;  // of the model's torque
   const Eigen::Index load = 10 * (static_cast<Eigen::Index>(rigid.bodies.size()) - 1);
   const Eigen::MatrixXd regressor = regressors_of_samples(
       rigid, samples.q, samples.dq, samples.ddq)[static_cast<std::size_t>(joint)];
-  const double width = std::max(narrow_width(samples.dq.col(joint)), 1e-12);
   Eigen::MatrixXd nuisance(samples.size(), 13);
-  nuisance << Eigen::VectorXd::Ones(samples.size()), samples.dq.col(joint),
-      (samples.dq.col(joint).array() / width).tanh().matrix(), regressor.middleCols(load, 10);
-  Eigen::MatrixXd both(samples.size(), 2);
-  both << inverse_dynamics_of_samples(rigid, samples.q, samples.dq, samples.ddq).col(joint),
-      samples.torque.col(joint);
-  const Eigen::MatrixXd rest = both - nuisance * least_squares(nuisance, both);
-  if (rest.col(0).norm() <= kNothing * both.col(0).norm()) return 0.0;
-  return rest.col(0).dot(rest.col(1)) / (rest.col(0).norm() * rest.col(1).norm());
+  nuisance << friction_of(samples, joint), regressor.middleCols(load, 10);
+  return correlation_beyond(
+      nuisance, inverse_dynamics_of_samples(rigid, samples.q, samples.dq, samples.ddq).col(joint),
+      samples.torque.col(joint));
 }
 
 /// 0 where the samples are too few to say.
@@ -74,6 +88,40 @@ bool is_sign(const LogFinding& finding) {
          finding.value < 0.0;
 }
 
+/// Joints whose torque clearly goes with the inertia of the masses, less those that it goes
+/// against, whatever gravity, friction and offset do: gravity may be turned, as in a robot that
+/// hangs from the ceiling; inertia is not.
+int joints_with_inertia(const RigidModel& rigid, const TorqueSamples& samples) {
+  const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(samples.size(), samples.joints());
+  const Eigen::MatrixXd gravity = inverse_dynamics_of_samples(rigid, samples.q, still, still);
+  const Eigen::MatrixXd inertia =
+      inverse_dynamics_of_samples(rigid, samples.q, samples.dq, samples.ddq) - gravity;
+  int out = 0;
+  for (Eigen::Index joint = 0; joint < samples.joints(); ++joint) {
+    Eigen::MatrixXd nuisance(samples.size(), 4);
+    nuisance << friction_of(samples, joint), gravity.col(joint);
+    const double correlation =
+        correlation_beyond(nuisance, inertia.col(joint), samples.torque.col(joint));
+    if (std::abs(correlation) > kClearCorrelation) out += correlation > 0.0 ? 1 : -1;
+  }
+  return out;
+}
+
+/// Most joints against the masses, and against their inertia.
+void refuse_where_all_are_turned(const RigidModel& rigid, const TorqueSamples& samples,
+                                 const std::vector<std::filesystem::path>& logs,
+                                 const TorqueScales& scales) {
+  const auto against = std::ranges::count_if(scales.findings, is_sign);
+  const auto with = std::ranges::count_if(scales.joints, [](const TorqueScale& scale) {
+    return scale.correlation > kClearCorrelation;
+  });
+  if (against < 2 || against <= with || joints_with_inertia(rigid, samples) >= 0) return;
+  const std::vector<int> all(static_cast<std::size_t>(samples.joints()), -1);
+  throw bad_input(file_list(logs), "the torques have the other sign than what moves the masses",
+                  fmt::format("say so in recording.yaml, dynamics: {{torque_factor: [{}]}}",
+                              fmt::join(all, ", ")));
+}
+
 }  // namespace
 
 void check_torque_signs(const DynamicModel& model, const TorqueSamples& samples,
@@ -82,6 +130,7 @@ void check_torque_signs(const DynamicModel& model, const TorqueSamples& samples,
   const std::vector<int> turned = find_turned_torques(model, samples, options);
   if (!turned.empty()) refuse(turned, samples, logs);
   const RigidModel rigid = make_rigid_model(model);
+  refuse_where_all_are_turned(rigid, samples, logs, scales);
   for (LogFinding& finding : scales.findings) {
     const auto name = std::ranges::find(samples.joint_names, finding.channel);
     if (!is_sign(finding) || name == samples.joint_names.end()) continue;

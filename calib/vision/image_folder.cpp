@@ -160,7 +160,9 @@ std::vector<std::filesystem::path> list_images(const std::filesystem::path& fold
   std::vector<std::filesystem::path> files;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.is_regular_file() && is_image_name(entry.path())) files.push_back(entry.path());
+    std::error_code unreachable;  // a link to itself, say
+    if (entry.is_regular_file(unreachable) && is_image_name(entry.path()))
+      files.push_back(entry.path());
   }
   if (error) throw bad_input(folder.string(), "the folder cannot be read", "check its permissions");
   std::ranges::sort(files);

@@ -106,10 +106,15 @@ bool may_be_a_drives(const TorqueSamples& samples, Eigen::Index joint, double dr
   return rms <= kThousandLow * drive_scale;
 }
 
-/// "[1, -1, 1]": what turns the joints whose torque goes against the model, and no other.
+/// "[1, -1, 1]": what turns the joints whose torque goes against the model, and no other. Where
+/// several do and none goes with it, it is the log's sign, also of those that do not show it.
 std::string turning_factors(const std::vector<TorqueScale>& scales) {
+  const auto turned = std::ranges::count_if(scales, is_turned);
+  const bool all = turned > 1 && std::ranges::none_of(scales, [](const TorqueScale& scale) {
+                     return scale.correlation > kClearCorrelation;
+                   });
   std::vector<int> factors;
-  for (const TorqueScale& scale : scales) factors.push_back(is_turned(scale) ? -1 : 1);
+  for (const TorqueScale& scale : scales) factors.push_back(all || is_turned(scale) ? -1 : 1);
   return fmt::format("[{}]", fmt::join(factors, ", "));
 }
 

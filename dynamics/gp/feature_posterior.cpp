@@ -42,6 +42,14 @@ class FeaturePosterior : public Posterior {
     work.variance = work.cross.rowwise().squaredNorm();
   }
 
+  // K w + noise w = y: what the mean leaves of the targets, over the noise.
+  [[nodiscard]] Eigen::VectorXd kernel_weights() const override {
+    Workers workers(1);
+    const Problem& problem = given_.problem;
+    const Eigen::VectorXd mean = moments(workers, problem.inputs, false, solution_).mean;
+    return (problem.targets - mean).cwiseQuotient(noise_of_rows(problem, given_.log_noise));
+  }
+
   [[nodiscard]] LeftOut leave_out(Workers& workers,
                                   const std::vector<std::vector<Index>>& folds) const override {
     const Problem& problem = given_.problem;

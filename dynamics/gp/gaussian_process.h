@@ -77,7 +77,7 @@ struct PredictOptions {
                                  const PredictOptions& options = {});
 
 /// Weights w of the normalised mean sum_i w_i k(x, x_i) of one output, over the training samples
-/// or, of fit_sparse(), the inducing inputs. Empty for the route kFeatures.
+/// or, of fit_sparse(), the inducing inputs.
 [[nodiscard]] Eigen::VectorXd kernel_weights(const FittedGp& fitted);
 
 /// One sample after another at control rate: no allocation after the first call. One for each

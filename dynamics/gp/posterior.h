@@ -56,9 +56,8 @@ class Posterior {
   /// `folds`: for each fold its samples.
   [[nodiscard]] virtual LeftOut leave_out(
       Workers& workers, const std::vector<std::vector<Eigen::Index>>& folds) const = 0;
-  /// w with mean = sum_i w_i k(x, x_i), over the training samples or the inducing inputs; empty for
-  /// features.
-  [[nodiscard]] virtual Eigen::VectorXd kernel_weights() const { return {}; }
+  /// w with mean = sum_i w_i k(x, x_i), over the training samples or the inducing inputs.
+  [[nodiscard]] virtual Eigen::VectorXd kernel_weights() const = 0;
   /// y - E[f | y] and var[f | y] at the training samples.
   [[nodiscard]] virtual Moments at_training(Workers& workers) const = 0;
 };

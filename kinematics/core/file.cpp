@@ -64,7 +64,17 @@ std::string read_text_file(const fs::path& path, std::uintmax_t max_bytes) {
   return text;
 }
 
+void require_replaceable(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status there = fs::status(path, error);
+  if (!fs::exists(there) || fs::is_regular_file(there)) return;
+  throw bad_request(path.string(),
+                    fs::is_directory(there) ? "is a folder" : "is a pipe or a device, no file",
+                    "name another file");
+}
+
 void write_file_atomically(const fs::path& path, std::string_view content) {
+  require_replaceable(path);
   const fs::path temporary = temporary_beside(path);
   {
     std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
@@ -99,6 +109,8 @@ void require_writable_folder(const fs::path& folder) {
   stream << "kinescope";
   stream.flush();
   if (!stream) {
+    stream.close();
+    fs::remove(probe, error);
     throw bad_request(folder.string(), "the output folder cannot be written",
                       "choose another one with --output, or free some disk space");
   }

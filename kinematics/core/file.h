@@ -14,7 +14,11 @@ namespace kinescope {
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
                                          std::uintmax_t max_bytes = std::uintmax_t{1} << 30U);
 
-/// Writes all of it or nothing. Throws bad_request when the folder cannot be written.
+/// Throws bad_request where there is something that is no file: a folder, a pipe, a device.
+void require_replaceable(const std::filesystem::path& path);
+
+/// Writes all of it or nothing. Throws bad_request when the folder cannot be written, and as
+/// require_replaceable().
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
 /// Makes the folder (and its parents) and proves that a file can be made there. Throws bad_request.

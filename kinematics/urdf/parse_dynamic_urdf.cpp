@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
@@ -78,6 +79,17 @@ InertialParameters read_inertial(const XMLElement& inertial, const XmlOwner& own
   const double xz = moment("ixz");
   const double yz = moment("iyz");
   central.inertia_kgm2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  // Rounding may leave a rod's own axis slightly below nothing.
+  constexpr double kRounding = 1e-3;
+  const Eigen::Vector3d principal =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(central.inertia_kgm2, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  if (principal[0] < -kRounding * principal.cwiseAbs().maxCoeff()) {
+    throw bad_input(xml_place(inertial, owner.source),
+                    fmt::format("{}: a principal moment of inertia is {:.3g} kg m^2", owner.owner,
+                                principal[0]),
+                    "a moment of inertia is not negative");
+  }
   const Pose origin = read_origin(inertial, owner);
   check_size(inertial, "a coordinate of the centre of mass",
              origin.translation.lpNorm<Eigen::Infinity>(), owner);

@@ -83,6 +83,9 @@ TEST(Fit, FeaturesAndKernelMatrixGiveTheSame) {
     EXPECT_LT((a.variance - b.variance).cwiseAbs().maxCoeff(),
               kTwoRoads * covariance(kernel, x).diagonal().maxCoeff())
         << name;
+    const Eigen::VectorXd wa = kernel_weights(dense);
+    const Eigen::VectorXd wb = kernel_weights(features);
+    EXPECT_LT((wa - wb).cwiseAbs().maxCoeff(), kTwoRoads * wa.cwiseAbs().maxCoeff()) << name;
     const Likelihood la = log_marginal_likelihood(model, data, {.route = Route::kDense});
     const Likelihood lb = log_marginal_likelihood(model, data, {.route = Route::kFeatures});
     EXPECT_LT((la.gradient - lb.gradient).cwiseAbs().maxCoeff(),
