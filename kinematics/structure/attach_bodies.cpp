@@ -38,6 +38,40 @@ std::optional<Choice> next_to_attach(const GrowthState& state) {
   return chosen;
 }
 
+// ln det of the covariance of a sighting, mean.
+double noise_of(const Body& body) {
+  double sum = 0.0;
+  for (const Sighting& s : body.at)
+    if (s.seen) sum -= 2.0 * s.whitening.diagonal().array().abs().log().sum();
+  return sum / std::max(1, body.seen);
+}
+
+bool hang_alike(const Attachment& a, const Attachment& b) {
+  return a.parent == b.parent && a.driven() && b.driven() && a.channel() == b.channel() &&
+         a.fit.model.joints.size() == 1 && b.fit.model.joints.size() == 1 &&
+         a.fit.model.joints.front().type == b.fit.model.joints.front().type;
+}
+
+// Of bodies that may be of one link, the one that is seen best: what its joint leaves open is in
+// doubt for the others, and more of it than they know by themselves would set them apart.
+Choice seen_best(const GrowthState& state, Choice chosen) {
+  constexpr double kNoiseOnly = 1.5;  // variance over the declared one
+  double least = noise_of(state.series.bodies[chosen.body]);
+  const Attachment* cleanest = chosen.attachment;
+  for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
+    if (state.tree.bodies[b].link >= 0) continue;
+    const Attachment* best = acceptable_best(state, b);
+    if (best == nullptr || !hang_alike(*best, *cleanest) || best->fit.variance > kNoiseOnly)
+      continue;
+    const double noise = noise_of(state.series.bodies[b]);
+    if (noise < least) {
+      least = noise;
+      chosen = {b, best};
+    }
+  }
+  return chosen;
+}
+
 // Moving channels that drive no joint yet.
 std::vector<char> unused_channels(const GrowthState& state) {
   std::vector<char> unused = state.usable;
@@ -92,7 +126,11 @@ void place(GrowthState& state, std::size_t body, Attachment attachment) {
 }
 
 void attach_all(GrowthState& state) {
-  while (const auto next = next_to_attach(state)) place(state, next->body, *next->attachment);
+  while (const auto next = next_to_attach(state)) {
+    const Choice founder = seen_best(state, *next);
+    // A copy: new links bring new alternatives.
+    place(state, founder.body, Attachment(*founder.attachment));
+  }
 }
 
 bool attach_through_unseen_links(GrowthState& state) {

@@ -68,14 +68,10 @@ void add_parameter_doubt(const ChainFit& fit, const ChainKinematics& chain,
   for (Eigen::Index i = 0; i < instants; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (path.valid[at] == 0) continue;
-    Matrix6d& covariance = path.covariance[at];
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      for (Eigen::Index r = c; r < 6; ++r) {
-        const double sum = roots.col(6 * i + r).dot(roots.col(6 * i + c));
-        covariance(r, c) += sum;
-        if (r > c) covariance(c, r) += sum;
-      }
-    }
+    DoubtRoot& doubt = path.doubt[at];
+    const Eigen::Index inherited = doubt.cols();
+    doubt.conservativeResize(Eigen::NoChange, inherited + size);
+    doubt.rightCols(size) = roots.middleCols<6>(6 * i).transpose();
   }
 }
 
@@ -85,6 +81,7 @@ LinkPath unknown_path(std::size_t instants) {
   path.pose.resize(instants);
   path.valid.assign(instants, 0);
   path.covariance.assign(instants, Matrix6d::Zero());
+  path.doubt.resize(instants);
   return path;
 }
 
@@ -129,9 +126,10 @@ LinkPath path_of(const Attachment& attachment, const Body& body, const LinkPath&
     const Pose relative = chain.pose(values.data());
     path.valid[i] = 1;
     path.pose[i] = parent.pose[i] * relative;
-    if (parent.covariance.empty()) continue;
     const Matrix6d ad = adjoint(relative.inverse());
-    path.covariance[i] += ad * parent.covariance[i] * ad.transpose();
+    if (!parent.covariance.empty())
+      path.covariance[i] += ad * parent.covariance[i] * ad.transpose();
+    if (!parent.doubt.empty()) path.doubt[i] = ad * parent.doubt[i];
   }
   add_parameter_doubt(attachment.fit, chain, coordinates, readings, path);
   return path;

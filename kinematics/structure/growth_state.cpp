@@ -7,6 +7,7 @@
 #include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/first_look.h"
+#include "kinematics/structure/move_bodies.h"
 #include "kinematics/structure/rest.h"
 
 namespace kinescope::structure_search {
@@ -24,12 +25,14 @@ std::vector<char> channels_that_move(const Readings& readings) {
   return usable;
 }
 
-// By cost, tempered by the correlation that the closest one leaves.
-const Attachment* best_of(const std::vector<Attachment>& alternatives) {
+// By cost, tempered by the correlation that the closest one leaves, and what else is held against
+// each.
+template <typename Price>
+const Attachment* best_of(const std::vector<Attachment>& alternatives, Price price) {
   if (alternatives.empty()) return nullptr;
   const double correlation =
       std::ranges::min_element(alternatives, {}, &Attachment::data_cost)->fit.correlation;
-  const auto cost = [&](const Attachment& a) { return a.cost(correlation); };
+  const auto cost = [&](const Attachment& a) { return a.cost(correlation) + price(a); };
   return &*std::ranges::min_element(alternatives, {}, cost);
 }
 
@@ -83,7 +86,7 @@ void list_alternatives(GrowthState& state, std::size_t body, int link) {
   if (grown.link >= 0 && is_below(state.tree, link, body)) return;
   AttachmentOptions options;
   options.give_up_above = state.likely_cost[body];
-  const Attachment* best = best_of(grown.alternatives);
+  const Attachment* best = best_of(grown.alternatives, [](const Attachment&) { return 0.0; });
   if (best != nullptr && seen.seen > 0) {
     const double known = std::max(0.0, best->data_cost / seen.seen) + kGiveUpMargin;
     options.give_up_above = std::min(options.give_up_above, known);
@@ -149,7 +152,8 @@ bool is_acceptable(const GrowthState& state, std::size_t body, const Attachment&
 
 const Attachment* acceptable_best(const GrowthState& state, std::size_t body) {
   const std::vector<Attachment>& alternatives = state.tree.bodies[body].alternatives;
-  const Attachment* best = best_of(alternatives);
+  const Attachment* best =
+      best_of(alternatives, [&](const Attachment& a) { return price_of_sharing(state, body, a); });
   if (best == nullptr || is_acceptable(state, body, *best)) return best;
   if (best->at_rest() || best->driven()) return nullptr;
   const Attachment* other = nullptr;

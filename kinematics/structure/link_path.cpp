@@ -20,6 +20,8 @@ Matrix6d whitening_with(const Matrix6d& child, const Matrix6d& parent, const Pos
   return whitening_of(child + ad * parent * ad.transpose());
 }
 
+bool is_exact(const LinkPath& path) { return path.covariance.empty() && path.doubt.empty(); }
+
 }  // namespace
 
 LinkPath camera_path(int instants) {
@@ -40,6 +42,8 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
   const std::size_t stride = keep > 0 ? (instants.size() + keep - 1) / keep : 1;
   RelativeMotion out;
   out.motion.reserve(std::min(keep, instants.size()));
+  const bool in_doubt =
+      std::ranges::any_of(path.doubt, [](const DoubtRoot& root) { return root.cols() > 0; });
   for (std::size_t k = 0; k < instants.size(); k += stride) {
     const std::size_t i = instants[k];
     const Sighting& s = body.at[i];
@@ -53,13 +57,26 @@ RelativeMotion relative_motion(const Body& body, const LinkPath& path, const Rea
       sample.alternative = inverse * s.alternative->pose;
       sample.alternative_whitening = s.alternative->whitening;
     }
-    if (path.covariance.empty()) continue;
-    sample.whitening = whitening_with(s.covariance, path.covariance[i], sample.pose);
+    if (is_exact(path)) continue;
+    Matrix6d covariance = Matrix6d::Zero();
+    Matrix6d own = s.whitening;
+    if (!path.covariance.empty()) {
+      covariance = path.covariance[i];
+      if (!covariance.isZero(0.0)) own = whitening_with(s.covariance, covariance, sample.pose);
+      out.log_det += log_det_ratio(own, s.whitening);
+    }
+    if (in_doubt) covariance += path.doubt[i] * path.doubt[i].transpose();
+    sample.whitening = whitening_with(s.covariance, covariance, sample.pose);
     if (s.alternative) {
       sample.alternative_whitening =
-          whitening_with(s.alternative->covariance, path.covariance[i], *sample.alternative);
+          whitening_with(s.alternative->covariance, covariance, *sample.alternative);
     }
-    out.log_det += log_det_ratio(sample.whitening, s.whitening);
+    if (!in_doubt) continue;
+    const double more = log_det_ratio(sample.whitening, own);
+    out.log_det += more;
+    out.doubt_log_det += more;
+    out.own_whitening.push_back(own);
+    out.doubt.push_back(adjoint(sample.pose.inverse()) * path.doubt[i]);
   }
   return out;
 }

@@ -10,11 +10,19 @@
 
 namespace kinescope::structure_search {
 
+/// 6 x numbers; times its transpose, a covariance.
+using DoubtRoot = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
 /// Where a link is at every instant, in the camera's frame.
 struct LinkPath {
   std::vector<Pose> pose;
   std::vector<char> valid;
-  std::vector<Matrix6d> covariance;  ///< right perturbation; empty when the path is exact
+  /// Right perturbations. Of the sightings that the path follows, another error at each instant;
+  /// empty when the path is exact.
+  std::vector<Matrix6d> covariance;
+  /// Of the parameters of the joints on the way, which are the same for all instants: what so many
+  /// standard normal numbers move the link by. Empty when the path is exact.
+  std::vector<DoubtRoot> doubt;
   std::vector<double>
       coordinate;  ///< of the joint that leads there, where no channel drives it; NaN unknown
 };
@@ -26,6 +34,11 @@ struct LinkPath {
 struct RelativeMotion {
   Motion motion;
   double log_det = 0.0;  ///< sum of ln det of the covariances over those of the sightings alone
+  /// Samples are whitened as if the parameters of the link's joints erred anew in each. Without
+  /// that: whitening, and what the parameters move each sample by; empty where they are exact.
+  std::vector<Matrix6d> own_whitening;
+  std::vector<DoubtRoot> doubt;
+  double doubt_log_det = 0.0;  ///< their part of log_det
 };
 /// With `most` above 0, evenly chosen sightings, at most so many.
 [[nodiscard]] RelativeMotion relative_motion(const Body& body, const LinkPath& path,

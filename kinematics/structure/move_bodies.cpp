@@ -2,6 +2,7 @@
 #include "kinematics/structure/move_bodies.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "kinematics/structure/attach_bodies.h"
 #include "kinematics/structure/attachment_path.h"
@@ -109,6 +110,11 @@ bool conflicts(const GrownTree& tree, std::size_t body, const Attachment& a) {
   });
 }
 
+double price_of_sharing(const GrowthState& state, std::size_t body, const Attachment& a) {
+  if (!conflicts(state.tree, body, a)) return 0.0;
+  return 2.0 * std::log(100.0 * std::max(2, state.readings.channels()));
+}
+
 void move_body(GrowthState& state, std::size_t body, Attachment attachment) {
   GrownBody& grown = state.tree.bodies[body];
   const int own = own_link(state.tree, body);
@@ -145,7 +151,8 @@ bool improve(GrowthState& state, std::size_t body) {
   if (grown.link < 0) return false;
   const double correlation = grown.attachment.fit.correlation;
   const Attachment* best = nullptr;
-  double least = grown.attachment.cost(correlation) - kLeastGain;
+  double least = grown.attachment.cost(correlation) +
+                 price_of_sharing(state, body, grown.attachment) - kLeastGain;
   for (const Attachment& a : grown.alternatives) {
     if (is_below(state.tree, a.parent, body) || conflicts(state.tree, body, a)) continue;
     const bool free = !a.at_rest() && !a.driven();
