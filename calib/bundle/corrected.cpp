@@ -93,14 +93,21 @@ Eigen::VectorXd d_carried(const CorrectedError& at, const Eigen::Vector3d& shift
   return at.error.d_marker.rightCols<3>() * (base_marker(at).matrix3().transpose() * shift_m);
 }
 
+constexpr std::size_t kSquare = 4;
+
 // Of the residual by a shift of the edges of a square towards its centre, 1/px: a corner is where
-// two of them meet. The directions are those that were seen.
-Eigen::VectorXd d_bloom(const Sighting& sighting) {
-  constexpr std::size_t kSquare = 4;
+// two of them meet. `residual`: without that shift. The edges are where they are expected: those
+// that were seen have the corners' own noise in them, which a shift towards the centre would seem
+// to explain (by twice its variance over the length of an edge, in every sighting alike).
+Eigen::VectorXd d_bloom(const Sighting& sighting, const Eigen::VectorXd& residual) {
   constexpr double kStraight = 1e-3;  // sine of an angle that is no corner's
-  const std::vector<Eigen::Vector2d>& corners = sighting.corners_px;
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(sighting.dimension());
-  if (corners.size() != kSquare) return out;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(residual.size());
+  if (sighting.corners_px.size() != kSquare) return out;
+  std::array<Eigen::Vector2d, kSquare> corners;
+  for (std::size_t i = 0; i < kSquare; ++i) {
+    corners[i] = sighting.corners_px[i] -
+                 sighting.sigma * residual.segment<2>(static_cast<Eigen::Index>(2 * i));
+  }
   for (std::size_t i = 0; i < kSquare; ++i) {
     const Eigen::Vector2d a = (corners[(i + 1) % kSquare] - corners[i]).normalized();
     const Eigen::Vector2d b = (corners[(i + kSquare - 1) % kSquare] - corners[i]).normalized();
@@ -109,6 +116,23 @@ Eigen::VectorXd d_bloom(const Sighting& sighting) {
     out.segment<2>(static_cast<Eigen::Index>(2 * i)) = -(a + b) / (sine * sighting.sigma);
   }
   return out;
+}
+
+// Shifts the edges in the residual and turns its slopes with them.
+void add_bloom(const Sighting& sighting, double bloom_px, SightingError& error) {
+  if (bloom_px == 0.0 || sighting.corners_px.size() != kSquare) return;
+  constexpr double kStep = 1e-3;  // in sigmas: edges are long and straight beside it
+  const Eigen::VectorXd plain = error.residual;
+  const Eigen::Index size = plain.size();
+  error.residual += bloom_px * d_bloom(sighting, plain);
+  Eigen::MatrixXd turned = Eigen::MatrixXd::Identity(size, size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(size, k);
+    turned.col(k) += bloom_px / (2.0 * kStep) *
+                     (d_bloom(sighting, plain + step) - d_bloom(sighting, plain - step));
+  }
+  error.d_marker = turned * error.d_marker;
+  if (error.d_intrinsics.rows() == size) error.d_intrinsics = turned * error.d_intrinsics;
 }
 
 bool acts_in(const Correction& correction, int frame) {
@@ -262,7 +286,9 @@ std::optional<CorrectedError> corrected_error(
                        target_m, corrected.shape);
   if (!error) return std::nullopt;
   out.error = std::move(*error);
-  if (corrected.bloom_px != 0.0) out.error.residual += corrected.bloom_px * d_bloom(sighting);
+  if (out.error.residual.size() == 2 * std::ssize(sighting.corners_px))
+    out.d_bloom = d_bloom(sighting, out.error.residual);
+  add_bloom(sighting, corrected.bloom_px, out.error);
   Vector6d velocity = Vector6d::Zero();
   for (std::size_t k = 0; k < joints.size(); ++k) velocity += out.chain.d_value[k] * rates[k];
   out.d_time = out.error.d_marker * velocity;
@@ -296,7 +322,7 @@ std::optional<Eigen::VectorXd> corrected_residual(
     T_camera_marker = grown(corrected.growth, corrected_camera, T_camera_marker);
   auto out = residual_of(sighting, T_camera_marker, changed(camera, corrected.intrinsics), target_m,
                          corrected.shape);
-  if (out && corrected.bloom_px != 0.0) *out += corrected.bloom_px * d_bloom(sighting);
+  if (out && corrected.bloom_px != 0.0) *out += corrected.bloom_px * d_bloom(sighting, *out);
   return out;
 }
 
@@ -337,7 +363,7 @@ Eigen::VectorXd d_correction(const Spec& spec, const Sighting& sighting,
               at.error.d_intrinsics.col(1) * model_of(spec, sighting).fy) *
              share;
     case CorrectedPart::kBloom:
-      return share * d_bloom(sighting);
+      return share * at.d_bloom;
     case CorrectedPart::kReadout: {
       Eigen::VectorXd out = at.d_time * share;
       for (std::size_t i = 0; i < sighting.corners_px.size(); ++i) {

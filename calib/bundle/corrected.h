@@ -48,6 +48,7 @@ struct CorrectedError {
   ChainDerivatives chain;
   Pose T_camera_base;  ///< with what corrections move the camera by
   SightingError error;
+  Eigen::VectorXd d_bloom;    ///< of the residual by bloom_px; of corners only
   std::vector<double> rates;  ///< of the joints on the path, rad/s or m/s
   Eigen::VectorXd d_time;     ///< of the residual by the log's time, per s
 };
