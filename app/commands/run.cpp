@@ -48,6 +48,19 @@ constexpr std::string_view kReport = "report.html";
 // Of a run without an answer, beside the products of an earlier one that has one.
 constexpr std::string_view kFailedReport = "failed_report.html";
 
+/// Joints of one channel follow one another in a URDF; one of them that an effect moves beside its
+/// channel does not.
+KinematicTree without_false_mimics(KinematicTree tree, const std::vector<FittedEffect>& effects) {
+  for (Joint& joint : tree.joints) {
+    if (std::ranges::find(effects, joint.name,
+                          [](const FittedEffect& effect) -> const std::string& {
+                            return effect.id.place;
+                          }) != effects.end())
+      joint.channel.clear();
+  }
+  return tree;
+}
+
 void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   describe_input(recording, observed, options, run);
@@ -364,10 +377,10 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   run.errors = summarise_errors(run.calibration);
   add_film(recording, run);
 
+  const KinematicTree tree = without_false_mimics(with_camera(run.calibration), run.effects);
   const std::string urdf =
-      run.nominal ? write_urdf(with_nominal_limits(with_camera(run.calibration), *run.nominal),
-                               LimitSource::kRobotFile)
-                  : write_urdf(with_camera(run.calibration));
+      run.nominal ? write_urdf(with_nominal_limits(tree, *run.nominal), LimitSource::kRobotFile)
+                  : write_urdf(tree);
   const Answer answer = judge(run);
   if (answered && !answer.given) {
     folder.write(kFailedReport, report_html(run, urdf));

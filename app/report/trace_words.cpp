@@ -114,7 +114,7 @@ std::string other_sizes_words(const TracedEffect& effect) {
   std::map<std::string, std::pair<double, std::string>> squares;  // by quantity; its unit
   for (const EffectValue& value : effect.values) {
     const std::string& name = value.parameter.name;
-    const bool part = name.ends_with(" x") || name.ends_with(" y");
+    const bool part = name.ends_with(" x") || name.ends_with(" y") || name.ends_with(" z");
     if (!part || value.parameter.unit == effect.unit) continue;
     auto& [square, unit] = squares[name.substr(0, name.size() - 2)];
     square += value.value * value.value;

@@ -28,14 +28,32 @@ constexpr std::size_t kMostChannels = 4;
 // Rows of a motion that are linear in the channel that drives it: logarithms about the mean pose
 // or, where the turn is too wide for one, from each sample to the next.
 struct Rows {
-  Eigen::MatrixXd y;  // 6 x samples, whitened
-  Eigen::MatrixXd q;  // samples x channels
+  Eigen::MatrixXd y;   // 6 x samples, whitened alike
+  Eigen::MatrixXd q;   // samples x channels
+  double noise = 1.0;  // variance that the samples' own noise has so
 };
+
+double median(Eigen::ArrayXd values) {
+  double* middle = values.data() + values.size() / 2;
+  std::nth_element(values.data(), middle, values.data() + values.size());
+  return *middle;
+}
+
+// A marker that turns before the camera is seen well along ever other directions.
+double noise_in(const Matrix6d& whitening, const Motion& motion) {
+  Eigen::ArrayXd variance(std::ssize(motion));
+  for (Eigen::Index i = 0; i < variance.size(); ++i) {
+    const Matrix6d& own = motion[static_cast<std::size_t>(i)].whitening;
+    variance[i] =
+        own.triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(whitening).squaredNorm() / 6.0;
+  }
+  return std::max(1.0, median(std::move(variance)));
+}
 
 Rows rows_of(const Motion& motion, const Eigen::MatrixXd& readings) {
   const LinearMotion linear = linear_motion(motion);
   const auto n = static_cast<Eigen::Index>(motion.size());
-  Rows rows{linear.y, Eigen::MatrixXd(n, readings.cols())};
+  Rows rows{linear.y, Eigen::MatrixXd(n, readings.cols()), noise_in(linear.whitening, motion)};
   for (Eigen::Index i = 0; i < n; ++i) {
     rows.q.row(i) = readings.row(motion[static_cast<std::size_t>(i)].instant);
   }
@@ -49,12 +67,6 @@ Rows rows_of(const Motion& motion, const Eigen::MatrixXd& readings) {
                     std::sqrt(2.0);
   }
   return rows;
-}
-
-double median(Eigen::ArrayXd values) {
-  double* middle = values.data() + values.size() / 2;
-  std::nth_element(values.data(), middle, values.data() + values.size());
-  return *middle;
 }
 
 // Weights that leave out what lies far from most.
@@ -134,8 +146,9 @@ bool may_hang(const Motion& motion, const Readings& readings, const std::vector<
   const Rows rows = rows_of(motion, readings.value);
   const Eigen::MatrixXd centred = rows.y.colwise() - Vector6d(rows.y.rowwise().mean());
   const double spread = median(centred.colwise().squaredNorm().transpose()) / kMedian6;
-  const double limit = std::min(variance_of_cost(give_up_above),
-                                std::max(kHopelessAtFirst, kHopelessShareAtFirst * spread));
+  const double limit =
+      rows.noise * std::min(variance_of_cost(give_up_above),
+                            std::max(kHopelessAtFirst, kHopelessShareAtFirst * spread));
   if (spread < limit || left_by_principal(rows.y) < limit) return true;
   return std::ranges::any_of(best_channels(rows, usable), [&](Eigen::Index c) {
     return left_by_channel(rows.y, rows.q.col(c)) < limit;

@@ -47,6 +47,23 @@ TEST(FindStructure, TreeWithTwoMarkersALink) {
   }
 }
 
+// Corners show a pose far better across the line of sight than along it, and one marker of a link
+// far better than the other: what a link's joint leaves open by the one is no motion of the other.
+TEST(FindStructure, MarkersThatAreSeenDifferentlyWellShareALink) {
+  for (const double corner_px : {0.1, 0.3, 1.0}) {
+    for (int seed = 1; seed <= 4; ++seed) {
+      RecordingOptions o;
+      o.corner_px = corner_px;
+      const Scene scene =
+          make_scene("Shared" + std::to_string(seed), {.joints = seed, .markers_per_link = 3}, o);
+      const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
+      SCOPED_TRACE(std::to_string(corner_px) + " px, seed " + std::to_string(seed));
+      expect_right(s, scene);
+      for (const StructureLink& link : s.links) EXPECT_EQ(link.markers.size(), 3U);
+    }
+  }
+}
+
 TEST(FindStructure, WithoutAMarkerOnTheBase) {
   const Scene scene = make_scene("NoBase", {.joints = 4, .base_marker = false}, noisy());
   const Structure s = find_structure(scene.recording.tracks, scene.recording.log);
