@@ -148,8 +148,8 @@ ExitCode compare_command(const CompareOptions& options, const Console& console) 
   summary.differences = run_differences(runs, matches, options.level);
   summary.carried = carried_over(runs, matches, options.level, console.progress);
   if (folder) {
-    folder->write("compare.json", compare_json(summary).dump(1) + "\n");
-    folder->write("compare.html", compare_html(summary));
+    folder->write({{"compare.json", compare_json(summary).dump(1) + "\n"},
+                   {"compare.html", compare_html(summary)}});
   }
   print_comparison(summary, options, console);
   return within_limit(summary, options.fail_on, console);

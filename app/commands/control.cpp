@@ -268,8 +268,8 @@ ExitCode control_command(const ControlOptions& options, const Console& console) 
   Session(options, bench, folder, rounds, console.progress, summary).run();
   report_progress(console.progress, "", 0, 0);
   const nlohmann::json document = control_json(summary);
-  folder.write("control.json", document.dump(1) + "\n");
-  folder.write("control.html", control_html(summary));
+  folder.write(
+      {{"control.json", document.dump(1) + "\n"}, {"control.html", control_html(summary)}});
   if (console.json) {
     console.print(document);
     return ExitCode::kDone;

@@ -99,12 +99,12 @@ ExitCode experiment_command(const ExperimentOptions& options, const Console& con
   summary.version = program_version();
   summary.command = options.command_line;
   summary.inputs = std::move(inputs);
-  for (const ExperimentTable& table : summary.tables) {
-    folder.write(table.id + ".csv", experiment_csv(table));
-  }
   const nlohmann::json document = experiment_json(summary);
-  folder.write("experiment.json", document.dump(1) + "\n");
-  folder.write("experiment.html", experiment_html(summary));
+  std::vector<std::pair<std::string, std::string>> products{
+      {"experiment.json", document.dump(1) + "\n"}, {"experiment.html", experiment_html(summary)}};
+  for (const ExperimentTable& table : summary.tables)
+    products.emplace_back(table.id + ".csv", experiment_csv(table));
+  folder.write(products);
   if (console.json) {
     console.print(document);
     return ExitCode::kDone;

@@ -164,8 +164,8 @@ ExitCode plan_command(const PlanCommandOptions& options, const Console& console)
   const design::RecordingPlan plan =
       plan_recording(run.robot, run.space, run.rivals, asked, console.progress);
   const PlanSummary summary = plan_summary_of(options, run, asked, plan);
-  folder.write("plan.csv", plan_csv(run, plan));
-  folder.write("plan.json", plan_json(summary).dump(1) + "\n");
+  folder.write(
+      {{"plan.csv", plan_csv(run, plan)}, {"plan.json", plan_json(summary).dump(1) + "\n"}});
   print_plan(summary, folder, console);
   return ExitCode::kDone;
 }

@@ -163,8 +163,16 @@ OutputFolder::OutputFolder(fs::path folder, Writer writer)
 }
 
 void OutputFolder::write(std::string_view name, std::string_view content) const {
-  if (owner_of(name, owners_in(folder_)) != command_) add_to_list(folder_, command_, name);
-  write_file_atomically(folder_ / name, content);
+  write({{std::string(name), std::string(content)}});
+}
+
+void OutputFolder::write(const std::vector<std::pair<std::string, std::string>>& products) const {
+  std::vector<FileContent> files;
+  for (const auto& [name, content] : products) {
+    if (owner_of(name, owners_in(folder_)) != command_) add_to_list(folder_, command_, name);
+    files.push_back({folder_ / name, content});
+  }
+  write_files_atomically(files);
 }
 
 void OutputFolder::remove(std::string_view name) const {
@@ -200,12 +208,16 @@ void require_new_file(const fs::path& file, std::string_view option,
                       const std::vector<fs::path>& inputs, bool force) {
   require_no_input(file, inputs, option);
   std::error_code error;
+  const fs::path beside = fs::absolute(file).parent_path();
+  if (!fs::is_directory(beside, error)) {
+    throw bad_request(file.string(), fmt::format("there is no folder {}", beside.string()),
+                      fmt::format("make it, or name another file with {}", option));
+  }
   const fs::file_status status = fs::symlink_status(file, error);
   if (!fs::exists(status)) return;
   require_replaceable(file);
   const std::string remedy = fmt::format("name another file with {}", option);
-  const fs::path folder = fs::absolute(file).parent_path();
-  const std::string owner = owner_of(file.filename().string(), owners_in(folder));
+  const std::string owner = owner_of(file.filename().string(), owners_in(beside));
   if (!owner.empty()) {
     throw bad_request(file.string(), fmt::format("is a product of kinescope {}", owner), remedy);
   }

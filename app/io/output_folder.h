@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace kinescope {
@@ -42,6 +43,8 @@ class OutputFolder {
 
   [[nodiscard]] std::filesystem::path file(std::string_view name) const { return folder_ / name; }
   void write(std::string_view name, std::string_view content) const;
+  /// Products of one piece: by name, none of which is replaced before all are written.
+  void write(const std::vector<std::pair<std::string, std::string>>& products) const;
   /// Nothing happens to a file that this command did not write.
   void remove(std::string_view name) const;
   /// Names of what this command wrote here, now or earlier.

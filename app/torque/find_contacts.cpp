@@ -307,9 +307,9 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
     find_by_momentum(options, model, logs, contact, summary);
   }
 
-  folder.write("contacts.csv", contacts_csv(summary));
-  folder.write("contacts.json", contact_json(summary).dump(1) + "\n");
-  folder.write("contact.html", contact_report_html(summary));
+  folder.write({{"contacts.csv", contacts_csv(summary)},
+                {"contacts.json", contact_json(summary).dump(1) + "\n"},
+                {"contact.html", contact_report_html(summary)}});
   return summary;
 }
 

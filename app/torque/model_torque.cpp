@@ -379,9 +379,9 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     clock.lap("payload at rest", summary.times);
   }
   report_progress(progress, "", 0, 0);
-  folder.write("dynamics.json", torque_json(summary).dump(1) + "\n");
-  folder.write("robot_dynamics.urdf", write_urdf(summary.consistent.model));
-  folder.write("dynamics.html", torque_report_html(summary));
+  folder.write({{"dynamics.json", torque_json(summary).dump(1) + "\n"},
+                {"robot_dynamics.urdf", write_urdf(summary.consistent.model)},
+                {"dynamics.html", torque_report_html(summary)}});
   return summary;
 }
 

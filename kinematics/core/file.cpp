@@ -73,28 +73,41 @@ void require_replaceable(const fs::path& path) {
                     "name another file");
 }
 
-void write_file_atomically(const fs::path& path, std::string_view content) {
-  require_replaceable(path);
-  const fs::path temporary = temporary_beside(path);
-  {
-    std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
+namespace {
+
+void remove_all(const std::vector<fs::path>& files) {
+  std::error_code ignored;
+  for (const fs::path& file : files) fs::remove(file, ignored);
+}
+
+}  // namespace
+
+void write_files_atomically(const std::vector<FileContent>& files) {
+  for (const FileContent& file : files) require_replaceable(file.path);
+  std::vector<fs::path> temporaries;
+  for (const auto& [path, content] : files) {
+    temporaries.push_back(temporary_beside(path));
+    std::ofstream stream(temporaries.back(), std::ios::binary | std::ios::trunc);
     stream.write(content.data(), static_cast<std::streamsize>(content.size()));
     stream.flush();
-    if (!stream) {
-      std::error_code ignored;
-      fs::remove(temporary, ignored);
-      throw bad_request(path.string(), "cannot be written",
-                        "check that the folder is writable and the disk is not full");
-    }
+    if (stream) continue;
+    stream.close();
+    remove_all(temporaries);
+    throw bad_request(path.string(), "cannot be written",
+                      "check that the folder is writable and the disk is not full");
   }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw bad_request(path.string(), fmt::format("cannot be written: {}", error.message()),
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    std::error_code error;
+    fs::rename(temporaries[i], files[i].path, error);
+    if (!error) continue;
+    remove_all(temporaries);
+    throw bad_request(files[i].path.string(), fmt::format("cannot be written: {}", error.message()),
                       "choose another output folder with --output");
   }
+}
+
+void write_file_atomically(const fs::path& path, std::string_view content) {
+  write_files_atomically({{path, content}});
 }
 
 void require_writable_folder(const fs::path& folder) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace kinescope {
 
@@ -20,6 +21,13 @@ void require_replaceable(const std::filesystem::path& path);
 /// Writes all of it or nothing. Throws bad_request when the folder cannot be written, and as
 /// require_replaceable().
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+struct FileContent {
+  std::filesystem::path path;
+  std::string_view content;
+};
+/// The same of several, none of which is replaced before all are written.
+void write_files_atomically(const std::vector<FileContent>& files);
 
 /// Makes the folder (and its parents) and proves that a file can be made there. Throws bad_request.
 void require_writable_folder(const std::filesystem::path& folder);

@@ -64,6 +64,8 @@ TEST(Cli, WrongCommandLines) {
   expect_refusal({"run", "x", "--threads", "0"}, code, "'0' is not a number from 1 to 256");
   expect_refusal({"run", "x", "--decimate", "nan"}, code, "'nan' is not a number");
   expect_refusal({"run", "x", "--folds", "many"}, code, "'many'");
+  expect_refusal({"run", "x", "--output", ""}, code, "--output: is empty");
+  expect_refusal({"dynamics", "x", "--robot", ""}, code, "--robot: is empty");
   expect_refusal({"camera", "x"}, code, "--board");
   expect_refusal({"markers", "--ids", "0-3"}, code, "--size");
   expect_refusal({"markers", "--ids", "3-0", "--size", "0.04"}, code, "names no markers");

@@ -239,6 +239,17 @@ TEST_F(TorqueRefusals, APayloadOfCurrentsIsRefusedBeforeAnyWork) {
   EXPECT_EQ(read_text_file(folder_.path() / "out/dynamics.json"), kEarlier);
 }
 
+// All of them: it is the log's sign, which the advice turns, and no robot upside down.
+TEST_F(TorqueRefusals, TorquesThatAllHaveTheOtherSign) {
+  TorqueSamples turned = samples_;
+  turned.torque *= -1.0;
+  write(turned);
+  refused(ExitCode::kBadInput, "torque_factor: [-1, -1]");
+  folder_.write("recording.yaml", "dynamics: {torque_factor: [-1, -1]}\n");
+  const Outcome outcome = run(words());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
 // A joint whose torque has the other sign: the advice names that joint alone, and works.
 TEST_F(TorqueRefusals, TheAdviceForATurnedTorqueTurnsThatJoint) {
   TorqueSamples turned = samples_;

@@ -38,6 +38,27 @@ TEST_F(FileTest, WritesWholeFilesAndReadsThem) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "no temporary file is left";
 }
 
+TEST_F(FileTest, WritesSeveralOrNone) {
+  write_file_atomically(folder_ / "a", "before");
+  fs::create_directory(folder_ / "b");
+  EXPECT_EQ(code_of([&] {
+              write_files_atomically({{folder_ / "a", "after"}, {folder_ / "b", "a folder"}});
+            }),
+            ExitCode::kBadRequest);
+  EXPECT_EQ(read_text_file(folder_ / "a"), "before");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2) << "no temporary file is left";
+  write_files_atomically({{folder_ / "a", "after"}, {folder_ / "c", "new"}});
+  EXPECT_EQ(read_text_file(folder_ / "a"), "after");
+  EXPECT_EQ(read_text_file(folder_ / "c"), "new");
+}
+
+TEST_F(FileTest, ReplacesNoPipe) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(code_of([&] { write_file_atomically(pipe, "x"); }), ExitCode::kBadRequest);
+  EXPECT_TRUE(fs::is_fifo(pipe));
+}
+
 TEST_F(FileTest, RefusesWhatCannotBeRead) {
   EXPECT_EQ(code_of([&] { static_cast<void>(read_text_file(folder_ / "none")); }),
             ExitCode::kBadInput);
