@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/explain/doubted_sight.h"
 
-#include <array>
-#include <cmath>
-
 #include <fmt/format.h>
 
 #include "calib/tracks/camera_from_tags.h"
@@ -12,51 +9,14 @@
 namespace kinescope {
 namespace {
 
-// The declared camera with images of another size.
-CameraModel resized(CameraModel camera, double factor) {
-  camera.width = static_cast<int>(std::lround(factor * camera.width));
-  camera.height = static_cast<int>(std::lround(factor * camera.height));
-  camera.fx *= factor;
-  camera.fy *= factor;
-  // Pixels have their middles at whole numbers.
-  camera.cx = factor * (camera.cx + 0.5) - 0.5;
-  camera.cy = factor * (camera.cy + 0.5) - 0.5;
-  return camera;
-}
-
-// A camera.yaml of larger images than the corners are of; nothing where the markers' shapes do not
-// say so.
-std::optional<CameraModel> of_smaller_images(const Recording& recording, const Observed& observed,
-                                             const CameraModel& declared) {
-  constexpr std::array kFactors{0.75, 2.0 / 3.0, 0.5, 1.0 / 3.0, 0.25};  // 1080 to 720 rows, halves
-  Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
-  for (const TagObservation& tag : observed.tags.observations)
-    for (const Eigen::Vector2d& corner : tag.corners_px) farthest = farthest.cwiseMax(corner);
-  std::optional<CameraModel> out;
-  double best = 0.0;
-  for (const double factor : kFactors) {
-    const CameraModel camera = resized(declared, factor);
-    if (farthest.x() > camera.width || farthest.y() > camera.height) break;
-    const double odds = log_odds_of_shapes(camera, declared, observed.tags, recording.markers);
-    if (odds <= best) continue;
-    best = odds;
-    out = camera;
-  }
-  return out;
-}
-
 // What the shapes of the markers' images say, where they say something; the declared one.
 std::vector<CameraModel> cameras_to_begin_with(const Recording& recording, const Observed& observed,
                                                const CameraModel& declared) {
-  std::vector<CameraModel> out;
-  if (auto smaller = of_smaller_images(recording, observed, declared)) out.push_back(*smaller);
   try {
-    out.push_back(camera_from_tags(observed.tags, recording.markers));
+    return {camera_from_tags(observed.tags, recording.markers), declared};
   } catch (const Error&) {
-    // Too few views.
+    return {declared};
   }
-  out.push_back(declared);
-  return out;
 }
 
 // As the first robot has it that shows with one of these.
