@@ -204,20 +204,24 @@ void require_apart(const fs::path& folder, const std::vector<fs::path>& inputs) 
   }
 }
 
+void require_folder_of(const fs::path& file, std::string_view option) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(file).parent_path();
+  if (fs::is_directory(folder, error)) return;
+  throw bad_request(file.string(), fmt::format("there is no folder {}", folder.string()),
+                    fmt::format("make it, or name another file with {}", option));
+}
+
 void require_new_file(const fs::path& file, std::string_view option,
                       const std::vector<fs::path>& inputs, bool force) {
   require_no_input(file, inputs, option);
   std::error_code error;
-  const fs::path beside = fs::absolute(file).parent_path();
-  if (!fs::is_directory(beside, error)) {
-    throw bad_request(file.string(), fmt::format("there is no folder {}", beside.string()),
-                      fmt::format("make it, or name another file with {}", option));
-  }
   const fs::file_status status = fs::symlink_status(file, error);
   if (!fs::exists(status)) return;
   require_replaceable(file);
   const std::string remedy = fmt::format("name another file with {}", option);
-  const std::string owner = owner_of(file.filename().string(), owners_in(beside));
+  const std::string owner =
+      owner_of(file.filename().string(), owners_in(fs::absolute(file).parent_path()));
   if (!owner.empty()) {
     throw bad_request(file.string(), fmt::format("is a product of kinescope {}", owner), remedy);
   }

@@ -60,8 +60,12 @@ class OutputFolder {
 void require_apart(const std::filesystem::path& folder,
                    const std::vector<std::filesystem::path>& inputs);
 
-/// The same for a single file, named with `option`. Throws bad_request: it is an input, a folder or
-/// a product of a command, or, without force, it is there already.
+/// Throws bad_request where the folder is not there that a single file, named with `option`, would
+/// be written into.
+void require_folder_of(const std::filesystem::path& file, std::string_view option);
+
+/// The same as of products for a single file, named with `option`. Throws bad_request: it is an
+/// input, a folder or a product of a command, or, without force, it is there already.
 void require_new_file(const std::filesystem::path& file, std::string_view option,
                       const std::vector<std::filesystem::path>& inputs, bool force);
 
