@@ -57,7 +57,7 @@ void name_them(const std::vector<fs::path>& folders, std::vector<Recording>& rec
     std::string name = in_a_name(recordings[k].name);
     if (count[name] > 1) {
       const fs::path above = fs::absolute(folders[k]).lexically_normal().parent_path();
-      name = in_a_name(recording_name(above)) + "_" + name;
+      name.insert(0, in_a_name(recording_name(above)) + "_");
     }
     if (!taken.insert(name).second) {
       throw bad_request(folders[k].string(),
