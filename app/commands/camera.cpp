@@ -117,7 +117,7 @@ std::vector<std::filesystem::path> files_of(const std::filesystem::path& source)
 }  // namespace
 
 ExitCode camera_command(const CameraOptions& options, const Console& console) {
-  require_folder_of(options.output, "--output");
+  require_folder_of(options.output);
   require_new_file(options.output, "--output", files_of(options.source), options.force);
   const std::filesystem::path folder = options.output.parent_path();
   require_writable_folder(folder.empty() ? "." : folder);  // before the long work

@@ -5,7 +5,7 @@
 
 #include "app/commands/commands.h"
 #include "app/torque/find_contacts.h"
-#include "app/torque/saved_model_log.h"
+#include "app/torque/torque_inputs.h"
 
 namespace kinescope {
 

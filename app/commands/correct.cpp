@@ -137,7 +137,7 @@ void from_si(JointLog& log, const JointLog& before, const std::map<std::string, 
 
 ExitCode correct_command(const CorrectOptions& options, const Console& console) {
   const std::filesystem::path calibration = options.run_folder / "calibration.json";
-  require_folder_of(options.output, "--output");
+  require_folder_of(options.output);
   require_new_file(options.output, "--output",
                    {options.log, calibration, options.run_folder / "robot.urdf"}, options.force);
   const CalibratedEffects found = read_effects(calibration);

@@ -8,7 +8,7 @@
 #include "app/commands/commands.h"
 #include "app/report/trace_lines.h"
 #include "app/torque/model_torque.h"
-#include "app/torque/saved_model_log.h"
+#include "app/torque/torque_inputs.h"
 
 namespace kinescope {
 namespace {

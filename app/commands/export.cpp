@@ -43,13 +43,7 @@ void require_different_places(const std::vector<ExportForm>& forms) {
 void require_folders_of_files(const std::vector<ExportForm>& forms) {
   for (const ExportForm& form : forms) {
     if (!form.folder.empty()) continue;
-    for (const ExportedFile& file : form.files) {
-      const std::filesystem::path parent = std::filesystem::absolute(file.path).parent_path();
-      std::error_code error;
-      if (std::filesystem::is_directory(parent, error)) continue;
-      throw bad_request(file.path.string(), "there is no folder " + parent.string(),
-                        "make it, or name another file");
-    }
+    for (const ExportedFile& file : form.files) require_folder_of(file.path);
   }
 }
 

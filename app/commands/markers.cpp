@@ -15,7 +15,7 @@ namespace kinescope {
 ExitCode markers_command(const MarkersOptions& options, const Console& console) {
   const MarkerSheet& sheet = options.sheet;
   const SheetPdf pdf = marker_sheet_pdf(sheet);
-  require_folder_of(options.output, "--output");
+  require_folder_of(options.output);
   require_new_file(options.output, "--output", {}, options.force);
   write_file_atomically(options.output, pdf.bytes);
   if (console.json) {

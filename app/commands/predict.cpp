@@ -116,7 +116,7 @@ std::string worse_words(const std::vector<JointResult>& joints, const RigidModel
 ExitCode predict_command(const PredictOptions& options, const Console& console) {
   std::vector<std::filesystem::path> inputs = options.logs;
   inputs.push_back(options.model);
-  require_folder_of(options.output, "--output");
+  require_folder_of(options.output);
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueModelFile file = read_torque_model(options.model);
   JudgedPrediction predicted = predict(options, file);

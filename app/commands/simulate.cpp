@@ -31,7 +31,7 @@ ServoLog exact_log(const CorrectedTorqueModel& model, const TorqueSamples& motio
 ExitCode simulate_command(const SimulateOptions& options, const Console& console) {
   std::vector<fs::path> inputs{options.robot, options.trajectory};
   if (options.effects) inputs.push_back(*options.effects);
-  require_folder_of(options.output, "--output");
+  require_folder_of(options.output);
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueRobot robot = read_torque_robot(options.robot, options.gravity_m_s2);
   require_masses(options.robot, robot.model);

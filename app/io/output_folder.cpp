@@ -204,12 +204,12 @@ void require_apart(const fs::path& folder, const std::vector<fs::path>& inputs) 
   }
 }
 
-void require_folder_of(const fs::path& file, std::string_view option) {
+void require_folder_of(const fs::path& file) {
   std::error_code error;
   const fs::path folder = fs::absolute(file).parent_path();
   if (fs::is_directory(folder, error)) return;
   throw bad_request(file.string(), fmt::format("there is no folder {}", folder.string()),
-                    fmt::format("make it, or name another file with {}", option));
+                    "make it, or name another file");
 }
 
 void require_new_file(const fs::path& file, std::string_view option,

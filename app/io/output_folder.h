@@ -60,9 +60,8 @@ class OutputFolder {
 void require_apart(const std::filesystem::path& folder,
                    const std::vector<std::filesystem::path>& inputs);
 
-/// Throws bad_request where the folder is not there that a single file, named with `option`, would
-/// be written into.
-void require_folder_of(const std::filesystem::path& file, std::string_view option);
+/// Throws bad_request where the folder is not there that a single file would be written into.
+void require_folder_of(const std::filesystem::path& file);
 
 /// The same as of products for a single file, named with `option`. Throws bad_request: it is an
 /// input, a folder or a product of a command, or, without force, it is there already.

@@ -8,6 +8,7 @@
 #include "app/python/arrays.h"
 #include "app/python/bindings.h"
 #include "app/torque/saved_model_log.h"
+#include "app/torque/torque_inputs.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::python {

@@ -68,14 +68,4 @@ TorqueData read_log_for(const TorqueModelFile& file, const std::vector<std::file
                   "state --torque-unit and --torque-factor as for the log it was learned from");
 }
 
-std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings) {
-  std::vector<std::string> out;
-  for (const LogFinding& finding : findings) {
-    if (finding.weight == FaultWeight::kWarning || finding.fault == LogFault::kAssignment) {
-      out.push_back(to_line(finding));
-    }
-  }
-  return out;
-}
-
 }  // namespace kinescope

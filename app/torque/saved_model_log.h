@@ -27,7 +27,4 @@ namespace kinescope {
                                       const std::vector<std::filesystem::path>& logs,
                                       TorqueDataOptions data);
 
-/// What is odd about a log and was worked around, and joints that the model does not have.
-[[nodiscard]] std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings);
-
 }  // namespace kinescope

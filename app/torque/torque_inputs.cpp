@@ -88,4 +88,14 @@ std::vector<InputFile> hashed_inputs(const std::vector<std::vector<fs::path>>& l
   return out;
 }
 
+std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings) {
+  std::vector<std::string> out;
+  for (const LogFinding& finding : findings) {
+    if (finding.weight == FaultWeight::kWarning || finding.fault == LogFault::kAssignment) {
+      out.push_back(to_line(finding));
+    }
+  }
+  return out;
+}
+
 }  // namespace kinescope

@@ -38,6 +38,9 @@ struct TorqueRobot {
 void put_into_place(const std::vector<std::filesystem::path>& logs,
                     std::vector<LogFinding>& findings);
 
+/// What is odd about a log and was worked around, and joints that the model does not have.
+[[nodiscard]] std::vector<std::string> warnings_of(const std::vector<LogFinding>& findings);
+
 /// "a.csv, b.csv": names of files without their folders.
 [[nodiscard]] std::string file_list(const std::vector<std::filesystem::path>& files);
 

@@ -39,6 +39,11 @@ std::string read_at_most(std::istream& stream, std::uintmax_t expected, std::uin
   return text;
 }
 
+void remove_all(const std::vector<fs::path>& files) {
+  std::error_code ignored;
+  for (const fs::path& file : files) fs::remove(file, ignored);
+}
+
 }  // namespace
 
 std::string read_text_file(const fs::path& path, std::uintmax_t max_bytes) {
@@ -72,15 +77,6 @@ void require_replaceable(const fs::path& path) {
                     fs::is_directory(there) ? "is a folder" : "is a pipe or a device, no file",
                     "name another file");
 }
-
-namespace {
-
-void remove_all(const std::vector<fs::path>& files) {
-  std::error_code ignored;
-  for (const fs::path& file : files) fs::remove(file, ignored);
-}
-
-}  // namespace
 
 void write_files_atomically(const std::vector<FileContent>& files) {
   for (const FileContent& file : files) require_replaceable(file.path);

@@ -55,14 +55,12 @@ bool hang_alike(const Attachment& a, const Attachment& b) {
 // Of bodies that may be of one link, the one that is seen best: what its joint leaves open is in
 // doubt for the others, and more of it than they know by themselves would set them apart.
 Choice seen_best(const GrowthState& state, Choice chosen) {
-  constexpr double kNoiseOnly = 1.5;  // variances over the declared ones, across and along
   double least = noise_of(state.series.bodies[chosen.body]);
   const Attachment* cleanest = chosen.attachment;
   for (std::size_t b = 0; b < state.tree.bodies.size(); ++b) {
     if (state.tree.bodies[b].link >= 0) continue;
     const Attachment* best = acceptable_best(state, b);
-    if (best == nullptr || !hang_alike(*best, *cleanest)) continue;
-    if (std::max(best->fit.variance, best->fit.axis_variance) > kNoiseOnly) continue;
+    if (best == nullptr || !hang_alike(*best, *cleanest) || !best->leaves_noise_only()) continue;
     const double noise = noise_of(state.series.bodies[b]);
     if (noise < least) {
       least = noise;

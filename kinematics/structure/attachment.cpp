@@ -15,7 +15,7 @@ namespace {
 // Woodbury's identity and the determinant lemma.
 double less_for_common_errors(const ChainFit& fit, const RelativeMotion& relative,
                               const Readings& readings) {
-  constexpr double kOutlier = 30.0;  // as fit_chain() counts a sample at most
+  const double outlier = ChainFitOptions{}.outlier_cost;
   if (relative.doubt.empty()) return 0.0;
   const Eigen::Index numbers = relative.doubt.front().cols();
   const ChainResiduals left = chain_residuals(relative.motion, fit.model, readings.value);
@@ -27,7 +27,7 @@ double less_for_common_errors(const ChainFit& fit, const RelativeMotion& relativ
     const auto whitening = relative.own_whitening[i].triangularView<Eigen::Upper>();
     const Eigen::MatrixXd root = whitening * relative.doubt[i];
     information.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose());
-    if (left.white[i].squaredNorm() > kOutlier) continue;
+    if (left.white[i].squaredNorm() > outlier) continue;
     const Vector6d plain = whitening_of(relative.motion[i], left.other[i] != 0)
                                .triangularView<Eigen::Upper>()
                                .solve(left.white[i]);
@@ -45,6 +45,11 @@ double less_for_common_errors(const ChainFit& fit, const RelativeMotion& relativ
 }
 
 }  // namespace
+
+bool Attachment::leaves_noise_only() const {
+  constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
+  return fit.variance < kNoiseOnly && fit.axis_variance < kNoiseOnly;
+}
 
 double Attachment::explained_ratio() const {
   // A fifth of the noise at least: less cannot be seen.

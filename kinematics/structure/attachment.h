@@ -33,6 +33,8 @@ struct Attachment {
   [[nodiscard]] int channel() const {
     return driven() ? fit.model.joints.front().terms.front().channel : -1;
   }
+  /// Across the joint and along it.
+  [[nodiscard]] bool leaves_noise_only() const;
   /// How much of the motion is explained: its size over what is left beyond the noise.
   [[nodiscard]] double explained_ratio() const;
   /// Tempered: errors that are alike in `correlation` neighbouring samples count once.

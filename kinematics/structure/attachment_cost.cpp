@@ -118,6 +118,10 @@ double data_cost_of(const ChainFit& fit, const RelativeMotion& relative, int see
   return share * (fit.cost + relative.log_det + coordinate_cost(fit, relative.motion));
 }
 
+double price_of_further_channel(const Readings& readings) {
+  return 2.0 * std::log(100.0 * std::max(2, readings.channels()));
+}
+
 double penalty_of(const ChainFit& fit, const Readings& readings) {
   const double samples = std::max(2.0, fit.samples / fit.correlation);
   double penalty = 0.0;
@@ -135,8 +139,7 @@ double penalty_of(const ChainFit& fit, const Readings& readings) {
                         unit_shares(unit, joint.type, readings.si_share), rms);
       // Which channel drives the joint is one choice of many.
       if (k == 0) penalty += 2.0 * std::log(std::max(1, readings.channels()));
-      // Couplings are rare (1 joint in 100), and which channel couples is one choice of many.
-      if (k > 0) penalty += 2.0 * std::log(100.0 * std::max(2, readings.channels()));
+      if (k > 0) penalty += price_of_further_channel(readings);
     }
   }
   const double r = axis_distance(fit.model);

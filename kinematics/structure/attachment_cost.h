@@ -17,6 +17,10 @@ inline constexpr double kLever = 0.3;
 /// -2 ln likelihood of all `seen` sightings, as those in `relative` tell it for their share.
 [[nodiscard]] double data_cost_of(const ChainFit& fit, const RelativeMotion& relative, int seen);
 
+/// -2 ln prior of a channel that moves a further joint: 1 joint in 100 has one, which is one choice
+/// of many.
+[[nodiscard]] double price_of_further_channel(const Readings& readings);
+
 /// For parameters (Schwarz 1978), the choice of channels, and what is known of scales and sizes
 /// before.
 [[nodiscard]] double penalty_of(const ChainFit& fit, const Readings& readings);

@@ -2,9 +2,9 @@
 #include "kinematics/structure/move_bodies.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kinematics/structure/attach_bodies.h"
+#include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/attachment_path.h"
 #include "kinematics/structure/find_attachments.h"
 #include "kinematics/structure/idle_channels.h"
@@ -111,8 +111,7 @@ bool conflicts(const GrownTree& tree, std::size_t body, const Attachment& a) {
 }
 
 double price_of_sharing(const GrowthState& state, std::size_t body, const Attachment& a) {
-  if (!conflicts(state.tree, body, a)) return 0.0;
-  return 2.0 * std::log(100.0 * std::max(2, state.readings.channels()));
+  return conflicts(state.tree, body, a) ? price_of_further_channel(state.readings) : 0.0;
 }
 
 void move_body(GrowthState& state, std::size_t body, Attachment attachment) {

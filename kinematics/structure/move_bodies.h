@@ -10,8 +10,7 @@ namespace kinescope::structure_search {
 /// The attachment's main channel already drives another joint, which has no other to take instead.
 [[nodiscard]] bool conflicts(const GrownTree& tree, std::size_t body, const Attachment& a);
 
-/// -2 ln prior of a joint in conflict, else 0: a channel of a hundred drives two joints, as one
-/// couples.
+/// price_of_further_channel() of a joint in conflict, else 0.
 [[nodiscard]] double price_of_sharing(const GrowthState& state, std::size_t body,
                                       const Attachment& a);
 

@@ -88,16 +88,11 @@ bool is_declared(const Readings& readings, const Attachment& a) {
   return unit == ChannelUnit::kRadian || unit == ChannelUnit::kMetre;
 }
 
-bool leaves_noise_only(const Attachment& a) {
-  constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
-  return a.fit.variance < kNoiseOnly && a.fit.axis_variance < kNoiseOnly;
-}
-
 }  // namespace
 
 bool share_a_channel(const Attachment& a, const Attachment& b, const Readings& readings) {
   for (const Attachment* one : {&a, &b}) {
-    if (!one->driven() || one->fit.model.joints.size() != 1 || !leaves_noise_only(*one))
+    if (!one->driven() || one->fit.model.joints.size() != 1 || !one->leaves_noise_only())
       return false;
   }
   if (a.channel() != b.channel()) return false;
