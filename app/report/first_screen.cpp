@@ -112,8 +112,8 @@ struct Gain {
 
 std::string named(const TracedEffect& effect) {
   if (effect.is_curve()) return names_of({effect});
-  return fmt::format("{}: {}{}{}", effect_name(effect), size_words(effect),
-                     effect.words.empty() ? "" : "; ", effect.words);
+  return fmt::format("{}: {}{}{}{}", effect_name(effect), size_words(effect),
+                     other_sizes_words(effect), effect.words.empty() ? "" : "; ", effect.words);
 }
 
 std::vector<Gain> gains_of(const Trace& trace) {
