@@ -59,6 +59,17 @@ bool are_axes_known(const Explanation& of) {
   return !of.fitted || unknown_axes(of.fitted->calibration).empty();
 }
 
+/// By its scale, which then says nothing of a joint that channel drives.
+bool has_joint_at_rest(const Calibration& of) {
+  for (std::size_t j = 0; j < of.joints.size(); ++j) {
+    const auto sigma = of.joints[j].scale_sigma;
+    if (!sigma || of.tree.joints[j].channel.empty()) continue;
+    const double z = of.tree.joints[j].scale / *sigma;
+    if (0.5 * z * z < StructureOptions{}.min_log_odds) return true;
+  }
+  return false;
+}
+
 bool is_structure_clear(const Explanation& of) {
   return !of.structure || (of.structure->status == StructureStatus::kDetermined &&
                            !has_model_doubt(*of.structure) && are_axes_known(of));
@@ -185,11 +196,11 @@ class Explainer {
   /// `first`: a plain fit.
   [[nodiscard]] Explanation best_beside(Explanation first) const {
     Tried tried;
-    Explanation now = asked_again(begun_with(std::move(first), tried));
+    Explanation now = with_rivals_judged(asked_again(begun_with(std::move(first), tried)));
     // Beside joints that no fit settles for, doubts about some of them are not worth their time.
     if (now.fitted && !is_converged(now.fitted->calibration)) now = improved(std::move(now), tried);
     now = with_base_at_rest(with_couplings_doubted(std::move(now)));
-    return with_free_markers_attached(improved(std::move(now), tried));
+    return with_free_markers_attached(with_rivals_judged(improved(std::move(now), tried)));
   }
 
   [[nodiscard]] Explanation begun() const {
@@ -418,6 +429,17 @@ class Explainer {
     return is_better(one, other, evidence_.observed.measurements);
   }
 
+  [[nodiscard]] double log_odds_of(const Explanation& one, const Explanation& rival) const {
+    constexpr double kMost = 1000.0;  // larger ones mean nothing: the models are not that right
+    if (!rival.fitted || !is_converged(rival.fitted->calibration) || !are_axes_known(rival) ||
+        has_joint_at_rest(rival.fitted->calibration))
+      return kMost;
+    const Measurements& measurements = evidence_.observed.measurements;
+    return std::clamp(log_odds(predictive_score(one.fitted->calibration, measurements),
+                               predictive_score(rival.fitted->calibration, measurements)),
+                      0.0, kMost);
+  }
+
   [[nodiscard]] PoseTracks undone(const Calibration& calibration) const {
     const TagObservations& tags = evidence_.observed.tags;
     if (tags.observations.empty()) return with_effects_undone(calibration, evidence_.tracks);
@@ -445,6 +467,23 @@ class Explainer {
       if (!is_better(other, now)) return now;
       now = std::move(other);
     }
+    return now;
+  }
+
+  // Depths of small or noisy markers err as no linear covariance says, and structures that poses
+  // cannot tell apart are told by the images that the poses come from.
+  [[nodiscard]] Explanation with_rivals_judged(Explanation now) const {
+    if (!now.fitted || !now.structure || !is_converged(now.fitted->calibration)) return now;
+    Explanation alone = now;
+    alone.structure->status = StructureStatus::kDetermined;
+    // Beside an account that leaves noise only, a rival can but be as good with more.
+    const bool leaves_noise_only = is_settled(alone) && alone.fitted->effects.empty();
+    std::vector<double> odds;
+    for (const RivalStructure& rival : now.structure->rivals)
+      odds.push_back(log_odds_of(
+          alone, leaves_noise_only ? plainly_fitted(rival.structure)
+                                   : of_structure(rival.structure, {now.fitted->trace.added})));
+    now.structure = kinescope::with_rivals_judged(*std::move(now.structure), odds);
     return now;
   }
 

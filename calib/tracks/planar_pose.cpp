@@ -223,4 +223,17 @@ std::optional<PlanarPose> estimate_planar_pose(const CameraModel& camera,
   return PlanarPose{branches[0], branches[1]};
 }
 
+std::optional<PlanarBranch> pose_about(const CameraModel& camera,
+                                       std::span<const Eigen::Vector3d> corners_m,
+                                       std::span<const Eigen::Vector2d> corners_px, double sigma_px,
+                                       const Pose& T_camera_marker) {
+  const auto at = linearise(camera, T_camera_marker, corners_m, corners_px, sigma_px);
+  if (!at) return std::nullopt;
+  const std::optional<Matrix6d> covariance = inverse_of_positive(at->normal);
+  if (!covariance || !covariance->allFinite()) return std::nullopt;
+  const Vector6d step = *covariance * at->gradient;
+  return PlanarBranch{T_camera_marker * exp_pose(step), at->chi_square - step.dot(at->gradient),
+                      *covariance};
+}
+
 }  // namespace kinescope

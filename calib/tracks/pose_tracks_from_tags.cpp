@@ -165,6 +165,26 @@ void settle_resting(const PlanarPose& rest, PoseTrack& track) {
   }
 }
 
+// Of a marker whose one pose is known: each view told about that.
+void tell_about(const PlanarPose& rest, const std::vector<Candidate>& candidates,
+                const CameraModel& camera, const std::vector<Eigen::Vector3d>& corners_m,
+                double variance, PoseTrack& track) {
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const TagObservation& seen = *candidates[i].seen;
+    const auto about = pose_about(camera, corners_m, seen.corners_px, seen.sigma_px,
+                                  rest.best.T_camera_marker);
+    if (!about) continue;
+    PlanarPose pose{*about, {}};
+    widen(pose, variance);
+    pose = with_own_misfit(std::move(pose));
+    PoseSample& sample = track.samples[i];
+    sample = {.frame = sample.frame,
+              .T_camera_marker = pose.best.T_camera_marker,
+              .covariance = pose.best.covariance,
+              .T_camera_marker_alternative = {}};
+  }
+}
+
 PoseTrack make_track(TagId id, const std::vector<Candidate>& candidates,
                      const std::vector<double>& times_s) {
   PoseTrack track{id, {}};
@@ -234,7 +254,10 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
     if (!view) continue;
     const auto rest =
         estimate_planar_pose(camera, markers.corners_m(id), view->corners_px, view->sigma_px);
-    if (rest) settle_resting(*rest, tracks.tracks.back());
+    if (!rest) continue;
+    settle_resting(*rest, tracks.tracks.back());
+    if (!rest->other || rest->other->chi_square - rest->best.chi_square > kWorstMisfit)
+      tell_about(*rest, list, camera, markers.corners_m(id), variance, tracks.tracks.back());
   }
   return tracks;
 }

@@ -242,6 +242,7 @@ void judge_fit(const Answer& answer, const Series& plain, const JointLog& log, c
   }
   out.doubts.insert(out.doubts.begin(), std::move(doubt));
   if (out.status == StructureStatus::kDetermined) out.status = StructureStatus::kAmbiguous;
+  out.rivals.clear();  // that they are ruled out would not be enough
 }
 
 }  // namespace kinescope::structure_search

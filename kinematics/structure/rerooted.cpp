@@ -67,6 +67,7 @@ Structure rerooted(const Structure& structure, int link) {
   for (std::size_t k = 0; k < order.size(); ++k)
     number[static_cast<std::size_t>(joints[order[k]].child_link)] = static_cast<int>(k) + 1;
   Structure out = structure;
+  out.rivals.clear();
   out.camera_link = number[0];
   for (std::size_t l = 0; l < number.size(); ++l)
     out.links[static_cast<std::size_t>(number[l])] = structure.links[l];

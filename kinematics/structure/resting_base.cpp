@@ -51,6 +51,7 @@ std::optional<Structure> with_base_at_rest(const Structure& structure) {
       joint_motion(joint.type, Eigen::Vector3d::UnitZ(), usual_value(structure, below)) *
       joint.T_joint_child;
   Structure out = structure;
+  out.rivals.clear();
   out.links.front() = structure.links[static_cast<std::size_t>(child)];
   for (Pose& T : out.links.front().T_reference_marker) T = T_camera_reference * T;
   out.links.erase(out.links.begin() + child);

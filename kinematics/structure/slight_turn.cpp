@@ -34,6 +34,7 @@ std::optional<Structure> with_slide_for_slight_turn(const Structure& structure, 
   const Eigen::Vector3d tangent = Eigen::Vector3d::UnitZ().cross(T_joint_marker.translation);
   if (!(tangent.norm() > 0.0)) return std::nullopt;
   Structure out = structure;
+  out.rivals.clear();
   StructureJoint& slide = out.joints[joint];
   slide.type = JointType::kPrismatic;
   slide.T_parent_joint = turn.T_parent_joint *

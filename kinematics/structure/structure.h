@@ -74,7 +74,10 @@ struct StructureDoubt {
   std::string remedy;
   std::vector<std::string> names;  ///< channels or tags concerned
   bool of_model = false;           ///< an effect that the model lacks may be its cause
+  bool of_rivals = false;          ///< about Structure::rivals, and gone with them
 };
+
+struct RivalStructure;
 
 struct Structure {
   StructureStatus status = StructureStatus::kNotRun;
@@ -94,9 +97,18 @@ struct Structure {
   double time_offset_s = 0.0;       ///< joint-log time = frame time + offset, from the scan
   double time_offset_sigma_s = 0.0;
   std::vector<StructureDoubt> doubts;
+  /// Those that the poses alone do not rule out (1:100), the closest first: what the poses come from
+  /// tells more (with_rivals_judged()).
+  std::vector<RivalStructure> rivals;
   /// Without a log (or for joints that no channel drives): value of each joint in each frame,
   /// frames x joints; NaN where unknown or driven by a channel.
   Eigen::MatrixXd joint_values;
+};
+
+/// Another answer for the same markers; of its own doubts nothing is known.
+struct RivalStructure {
+  std::string words;
+  Structure structure;
 };
 
 struct StructureOptions {
@@ -119,6 +131,11 @@ struct StructureOptions {
 /// channels but for their numbering in the result.
 [[nodiscard]] Structure find_structure(const PoseTracks& tracks, const JointLog& log,
                                        const StructureOptions& options = {});
+
+/// Judged by more than poses: `log_odds` of the structure against each of its rivals. Determined
+/// where all are ruled out; without rivals after that.
+[[nodiscard]] Structure with_rivals_judged(Structure structure,
+                                           const std::vector<double>& log_odds);
 
 /// The found structure as a tree with SI joint values: joints named after their channels (or
 /// joint<k>), links link<k>, root "base" = the frame of the camera.

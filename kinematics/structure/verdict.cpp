@@ -64,6 +64,8 @@ struct Alternative {
   int first_channel = -1;  // the two channels that could be exchanged
   int second_channel = -1;
   int link = -1;  // whose joint it is about; -1: of a body at rest
+  std::size_t body = 0;
+  const Attachment* place = nullptr;  // of the body; null: it is not about one body's place
 };
 
 class Judge {
@@ -102,6 +104,8 @@ class Judge {
       alternative.first_channel = body.attachment.channel();
       alternative.second_channel = a.channel();
       alternative.link = own_link(tree_, b);
+      alternative.body = b;
+      alternative.place = &a;
       out.push_back(std::move(alternative));
     }
     const double free_loss = body.everywhere_cost / correlation - now;
@@ -354,6 +358,26 @@ void add_free_doubts(const GrownTree& tree, const Series& series, Verdict& verdi
   }
 }
 
+// Of `all`, where `most` is the largest loss that leaves an answer in doubt.
+std::vector<RivalPlace> rival_places(const std::vector<Alternative>& all, double most) {
+  constexpr std::size_t kMost = 6;  // each is a calibration
+  std::vector<const Alternative*> close;
+  for (const Alternative& a : all) {
+    if (a.place != nullptr && a.loss < most) close.push_back(&a);
+  }
+  std::ranges::stable_sort(close, {}, &Alternative::loss);
+  if (close.size() > kMost) close.resize(kMost);
+  std::vector<RivalPlace> out;
+  for (const Alternative* a : close) out.push_back({a->words, a->body, *a->place});
+  return out;
+}
+
+// Nothing but places of bodies stands against the answer.
+bool are_places(const std::vector<Alternative>& all, double most) {
+  return std::ranges::all_of(
+      all, [&](const Alternative& a) { return a.loss >= most || a.place != nullptr; });
+}
+
 }  // namespace
 
 std::string link_words(const GrownTree& tree, const Series& series, int link) {
@@ -361,6 +385,14 @@ std::string link_words(const GrownTree& tree, const Series& series, int link) {
   const int founder = tree.links[static_cast<std::size_t>(link)].founder;
   return fmt::format("the link of tag {}",
                      series.bodies[static_cast<std::size_t>(founder)].id.value);
+}
+
+StructureDoubt rival_doubt(const std::string& rival) {
+  StructureDoubt out{fmt::format("it could also be: {}", rival),
+                     "record longer, with larger motions of the joints concerned",
+                     {}};
+  out.of_rivals = true;
+  return out;
 }
 
 Verdict judge(const GrownTree& tree, const Series& series, const Readings& readings,
@@ -389,6 +421,8 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
   for (double& own : verdict.link_log_odds) own = std::min(own, kMostLogOdds);
   if (verdict.runner_up_log_odds < options.min_log_odds)
     verdict.status = StructureStatus::kAmbiguous;
+  if (are_places(all, 2.0 * options.min_log_odds))
+    verdict.rivals = rival_places(all, 2.0 * options.min_log_odds);
   add_order_doubts(tree, readings, log, options, verdict);
   add_free_doubts(tree, series, verdict);
   add_together_doubts(all, readings, log, options, verdict);
@@ -400,9 +434,7 @@ Verdict judge(const GrownTree& tree, const Series& series, const Readings& readi
                               "record the robot while every joint moves, one marker on every link",
                               {}});
   } else if (verdict.status == StructureStatus::kAmbiguous) {
-    verdict.doubts.push_back({fmt::format("it could also be: {}", verdict.runner_up),
-                              "record longer, with larger motions of the joints concerned",
-                              {}});
+    verdict.doubts.push_back(rival_doubt(verdict.runner_up));
   }
   add_constant_doubt(tree, readings, log, verdict);
   return verdict;

@@ -10,6 +10,13 @@
 
 namespace kinescope::structure_search {
 
+/// An answer that cannot be ruled out: a body that hangs elsewhere.
+struct RivalPlace {
+  std::string words;
+  std::size_t body = 0;
+  Attachment attachment;
+};
+
 struct Verdict {
   double probability = 0.0;
   double runner_up_log_odds = 0.0;
@@ -17,11 +24,15 @@ struct Verdict {
   std::vector<double> link_log_odds;  ///< of every link's joint; 0 for the camera's
   std::vector<std::string> link_runner_up;
   std::vector<StructureDoubt> doubts;
+  std::vector<RivalPlace> rivals;  ///< the closest first
   StructureStatus status = StructureStatus::kNotRun;
 };
 
 [[nodiscard]] Verdict judge(const GrownTree& tree, const Series& series, const Readings& readings,
                             const JointLog& log, const StructureOptions& options);
+
+/// What the recording does not tell the answer from.
+[[nodiscard]] StructureDoubt rival_doubt(const std::string& rival);
 
 /// "tag 3", or "the camera" for link 0.
 [[nodiscard]] std::string link_words(const GrownTree& tree, const Series& series, int link);
