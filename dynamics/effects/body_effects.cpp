@@ -51,7 +51,6 @@ Candidate gravity_direction(const SharedContext& c) {
   // A base on a wall is far from one on the floor: in a straight line, only its own direction says
   // what it does. The fit finds the tilt itself.
   for (int k = 0; k < kGravityStarts; ++k) out.scan.push_back(k);
-  out.scan_name = "direction looked from";
   out.columns = [carriers](double scan) {
     const int start = std::clamp(static_cast<int>(std::lround(scan)), 0, kGravityStarts - 1);
     if (start == 0)

@@ -51,7 +51,7 @@ struct Applied {
       context.turns.push_back(body.type == JointType::kRevolute ? 1 : 0);
     }
     context.widths = model.base.widths;
-    context.gravity_moves = tilt_moves(context.rigid.gravity_m_s2, Eigen::Vector2d::Zero());
+    context.gravity_moves = tilt_moves(context.rigid.gravity_m_s2);
     context.load =
         inverse_dynamics_of_samples(model.base.rigid, samples.q, samples.dq, samples.ddq);
     context.torque = context.load;

@@ -252,16 +252,20 @@ Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity) {
 
 }  // namespace
 
-Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity,
-                                       const Eigen::Vector2d& tilt_deg) {
-  constexpr double kStep_deg = 1e-3;
+Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity) {
+  const Eigen::Matrix<double, 3, 2> axes = kDegree * tilt_axes(gravity);
   Eigen::Matrix<double, 3, 2> out;
-  for (int a = 0; a < 2; ++a) {
-    const Eigen::Vector2d step = kStep_deg * Eigen::Vector2d::Unit(a);
-    out.col(a) =
-        (tilted(gravity, tilt_deg + step) - tilted(gravity, tilt_deg - step)) / (2.0 * kStep_deg);
-  }
+  out << axes.col(0).cross(gravity), axes.col(1).cross(gravity);
   return out;
+}
+
+Eigen::Vector2d tilt_between(const Eigen::Vector3d& gravity, const Eigen::Vector3d& other) {
+  const Eigen::Matrix<double, 3, 2> axes = tilt_axes(gravity);
+  const Eigen::Vector3d normal = gravity.cross(other);
+  const double angle = std::atan2(normal.norm(), gravity.dot(other));
+  // Straight up, any axis across gravity takes it there.
+  const Eigen::Vector3d axis = normal.norm() > 0.0 ? normal.normalized() : axes.col(0);
+  return angle / kDegree * axes.transpose() * axis;
 }
 
 Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt_deg) {

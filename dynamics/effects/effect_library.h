@@ -95,8 +95,10 @@ struct EffectLibrary {
 /// Gravity turned by a rotation vector about two axes across it, degrees; always the same two.
 [[nodiscard]] Eigen::Vector3d tilted(const Eigen::Vector3d& gravity,
                                      const Eigen::Vector2d& tilt_deg);
-/// Its derivative, m/s^2 a degree.
-[[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity,
-                                                     const Eigen::Vector2d& tilt_deg);
+/// Its derivative where nothing is turned yet, m/s^2 a degree.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> tilt_moves(const Eigen::Vector3d& gravity);
+/// The least turn that takes one gravity to the other: at most 180 degrees.
+[[nodiscard]] Eigen::Vector2d tilt_between(const Eigen::Vector3d& gravity,
+                                           const Eigen::Vector3d& other);
 
 }  // namespace kinescope

@@ -51,7 +51,7 @@ std::shared_ptr<const GravityCase> make_gravity_case(const TorqueTracedModel::Pa
   out->rigid.gravity_m_s2 = tilted(parts.base.rigid.gravity_m_s2, tilt_deg);
   out->context = parts.context;
   out->context.rigid.gravity_m_s2 = out->rigid.gravity_m_s2;
-  out->context.gravity_moves = tilt_moves(parts.base.rigid.gravity_m_s2, tilt_deg);
+  out->context.gravity_moves = tilt_moves(out->rigid.gravity_m_s2);
   if (!tilt_deg.isZero(0.0)) {
     out->context.load =
         inverse_dynamics_of_samples(out->context.rigid, parts.q, parts.dq, parts.ddq);

@@ -125,6 +125,7 @@ class TorqueFitter {
   void make_design();
   void put_base(Eigen::Index joint, const Eigen::MatrixXd& sensor);
   [[nodiscard]] Normal normal() const;
+  [[nodiscard]] Eigen::Matrix2d turn_of_tilt(const Eigen::Vector2d& tilt_deg) const;
   [[nodiscard]] TracedFit read_back(bool converged) const;
   [[nodiscard]] double noise_memory(const Eigen::VectorXi& trajectory) const;
   [[nodiscard]] Eigen::MatrixXd own_prior() const;

@@ -3,6 +3,8 @@
 // A fit as calib/trace takes it.
 #include <algorithm>
 
+#include <Eigen/SVD>
+
 #include "dynamics/effects/torque_parts.h"
 #include "dynamics/identify/block_jackknife.h"
 
@@ -27,6 +29,25 @@ double TorqueFitter::noise_memory(const Eigen::VectorXi& trajectory) const {
                                identify::correlation_samples(residual, trajectory));
 }
 
+/// How gravity turns from where it points by now, a degree of the tilt that took it there.
+Eigen::Matrix2d TorqueFitter::turn_of_tilt(const Eigen::Vector2d& tilt_deg) const {
+  constexpr double kStep_deg = 1e-3;
+  // Near 180 degrees, tilts of all directions are nearly the same.
+  constexpr double kLeast = 1e-3;
+  const Eigen::Vector3d& upright = parts_.base.rigid.gravity_m_s2;
+  const Eigen::Vector3d& now = case_->rigid.gravity_m_s2;
+  Eigen::Matrix2d out;
+  for (int a = 0; a < 2; ++a) {
+    const Eigen::Vector2d step = kStep_deg * Eigen::Vector2d::Unit(a);
+    out.col(a) = (tilt_between(now, tilted(upright, tilt_deg + step)) -
+                  tilt_between(now, tilted(upright, tilt_deg - step))) /
+                 (2.0 * kStep_deg);
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix2d> svd(out, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.singularValues().cwiseMax(kLeast).asDiagonal() *
+         svd.matrixV().transpose();
+}
+
 TracedFit TorqueFitter::read_back(bool converged) const {
   TracedFit out;
   out.converged = converged;
@@ -43,6 +64,11 @@ TracedFit TorqueFitter::read_back(bool converged) const {
     for (Eigen::Index c = 0; c < rows.columns.cols(); ++c) {
       linear.jacobian(own, rows.parameters[static_cast<std::size_t>(c)]) = rows.columns.col(c);
     }
+  }
+  for (const Added& added : added_) {
+    if (added.kind != Kind::kGravity) continue;
+    auto columns = linear.jacobian.middleCols(own_parameters() + added.first, 2);
+    columns = (columns * turn_of_tilt(added.values)).eval();
   }
   linear.prior = own_prior();
   linear.carriers = case_->carriers;
