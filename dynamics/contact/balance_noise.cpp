@@ -13,20 +13,26 @@ namespace kinescope {
 namespace {
 
 constexpr std::size_t kFewestSamples = 200;
-/// Mean square of the smaller 95 % of the absolute values of a standard normal variable.
-constexpr double kTrimmedVariance = 0.7588;
+/// Of the absolute values of a standard normal variable, the mean square of the smaller ones.
+struct Trim {
+  double share;
+  double variance;
+};
+constexpr Trim kMostValues{0.95, 0.7588};
+constexpr Trim kHalfOfThem{0.5, 0.1426};
 /// Sum of squared coefficients of a third difference.
 constexpr double kThirdDifference = 20.0;
 constexpr double kLongestWindow_s = 4.0;
 
-double trimmed_variance(std::vector<double> squares) {
+double trimmed_variance(std::vector<double> squares, const Trim& trim) {
   if (squares.empty()) return 0.0;
-  const std::size_t kept = std::max<std::size_t>(1, squares.size() * 95 / 100);
+  const auto kept = std::max<std::size_t>(
+      1, static_cast<std::size_t>(trim.share * static_cast<double>(squares.size())));
   std::nth_element(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(kept - 1),
                    squares.end());
   const double sum =
       std::accumulate(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(kept), 0.0);
-  return sum / static_cast<double>(kept) / kTrimmedVariance;
+  return sum / static_cast<double>(kept) / trim.variance;
 }
 
 /// For each sample the first of the unbroken stretch it stands in; a sample left out stands alone,
@@ -48,7 +54,7 @@ std::vector<std::size_t> stretches(const std::vector<BalanceSample>& samples,
 }
 
 template <typename Signal>
-double white_sigma(const std::vector<std::size_t>& first, const Signal& signal) {
+double white_sigma(const std::vector<std::size_t>& first, const Trim& trim, const Signal& signal) {
   std::vector<double> squares;
   double smallest = 0.0;
   for (std::size_t k = 3; k < first.size(); ++k) {
@@ -59,7 +65,7 @@ double white_sigma(const std::vector<std::size_t>& first, const Signal& signal) 
     if (step > 0.0 && (smallest == 0.0 || step < smallest)) smallest = step;
   }
   // A signal that rarely leaves its quantum has that quantum's noise.
-  return std::max(std::sqrt(trimmed_variance(std::move(squares)) / kThirdDifference),
+  return std::max(std::sqrt(trimmed_variance(std::move(squares), trim) / kThirdDifference),
                   smallest / std::sqrt(12.0));
 }
 
@@ -151,7 +157,8 @@ double usual_sigma(const std::vector<BalanceSample>& samples, Eigen::Index joint
 std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& samples,
                                              const std::vector<std::size_t>& first,
                                              const Eigen::VectorXd& imbalances, Eigen::Index joint,
-                                             const BalanceNoise& noise, double step_s) {
+                                             const BalanceNoise& noise, double step_s,
+                                             const Trim& trim) {
   std::vector<WindowVariance> out;
   const std::size_t n = samples.size();
   for (std::size_t length = 1; static_cast<double>(length) * step_s <= kLongestWindow_s;
@@ -173,7 +180,7 @@ std::vector<WindowVariance> window_variances(const std::vector<BalanceSample>& s
     if (independent < 8.0) break;
     const double torque = step_s * noise.torque_sigma[joint];
     out.push_back({.length_s = static_cast<double>(length) * step_s,
-                   .measured = trimmed_variance(std::move(squares)),
+                   .measured = trimmed_variance(std::move(squares), trim),
                    .white = white / count + static_cast<double>(length) * torque * torque,
                    .weight = std::min(independent, 100.0)});
   }
@@ -205,25 +212,27 @@ struct HeardNoise {
 
 void add_white_noise(const std::vector<BalanceSample>& samples,
                      const std::vector<std::size_t>& anyhow, const std::vector<std::size_t>& own,
-                     Eigen::Index joint, HeardNoise& out) {
+                     Eigen::Index joint, const Trim& trim, HeardNoise& out) {
   const bool heard = out.heard[static_cast<std::size_t>(joint)] != 0;
   BalanceNoise& noise = out.noise;
   if (samples[0].velocity.size() > 0) {
     noise.velocity_sigma[joint] = white_sigma(
-        heard ? own : anyhow, [&](std::size_t k) { return samples[k].velocity[joint]; });
+        heard ? own : anyhow, trim, [&](std::size_t k) { return samples[k].velocity[joint]; });
   }
   if (!heard) {
     noise.torque_sigma[joint] = unheard_sigma(samples, joint);
     return;
   }
   noise.torque_sigma[joint] =
-      white_sigma(own, [&](std::size_t k) { return samples[k].drive[joint]; });
+      white_sigma(own, trim, [&](std::size_t k) { return samples[k].drive[joint]; });
   if (noise.torque_sigma[joint] > 0.0) return;
   throw undetermined("contact", "the torque of joint " + std::to_string(joint + 1) + " is constant",
                      "log the measured torque");
 }
 
 HeardNoise heard_noise(const std::vector<BalanceSample>& samples, const std::vector<char>& use) {
+  // Half of an unsorted log may be contact.
+  const Trim& trim = use.empty() ? kHalfOfThem : kMostValues;
   const double step_s = median_step_s(samples);
   const Eigen::Index n = samples[0].drive.size();
   HeardNoise out{.noise = {.velocity_sigma = Eigen::VectorXd::Zero(n),
@@ -241,13 +250,13 @@ HeardNoise heard_noise(const std::vector<BalanceSample>& samples, const std::vec
   if (out.usable < kFewestSamples) return out;
   const std::vector<std::size_t> anyhow = stretches(samples, use, step_s, -1);
   for (Eigen::Index j = 0; j < n; ++j) {
-    add_white_noise(samples, anyhow, first[static_cast<std::size_t>(j)], j, out);
+    add_white_noise(samples, anyhow, first[static_cast<std::size_t>(j)], j, trim, out);
   }
   for (Eigen::Index j = 0; j < n; ++j) {
     const auto& own = first[static_cast<std::size_t>(j)];
     if (out.heard[static_cast<std::size_t>(j)] == 0) continue;
     const ModelError error = fit_model_error(
-        window_variances(samples, own, imbalance(samples, own, j), j, out.noise, step_s), step_s,
+        window_variances(samples, own, imbalance(samples, own, j), j, out.noise, step_s, trim), step_s,
         out.noise.torque_sigma[j]);
     out.noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
     out.noise.model_time_s[j] = error.time_s;
@@ -293,13 +302,15 @@ BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
 
 BalanceNoise estimate_noise_of_both(const std::vector<BalanceSample>& samples,
                                     const std::vector<char>& use, std::size_t second) {
-  const std::vector<char> all(samples.size(), 1);
-  const std::vector<char>& marks = use.empty() ? all : use;
   const auto middle = static_cast<std::ptrdiff_t>(second);
-  const BalanceNoise learned = estimate_noise({samples.begin(), samples.begin() + middle},
-                                              {marks.begin(), marks.begin() + middle});
-  const HeardNoise own =
-      heard_noise({samples.begin() + middle, samples.end()}, {marks.begin() + middle, marks.end()});
+  const bool sorted = !use.empty();
+  const auto marks = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    return sorted ? std::vector<char>(use.begin() + from, use.begin() + to) : std::vector<char>{};
+  };
+  const BalanceNoise learned =
+      estimate_noise({samples.begin(), samples.begin() + middle}, marks(0, middle));
+  const HeardNoise own = heard_noise({samples.begin() + middle, samples.end()},
+                                     marks(middle, std::ssize(samples)));
   return own.usable >= kFewestSamples ? larger_of(learned, own) : learned;
 }
 

@@ -249,7 +249,8 @@ ContactCalibration calibrate(const CalibrationLogs& logs, const ContactOptions& 
   calibration.options = options;
   calibration.step_s = median_step_s(samples);
   calibration.thresholds = Eigen::VectorXd::Zero(octaves_of(calibration));
-  calibration.noise = logs.noise();
+  const std::vector<char> all(samples.size(), 1);
+  calibration.noise = logs.noise(options.may_contain_contacts ? std::vector<char>{} : all);
   if (!options.may_contain_contacts) {
     learn_from_all(samples, calibration);
     return calibration;
@@ -261,6 +262,7 @@ ContactCalibration calibrate(const CalibrationLogs& logs, const ContactOptions& 
     // Too little is left: with all of it, contacts included, thresholds are high, not wrong.
     if (error.code() != ExitCode::kUndetermined) throw;
     calibration = begun;
+    calibration.noise = logs.noise(all);
     learn_from_all(samples, calibration);
     calibration.status = ContactCalibrationStatus::kIterationLimit;
   }
