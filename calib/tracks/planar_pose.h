@@ -33,9 +33,9 @@ struct PlanarPose {
     const CameraModel& camera, std::span<const Eigen::Vector3d> corners_m,
     std::span<const Eigen::Vector2d> corners_px, double sigma_px);
 
-/// What the corners say of a pose that is nearly known, linearised about that: errors of the corners
-/// are errors of the pose in proportion, which the best fit's of a small marker are not. Nothing
-/// where they do not determine a pose.
+/// What the corners say of a pose that is nearly known, linearised about that: errors of the
+/// corners are errors of the pose in proportion, which the best fit's of a small marker are not.
+/// Nothing where they do not determine a pose.
 [[nodiscard]] std::optional<PlanarBranch> pose_about(const CameraModel& camera,
                                                      std::span<const Eigen::Vector3d> corners_m,
                                                      std::span<const Eigen::Vector2d> corners_px,

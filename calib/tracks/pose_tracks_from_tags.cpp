@@ -171,8 +171,8 @@ void tell_about(const PlanarPose& rest, const std::vector<Candidate>& candidates
                 double variance, PoseTrack& track) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const TagObservation& seen = *candidates[i].seen;
-    const auto about = pose_about(camera, corners_m, seen.corners_px, seen.sigma_px,
-                                  rest.best.T_camera_marker);
+    const auto about =
+        pose_about(camera, corners_m, seen.corners_px, seen.sigma_px, rest.best.T_camera_marker);
     if (!about) continue;
     PlanarPose pose{*about, {}};
     widen(pose, variance);

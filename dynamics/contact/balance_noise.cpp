@@ -256,8 +256,8 @@ HeardNoise heard_noise(const std::vector<BalanceSample>& samples, const std::vec
     const auto& own = first[static_cast<std::size_t>(j)];
     if (out.heard[static_cast<std::size_t>(j)] == 0) continue;
     const ModelError error = fit_model_error(
-        window_variances(samples, own, imbalance(samples, own, j), j, out.noise, step_s, trim), step_s,
-        out.noise.torque_sigma[j]);
+        window_variances(samples, own, imbalance(samples, own, j), j, out.noise, step_s, trim),
+        step_s, out.noise.torque_sigma[j]);
     out.noise.model_sigma[j] = error.sigma / usual_sigma(samples, j);
     out.noise.model_time_s[j] = error.time_s;
   }
@@ -309,8 +309,8 @@ BalanceNoise estimate_noise_of_both(const std::vector<BalanceSample>& samples,
   };
   const BalanceNoise learned =
       estimate_noise({samples.begin(), samples.begin() + middle}, marks(0, middle));
-  const HeardNoise own = heard_noise({samples.begin() + middle, samples.end()},
-                                     marks(middle, std::ssize(samples)));
+  const HeardNoise own =
+      heard_noise({samples.begin() + middle, samples.end()}, marks(middle, std::ssize(samples)));
   return own.usable >= kFewestSamples ? larger_of(learned, own) : learned;
 }
 

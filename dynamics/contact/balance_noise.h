@@ -23,10 +23,10 @@ struct BalanceNoise {
 /// White parts from third differences (motion leaves next to nothing in them), the model's error
 /// from how the accumulated imbalance grows with the length of a window. Each spread is that of the
 /// smaller 95 % of the values or, of samples that nothing was left out of yet, of their half: a
-/// contact of a few seconds must not count as the model's error. Where a joint may stick it tells nothing; one that hardly slides
-/// gets a torque_sigma beside which nothing counts. `use`: one a sample, 0 leaves the sample out;
-/// empty uses all. Throws undetermined for fewer than 200 usable samples, and a torque that is
-/// constant.
+/// contact of a few seconds must not count as the model's error. Where a joint may stick it tells
+/// nothing; one that hardly slides gets a torque_sigma beside which nothing counts. `use`: one a
+/// sample, 0 leaves the sample out; empty uses all. Throws undetermined for fewer than 200 usable
+/// samples, and a torque that is constant.
 [[nodiscard]] BalanceNoise estimate_noise(const std::vector<BalanceSample>& samples,
                                           const std::vector<char>& use = {});
 

@@ -34,6 +34,7 @@ constexpr double kAfterBreakaway_rad = 0.01;  ///< or over that way, where it is
 constexpr double kIndependent_s = 0.25;
 /// Time over which the momentum's rate is taken.
 constexpr double kRateWindow_s = 0.05;
+constexpr double kHalf = 0.5;
 /// Friction is known down to half the speed below which the joint slid for so long; where it slid
 /// less than twice that, to half its median.
 constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
@@ -41,10 +42,11 @@ constexpr double kKnownAfter_s = 8.0 * kIndependent_s;
 constexpr double kBeyond = 1.2;
 /// Where the search for the speed begins, rad/s: the best of them, and from there to its
 /// neighbours.
-constexpr std::array kStribeckSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};
+constexpr std::array kBendSpeeds{0.005, 0.01, 0.02, 0.04, 0.08, 0.16};
 constexpr double kNeighbour = 2.0;
 /// To 1 % of the speed: what remains is a thousandth of the friction.
 constexpr int kSpeedSteps = 10;
+constexpr double kOutlier = 4.0;      ///< sigmas
 constexpr double kLinearShare = 0.2;  ///< speeds of linear joints, m/s to rad/s
 
 struct MotionTerms {
@@ -72,11 +74,38 @@ struct Slid {
   double length_s = 0.0;
 };
 
+/// By which fits to the same samples are compared.
+struct FitScale {
+  double sigma = 0.0;
+  double independent = 1.0;  ///< samples
+};
+
 struct Fit {
-  double cost = 0.0;   ///< deviance with a penalty for parameters (Schwarz 1978)
-  double sigma = 0.0;  ///< of the residual
+  double cost = 0.0;  ///< deviance with a penalty for parameters (Schwarz 1978)
+  FitScale own;       ///< of its own residual
   SlidingFriction friction;
 };
+
+/// Samples that count as one are those of the residual's integral time, and of kIndependent_s at
+/// the most.
+double independent_samples(const Eigen::VectorXd& residuals, double sigma, double length_s) {
+  const Eigen::Index rows = residuals.size();
+  // Outliers would hide how the others hang together.
+  const Eigen::VectorXd bounded = (residuals / sigma).cwiseMax(-kOutlier).cwiseMin(kOutlier);
+  const double power = bounded.squaredNorm() / static_cast<double>(rows);
+  const double noise = 2.0 / std::sqrt(static_cast<double>(rows));
+  const double longest =
+      std::max(1.0, kIndependent_s * static_cast<double>(rows) / std::max(length_s, 1e-9));
+  double together = 1.0;
+  for (Eigen::Index lag = 1; lag < rows && together < longest && power > 0.0; ++lag) {
+    const Eigen::Index n = rows - lag;
+    const double correlation =
+        bounded.head(n).dot(bounded.tail(n)) / (static_cast<double>(n) * power);
+    if (correlation < noise) break;
+    together += 2.0 * correlation;
+  }
+  return static_cast<double>(rows) / std::min(together, longest);
+}
 
 /// Twice Huber's loss, of residuals in sigmas.
 double huber_deviance(const Eigen::VectorXd& residuals, double sigma) {
@@ -89,8 +118,9 @@ double huber_deviance(const Eigen::VectorXd& residuals, double sigma) {
   return sum;
 }
 
-/// `sigma` scales the deviance; 0: that of the fit itself.
-std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape, double sigma) {
+/// `scale`: none: the fit's own.
+std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape,
+                                const std::optional<FitScale>& scale) {
   const Eigen::Index rows = slid.dq.size();
   const bool both = shape.slides_forward && shape.slides_backward;
   const bool stribeck = shape.stribeck_speed > 0.0;
@@ -98,6 +128,8 @@ std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape, 
   columns.col(0).setOnes();
   columns.col(1) = slid.dq;
   if (both) columns.col(2) = slid.direction;
+  if (both && shape.rise_speed > 0.0)
+    columns.col(2).array() *= (slid.dq.array().abs() / shape.rise_speed).tanh();
   if (stribeck) {
     columns.rightCols(1) =
         slid.direction.array() * (-(slid.dq.array() / shape.stribeck_speed).square()).exp();
@@ -112,19 +144,21 @@ std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape, 
   const identify::WeightedFit fit = weighted_fit(system, robust);
   // A log without noise has rounding.
   const double least = 1e-9 * (1e-9 + slid.residual.cwiseAbs().maxCoeff());
-  Fit out{
-      .cost = 0.0, .sigma = sigma > 0.0 ? sigma : std::max(least, fit.sigma[0]), .friction = shape};
+  const double sigma = std::max(least, fit.sigma[0]);
+  Fit out{.cost = 0.0,
+          .own = {sigma, independent_samples(fit.residuals.col(0), sigma, slid.length_s)},
+          .friction = shape};
+  const FitScale by = scale.value_or(out.own);
   out.friction.offset = fit.parameters[0];
   out.friction.viscous = fit.parameters[1];
   if (both) out.friction.coulomb = fit.parameters[2];
   if (stribeck) out.friction.stribeck = fit.parameters[columns.cols() - 1];
   // Friction that grows from standstill on is no breakaway.
   if (out.friction.stribeck < 0.0) return std::nullopt;
-  const double independent = slid.length_s / kIndependent_s;
+  const auto parameters = columns.cols() + (stribeck ? 1 : 0) + (shape.rise_speed > 0.0 ? 1 : 0);
   out.cost =
-      huber_deviance(fit.residuals.col(0), out.sigma) * independent / static_cast<double>(rows) +
-      std::log(std::max(2.0, independent)) *
-          static_cast<double>(columns.cols() + (stribeck ? 1 : 0));
+      huber_deviance(fit.residuals.col(0), by.sigma) * by.independent / static_cast<double>(rows) +
+      std::log(std::max(2.0, by.independent)) * static_cast<double>(parameters);
   return out;
 }
 
@@ -178,22 +212,30 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
   shape.slides_forward = (slid.direction.array() > 0.0).count() >= kFewestSliding;
   shape.slides_backward = (slid.direction.array() < 0.0).count() >= kFewestSliding;
   if (!shape.known()) return shape;
-  std::optional<Fit> best = fit_friction(slid, shape, 0.0);
-  const double sigma = best->sigma;
-  const auto try_speed = [&](double speed) {
-    shape.stribeck_speed = speed;
-    const std::optional<Fit> fit = fit_friction(slid, shape, sigma);
+  std::optional<Fit> best = fit_friction(slid, shape, {});
+  const FitScale scale = best->own;
+  const auto try_speed = [&](double SlidingFriction::* own, double speed) {
+    SlidingFriction with = shape;
+    with.*own = speed;
+    const std::optional<Fit> fit = fit_friction(slid, with, scale);
     if (fit && fit->cost < best->cost) best = fit;
     return fit ? -fit->cost : -std::numeric_limits<double>::infinity();
   };
-  for (const double speed : kStribeckSpeeds) try_speed(turns ? speed : kLinearShare * speed);
-  if (const double speed = best->friction.stribeck_speed; speed > 0.0) {
-    const Maximum found =
-        golden_section([&](double log_speed) { return try_speed(std::exp(log_speed)); },
-                       std::log(speed / kNeighbour), std::log(speed * kNeighbour), kSpeedSteps);
-    try_speed(std::exp(found.at));
+  std::vector<double SlidingFriction::*> bends{&SlidingFriction::stribeck_speed};
+  // Of one direction, all of it would be an offset.
+  if (shape.slides_forward && shape.slides_backward) bends.push_back(&SlidingFriction::rise_speed);
+  for (double SlidingFriction::* bend : bends) {
+    for (const double speed : kBendSpeeds) try_speed(bend, turns ? speed : kLinearShare * speed);
   }
-  best->friction.sigma = best->sigma;
+  for (double SlidingFriction::* bend : bends) {
+    const double speed = best->friction.*bend;
+    if (speed == 0.0) continue;
+    const Maximum found =
+        golden_section([&](double log_speed) { return try_speed(bend, std::exp(log_speed)); },
+                       std::log(speed / kNeighbour), std::log(speed * kNeighbour), kSpeedSteps);
+    try_speed(bend, std::exp(found.at));
+  }
+  best->friction.sigma = best->own.sigma;
   best->friction.slid_s = slid.length_s;
   best->friction.slowest_known =
       0.5 * speed_quantile(slid, std::min(0.5, kKnownAfter_s / slid.length_s));
@@ -222,6 +264,19 @@ FrictionInterval interval_of(const SlidingFriction& own, double sliding, double 
   if (size >= own.slowest_known) return {sliding, sliding};
   return direction > 0 ? FrictionInterval{sliding, std::max(sliding, viscous + own.highest)}
                        : FrictionInterval{std::min(sliding, viscous + own.lowest), sliding};
+}
+
+/// Where friction rises with the speed it is as little known as that is.
+FrictionInterval with_doubt_of_speed(FrictionInterval taken, const SlidingFriction& own,
+                                     double speed, double doubt, int direction) {
+  if (own.rise_speed == 0.0 || direction == 0) return taken;
+  const auto risen = [&](double at) {
+    return std::abs(own.coulomb) * std::tanh(at / own.rise_speed);
+  };
+  const double below = risen(speed) - risen(speed - doubt);
+  const double above = risen(speed + doubt) - risen(speed);
+  if (std::max(below, above) < own.sigma) return taken;
+  return {taken.lowest - below, taken.highest + above};
 }
 
 struct JointPast {
@@ -282,8 +337,12 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
       const int direction = own.known(states(t, j)) ? states(t, j) : 0;
       past.has_slid = past.has_slid || direction != 0;
       const double rate = terms.rate(t, j);
-      const FrictionInterval taken =
-          interval_of(own, sliding(t, j, direction), motion.dq(t, j), speeds(t, j), direction);
+      const FrictionInterval taken = with_doubt_of_speed(
+          interval_of(own, sliding(t, j, direction), motion.dq(t, j), speeds(t, j), direction), own,
+          speeds(t, j),
+          std::abs(motion.dq(t, j) - speeds(t, j)) +
+              kHalf * kRateWindow_s * std::abs(accelerations(t, j)),
+          direction);
       const double wanted = sample.drive[j] - rate;
       // Seen to one side only, an acceleration at the end is noise.
       const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
@@ -362,7 +421,7 @@ Eigen::MatrixXd windowed_rates(const Eigen::VectorXd& t_s, const Eigen::MatrixXd
 }
 
 double SlidingFriction::sliding(double dq, int direction) const {
-  double size = coulomb;
+  double size = rise_speed > 0.0 ? coulomb * std::tanh(std::abs(dq) / rise_speed) : coulomb;
   if (stribeck_speed > 0.0) {
     const double low = dq / stribeck_speed;
     size += stribeck * std::exp(-low * low);

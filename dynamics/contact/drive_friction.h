@@ -12,13 +12,15 @@
 namespace kinescope {
 
 /// Torques in the unit of the log, N m, N or A. Sliding with direction s = +-1 takes
-///     offset + viscous dq + s (coulomb + stribeck exp(-(dq / stribeck_speed)^2)).
+///     offset + viscous dq + s (coulomb + stribeck exp(-(dq / stribeck_speed)^2)),
+/// or, where friction turns round smoothly, coulomb tanh(|dq| / rise_speed) in place of coulomb.
 struct SlidingFriction {
   double offset = 0.0;
   double viscous = 0.0;
   double coulomb = 0.0;
   double stribeck = 0.0;
   double stribeck_speed = 0.0;  ///< rad/s or m/s
+  double rise_speed = 0.0;      ///< rad/s or m/s; 0: at once
   double lowest = 0.0;          ///< sticking may take anything from here
   double highest = 0.0;         ///< to here
   /// rad/s or m/s; slower, and friction may rise up to breakaway for all that the log tells.

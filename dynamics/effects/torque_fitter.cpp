@@ -183,12 +183,11 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
   base_values_ += change.head(p);
   Eigen::Vector2d tilt = case_->tilt_deg;
   for (Added& added : added_) {
-    const Eigen::VectorXd own =
-        change.segment(own_parameters() + added.first, added.values.size());
+    const Eigen::VectorXd own = change.segment(own_parameters() + added.first, added.values.size());
     if (added.kind == Kind::kGravity) {
       // From where it points: about the model's own, a tilt of 180 degrees is every way the same.
-      added.values = tilt = tilt_between(parts_.base.rigid.gravity_m_s2,
-                                         tilted(case_->rigid.gravity_m_s2, own));
+      added.values = tilt =
+          tilt_between(parts_.base.rigid.gravity_m_s2, tilted(case_->rigid.gravity_m_s2, own));
     } else {
       added.values += own;
     }

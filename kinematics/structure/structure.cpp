@@ -76,8 +76,7 @@ std::vector<RivalStructure> rivals_of(const Answer& answer, const EveryFrame& ev
                                       const std::vector<RivalPlace>& rivals) {
   std::vector<RivalStructure> out;
   for (const RivalPlace& rival : rivals) {
-    const GrownTree tree =
-        refit_tree(with_place(answer, rival), every.series, every.readings);
+    const GrownTree tree = refit_tree(with_place(answer, rival), every.series, every.readings);
     Verdict unknown;
     unknown.status = StructureStatus::kDetermined;
     unknown.link_log_odds.resize(tree.links.size());

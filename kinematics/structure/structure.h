@@ -97,8 +97,8 @@ struct Structure {
   double time_offset_s = 0.0;       ///< joint-log time = frame time + offset, from the scan
   double time_offset_sigma_s = 0.0;
   std::vector<StructureDoubt> doubts;
-  /// Those that the poses alone do not rule out (1:100), the closest first: what the poses come from
-  /// tells more (with_rivals_judged()).
+  /// Those that the poses alone do not rule out (1:100), the closest first: what the poses come
+  /// from tells more (with_rivals_judged()).
   std::vector<RivalStructure> rivals;
   /// Without a log (or for joints that no channel drives): value of each joint in each frame,
   /// frames x joints; NaN where unknown or driven by a channel.

@@ -212,8 +212,8 @@ TEST(Explain, GravityIsFoundBesideWhatElseWasTraced) {
             (std::vector<std::string>{"camera_bump camera", "compliance q2", "helical q3"}));
 }
 
-// Poses of markers of 10 px, or of 1 px of noise, have errors that no covariance tells: a marker that
-// rests looks like one on a slide, and the images settle it.
+// Poses of markers of 10 px, or of 1 px of noise, have errors that no covariance tells: a marker
+// that rests looks like one on a slide, and the images settle it.
 TEST(Explain, SmallAndNoisyMarkersShowTheRobot) {
   struct Case {
     std::uint64_t seed;
