@@ -355,11 +355,12 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   clock.lap("track", run.times);
 
   run.camera_motion = settle_camera(observed, run.tracks, options.calibrate, recording);
-  require_plausible_motion(recording,
-                           at_common_instants(as_of_fixed_camera(recording, run.tracks),
-                                              observed.measurements.camera_of_frame),
-                           options.calibrate);
-  const Evidence evidence{recording, observed, run.tracks, seen.camera};
+  std::optional<Structure> structure =
+      require_plausible_motion(recording,
+                               at_common_instants(as_of_fixed_camera(recording, run.tracks),
+                                                  observed.measurements.camera_of_frame),
+                               options.calibrate);
+  const Evidence evidence{recording, observed, run.tracks, seen.camera, std::move(structure)};
   const std::size_t told = run.warnings.size();
   Explanation best =
       explain(evidence, explain_options(options, run, clock, console.progress), run.warnings);

@@ -159,17 +159,22 @@ std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
 class Explainer {
  public:
   /// `evidence` must outlive it.
-  Explainer(const Evidence& evidence, ExplainOptions options)
-      : evidence_(evidence), options_(std::move(options)) {}
+  Explainer(const Evidence& evidence, ExplainOptions options,
+            std::optional<Structure> believed = {})
+      : evidence_(evidence), options_(std::move(options)), believed_(std::move(believed)) {}
 
   /// The best account of this evidence.
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Explanation first = plainly_fitted(structure_of(evidence_.tracks));
+    Structure believed = evidence_.structure ? whole_of(as_robot(recording(), *evidence_.structure),
+                                                        evidence_.tracks)
+                                             : structure_of(evidence_.tracks);
+    Explanation first = plainly_fitted(believed);
     ExplainOptions options = options_;
     if (first.fitted && options.calibrate.fold_of_frame.empty())
       options.calibrate.fold_of_frame = folds_of(first.fitted->calibration);
-    return Explainer(evidence_, std::move(options)).best_beside(std::move(first));
+    return Explainer(evidence_, std::move(options), std::move(believed))
+        .best_beside(std::move(first));
   }
 
   /// The robot and the effects of one account of other evidence, fitted to this; nothing where it
@@ -325,9 +330,14 @@ class Explainer {
   [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
                                        std::optional<double> allowance = {}) const {
     const std::vector<int>& cameras = evidence_.observed.measurements.camera_of_frame;
-    Structure out = with_further_markers(
+    return whole_of(
         find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance),
-        recording(), evidence_.observed, tracks, evidence_.camera);
+        tracks);
+  }
+
+  [[nodiscard]] Structure whole_of(Structure robot, const PoseTracks& tracks) const {
+    Structure out = with_further_markers(std::move(robot), recording(), evidence_.observed, tracks,
+                                         evidence_.camera);
     lap("structure");
     return out;
   }
@@ -599,13 +609,13 @@ class Explainer {
 
   // Where another sight was begun with.
   [[nodiscard]] std::vector<Proposal> with_all_believed(const Explanation&) const {
-    std::optional<Structure> structure = proposed_structure(evidence_.tracks);
-    if (!structure) return {};
-    return {{std::move(*structure), {}}};
+    if (!believed_) return {};
+    return {{*believed_, {}}};
   }
 
   const Evidence& evidence_;
   const ExplainOptions options_;
+  const std::optional<Structure> believed_;  ///< of all that was declared and read
 };
 
 // Evidence that owns what it changed.

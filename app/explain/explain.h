@@ -38,6 +38,8 @@ struct Evidence {
   const Observed& observed;
   const PoseTracks& tracks;  ///< as the camera shows them; empty for points
   CameraModel camera;        ///< declared, or found from the motion
+  /// That the tracks alone show, where it was found already.
+  std::optional<Structure> structure = {};
 };
 
 struct ExplainOptions {

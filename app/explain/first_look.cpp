@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 
 #include "app/explain/declared.h"
+#include "app/explain/moving_camera.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/log_faults.h"
 #include "kinematics/structure/flange_log.h"
@@ -205,20 +206,24 @@ void refuse_markers_at_rest(const Recording& recording, const PoseTracks& tracks
 
 }  // namespace
 
-void require_plausible_motion(const Recording& recording, const PoseTracks& tracks,
-                              const CalibrateOptions& options) {
-  if (recording.nominal || tracks.tracks.empty() || tracks.times_s.size() < 2) return;
+std::optional<Structure> require_plausible_motion(const Recording& recording,
+                                                  const PoseTracks& tracks,
+                                                  const CalibrateOptions& options) {
+  if (recording.nominal || tracks.tracks.empty() || tracks.times_s.size() < 2) return std::nullopt;
   const JointLog& log = recording.log;
   refuse_flange_poses(log, tracks, options);
-  const auto first = structure_of(recording, tracks, log, options);
-  if (!first || is_robot(*first)) return;
-  const bool idle = first->idle_channels.size() >= kFewestIdle && !is_driven(*first);
-  const auto alone = idle ? structure_of(recording, tracks, {}, options) : std::nullopt;
-  if (alone) refuse_markers_at_rest(recording, tracks, *alone, idle_channels(*first, log));
-  if (recording.entry == RecordingEntry::kPoses) {
-    refuse_other_convention(recording, tracks, options);
+  auto first = structure_of(recording, tracks, log, options);
+  if (first && !is_robot(*first)) {
+    const bool idle = first->idle_channels.size() >= kFewestIdle && !is_driven(*first);
+    const auto alone = idle ? structure_of(recording, tracks, {}, options) : std::nullopt;
+    if (alone) refuse_markers_at_rest(recording, tracks, *alone, idle_channels(*first, log));
+    if (recording.entry == RecordingEntry::kPoses) {
+      refuse_other_convention(recording, tracks, options);
+    }
+    if (alone) refuse_other_log(recording, tracks, *alone, idle_channels(*first, log), options);
   }
-  if (alone) refuse_other_log(recording, tracks, *alone, idle_channels(*first, log), options);
+  if (moves_camera(recording)) first.reset();
+  return first;
 }
 
 }  // namespace kinescope

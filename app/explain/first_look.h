@@ -10,8 +10,10 @@ namespace kinescope {
 /// Throws undetermined, or bad_input, where the markers move as a robot's do, but not with this
 /// log (another robot's, another clock), where poses move so only in another convention
 /// (quaternions w first, inverse poses), and where no marker moves while the log's channels do. A
-/// recording with a nominal robot, and points, are passed over.
-void require_plausible_motion(const Recording& recording, const PoseTracks& tracks,
-                              const CalibrateOptions& options);
+/// recording with a nominal robot, and points, are passed over. Gives the structure that it looked
+/// at, before a fixed camera: the search is long.
+std::optional<Structure> require_plausible_motion(const Recording& recording,
+                                                  const PoseTracks& tracks,
+                                                  const CalibrateOptions& options);
 
 }  // namespace kinescope

@@ -292,7 +292,10 @@ Structure find_robot(const Recording& recording, const PoseTracks& tracks,
   structure_options.scan_time_offset = options.estimate_time_offset;
   structure_options.units = declared_units(recording);
   structure_options.allowance = allowance;
-  Structure structure = structure_from_base(recording, tracks, structure_options);
+  return as_robot(recording, structure_from_base(recording, tracks, structure_options));
+}
+
+Structure as_robot(const Recording& recording, Structure structure) {
   for (StructureDoubt& doubt : structure.doubts) {
     if (doubt.of_model) doubt.remedy = model_remedy(recording.entry, recording.camera.has_value());
   }

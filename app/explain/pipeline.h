@@ -81,6 +81,9 @@ class NothingSeen : public Error {
                                    const CalibrateOptions& options,
                                    std::optional<double> allowance = {});
 
+/// A structure that was found already, as find_robot() gives it.
+[[nodiscard]] Structure as_robot(const Recording& recording, Structure structure);
+
 /// The cameras beside the reference camera, where that stands as the start says; joint values by
 /// frame (at_common_instants()) for the frames of all cameras. One camera: nothing changes.
 void add_further_cameras(const Observed& observed, CalibrationStart& start);

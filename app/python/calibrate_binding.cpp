@@ -153,8 +153,10 @@ Calibration calibrated(const Recording& recording, const SightOptions& options) 
   require_time_overlap(recording.log, observed.measurements.times_s, "frame_times");
   const CameraModel camera = choose_camera(recording, observed.tags);
   const PoseTracks tracks = pose_tracks_from_tags(observed.tags, camera, recording.markers);
-  require_plausible_motion(recording, tracks, options.calibrate);
-  run.structure = find_robot(recording, tracks, options.calibrate);
+  std::optional<Structure> structure =
+      require_plausible_motion(recording, tracks, options.calibrate);
+  run.structure = structure ? as_robot(recording, *std::move(structure))
+                            : find_robot(recording, tracks, options.calibrate);
   require_determined(*run.structure);
   run.calibration =
       calibrate(observed.measurements, recording.markers, recording.log,
