@@ -31,6 +31,9 @@ enum class CorrectedPart {
 
 inline constexpr int kEverywhere = -1;
 
+/// Of a correction that is in proportion to a joint's value: "joint3 scale error".
+inline constexpr const char* kScaleError = "scale error";
+
 /// A parameter of the bundle that is zero where the effect is absent.
 struct Correction {
   std::string name;   ///< "joint3 backlash width"

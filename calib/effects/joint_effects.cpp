@@ -132,7 +132,7 @@ CameraEffect encoder_scale(const Suspect& s) {
   // Where no other length is known, a page printed too large says the same.
   if (!s.turns) out.candidate.check += "; size of the printed markers (a black square's edge)";
   out.candidate.record = fmt::format("move {} over a larger range", s.name);
-  out.corrections = [s](double) { return std::vector{turn(s, "scale error", "", s.value)}; };
+  out.corrections = [s](double) { return std::vector{turn(s, kScaleError, "", s.value)}; };
   return out;
 }
 

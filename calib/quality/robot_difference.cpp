@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/bundle/correction.h"
 #include "calib/quality/robot_parameters.h"
 #include "kinematics/core/error.h"
 
@@ -103,7 +104,8 @@ struct Model {
 };
 
 bool is_encoder_scale(const Parameter& parameter, const Joint& joint) {
-  return parameter.block == "effects" && parameter.name.starts_with(joint.name + " encoder_scale ");
+  return parameter.block == "effects" &&
+         parameter.name == fmt::format("{} {}", joint.name, kScaleError);
 }
 
 Model model_of(const Calibration& run) {

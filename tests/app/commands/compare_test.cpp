@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using ComparedJson = nlohmann::json;
 
+constexpr double kRatio = 0.003;
 constexpr double kZero_rad = 0.2 * std::numbers::pi / 180.0;
 
 KinematicTree compared_arm(std::size_t joints) {
@@ -64,11 +65,15 @@ class Compare : public testing::Test {
     record("moved", with_moved_zero(kZero_rad), 4);
     record("far", with_moved_zero(15.0 * kZero_rad), 6);
     record("two", compared_arm(2), 5);
+    record("geared", compared_arm(3), 8, 1.0 + kRatio);
   }
   static fs::path runs() { return truth::temporary_path("compared"); }
   static std::string of(const std::string& name) { return (runs() / (name + "_run")).string(); }
-  static void record(const std::string& name, const KinematicTree& robot, std::uint64_t seed) {
-    truth::write_world(view_of(robot, seed), runs() / name);
+  static void record(const std::string& name, const KinematicTree& robot, std::uint64_t seed,
+                     double ratio_of_q2 = 1.0) {
+    truth::World world = view_of(robot, seed);
+    world.log.values.col(1) /= ratio_of_q2;
+    truth::write_world(world, runs() / name);
     const Outcome made = run({"run", (runs() / name).string(), "-o", of(name), "--quiet"});
     ASSERT_EQ(made.code, 0) << name << ": " << made.err;
   }
@@ -126,6 +131,18 @@ TEST_F(Compare, AZeroThatMovedIsNamedWithItsSize) {
     EXPECT_LT(one.at("p_value").get<double>(), 0.05) << one;
     EXPECT_EQ(one.at("carries"), true) << one;
   }
+}
+
+// Found as an effect in the one, looked for in vain in the other.
+TEST_F(Compare, ARatioThatTracingFoundIsNamedWithItsSize) {
+  const ComparedJson found = compared({"a", "geared"});
+  EXPECT_EQ(found.at("changed"), true);
+  const ComparedJson& worst = found.at("differences")[0].at("quantities")[0];
+  EXPECT_EQ(worst.at("name"), "ratio of q2");
+  EXPECT_NEAR(worst.at("difference").get<double>(), kRatio,
+              2.0 * worst.at("expanded").get<double>());
+  for (const ComparedJson& other : found.at("differences")[0].at("quantities"))
+    EXPECT_EQ(other.at("changed"), other == worst) << other;
 }
 
 TEST_F(Compare, AModelWhoseZeroIsFarOffDoesNotCarryOver) {
