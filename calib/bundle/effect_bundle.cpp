@@ -582,6 +582,8 @@ JointMotion EffectBundle::motion_of_log(double time_offset_s) const {
       times_s.push_back(t);
     }
   }
+  // A fit may have run off with the clock.
+  if (times_s.empty()) times_s = spec.log.times_s;
   return impl_->motion(times_s,
                        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(times_s.size()),
                                              static_cast<Eigen::Index>(spec.tree.joints.size())));

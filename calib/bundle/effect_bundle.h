@@ -132,7 +132,8 @@ class EffectBundle {
   /// joints. By the frames' own times.
   [[nodiscard]] JointMotion motion_at_frames(double time_offset_s) const;
   [[nodiscard]] JointMotion motion_at_frames(const Eigen::MatrixXd& ahead_s) const;
-  /// The log's own samples, from the first to the last frame and a little beyond.
+  /// The log's own samples, from the first to the last frame and a little beyond; all of them
+  /// where none are there.
   [[nodiscard]] JointMotion motion_of_log(double time_offset_s) const;
   /// Joints that a channel drives.
   [[nodiscard]] std::vector<int> driven_joints() const;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -72,6 +73,16 @@ TEST(TraceCalibration, GravityIsToldBesideACurve) {
       model, {{{"joint_map", "q1"}, kSmoothOver, kSpread}}, {"compliance", "q2"});
   EXPECT_NEAR(told.direction.norm(), 1.0, 1e-12);
   EXPECT_GT(told.explained, 0.0);
+}
+
+// Two cameras whose clocks differ by more than the search allows led a fit there.
+TEST(EffectBundle, HasTheWholeLogForAClockThatRanOff) {
+  const World world = truth::make_world({});
+  const EffectBundle bundle(world.measurements, world.markers, world.log, start_of(world), {});
+  const double beyond_s = 1e3;
+  for (const double offset_s : {beyond_s, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_EQ(bundle.motion_of_log(offset_s).times_s.size(), world.log.size());
+  EXPECT_LE(bundle.motion_of_log(0.0).times_s.size(), world.log.size());
 }
 
 // Where another model ended, a change may begin with a marker behind the camera.
