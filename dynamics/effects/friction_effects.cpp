@@ -187,11 +187,16 @@ std::vector<EffectId> plain_friction(const EffectContext& context, std::size_t j
 
 /// Of what the model declares and the effect adds together. A Stribeck excess is positive
 /// (Armstrong-Helouvry, Dupont, Canudas de Wit 1994): less friction at low speed is sub-linear
-/// viscous friction.
+/// viscous friction. Nor is it more than the drive ever gave: a joint that moved had overcome it,
+/// and a speed below all that the log shows would make it anything.
 void forbid_driving(const EffectContext& c, std::size_t j, Candidate& out) {
   if (c.least_coulomb.size() == 0) return;
   if (out.id.effect == "stribeck") {
-    out.possible = [](const Eigen::VectorXd& theta) { return theta[0] > 0.0; };
+    const double most =
+        c.motion->samples().torque.col(static_cast<Eigen::Index>(j)).cwiseAbs().maxCoeff();
+    out.possible = [most](const Eigen::VectorXd& theta) {
+      return theta[0] > 0.0 && theta[0] <= most;
+    };
   }
   const bool viscous = out.id.effect == "viscous";
   if (!viscous && out.id.effect != "coulomb") return;
