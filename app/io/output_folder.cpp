@@ -160,6 +160,8 @@ OutputFolder::OutputFolder(fs::path folder, Writer writer)
   }
   if (!writer.force) require_own(folder_, writer);
   require_writable_folder(folder_);
+  writer.products.emplace_back(kList);
+  remove_abandoned(folder_, writer.products);
 }
 
 void OutputFolder::write(std::string_view name, std::string_view content) const {

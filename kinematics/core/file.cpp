@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/core/file.h"
 
+#include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <istream>
+#include <optional>
 
 #include <fmt/format.h>
+#include <sys/types.h>
 #include <unistd.h>
 
 #include "kinematics/core/error.h"
@@ -16,9 +21,26 @@ namespace {
 
 // Beside the target, so that the rename stays within one file system; the process id keeps two runs
 // on one folder apart.
+constexpr std::string_view kTemporary = ".tmp";
+
 fs::path temporary_beside(const fs::path& path) {
-  return path.parent_path() / fmt::format(".{}.{}.tmp", path.filename().string(), ::getpid());
+  return path.parent_path() /
+         fmt::format(".{}.{}{}", path.filename().string(), ::getpid(), kTemporary);
 }
+
+// The process that writes `name` by way of the file; nothing where it is none of such.
+std::optional<pid_t> writer_of(std::string_view file, std::string_view name) {
+  const std::string begin = fmt::format(".{}.", name);
+  if (!file.starts_with(begin) || !file.ends_with(kTemporary)) return std::nullopt;
+  if (file.size() <= begin.size() + kTemporary.size()) return std::nullopt;
+  file = file.substr(begin.size(), file.size() - begin.size() - kTemporary.size());
+  pid_t out = 0;
+  const auto [end, error] = std::from_chars(file.data(), file.data() + file.size(), out);
+  if (error != std::errc() || end != file.data() + file.size() || out <= 0) return std::nullopt;
+  return out;
+}
+
+bool is_gone(pid_t process) { return ::kill(process, 0) == -1 && errno == ESRCH; }
 
 Error too_large(const fs::path& path, std::uintmax_t bytes, std::uintmax_t max_bytes) {
   return bad_input(path.string(), fmt::format("{} bytes, more than {}", bytes, max_bytes),
@@ -104,6 +126,19 @@ void write_files_atomically(const std::vector<FileContent>& files) {
 
 void write_file_atomically(const fs::path& path, std::string_view content) {
   write_files_atomically({{path, content}});
+}
+
+void remove_abandoned(const fs::path& folder, const std::vector<std::string>& names) {
+  std::error_code error;
+  std::vector<fs::path> abandoned;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string file = entry.path().filename().string();
+    for (const std::string& name : names) {
+      const auto process = writer_of(file, name);
+      if (process && is_gone(*process)) abandoned.push_back(entry.path());
+    }
+  }
+  for (const fs::path& path : abandoned) fs::remove(path, error);
 }
 
 void require_writable_folder(const fs::path& folder) {

@@ -29,6 +29,10 @@ struct FileContent {
 /// The same of several, none of which is replaced before all are written.
 void write_files_atomically(const std::vector<FileContent>& files);
 
+/// Removes what a process that is gone (killed, or without power) left of files of these names when
+/// it was writing them.
+void remove_abandoned(const std::filesystem::path& folder, const std::vector<std::string>& names);
+
 /// Makes the folder (and its parents) and proves that a file can be made there. Throws bad_request.
 void require_writable_folder(const std::filesystem::path& folder);
 

@@ -3,8 +3,10 @@
 
 #include <fstream>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "kinematics/core/error.h"
 #include "tests/truth/temporary_path.h"
@@ -50,6 +52,24 @@ TEST_F(FileTest, WritesSeveralOrNone) {
   write_files_atomically({{folder_ / "a", "after"}, {folder_ / "c", "new"}});
   EXPECT_EQ(read_text_file(folder_ / "a"), "after");
   EXPECT_EQ(read_text_file(folder_ / "c"), "new");
+}
+
+TEST_F(FileTest, RemovesWhatAProcessThatIsGoneWasWriting) {
+  constexpr int kNoProcess = 2147483647;  // beyond the largest that Linux gives
+  const fs::path gone = folder_ / fmt::format(".a.csv.{}.tmp", kNoProcess);
+  const std::vector<fs::path> kept{
+      folder_ / fmt::format(".a.csv.{}.tmp", ::getpid()),
+      folder_ / fmt::format(".b.csv.{}.tmp", kNoProcess),
+      folder_ / ".a.csv.tmp",
+      folder_ / ".a.csv.12x.tmp",
+      folder_ / "a.csv",
+  };
+  for (const fs::path& path : kept) write_file_atomically(path, "kept");
+  write_file_atomically(gone, "half");
+  remove_abandoned(folder_, {"a.csv", "c.csv"});
+  EXPECT_FALSE(fs::exists(gone));
+  for (const fs::path& path : kept) EXPECT_TRUE(fs::exists(path)) << path;
+  EXPECT_NO_THROW(remove_abandoned(folder_ / "nowhere", {"a.csv"}));
 }
 
 TEST_F(FileTest, ReplacesNoPipe) {
