@@ -58,11 +58,11 @@ TEST_F(FileTest, RemovesWhatAProcessThatIsGoneWasWriting) {
   constexpr int kNoProcess = 2147483647;  // beyond the largest that Linux gives
   const fs::path gone = folder_ / fmt::format(".a.csv.{}.tmp", kNoProcess);
   const std::vector<fs::path> kept{
+      folder_ / "a.csv",
       folder_ / fmt::format(".a.csv.{}.tmp", ::getpid()),
       folder_ / fmt::format(".b.csv.{}.tmp", kNoProcess),
       folder_ / ".a.csv.tmp",
       folder_ / ".a.csv.12x.tmp",
-      folder_ / "a.csv",
   };
   for (const fs::path& path : kept) write_file_atomically(path, "kept");
   write_file_atomically(gone, "half");
