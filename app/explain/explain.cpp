@@ -649,7 +649,7 @@ std::string words_of(const ReadingApart& reading, const Explanation& of, const E
   const JointLog& log = evidence.recording.log;
   const double time_s = log.times_s[reading.row];
   const std::string& channel = log.channels[static_cast<std::size_t>(reading.channel)];
-  const std::string out = words_of(log, reading) + ": put aside";
+  std::string out = words_of(log, reading) + ": put aside";
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   const auto frame = std::ranges::find(times_s, time_s);
   if (frame == times_s.end()) return out;

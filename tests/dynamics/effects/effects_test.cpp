@@ -109,6 +109,23 @@ INSTANTIATE_TEST_SUITE_P(library, EveryEffect,
                                          "torque_delay", "drift", "gravity_direction"),
                          [](const auto& tested) { return tested.param; });
 
+// From a floor to a ceiling, where tilts of all directions are the same.
+TEST(TorqueEffects, GravityIsFoundWhereverTheBaseIsMounted) {
+  for (const double tilt_deg : {60.0, 120.0, 150.0, 175.0, 180.0}) {
+    SCOPED_TRACE(tilt_deg);
+    Rng rng = Rng::from_name("mounts");
+    const EffectWorld world =
+        effect_world({{"gravity_direction", 1, 2, tilt_deg}}, quiet_world(), rng);
+    const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+    const TracedFit with = model.fit({{{"gravity_direction", "base"}, 0.0}});
+    ASSERT_TRUE(with.converged) << with.reason;
+    EXPECT_NEAR(with.values.front().norm(), tilt_deg, 0.2);
+    EXPECT_TRUE(with.linear.jacobian.allFinite());
+    EXPECT_LT(model.residual_torque(with).norm(),
+              kLeft * model.residual_torque(model.fit({})).norm());
+  }
+}
+
 TEST(TorqueEffects, EveryFixedNameIsOfferedOnceAtEachPlace) {
   Rng rng = Rng::from_name("effects", 1);
   const EffectWorld world = effect_world({}, quiet_world(), rng);
