@@ -81,8 +81,9 @@ struct FitScale {
 };
 
 struct Fit {
-  double cost = 0.0;  ///< deviance with a penalty for parameters (Schwarz 1978)
-  FitScale own;       ///< of its own residual
+  double cost = 0.0;   ///< deviance with a penalty for parameters (Schwarz 1978)
+  double sigma = 0.0;  ///< of its own residual
+  FitScale by;         ///< that the cost is meant by
   SlidingFriction friction;
 };
 
@@ -145,10 +146,10 @@ std::optional<Fit> fit_friction(const Slid& slid, const SlidingFriction& shape,
   // A log without noise has rounding.
   const double least = 1e-9 * (1e-9 + slid.residual.cwiseAbs().maxCoeff());
   const double sigma = std::max(least, fit.sigma[0]);
-  Fit out{.cost = 0.0,
-          .own = {sigma, independent_samples(fit.residuals.col(0), sigma, slid.length_s)},
-          .friction = shape};
-  const FitScale by = scale.value_or(out.own);
+  const FitScale by =
+      scale ? *scale
+            : FitScale{sigma, independent_samples(fit.residuals.col(0), sigma, slid.length_s)};
+  Fit out{.cost = 0.0, .sigma = sigma, .by = by, .friction = shape};
   out.friction.offset = fit.parameters[0];
   out.friction.viscous = fit.parameters[1];
   if (both) out.friction.coulomb = fit.parameters[2];
@@ -213,7 +214,7 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
   shape.slides_backward = (slid.direction.array() < 0.0).count() >= kFewestSliding;
   if (!shape.known()) return shape;
   std::optional<Fit> best = fit_friction(slid, shape, {});
-  const FitScale scale = best->own;
+  const FitScale scale = best->by;
   const auto try_speed = [&](double SlidingFriction::* own, double speed) {
     SlidingFriction with = shape;
     with.*own = speed;
@@ -235,7 +236,7 @@ SlidingFriction friction_from(const Slid& slid, bool turns) {
                        std::log(speed / kNeighbour), std::log(speed * kNeighbour), kSpeedSteps);
     try_speed(bend, std::exp(found.at));
   }
-  best->friction.sigma = best->own.sigma;
+  best->friction.sigma = best->sigma;
   best->friction.slid_s = slid.length_s;
   best->friction.slowest_known =
       0.5 * speed_quantile(slid, std::min(0.5, kKnownAfter_s / slid.length_s));

@@ -19,10 +19,10 @@ namespace kinescope {
 namespace fs = std::filesystem;
 namespace {
 
-// Beside the target, so that the rename stays within one file system; the process id keeps two runs
-// on one folder apart.
 constexpr std::string_view kTemporary = ".tmp";
 
+// Beside the target, so that the rename stays within one file system; the process id keeps two runs
+// on one folder apart.
 fs::path temporary_beside(const fs::path& path) {
   return path.parent_path() /
          fmt::format(".{}.{}{}", path.filename().string(), ::getpid(), kTemporary);
@@ -138,7 +138,7 @@ void remove_abandoned(const fs::path& folder, const std::vector<std::string>& na
       if (process && is_gone(*process)) abandoned.push_back(entry.path());
     }
   }
-  for (const fs::path& path : abandoned) fs::remove(path, error);
+  remove_all(abandoned);
 }
 
 void require_writable_folder(const fs::path& folder) {
