@@ -108,20 +108,6 @@ std::size_t parts_of(const Explanation& of) {
   return of.start.tree.joints.size() + told_by_none + of.fitted->trace.accepted.size();
 }
 
-// What tracing says of a robot whose geometry is better held than free: nothing but noise, or that
-// it bent a geometry that so few postures do not bear.
-Trace without_effects(const Trace& traced, const FreedomLevel& exported) {
-  if (traced.verdict == TraceVerdict::kClean || traced.verdict == TraceVerdict::kNotRun)
-    return traced;
-  Trace out;
-  out.verdict = TraceVerdict::kNothingToSay;
-  out.reason = fmt::format(
-      "effects are looked for beside a free geometry, and unseen postures are predicted better "
-      "with the robot {}: too few postures, or too much alike",
-      words_of(exported));
-  return out;
-}
-
 // Which frames it had unseen together: those are what its rivals are to predict, too. Cuts of the
 // space of their own joints leave out other frames, and are worth as much as an effect (80 of log
 // odds: `undeclared`, 10097).
@@ -233,8 +219,8 @@ class Explainer {
                      options, options_.progress);
   }
 
-  // How much of a nominal robot is free: all levels are rivals, and effects stand beside the
-  // freest.
+  // How much of a nominal robot is free: all levels are rivals. Effects are looked for beside the
+  // freest, and beside the one that predicts best without any.
   void fit_levels(Explanation& out) const {
     using enum FreeGeometry;
     const Measurements& measurements = evidence_.observed.measurements;
@@ -244,33 +230,42 @@ class Explainer {
     for (const FreeGeometry free : kLevels) plain.push_back(calibrated(out.start, free));
     for (std::size_t k = 0; k < plain.size(); ++k) fits.push_back({kLevels[k], 0, &plain[k]});
     lap("calibrate");
-    const auto traced = static_cast<std::size_t>(options_.free.value_or(kGeometry));
-    TracedCalibration whole = closed_loop(out.start, kLevels[traced], plain[traced], {});
-    std::size_t exported = traced;
-    if (!whole.effects.empty()) {
-      exported = fits.size();
-      fits.push_back({kLevels[traced], static_cast<int>(whole.effects.size()), &whole.calibration});
+    std::set<std::size_t> levels = {static_cast<std::size_t>(options_.free.value_or(kGeometry))};
+    if (!options_.free) levels.insert(best_level(fits, measurements));
+    struct TracedLevel {
+      std::size_t row;  // of `fits`
+      TracedCalibration whole;
+    };
+    std::vector<TracedLevel> traced;
+    traced.reserve(levels.size());
+    std::vector<LevelFit> rivals;
+    for (const std::size_t level : levels) {
+      traced.push_back({level, closed_loop(out.start, kLevels[level], plain[level], {})});
+      auto& [row, whole] = traced.back();
+      if (!whole.effects.empty()) {
+        row = fits.size();
+        fits.push_back(
+            {kLevels[level], static_cast<int>(whole.effects.size()), &whole.calibration});
+      }
+      rivals.push_back(fits[row]);
     }
-    if (!options_.free) {
-      const std::size_t best = best_level({fits[0], fits[1], fits[exported]}, measurements);
-      if (best < traced) exported = best;
-    }
-    out.levels = compare_levels(fits, exported, measurements);
-    if (exported >= traced) {
-      out.fitted = std::move(whole);
-    } else {
-      out.fitted = TracedCalibration{without_effects(whole.trace, out.levels[exported]),
-                                     std::move(plain[exported]),
-                                     {},
-                                     {},
-                                     0.0};
-    }
+    TracedLevel& best = traced[best_level(rivals, measurements)];
+    out.levels = compare_levels(fits, best.row, measurements);
+    out.fitted = std::move(best.whole);
   }
 
   [[nodiscard]] TracedCalibration closed_loop(const CalibrationStart& start, FreeGeometry free,
                                               const Calibration& plain,
                                               const TraceStart& begin) const {
     if (!options_.trace) return {{}, plain, {}, {}, 0.0};
+    if (options_.free && free != FreeGeometry::kGeometry) {
+      TracedCalibration out{{}, plain, {}, {}, 0.0};
+      out.trace.verdict = TraceVerdict::kNothingToSay;
+      out.trace.reason =
+          "the robot's geometry is held as declared, and its errors cannot be told from effects: "
+          "trace with --free geometry";
+      return out;
+    }
     CalibrateOptions options = options_.calibrate;
     options.free = free;
     TracedCalibration out = trace_stage(recording(), evidence_.observed, start, plain, begin,

@@ -69,14 +69,6 @@ TracedCalibration trace_stage(const Recording& recording, const Observed& observ
                               const CalibrationStart& start, const Calibration& plain,
                               const TraceStart& begin, const CalibrateOptions& options,
                               const Progress& progress) {
-  if (options.free != FreeGeometry::kGeometry) {
-    TracedCalibration out{{}, plain, {}, {}, 0.0};
-    out.trace.verdict = TraceVerdict::kNothingToSay;
-    out.trace.reason =
-        "the robot's geometry is held as declared, and its errors cannot be told from effects: "
-        "trace with --free geometry";
-    return out;
-  }
   if (start.tree.joints.empty()) {
     TracedCalibration out{{}, plain, {}, {}, 0.0};
     out.trace.verdict = TraceVerdict::kNothingToSay;

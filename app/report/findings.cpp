@@ -375,6 +375,10 @@ std::vector<std::string> fault_sentences(const KinematicTree& nominal,
                                joint.name, joint.type == JointType::kRevolute ? "about" : "along",
                                direction_words(*fault.axis), direction_words(joint.axis)),
                    fault));
+    } else if (fault.zero) {
+      out.push_back(taken_so(fmt::format("The zero of {} is {} from where the nominal robot has it",
+                                         joint.name, text_with_unit(*fault.zero, Quantity::kAngle)),
+                             fault));
     } else if (fault.exchanged_with) {
       out.push_back(taken_so(fmt::format("The channels of {} and {} are exchanged", joint.name,
                                          joint_of(*fault.exchanged_with).name),

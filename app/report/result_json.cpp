@@ -266,6 +266,7 @@ json nominal_faults_json(const RunSummary& run) {
          {"axis", fault.axis ? vector3(*fault.axis) : json(nullptr)},
          {"exchanged_with", fault.exchanged_with ? name(*fault.exchanged_with) : json(nullptr)},
          {"unit", fault.unit ? number(*fault.unit) : json(nullptr)},
+         {"zero_rad", fault.zero ? number(*fault.zero) : json(nullptr)},
          {"marker", fault.marker.value},
          {"typical_error_with_it", error_json(fault.before)},
          {"typical_error_without", error_json(fault.after)}});

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -115,9 +116,14 @@ Gain gain(const Errors& from, const Errors& to) {
   return out;
 }
 
+Pose turn_about(const Eigen::Vector3d& axis, double angle) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), Eigen::Vector3d::Zero()};
+}
+
 void mend(const NominalFault& fault, KinematicTree& tree) {
   Joint& joint = tree.joints[static_cast<std::size_t>(fault.joint)];
   if (fault.axis) joint.axis = *fault.axis;
+  if (fault.zero) joint.T_parent_joint = joint.T_parent_joint * turn_about(joint.axis, *fault.zero);
   if (fault.unit) joint.scale *= *fault.unit;
   if (fault.exchanged_with) {
     Joint& other = tree.joints[static_cast<std::size_t>(*fault.exchanged_with)];
@@ -162,21 +168,38 @@ std::vector<NominalFault> other_units(const KinematicTree& tree, JointType type)
   return out;
 }
 
+constexpr double kTurn = 2.0 * std::numbers::pi;
+// A zero that is up to half a step away is found by the fit itself.
+constexpr int kZeros = 8;  // in a turn
+
+bool can_be_turned(const Joint& joint) {
+  return is_driven(joint) && joint.type == JointType::kRevolute;
+}
+
+// Plainer ones first: a zero that is a quarter turn off looks like an axis before it that points
+// elsewhere.
 std::vector<NominalFault> possible_faults(const KinematicTree& tree,
-                                          const std::vector<NominalFault>& known) {
+                                          const std::vector<NominalFault>& known, bool zeros) {
   std::vector<NominalFault> out;
   const int joints = static_cast<int>(tree.joints.size());
-  const auto is_known = [&](int j, bool unit) {
+  const auto is_known = [&](int j, const auto& has) {
     return std::ranges::any_of(known, [&](const NominalFault& fault) {
-      return fault.unit.has_value() == unit && (fault.joint == j || fault.exchanged_with == j);
+      return has(fault) && (fault.joint == j || fault.exchanged_with == j);
     });
   };
+  const auto has_unit = [](const NominalFault& fault) { return fault.unit.has_value(); };
+  const auto has_zero = [](const NominalFault& fault) { return fault.zero.has_value(); };
+  const auto has_other = [](const NominalFault& fault) { return !fault.unit && !fault.zero; };
   const auto is_open = [&](int j) {
-    return is_driven(tree.joints[static_cast<std::size_t>(j)]) && !is_known(j, false);
+    return is_driven(tree.joints[static_cast<std::size_t>(j)]) && !is_known(j, has_other);
   };
+  for (int j = 0; j < joints && zeros; ++j) {
+    if (!can_be_turned(tree.joints[static_cast<std::size_t>(j)]) || is_known(j, has_zero)) continue;
+    for (int k = 1; k < kZeros; ++k) out.push_back({.joint = j, .zero = kTurn * k / kZeros});
+  }
   for (int j = 0; j < joints; ++j) {
     const Joint& joint = tree.joints[static_cast<std::size_t>(j)];
-    if (is_driven(joint) && !is_known(j, true))
+    if (is_driven(joint) && !is_known(j, has_unit))
       out.push_back({.joint = j, .unit = other_unit(joint.type)});
     if (!is_open(j)) continue;
     for (const Eigen::Vector3d& axis : other_directions(joint.axis))
@@ -202,6 +225,35 @@ struct Trial {
   CalibrationStart start;
   Errors errors;
 };
+
+// How far a joint's frame was turned about its axis, of the whole turn nearest to none.
+double turn_between(const Joint& from, const Joint& to) {
+  const Eigen::Quaterniond q = (from.T_parent_joint.inverse() * to.T_parent_joint).rotation;
+  return std::remainder(2.0 * std::atan2(q.vec().dot(from.axis), q.w()), kTurn);
+}
+
+// The faults with the zeros where a fit puts them that frees nothing else of the robot.
+std::vector<NominalFault> with_fitted_zeros(const std::vector<NominalFault>& faults,
+                                            const KinematicTree& start,
+                                            const KinematicTree& fitted) {
+  std::vector<NominalFault> out;
+  std::vector<double> zeros(start.joints.size(), 0.0);
+  for (const NominalFault& fault : faults) {
+    if (fault.zero) {
+      zeros[static_cast<std::size_t>(fault.joint)] = *fault.zero;
+    } else {
+      out.push_back(fault);
+    }
+  }
+  for (std::size_t j = 0; j < zeros.size(); ++j) {
+    if (!can_be_turned(start.joints[j])) continue;
+    const double zero =
+        std::remainder(zeros[j] + turn_between(start.joints[j], fitted.joints[j]), kTurn);
+    if (std::abs(zero) > 0.5 * kTurn / kZeros)
+      out.push_back({.joint = static_cast<int>(j), .zero = zero});
+  }
+  return out;
+}
 
 std::string length_words(double length, bool px) {
   return px ? fmt::format("{:.0f} px", length) : fmt::format("{:.1f} mm", 1e3 * length);
@@ -252,12 +304,21 @@ std::map<TagId, double> typical_noise(const Measurements& measurements) {
   return out;
 }
 
+constexpr double kNoise = 5.0;  // times the declared one: the robot misses a marker
+
+double length_of(const TypicalError& error) { return error.px > 0.0 ? error.px : error.m; }
+
+bool misses_a_marker(const Errors& errors, const Measurements& measurements) {
+  const std::map<TagId, double> noise = typical_noise(measurements);
+  return std::ranges::any_of(
+      errors, [&](const auto& of) { return length_of(of.second) > kNoise * noise.at(of.first); });
+}
+
 // A marker that the robot moves far and yet misses by a share of that: no drawing's inaccuracy, but
 // another robot, other columns or other units.
 void require_fit(const Errors& errors, const Measurements& measurements) {
   constexpr double kGross = 0.2;  // of its motion
   constexpr double kFar = 0.2;    // of the motion of the marker that moves most
-  constexpr double kNoise = 5.0;  // times the declared one
   const std::map<TagId, double> motions = typical_motions(measurements);
   const std::map<TagId, double> noise = typical_noise(measurements);
   double most = 0.0;
@@ -265,9 +326,9 @@ void require_fit(const Errors& errors, const Measurements& measurements) {
   for (const auto& [id, motion] : motions) {
     const auto error = errors.find(id);
     if (error == errors.end() || motion < kFar * most) continue;
-    const bool corners = error->second.px > 0.0;
-    const double missed = corners ? error->second.px : error->second.m;
+    const double missed = length_of(error->second);
     if (missed < std::max(kGross * motion, kNoise * noise.at(id))) continue;
+    const bool corners = error->second.px > 0.0;
     throw undetermined(
         "nominal robot",
         fmt::format("it does not fit with these columns: tag_{} is typically {} from where it "
@@ -278,74 +339,130 @@ void require_fit(const Errors& errors, const Measurements& measurements) {
   }
 }
 
+using Faults = std::vector<NominalFault>;
+
+Faults with(Faults faults, const NominalFault& another) {
+  faults.push_back(another);
+  return faults;
+}
+
+class FaultSearch {
+ public:
+  FaultSearch(const KinematicTree& nominal,
+              const std::function<CalibrationStart(const KinematicTree&)>& place,
+              const Measurements& measurements, const MarkerSet& markers, const JointLog& log)
+      : nominal_(nominal),
+        place_(place),
+        few_(few_of(measurements)),
+        markers_(markers),
+        log_(log),
+        now_(try_out({})) {}
+
+  CheckedNominal result() {
+    change_units();
+    if (!now_) return {place_(nominal_), {}};
+    // Beside another fault the first one found may help little.
+    for (std::size_t most = faults_.size() + kMostFaults; faults_.size() < most;) {
+      if (!add_best()) break;
+    }
+    fit_zeros();
+    drop_useless();
+    require_fit(now_->errors, few_);
+    return {std::move(now_->start), std::move(faults_)};
+  }
+
+ private:
+  [[nodiscard]] std::optional<Trial> try_out(const Faults& faults) const {
+    KinematicTree tree = nominal_;
+    for (const NominalFault& fault : faults) mend(fault, tree);
+    try {
+      Trial trial{place_(tree), {}};
+      trial.errors = typical_errors(calibrate(few_, markers_, log_, trial.start, quick_options()));
+      return trial;
+    } catch (const Error&) {  // cannot be placed: no answer
+      return std::nullopt;
+    }
+  }
+
+  void change_units() {
+    for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
+      Faults more = faults_;
+      std::ranges::copy(other_units(nominal_, type), std::back_inserter(more));
+      std::optional<Trial> trial = more.size() > faults_.size() ? try_out(more) : std::nullopt;
+      if (!trial || (now_ && gain(now_->errors, trial->errors).mean < kBetter)) continue;
+      faults_ = std::move(more);
+      now_ = std::move(trial);
+    }
+  }
+
+  bool add_best() {
+    std::optional<NominalFault> best;
+    std::optional<Trial> best_trial;
+    const bool zeros = misses_a_marker(now_->errors, few_);
+    for (const NominalFault& fault : possible_faults(nominal_, faults_, zeros)) {
+      std::optional<Trial> trial = try_out(with(faults_, fault));
+      const double least = best && best->zero && !fault.zero ? kNoticeable : 1.0;
+      if (!trial || gain((best_trial ? *best_trial : *now_).errors, trial->errors).mean <= least)
+        continue;
+      best = fault;
+      best_trial = std::move(trial);
+    }
+    if (!best) return false;
+    const Gain won = gain(now_->errors, best_trial->errors);
+    if (won.mean < kNoticeable && won.largest < kBetter) return false;
+    faults_.push_back(*best);
+    now_ = std::move(best_trial);
+    return true;
+  }
+
+  void fit_zeros() {
+    if (std::ranges::none_of(faults_, [](const auto& fault) { return fault.zero.has_value(); }))
+      return;
+    CalibrateOptions options = quick_options();
+    options.free = FreeGeometry::kOffsets;
+    const Calibration fitted = calibrate(few_, markers_, log_, now_->start, options);
+    Faults others = with_fitted_zeros(faults_, now_->start.tree, fitted.tree);
+    std::optional<Trial> trial = try_out(others);
+    if (!trial || gain(trial->errors, now_->errors).mean > kNoticeable) return;
+    faults_ = std::move(others);
+    now_ = std::move(trial);
+  }
+
+  // With all in, each must be worth it.
+  void drop_useless() {
+    for (std::size_t i = faults_.size(); i-- > 0;) {
+      Faults others = faults_;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      std::optional<Trial> without = try_out(others);
+      if (!without) continue;
+      const Gain won = gain(without->errors, now_->errors);
+      if (won.largest >= kBetter) {
+        faults_[i].marker = won.marker;
+        faults_[i].before = without->errors.at(won.marker);
+        faults_[i].after = now_->errors.at(won.marker);
+        continue;
+      }
+      faults_ = std::move(others);
+      now_ = std::move(without);
+    }
+  }
+
+  const KinematicTree& nominal_;
+  const std::function<CalibrationStart(const KinematicTree&)>& place_;
+  Measurements few_;
+  const MarkerSet& markers_;
+  const JointLog& log_;
+  Faults faults_;
+  std::optional<Trial> now_;  // with these faults mended
+};
+
 }  // namespace
 
 CheckedNominal check_nominal(const KinematicTree& nominal,
                              const std::function<CalibrationStart(const KinematicTree&)>& place,
                              const Measurements& measurements, const MarkerSet& markers,
                              const JointLog& log) {
-  const Measurements few = few_of(measurements);
-  const CalibrateOptions options = quick_options();
-  const auto try_out = [&](const std::vector<NominalFault>& faults) -> std::optional<Trial> {
-    KinematicTree tree = nominal;
-    for (const NominalFault& fault : faults) mend(fault, tree);
-    try {
-      Trial trial{place(tree), {}};
-      trial.errors = typical_errors(calibrate(few, markers, log, trial.start, options));
-      return trial;
-    } catch (const Error&) {  // cannot be placed: no answer
-      return std::nullopt;
-    }
-  };
-  std::vector<NominalFault> faults;
-  std::optional<Trial> now = try_out(faults);
-  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
-    std::vector<NominalFault> more = faults;
-    std::ranges::copy(other_units(nominal, type), std::back_inserter(more));
-    std::optional<Trial> trial = more.size() > faults.size() ? try_out(more) : std::nullopt;
-    if (!trial || (now && gain(now->errors, trial->errors).mean < kBetter)) continue;
-    faults = std::move(more);
-    now = std::move(trial);
-  }
-  if (!now) return {place(nominal), {}};
-  const std::size_t most = faults.size() + kMostFaults;
-  // Beside another fault the first one found may help little.
-  while (faults.size() < most) {
-    std::optional<NominalFault> best;
-    std::optional<Trial> best_trial;
-    for (const NominalFault& fault : possible_faults(nominal, faults)) {
-      std::vector<NominalFault> more = faults;
-      more.push_back(fault);
-      std::optional<Trial> trial = try_out(more);
-      if (!trial || gain((best_trial ? *best_trial : *now).errors, trial->errors).mean <= 1.0)
-        continue;
-      best = fault;
-      best_trial = std::move(trial);
-    }
-    if (!best) break;
-    const Gain won = gain(now->errors, best_trial->errors);
-    if (won.mean < kNoticeable && won.largest < kBetter) break;
-    faults.push_back(*best);
-    now = std::move(best_trial);
-  }
-  // With all in, each must be worth it.
-  for (std::size_t i = faults.size(); i-- > 0;) {
-    std::vector<NominalFault> others = faults;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    std::optional<Trial> without = try_out(others);
-    if (!without) continue;
-    const Gain won = gain(without->errors, now->errors);
-    if (won.largest >= kBetter) {
-      faults[i].marker = won.marker;
-      faults[i].before = without->errors.at(won.marker);
-      faults[i].after = now->errors.at(won.marker);
-      continue;
-    }
-    faults = std::move(others);
-    now = std::move(without);
-  }
-  require_fit(now->errors, few);
-  return {std::move(now->start), std::move(faults)};
+  return FaultSearch(nominal, place, measurements, markers, log).result();
 }
 
 }  // namespace kinescope

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a nominal robot and what was measured of the real one.
-// Gives   what of the drawing and its columns is grossly wrong: axes that point elsewhere, channels
-//         exchanged, columns in degrees or mm; and the drawing without that.
+// Gives   what of the drawing and its columns is grossly wrong: axes that point elsewhere, zeros that
+//         are far off, channels exchanged, columns in degrees or mm; and the drawing without that.
 // Method  the columns of all joints of a type are tried in the other unit, every joint with each of
-//         the other five directions of its frame and in the other unit, and every two channels are
-//         exchanged; the markers are placed anew and the robot fitted on few frames. The best is
+//         the other five directions of its frame and in the other unit, every two channels are
+//         exchanged, and where a marker is missed every zero is turned by eighths of a turn; the
+//         markers are placed anew and the robot fitted on few frames. The best is
 //         taken, then the best beside it, until nothing helps; what does not cut the typical error
 //         of any marker by half, with all the others in, is left out again.
 // Why     a fit with a prior cannot leave a wrong axis, a robust loss hides it, and tracing names
@@ -32,6 +33,7 @@ struct NominalFault {
   std::optional<Eigen::Vector3d> axis = {};  ///< the direction it moves along or about, joint frame
   std::optional<int> exchanged_with = {};    ///< another joint, whose channel drives this one
   std::optional<double> unit = {};           ///< of its column, rad or m
+  std::optional<double> zero = {};           ///< where it really is, of a revolute joint; rad
   TagId marker = {};                         ///< the one that it concerns most
   TypicalError before = {};                  ///< of that one, with this fault alone
   TypicalError after = {};                   ///< with none

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/quality/freedom_levels.h"
 
+#include <array>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -63,16 +65,11 @@ std::vector<FreedomLevel> compare_levels(const std::vector<LevelFit>& fits, std:
 }
 
 std::string words_of(const FreedomLevel& level) {
-  switch (level.free) {
-    case FreeGeometry::kPlacement:
-      return "only placed";
-    case FreeGeometry::kOffsets:
-      return "joint zeros free";
-    case FreeGeometry::kGeometry:
-      break;
-  }
-  if (level.effects == 0) return "geometry free";
-  return fmt::format("geometry free and {} effect{}", level.effects, level.effects == 1 ? "" : "s");
+  constexpr std::array<std::string_view, 3> kFree = {"only placed", "joint zeros free",
+                                                     "geometry free"};
+  const std::string_view free = kFree[static_cast<std::size_t>(level.free)];
+  if (level.effects == 0) return std::string(free);
+  return fmt::format("{} and {} effect{}", free, level.effects, level.effects == 1 ? "" : "s");
 }
 
 }  // namespace kinescope

@@ -206,7 +206,9 @@ CheckedNominal check(const Lab& lab, const Measurements& measurements) {
       values.col(static_cast<Eigen::Index>(j)) =
           lab.values.col(value_of(lab.log.channel(tree.joints[j].channel)));
     }
-    const Placement placement = place_markers(tree, values, measurements.poses);
+    const Placement placement = measurements.poses.tracks.empty()
+                                    ? place_points(tree, values, measurements.points)
+                                    : place_markers(tree, values, measurements.poses);
     CalibrationStart start;
     start.tree = tree;
     start.tree.markers = placement.markers;
@@ -243,6 +245,36 @@ TEST(CheckNominal, FindsExchangedChannels) {
   EXPECT_EQ(checked.faults[0].joint, 1);
   EXPECT_EQ(checked.faults[0].exchanged_with, 4);
   EXPECT_EQ(checked.start.tree.joints[1].channel, "j2");
+}
+
+/// Of a ball on the flange.
+Measurements tracked_points(const Lab& lab, double sigma_m) {
+  Rng rng = Rng::from_name("tracker noise");
+  const Eigen::Vector3d ball(0.05, -0.02, 0.1);
+  Measurements measurements;
+  measurements.times_s = measurements.points.times_s = lab.times_s;
+  for (int f = 0; f < kLabPostures; ++f) {
+    const Eigen::Vector3d seen =
+        lab.T_tracker_base * (flange(lab, f) * ball) + rng.normal3(sigma_m);
+    measurements.points.observations.push_back({f, TagId{1}, seen, "", sigma_m});
+  }
+  return measurements;
+}
+
+// Poses lead a fit to far zeros by themselves; a point does not.
+TEST(CheckNominal, FindsZerosThatAreFarOff) {
+  for (const double off : {0.7, -1.3, 3.0}) {
+    Lab lab = make_lab("far off", 0.02, 0.003);
+    const Measurements measurements = tracked_points(lab, 1e-4);
+    Pose& frame = lab.nominal.joints[2].T_parent_joint;
+    frame = frame * Pose{Eigen::Quaterniond(Eigen::AngleAxisd(off, Eigen::Vector3d::UnitZ())),
+                         Eigen::Vector3d::Zero()};
+    const CheckedNominal checked = check(lab, measurements);
+    ASSERT_EQ(checked.faults.size(), 1U) << off;
+    EXPECT_EQ(checked.faults[0].joint, 2) << off;
+    ASSERT_TRUE(checked.faults[0].zero) << off;
+    EXPECT_NEAR(*checked.faults[0].zero, -off, 0.06);
+  }
 }
 
 TEST(CheckNominal, LeavesARobotAloneThatIsOnlyInaccurate) {
@@ -346,15 +378,7 @@ TEST(Nominal, AJointThatMovesInOnePostureStandsStill) {
 TEST(Nominal, PointsOfATracker) {
   constexpr double kSigma = 5e-5;
   const Lab lab = make_lab("tracker points", 0.01, 0.002);
-  Rng rng = Rng::from_name("tracker noise");
-  const Eigen::Vector3d ball(0.05, -0.02, 0.1);
-  Measurements measurements;
-  measurements.times_s = lab.times_s;
-  measurements.points.times_s = lab.times_s;
-  for (int f = 0; f < kLabPostures; ++f) {
-    const Eigen::Vector3d seen = lab.T_tracker_base * (flange(lab, f) * ball) + rng.normal3(kSigma);
-    measurements.points.observations.push_back({f, TagId{1}, seen, "", kSigma});
-  }
+  const Measurements measurements = tracked_points(lab, kSigma);
   const Placement placement = place_points(lab.nominal, lab.values, measurements.points);
   EXPECT_EQ(placement.markers.at(0).link, LinkId{6});
   const Calibration before = run(lab, measurements, placement, FreeGeometry::kPlacement);
