@@ -15,6 +15,15 @@
 
 namespace kinescope {
 
+namespace bundle {
+
+// A marker on an inner link misses by the motion of the joints behind that link, which is large;
+// errors of the nominal robot alone can make an inner link fit a little better. So the outermost
+// link stays unless another one's misfit is below this share of its own.
+inline constexpr double kClearlyBetter = 0.8;
+
+}  // namespace bundle
+
 struct Placement {
   Pose T_camera_base;
   std::vector<Marker> markers;
@@ -26,8 +35,8 @@ struct Placement {
                                       const Eigen::MatrixXd& joint_values,
                                       const PoseTracks& tracks);
 
-/// The same for points. Points held in targets (no measured place) leave T_camera_base at the
-/// identity.
+/// The same for points; where there are several, one may be on the base. Points held in targets (no
+/// measured place) leave T_camera_base at the identity.
 [[nodiscard]] Placement place_points(const KinematicTree& nominal,
                                      const Eigen::MatrixXd& joint_values,
                                      const PointObservations& points);

@@ -387,6 +387,24 @@ TEST(Nominal, PointsOfATracker) {
   EXPECT_LT(after.held_out_rms, 1.5 * kDistance * kSigma);
 }
 
+// A point that rests fits any base best.
+TEST(Nominal, APointOnTheBaseIsPlacedByTheOthers) {
+  const Lab lab = make_lab("a point on the base", 0.01, 0.002);
+  Measurements measurements = tracked_points(lab, 5e-5);
+  Rng rng = Rng::from_name("resting");
+  const Eigen::Vector3d resting(0.3, 0.2, 0.0);
+  for (int f = 0; f < kLabPostures; ++f) {
+    measurements.points.observations.push_back(
+        {f, TagId{0}, lab.T_tracker_base * resting + rng.normal3(1e-6), "", 1e-6});
+  }
+  const Placement placement = place_points(lab.nominal, lab.values, measurements.points);
+  ASSERT_EQ(placement.markers.size(), 2U);
+  EXPECT_EQ(placement.markers[0].link, LinkId{0});
+  EXPECT_EQ(placement.markers[1].link, LinkId{6});
+  EXPECT_LT((placement.markers[0].T_link_marker.translation - resting).norm(), 0.02);
+  EXPECT_LT(log_pose(placement.T_camera_base.inverse() * lab.T_tracker_base).norm(), 0.05);
+}
+
 // A point has no turn: nothing is known of it, and all else as before.
 TEST(Nominal, WhatMovesNoMeasurementHasNoUncertainty) {
   const Lab lab = make_lab("a turn of a point", 0.01, 0.002);
