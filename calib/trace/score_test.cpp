@@ -168,6 +168,14 @@ PooledNoise noise_elsewhere(const NormalSystem& system, const Projected& p,
   return {squares / directions, seen - 1.0};
 }
 
+// A prior is an observation of its own. Of an effect that the model can imitate it alone says how
+// far the model may go: no stretch disagrees about that, and yet it is no better known.
+Eigen::MatrixXd scatter_of_prior(const NormalSystem& system, const Projected& p) {
+  const Eigen::MatrixXd& prior = system.linear().prior;
+  if (prior.size() == 0) return Eigen::MatrixXd::Zero(p.theta.size(), p.theta.size());
+  return p.S_inverse * (p.B.transpose() * prior * p.B) * p.S_inverse;
+}
+
 void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
            const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
            Score& out) {
@@ -264,7 +272,8 @@ Score score_test(const NormalSystem& system, const std::vector<EffectColumn>& co
   const auto count = static_cast<double>(system.partition().stretches);
   const Eigen::MatrixXd meat = stretches.scores * stretches.scores.transpose();
   judge(system, p, stretches,
-        p.S_inverse * meat * p.S_inverse * (system.partition().widening * count / (count - 1.0)),
+        p.S_inverse * meat * p.S_inverse * (system.partition().widening * count / (count - 1.0)) +
+            scatter_of_prior(system, p),
         columns, out);
   return out;
 }
@@ -276,7 +285,8 @@ Score jackknife_test(const NormalSystem& system, const std::vector<EffectColumn>
   const std::vector<EffectSums> raw = system.stretch_sums(columns);
   std::vector<EffectSums> shown;
   for (const EffectSums& stretch : raw) shown.push_back(combine(stretch, p.T));
-  const Eigen::MatrixXd covariance = leave_out(system, shown, p.theta.size());
+  const Eigen::MatrixXd covariance =
+      leave_out(system, shown, p.theta.size()) + scatter_of_prior(system, p);
   judge(system, p, stretch_scores(system, p, raw), covariance, columns, out);
   return out;
 }
