@@ -38,7 +38,7 @@ struct EffectWorld {
   std::map<int, Eigen::Vector2d> bends;
   /// Of joints with play, how far ahead of its drive the link begins, rad or m.
   std::map<int, double> play_starts;
-  JointMotion log;                              ///< finer in time; empty for postures
+  JointMotion log;                              ///< finer in time; postures: in order
   std::map<int, UnsteadyReading> unsteady;      ///< joints whose reading in the log jumps
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   double first_s = 0.0;                         ///< of the frames

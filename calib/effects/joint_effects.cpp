@@ -212,6 +212,7 @@ CameraEffect gear_error(const Suspect& s) {
   return out;
 }
 
+// At postures the last one tells from which side a joint came.
 CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
   CameraEffect out =
       effect(s, "backlash", fmt::format("{} has play", s.name), {{"width", s.unit}}, s.unit);
@@ -473,8 +474,8 @@ std::vector<CameraEffect> joint_effects(const EffectWorld& world) {
     if (CameraEffect gear = gear_error(s); world.known || !gear.candidate.scan.empty()) {
       out.push_back(std::move(gear));
     }
+    out.push_back(backlash(world, s));
     if (!world.postures) {
-      out.push_back(backlash(world, s));
       if (const auto reading = world.unsteady.find(joint); reading != world.unsteady.end())
         out.push_back(unsteady(world, s, reading->second));
     }

@@ -384,7 +384,7 @@ EffectWorld TracedBundle::world_at(const Eigen::MatrixXd& ahead_s) const {
   if (world.of_recordings) world.seen_by = bundle_->cameras_of_markers();
   world.frames = bundle_->motion_at_frames(ahead_s);
   world.loaded = world.frames;
-  if (!world.postures) world.log = bundle_->motion_of_log(ahead_s.mean());
+  world.log = bundle_->motion_of_log(world.postures ? 0.0 : ahead_s.mean());
   world.unsteady = unsteady_;
   world.gravity_base = options_.gravity_base;
   world.clock_free = options_.calibrate.estimate_time_offset;
