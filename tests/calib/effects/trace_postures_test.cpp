@@ -146,5 +146,23 @@ TEST(TracePostures, WithoutCommandsAnEarlyReadingIsNotUndone) {
   EXPECT_THROW((void)corrected_log(world.log, world.tree, found.effects, std::nullopt), Error);
 }
 
+// A joint with play stands short of its reading, on the side that it came from.
+TEST(TracePostures, TheOrderOfPosturesTellsFromWhichSideAJointCame) {
+  constexpr double kWidth = 0.004;  // rad
+  const World clean = tracked(truth::RobotKind::kScara, 100, {});
+  World world = clean;
+  for (Eigen::Index i = 0; i < world.log.values.rows(); ++i) {
+    const double from = i > 0 ? clean.log.values(i - 1, 1) : clean.log.values(i, 1) - kWidth;
+    world.log.values(i, 1) += std::copysign(0.5 * kWidth, clean.log.values(i, 1) - from);
+  }
+  const CalibrationTrace found = trace_of(world);
+  EXPECT_EQ(found.trace.verdict, TraceVerdict::kEffects) << answer(found.trace);
+  ASSERT_EQ(found.trace.accepted.size(), 1U) << answer(found.trace);
+  EXPECT_EQ(found.trace.accepted.front().id, (EffectId{"backlash", "q2"}));
+  EXPECT_TRUE(size_is_right(found.trace.accepted.front(), kWidth));
+  const CorrectedLog corrected = corrected_log(world.log, world.tree, found.effects, std::nullopt);
+  EXPECT_LT((corrected.log.values - clean.log.values).cwiseAbs().maxCoeff(), 0.1 * kWidth);
+}
+
 }  // namespace
 }  // namespace kinescope
