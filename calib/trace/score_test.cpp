@@ -29,6 +29,21 @@ Eigen::MatrixXd shown_directions(const EffectSums& sums, const Eigen::MatrixXd& 
   return scale.asDiagonal() * eigen.vectors.rightCols(S.rows() - first);
 }
 
+// Of directions T those that the data tell from the model's own parameters, and not the prior of
+// these alone: about that no stretch disagrees, and yet it is no better known. `S_prior`: of S what
+// the prior gives.
+Eigen::MatrixXd told_by_data(const Eigen::MatrixXd& T, const Eigen::MatrixXd& S,
+                             const Eigen::MatrixXd& S_prior) {
+  constexpr double kHalf = 0.5;
+  const SymmetricEigen own = symmetric_eigen(T.transpose() * S * T);
+  const Eigen::MatrixXd white =
+      T * own.vectors * own.values.cwiseMax(1e-300).cwiseInverse().cwiseSqrt().asDiagonal();
+  const SymmetricEigen share = symmetric_eigen(white.transpose() * S_prior * white);
+  Eigen::Index told = 0;
+  while (told < share.values.size() && share.values[told] < kHalf) ++told;
+  return told == T.cols() ? T : Eigen::MatrixXd(white * share.vectors.leftCols(told));
+}
+
 EffectSums combine(const EffectSums& sums, const Eigen::MatrixXd& T) {
   return {sums.JE * T, T.transpose() * sums.EE * T, T.transpose() * sums.Er};
 }
@@ -51,6 +66,9 @@ Projected project(const NormalSystem& system, const EffectSums& raw,
   Projected out;
   const Eigen::MatrixXd S_raw = raw.EE - raw.JE.transpose() * imitation;
   out.T = shown_directions(raw, S_raw);
+  const Eigen::MatrixXd& prior = system.linear().prior;
+  if (prior.size() > 0 && out.T.cols() > 0)
+    out.T = told_by_data(out.T, S_raw, imitation.transpose() * prior * imitation);
   out.B = imitation * out.T;
   out.S = out.T.transpose() * S_raw * out.T;
   out.S_inverse = scaled_pseudo_inverse(out.S, 0.0);
@@ -168,14 +186,6 @@ PooledNoise noise_elsewhere(const NormalSystem& system, const Projected& p,
   return {squares / directions, seen - 1.0};
 }
 
-// A prior is an observation of its own. Of an effect that the model can imitate it alone says how
-// far the model may go: no stretch disagrees about that, and yet it is no better known.
-Eigen::MatrixXd scatter_of_prior(const NormalSystem& system, const Projected& p) {
-  const Eigen::MatrixXd& prior = system.linear().prior;
-  if (prior.size() == 0) return Eigen::MatrixXd::Zero(p.theta.size(), p.theta.size());
-  return p.S_inverse * (p.B.transpose() * prior * p.B) * p.S_inverse;
-}
-
 void judge(const NormalSystem& system, const Projected& p, const StretchScores& stretches,
            const Eigen::MatrixXd& covariance, const std::vector<EffectColumn>& columns,
            Score& out) {
@@ -272,8 +282,7 @@ Score score_test(const NormalSystem& system, const std::vector<EffectColumn>& co
   const auto count = static_cast<double>(system.partition().stretches);
   const Eigen::MatrixXd meat = stretches.scores * stretches.scores.transpose();
   judge(system, p, stretches,
-        p.S_inverse * meat * p.S_inverse * (system.partition().widening * count / (count - 1.0)) +
-            scatter_of_prior(system, p),
+        p.S_inverse * meat * p.S_inverse * (system.partition().widening * count / (count - 1.0)),
         columns, out);
   return out;
 }
@@ -285,8 +294,7 @@ Score jackknife_test(const NormalSystem& system, const std::vector<EffectColumn>
   const std::vector<EffectSums> raw = system.stretch_sums(columns);
   std::vector<EffectSums> shown;
   for (const EffectSums& stretch : raw) shown.push_back(combine(stretch, p.T));
-  const Eigen::MatrixXd covariance =
-      leave_out(system, shown, p.theta.size()) + scatter_of_prior(system, p);
+  const Eigen::MatrixXd covariance = leave_out(system, shown, p.theta.size());
   judge(system, p, stretch_scores(system, p, raw), covariance, columns, out);
   return out;
 }
