@@ -149,13 +149,13 @@ Candidate position_friction(const SharedContext& c, std::size_t j) {
   return out;
 }
 
-/// Dahl's state, between -1 and 1; within each step the joint turns one way. Before the log, the
-/// joint slid on as it moves at first.
-Eigen::ArrayXd dahl_state(const Eigen::ArrayXd& q, double length) {
-  Eigen::ArrayXd z(q.size());
-  double state = q.size() > 1 && q(1) != q(0) ? (q(1) < q(0) ? -1.0 : 1.0) : 0.0;
-  for (Eigen::Index k = 0; k < q.size(); ++k) {
-    if (k > 0) state = dahl_after(state, q(k) - q(k - 1), length);
+/// Dahl's state, between -1 and 1; within each step the joint turns one way. A joint that moves at
+/// first slid on before the log; one that rests may have been left anywhere, in the middle at best.
+Eigen::ArrayXd dahl_state(const FinePath& path, double length, double width) {
+  Eigen::ArrayXd z(path.q.size());
+  double state = path.q.size() > 0 ? direction(path.dq(0), width) : 0.0;
+  for (Eigen::Index k = 0; k < path.q.size(); ++k) {
+    if (k > 0) state = dahl_after(state, path.q(k) - path.q(k - 1), length);
     z(k) = state;
   }
   return z;
@@ -172,9 +172,10 @@ Candidate hysteresis(const SharedContext& c, std::size_t j) {
   out.scan = ratios(2e-4 * range, 0.2 * range, 13);
   out.scan_name = "pre-sliding length";
   out.scan_unit = c->angle(j);
-  out.columns = [c, j](double length) {
-    return one_column(j, joint_column(*c, j, fmt::format("dahl {:.17g}", length),
-                                      [&](const FinePath& p) { return dahl_state(p.q, length); }));
+  out.columns = [c, j, width = c->widths[static_cast<Eigen::Index>(j)]](double length) {
+    return one_column(
+        j, joint_column(*c, j, fmt::format("dahl {:.17g} from {:.17g}", length, width),
+                        [&](const FinePath& p) { return dahl_state(p, length, width); }));
   };
   return out;
 }

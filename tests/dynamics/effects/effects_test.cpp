@@ -239,6 +239,47 @@ TEST(TorqueEffects, ASnagIsNoSumOfRipples) {
   }
 }
 
+// A joint that rests at first with its bristles relaxed: taken for one that slid on before the log,
+// the rest alone contradicted it, and a delay of the torque took its place.
+TEST(TorqueEffects, HysteresisOfALogThatBeginsAtRest) {
+  constexpr double kRest_s = 2.0;
+  constexpr double kLength = 0.004;  // rad
+  EffectWorldOptions quiet = quiet_world();
+  quiet.declared_coulomb = quiet.declared_viscous = 0.0;
+  Rng rng = Rng::from_name("effects", 11);
+  EffectWorld world = effect_world({}, quiet, rng);
+  TorqueLog& log = world.log;
+  const RigidModel rigid = make_rigid_model(world.model);
+  for (Eigen::Index t = 0; t < log.rows(); ++t) {
+    const double u = std::max(0.0, log.t_s[t] - kRest_s);
+    Eigen::VectorXd q(3), dq(3), ddq(3);
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      const double w = 1.3 + 0.7 * static_cast<double>(j);
+      q[j] = 0.3 * (1.0 - std::cos(w * u));
+      dq[j] = 0.3 * w * std::sin(w * u);
+      ddq[j] = u > 0.0 ? 0.3 * w * w * std::cos(w * u) : 0.0;
+    }
+    log.q.row(t) = q.transpose();
+    log.torque.row(t) = inverse_dynamics(rigid, q, dq, ddq).transpose();
+  }
+  const double friction = 0.2 * log.torque.col(1).cwiseAbs().maxCoeff();
+  double state = 0.0;
+  for (Eigen::Index t = 0; t < log.rows(); ++t) {
+    const double moved = t > 0 ? log.q(t, 1) - log.q(t - 1, 1) : 0.0;
+    if (moved != 0.0)
+      state += (1.0 - std::exp(-std::abs(moved) / kLength)) * (std::copysign(1.0, moved) - state);
+    log.torque(t, 1) += friction * state;
+  }
+  for (double& torque : log.torque.reshaped()) torque += rng.normal(1e-3 * friction);
+  TorqueTraceOptions options;
+  options.contacts = false;
+  options.model.filter = {LowPass::kSmoothingSpline, 25.0};
+  const Trace trace = trace_torque(world.model, exact_samples(world), options).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << trace.reason;
+  EXPECT_EQ(trace.accepted.front().id, (EffectId{"hysteresis", "joint2"}));
+  EXPECT_NEAR(trace.accepted.front().size, friction, 0.02 * friction);
+}
+
 TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);
