@@ -111,16 +111,22 @@ std::vector<int> choose_branches(const std::vector<Candidate>& candidates,
   return chosen;
 }
 
-// The corners of a marker that hardly moves, as one view: far more exact than any of its own.
-// Nothing where it moves.
-std::optional<TagObservation> resting_view(const std::vector<Candidate>& candidates,
-                                           double variance) {
+struct RestingView {
+  TagObservation view;
+  std::vector<char> has_part;  // of every candidate: it is of the marker where that rests
+};
+
+// The corners of a marker that mostly rests in one place, as one view: far more exact than any of
+// its own. Nothing where it moves. A joint that moves for a while only has most of its views there
+// and yet others elsewhere.
+std::optional<RestingView> resting_view(const std::vector<Candidate>& candidates, double variance) {
   constexpr std::size_t kFewest = 8;
   // Variance of the corners about their medians, over the declared one, of a marker that moves by
   // so little that all views show one branch.
   constexpr double kHardlyMoves = 4.0;
   if (candidates.size() < kFewest) return std::nullopt;
-  TagObservation view = *candidates.front().seen;
+  RestingView out{*candidates.front().seen, {}};
+  TagObservation& view = out.view;
   for (std::size_t c = 0; c < view.corners_px.size(); ++c) {
     for (const Eigen::Index axis : {0, 1}) {
       std::vector<double> places;
@@ -138,19 +144,21 @@ std::optional<TagObservation> resting_view(const std::vector<Candidate>& candida
     sigmas.push_back(candidate.seen->sigma_px * std::sqrt(variance));
     squared.push_back(sum / (sigmas.back() * sigmas.back()));
   }
-  const auto numbers = 2.0 * static_cast<double>(view.corners_px.size());
-  if (median_of(std::move(squared)) > kHardlyMoves * numbers) return std::nullopt;
+  const double limit = kHardlyMoves * 2.0 * static_cast<double>(view.corners_px.size());
+  for (const double of_view : squared) out.has_part.push_back(of_view > limit ? 0 : 1);
+  if (median_of(std::move(squared)) > limit) return std::nullopt;
   // The median of n has pi / 2 times the variance of their mean.
   view.sigma_px = median_of(std::move(sigmas)) *
                   std::sqrt(0.5 * std::numbers::pi / static_cast<double>(candidates.size()));
-  return view;
+  return out;
 }
 
 // Of a marker that rests, the branches nearer to its one pose stand first, and the others cost what
 // all views say against them together.
-void settle_resting(const PlanarPose& rest, PoseTrack& track) {
-  for (PoseSample& s : track.samples) {
-    if (!s.T_camera_marker_alternative) continue;
+void settle_resting(const PlanarPose& rest, const std::vector<char>& rests, PoseTrack& track) {
+  for (std::size_t i = 0; i < track.samples.size(); ++i) {
+    PoseSample& s = track.samples[i];
+    if (rests[i] == 0 || !s.T_camera_marker_alternative) continue;
     const Eigen::Quaterniond& rotation = rest.best.T_camera_marker.rotation;
     if (angle_between(s.T_camera_marker_alternative->rotation, rotation) <
         angle_between(s.T_camera_marker.rotation, rotation)) {
@@ -166,10 +174,11 @@ void settle_resting(const PlanarPose& rest, PoseTrack& track) {
 }
 
 // Of a marker whose one pose is known: each view told about that.
-void tell_about(const PlanarPose& rest, const std::vector<Candidate>& candidates,
-                const CameraModel& camera, const std::vector<Eigen::Vector3d>& corners_m,
-                double variance, PoseTrack& track) {
+void tell_about(const PlanarPose& rest, const std::vector<char>& rests,
+                const std::vector<Candidate>& candidates, const CameraModel& camera,
+                const std::vector<Eigen::Vector3d>& corners_m, double variance, PoseTrack& track) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (rests[i] == 0) continue;
     const TagObservation& seen = *candidates[i].seen;
     const auto about =
         pose_about(camera, corners_m, seen.corners_px, seen.sigma_px, rest.best.T_camera_marker);
@@ -250,14 +259,16 @@ PoseTracks pose_tracks_from_tags(const TagObservations& observations, const Came
     }
     std::ranges::sort(list, {}, &Candidate::frame);
     tracks.tracks.push_back(make_track(id, list, observations.times_s));
-    const auto view = resting_view(list, variance);
-    if (!view) continue;
-    const auto rest =
-        estimate_planar_pose(camera, markers.corners_m(id), view->corners_px, view->sigma_px);
+    const auto resting = resting_view(list, variance);
+    if (!resting) continue;
+    const auto rest = estimate_planar_pose(camera, markers.corners_m(id), resting->view.corners_px,
+                                           resting->view.sigma_px);
     if (!rest) continue;
-    settle_resting(*rest, tracks.tracks.back());
-    if (!rest->other || rest->other->chi_square - rest->best.chi_square > kWorstMisfit)
-      tell_about(*rest, list, camera, markers.corners_m(id), variance, tracks.tracks.back());
+    PoseTrack& track = tracks.tracks.back();
+    settle_resting(*rest, resting->has_part, track);
+    if (!rest->other || rest->other->chi_square - rest->best.chi_square > kWorstMisfit) {
+      tell_about(*rest, resting->has_part, list, camera, markers.corners_m(id), variance, track);
+    }
   }
   return tracks;
 }

@@ -2,8 +2,10 @@
 #include "dynamics/effects/trace_torque.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -204,16 +206,35 @@ bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan
   });
 }
 
-}  // namespace
-
-double tracing_cutoff_hz(const CutoffChoice& chosen) {
-  constexpr double kOverEnd = 2.0;  // of the fastest motion
-  const double end_hz = chosen.motion_end_hz.size() > 0 ? chosen.motion_end_hz.maxCoeff() : 0.0;
-  return end_hz > 0.0 ? std::min(chosen.cutoff_hz, kOverEnd * end_hz) : chosen.cutoff_hz;
+/// True where masses that are declared wrongly would look like what was found, or left.
+bool may_be_of_masses(const Trace& trace) {
+  constexpr std::array<std::string_view, 6> kLikeMasses{
+      "payload", "torque_gain", "motor_inertia", "spring", "cross_talk", "gravity_direction"};
+  return trace.verdict == TraceVerdict::kUnknown ||
+         std::ranges::any_of(trace.accepted, [&](const TracedEffect& effect) {
+           return std::ranges::find(kLikeMasses, effect.id.effect) != kLikeMasses.end();
+         });
 }
 
-TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
-                         const TorqueTraceOptions& options, const Progress& progress) {
+/// Student's t of the squares of held-out errors, whitened, over the stretches of the instants that
+/// both know: positive where `rival` predicts better.
+double advantage_of(const TorqueTrace& rival, const TorqueTrace& trace) {
+  const trace::Partition& partition = trace.trace.partition;
+  Eigen::VectorXd won = Eigen::VectorXd::Zero(partition.stretches);
+  for (std::size_t i = 0; i < trace.rows.size(); ++i) {
+    const auto same = std::ranges::lower_bound(rival.rows, trace.rows[i]);
+    if (same == rival.rows.end() || *same != trace.rows[i]) continue;
+    won[partition.stretch[i]] +=
+        trace.trace.held_out_whitened[static_cast<Eigen::Index>(i)] -
+        rival.trace.held_out_whitened[std::distance(rival.rows.begin(), same)];
+  }
+  const auto n = static_cast<double>(won.size());
+  const double variance = (won.array() - won.mean()).square().sum() / std::max(1.0, n - 1.0);
+  return variance > 0.0 ? won.mean() / std::sqrt(variance * partition.widening / n) : 0.0;
+}
+
+TorqueTrace trace_beside_base(const DynamicModel& model, const TorqueSamples& samples,
+                              const TorqueTraceOptions& options, const Progress& progress) {
   const TorqueTracedModel whole(model, samples, options.model);
   const double margin_s = contact_margin_s(options);
   TorqueTrace out;
@@ -228,6 +249,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
     out.trace = trace_with(traced, options, progress);
     effects::widen_by_disagreement(traced, out.trace);
     out.base = traced.base();
+    out.rows = traced.motion().kept();
     out.corrected = correct(model, traced, out.trace.added, effects_of(out.trace));
     if (pass == 0) before = out.trace.held_out_before;
     if (!options.contacts || out.trace.verdict == TraceVerdict::kNothingToSay) break;
@@ -237,6 +259,38 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   }
   if (!out.contacts.empty()) add_contacts(whole, before, out);
   return out;
+}
+
+}  // namespace
+
+double tracing_cutoff_hz(const CutoffChoice& chosen) {
+  constexpr double kOverEnd = 2.0;  // of the fastest motion
+  const double end_hz = chosen.motion_end_hz.size() > 0 ? chosen.motion_end_hz.maxCoeff() : 0.0;
+  return end_hz > 0.0 ? std::min(chosen.cutoff_hz, kOverEnd * end_hz) : chosen.cutoff_hz;
+}
+
+TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
+                         const TorqueTraceOptions& options, const Progress& progress) {
+  constexpr double kClear = 3.0;
+  TorqueTrace out = trace_beside_base(model, samples, options, progress);
+  if (options.model.base != TorqueBaseKind::kAuto || out.base.kind != TorqueBaseKind::kDeclared ||
+      !may_be_of_masses(out.trace)) {
+    return out;
+  }
+  TorqueTraceOptions beside_identified = options;
+  beside_identified.model.base = TorqueBaseKind::kIdentified;
+  TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
+  const double advantage = advantage_of(rival, out);
+  fmt::print(stderr, "DBG t {} declared {} ({} eff) identified {} ({} eff) {} {}\n", advantage,
+             out.trace.held_out_after.value, out.trace.accepted.size(),
+             rival.trace.held_out_after.value, rival.trace.accepted.size(),
+             (int)rival.trace.verdict, rival.trace.reason);
+  if (advantage < kClear) return out;
+  rival.base.reason = fmt::format(
+      "with the effects that were found, identified masses predict unseen stretches better than "
+      "declared ones do with theirs (Student's t {:.1f})",
+      advantage);
+  return rival;
 }
 
 CorrectedTorqueModel refit(const DynamicModel& model, const TorqueSamples& samples,

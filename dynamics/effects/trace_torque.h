@@ -5,6 +5,8 @@
 //         model with all of that in it, and functions that take the effects out of a log again.
 // Units   N m (N for joints that slide) or A.
 // Method  contact spans, then calib/trace over TorqueTracedModel, until no more spans are found.
+//         Where what was found may be masses that are declared wrongly, the same beside identified
+//         ones: the account stays that predicts unseen stretches better.
 // Not here: what the effects are (effect_library.h), reading logs (dynamics/data), files (app/io).
 #pragma once
 
@@ -52,6 +54,7 @@ struct TorqueTrace {
   Trace trace;
   TorqueBase base;
   std::vector<ContactSpan> contacts;  ///< left out
+  std::vector<Eigen::Index> rows;     ///< samples that `trace` has its instants at
   CorrectedTorqueModel corrected;
 };
 

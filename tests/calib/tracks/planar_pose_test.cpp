@@ -201,6 +201,41 @@ TEST(PoseTracks, ViewsOfAMarkerAtRestErrByTheirCovariance) {
   EXPECT_NEAR(squares / kFrames, 6.0, 0.7);
 }
 
+// A joint that is moved by itself, in its turn: its marker rests for most of the time. Views of
+// its motion were linearised about that rest.
+TEST(PoseTracks, AMarkerThatMovesForAWhileIsWhereItIs) {
+  constexpr double kSigma = 0.05;
+  constexpr int kFrames = 150;
+  Rng rng = Rng::from_name("moves for a while");
+  MarkerSet markers;
+  markers.default_size_m = 0.06;
+  TagObservations observations;
+  observations.width = 1280;
+  observations.height = 720;
+  std::vector<Pose> truth;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    observations.times_s.push_back(frame / 30.0);
+    const double turn =
+        0.9 * std::sin(2.0 * std::numbers::pi * std::clamp(frame - 50, 0, 50) / 50.0);
+    truth.push_back(Pose{exp_rotation({0.5, 0.2, 0.0}), {0.0, 0.0, 1.0}} *
+                    Pose{exp_rotation({0.0, 0.0, turn}), Eigen::Vector3d::Zero()} *
+                    Pose{exp_rotation({0.1, 0.3, 0.4}), {0.1, 0.05, 0.0}});
+    TagObservation seen;
+    seen.frame = frame;
+    seen.id = TagId{7};
+    seen.sigma_px = kSigma;
+    seen.corners_px = images(camera_720p(), truth.back(), markers.corners_m(seen.id));
+    for (auto& p : seen.corners_px) p += Eigen::Vector2d(rng.normal(kSigma), rng.normal(kSigma));
+    observations.observations.push_back(seen);
+  }
+  const PoseTracks tracks = pose_tracks_from_tags(observations, camera_720p(), markers);
+  ASSERT_EQ(tracks.tracks.size(), 1U);
+  for (const PoseSample& s : tracks.tracks[0].samples) {
+    const Pose error = truth[static_cast<std::size_t>(s.frame)].inverse() * s.T_camera_marker;
+    EXPECT_LT(log_rotation(error.rotation).norm(), 0.03) << s.frame;
+  }
+}
+
 TEST(PoseTracks, TheOtherBranchHasACovarianceOfItsOwn) {
   const Swaying scene(0.05, 0.05);
   std::vector<double> squared;
