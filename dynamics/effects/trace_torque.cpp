@@ -281,10 +281,6 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   beside_identified.model.base = TorqueBaseKind::kIdentified;
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
-  fmt::print(stderr, "DBG t {} declared {} ({} eff) identified {} ({} eff) {} {}\n", advantage,
-             out.trace.held_out_after.value, out.trace.accepted.size(),
-             rival.trace.held_out_after.value, rival.trace.accepted.size(),
-             (int)rival.trace.verdict, rival.trace.reason);
   if (advantage < kClear) return out;
   rival.base.reason = fmt::format(
       "with the effects that were found, identified masses predict unseen stretches better than "

@@ -15,6 +15,7 @@
 
 #include "kinematics/model/kinematic_tree.h"
 #include "kinematics/structure/pose_tracks.h"
+#include "kinematics/structure/residual_scale.h"
 
 namespace kinescope::structure_search {
 
@@ -70,7 +71,7 @@ struct ChainFitOptions {
   int max_iterations = 8;
   double axis_weight =
       1.0;  ///< weight of the residual along the joint, 1: channels are exact, 0: not used
-  double outlier_cost = 30.0;  ///< most that one sample may cost
+  double outlier_cost = kOutlierCost;  ///< of a sample: what costs more is an outlier
   bool with_residuals = false;
 };
 

@@ -45,7 +45,7 @@ ResidualScale residual_scale(const ResidualParts& parts, double outlier_cost) {
     scale.along = std::max(1.0, trimmed_variance(squared, 1.0, 0.4549));
   }
   for (std::size_t i = 0; i < parts.across.size(); ++i) {
-    scale.cost += std::min(squared_of(parts, scale, i) + parts.penalty[i], outlier_cost);
+    scale.cost += tailed_cost(squared_of(parts, scale, i) + parts.penalty[i], outlier_cost);
   }
   scale.cost += samples * (dof * std::log(scale.across) + std::log(scale.along));
   return scale;

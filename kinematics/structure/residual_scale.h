@@ -3,6 +3,7 @@
 // Robust size of whitened residuals and the likelihood that goes with it.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "kinematics/core/pose.h"
@@ -33,11 +34,19 @@ inline constexpr double kMedian6 = 5.3481;
 /// Samples beyond this many squared robust sigmas do not enter a second, efficient estimate.
 inline constexpr double kTrim = 25.0;
 
-/// A sample costs at most this much: outliers (flips) are as likely as a 1 in 10^6 residual.
+/// A sample that costs more than this is an outlier (a flip; as likely as a 1 in 10^6 residual).
 inline constexpr double kOutlierCost = 30.0;
 
-/// Cost = sum_i min(across_i / s2 + along_i^2 / a2 + penalty_i, outlier_cost) + dof ln s2 + ln a2
-/// per sample.
+/// What it costs then: as if it had a variance of its own. Were all alike, a joint that moves for a
+/// while only would be as well at rest as on an axis that sensors show with errors.
+[[nodiscard]] inline double tailed_cost(double squared, double outlier_cost = kOutlierCost) {
+  constexpr double kFreedom = 6.0;
+  return squared <= outlier_cost ? squared
+                                 : outlier_cost + kFreedom * std::log(squared / outlier_cost);
+}
+
+/// Cost = sum_i tailed_cost(across_i / s2 + along_i^2 / a2 + penalty_i) + dof ln s2 + ln a2 per
+/// sample.
 [[nodiscard]] ResidualScale residual_scale(const ResidualParts& parts,
                                            double outlier_cost = kOutlierCost);
 

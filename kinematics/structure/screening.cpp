@@ -22,6 +22,8 @@ namespace {
 constexpr double kTurnEvidence = 3.5;
 // Cost beyond which, with one more a sample, a direction is not looked at any further.
 constexpr double kFar = 100.0;
+// Channels that tell most by least squares.
+constexpr std::size_t kLeading = 2;
 
 // What one direction of y explains: sums of squares along it after regression, and across it.
 struct Direction {
@@ -106,19 +108,21 @@ void add_candidates(const LinearMotion& linear, const LineProblem& problem, cons
 // Squared residuals of all samples about one direction (none: about the mean).
 std::vector<double> squared_residuals(const LinearMotion& linear, const Eigen::MatrixXd& q,
                                       const Direction& d) {
-  std::vector<double> squared;
-  squared.reserve(static_cast<std::size_t>(linear.y.cols()));
-  for (Eigen::Index i = 0; i < linear.y.cols(); ++i) {
-    Vector6d r = linear.y.col(i);
-    if (d.channel >= 0) {
-      r -= d.slope * q(d.channel, i);
-    } else if (d.slope.squaredNorm() > 0.0) {
-      const Vector6d u = d.slope.normalized();
-      r -= u.dot(r) * u;
-    }
-    squared.push_back(linear.weight(i) * r.squaredNorm());
+  Eigen::MatrixXd left = linear.y;
+  if (d.channel >= 0) {
+    left -= d.slope * q.row(d.channel);
+  } else if (d.slope.squaredNorm() > 0.0) {
+    const Vector6d u = d.slope.normalized();
+    left -= u * (u.transpose() * linear.y).eval();
   }
-  return squared;
+  // About where most are: the mean of a motion that is at rest for a while is in neither.
+  for (Eigen::Index k = 0; k < left.rows(); ++k) {
+    const Eigen::VectorXd row = left.row(k);
+    left.row(k).array() -= median_of({row.data(), row.data() + row.size()});
+  }
+  const Eigen::VectorXd squared =
+      left.colwise().squaredNorm().transpose().cwiseProduct(linear.weight);
+  return {squared.data(), squared.data() + squared.size()};
 }
 
 // What the direction leaves across itself is far above the noise and a fair part of the motion
@@ -156,22 +160,29 @@ struct Regression {
   Direction principal;
 };
 
+double cost_of(const std::vector<double>& squared) {
+  double sum = 0.0;
+  for (const double s : squared) sum += tailed_cost(s);
+  return sum;
+}
+
 // Leaves out the samples that lie far from the direction most samples follow; true when there are
-// any.
+// any. Of directions that fit most samples alike (a joint that moves for a while only rests in all
+// the others) it is the one that fits more of them.
 bool trim(LinearMotion& linear, const Eigen::MatrixXd& q, const Regression& r) {
   std::vector<Direction> tried{Direction{}, r.principal};
-  for (std::size_t k = 0; k < std::min<std::size_t>(2, r.driven.size()); ++k)
+  for (std::size_t k = 0; k < std::min(kLeading, r.driven.size()); ++k)
     tried.push_back(r.driven[k]);
   std::vector<double> best;
   double least = std::numeric_limits<double>::infinity();
   for (const Direction& d : tried) {
     std::vector<double> squared = squared_residuals(linear, q, d);
-    const double median = median_of(squared);
-    if (median >= least) continue;
-    least = median;
+    const double sum = cost_of(squared);
+    if (sum >= least) continue;
+    least = sum;
     best = std::move(squared);
   }
-  const double limit = kTrim * std::max(1.0, least / kMedian6) * 1.5;
+  const double limit = kTrim * std::max(1.0, median_of(best) / kMedian6) * 1.5;
   bool any = false;
   for (std::size_t i = 0; i < best.size(); ++i) {
     if (linear.kept[i] == 0 || best[i] <= limit) continue;
@@ -244,7 +255,7 @@ std::optional<Candidate> rest_of_branches(const Motion& motion, const Eigen::Mat
     double sum = 0.0;
     const std::size_t stride = std::max<std::size_t>(1, motion.size() / kJudges);
     for (std::size_t i = 0; i < motion.size(); i += stride) {
-      sum += std::min(kOutlierCost, distance_from(inverse, motion[i]));
+      sum += tailed_cost(distance_from(inverse, motion[i]));
     }
     if (sum >= least) return;
     least = sum;
@@ -287,6 +298,8 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
   LinearMotion linear = linear_motion(motion);
   const Eigen::MatrixXd q = readings_of(motion, readings);
   Regression r = regress(linear, q, usable);
+  const LinearMotion untrimmed = linear;
+  const Regression first = r;
   for (int pass = 0; pass < 2 && trim(linear, q, r) && linear.count > 8; ++pass)
     r = regress(linear, q, usable);
 
@@ -309,6 +322,13 @@ std::vector<Candidate> screen_motion(const Motion& motion, const Eigen::MatrixXd
     if (r.driven[k].cost > far) continue;
     const Eigen::VectorXd readings_k = q.row(r.driven[k].channel).transpose();
     add_candidates(linear, problem, r.driven[k], readings_k, out);
+  }
+  // Of a joint that moves for a while, and then errs by far more than at rest, all that it moved
+  // may have been left out.
+  for (std::size_t k = 0; k < std::min(kLeading, first.driven.size()); ++k) {
+    if (linear.count == untrimmed.count) break;
+    const Eigen::VectorXd readings_k = q.row(first.driven[k].channel).transpose();
+    add_candidates(untrimmed, problem, first.driven[k], readings_k, out);
   }
   if (options.coordinate_free && r.principal.slope.squaredNorm() > 0.0 && r.principal.cost < far) {
     const Eigen::VectorXd along =

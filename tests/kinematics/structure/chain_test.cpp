@@ -2,6 +2,8 @@
 #include "kinematics/structure/chain.h"
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -160,6 +162,41 @@ TEST(Chain, RestIsCheaperThanAnyJointWhenNothingMoves) {
   }
   EXPECT_NEAR(rest, 6.0 * kSamples, 4.0 * std::sqrt(12.0 * kSamples));
   EXPECT_LT(rest - least, 25.0);
+}
+
+// A joint that is moved in its turn: for most of the time its marker rests, and is seen with an
+// error that stays the same; when it moves, errors are many times what was declared. As outliers,
+// all that it ever moved would be left out.
+TEST(Chain, AJointThatMovesForAWhileIsNotAtRest) {
+  constexpr double kDeclared = 0.02;  // of the other tests' noise
+  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic}) {
+    Rng rng = Rng::from_name("for a while", static_cast<std::uint64_t>(type));
+    Eigen::MatrixXd q = sines(2);
+    for (int i = 0; i < kSamples; ++i) {
+      if (i < 2 * kSamples / 3) q(i, 0) = 0.0;
+      if (i >= kSamples / 3) q(i, 1) = 0.0;
+    }
+    const ChainModel truth = one_joint(type, type == JointType::kRevolute ? 0.5 : 0.1, rng);
+    Motion motion;
+    for (int i = 0; i < kSamples; ++i) {
+      MotionSample s;
+      s.instant = i;
+      s.pose =
+          chain_pose(truth, q, i) * exp_pose(noise(rng, (q(i, 0) == 0.0 ? 0.2 : 40.0) * kDeclared));
+      s.whitening = whitening(kDeclared);
+      motion.push_back(std::move(s));
+    }
+    std::vector<std::pair<double, int>> fits;
+    for (const Candidate& c : screen_motion(motion, q, {1, 1}))
+      fits.emplace_back(fit_chain(motion, q, c.start).cost, c.channel);
+    ASSERT_FALSE(fits.empty());
+    const auto [cost, channel] = std::ranges::min(fits);
+    EXPECT_EQ(channel, 0);
+    for (const auto& [other, of] : fits) {
+      if (of == 0) continue;
+      EXPECT_GT(other, cost + 100.0);
+    }
+  }
 }
 
 TEST(Chain, OutliersDoNotMoveTheFit) {
