@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a nominal robot and what was measured of the real one.
-// Gives   what of the drawing and its columns is grossly wrong: axes that point elsewhere, zeros that
-//         are far off, channels exchanged, columns in degrees or mm; and the drawing without that.
+// Gives   what of the drawing and its columns is grossly wrong: axes that point elsewhere, zeros
+//         that are far off, channels exchanged, columns in degrees or mm; and the drawing without.
 // Method  the columns of all joints of a type are tried in the other unit, every joint with each of
 //         the other five directions of its frame and in the other unit, every two channels are
 //         exchanged, and where a marker is missed every zero is turned by eighths of a turn; the

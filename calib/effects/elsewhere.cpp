@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/effects/elsewhere.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 namespace kinescope::effects {
@@ -87,6 +90,31 @@ bool rests(const EffectWorld& world, int marker) {
   if (world.is_carried) return false;
   if (world.camera_link.value != 0) return link == world.camera_link;
   return world.tree.path_to(link).empty();
+}
+
+std::vector<int> movers_of(const EffectWorld& world, int marker) {
+  std::vector<int> out;
+  for (const JointId joint :
+       world.tree.path_to(world.tree.markers[static_cast<std::size_t>(marker)].link))
+    out.push_back(joint.value);
+  return out;
+}
+
+Interval motion_span(const EffectWorld& world, const std::vector<int>& joints) {
+  constexpr double kStill = 0.1;  // of its travel: seen much as before
+  const std::vector<double>& times = world.frames.times_s;
+  std::size_t first = times.size() - 1;
+  std::size_t last = 0;
+  for (const int joint : joints) {
+    const Eigen::VectorXd value = world.frames.value.col(joint);
+    const double still = kStill * (value.maxCoeff() - value.minCoeff());
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const double reading = value[static_cast<Eigen::Index>(i)];
+      if (std::abs(reading - value[0]) > still) first = std::min(first, i);
+      if (std::abs(reading - value[value.size() - 1]) > still) last = std::max(last, i);
+    }
+  }
+  return {times[first], times[last]};
 }
 
 }  // namespace kinescope::effects

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/effects/camera_effects.h"
+#include "calib/trace/trace_result.h"
 
 namespace kinescope::effects {
 
@@ -35,5 +36,10 @@ namespace kinescope::effects {
 [[nodiscard]] std::string marker_name(const EffectWorld& world, int marker);
 /// True of a marker that nothing moves before the camera.
 [[nodiscard]] bool rests(const EffectWorld& world, int marker);
+/// Joints that move the marker.
+[[nodiscard]] std::vector<int> movers_of(const EffectWorld& world, int marker);
+/// From the first to the last time at which one of these joints moves, s; before and behind all of
+/// them keep their values.
+[[nodiscard]] Interval motion_span(const EffectWorld& world, const std::vector<int>& joints);
 
 }  // namespace kinescope::effects

@@ -74,6 +74,15 @@ std::function<Eigen::VectorXd(double)> since(const EffectWorld& world) {
   };
 }
 
+// Where all that would tell of it rests from the time on (or until then), it is seen in one posture
+// only, whose errors stay.
+void told_in_one_posture(const EffectWorld& world, const std::vector<int>& movers, Candidate& c) {
+  if (world.postures || world.kind != MeasurementKind::kCorners) return;
+  c.floor_at = [moves = motion_span(world, movers)](double at_s) {
+    return at_s > moves.low && at_s <= moves.high ? 0.0 : kRestingBias;
+  };
+}
+
 // The time at which something happens once, as the value of the scan.
 void happens_once(const EffectWorld& world, const std::vector<Period>& periods, Candidate& c) {
   c.scan.clear();
@@ -152,6 +161,7 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
   if (rests(world, marker) && world.kind == MeasurementKind::kCorners)
     out.candidate.floor = kRestingBias;
   happens_once(world, periods_of(world), out.candidate);
+  told_in_one_posture(world, movers_of(world, marker), out.candidate);
   out.corrections = [like = out, marker, share = since(world)](double at_s) {
     return twists(like, CorrectedPart::kMarker, marker, share(at_s));
   };
@@ -169,6 +179,7 @@ CameraEffect camera_bump(const EffectWorld& world) {
                                  : "tripod, cable pulls, screws of the base";
   out.candidate.record = "put a marker on the base, in view all the time";
   happens_once(world, periods_of(world), out.candidate);
+  told_in_one_posture(world, world.moving, out.candidate);
   out.corrections = [like = out, share = since(world)](double at_s) {
     return twists(like, CorrectedPart::kCamera, 0, share(at_s));
   };
@@ -263,6 +274,7 @@ CameraEffect zero_jump(const EffectWorld& world, const Suspect& s) {
       "lost";
   out.candidate.record = fmt::format("go to the reference of {} before and after", s.name);
   happens_once(world, periods_of(world), out.candidate);
+  told_in_one_posture(world, world.moving, out.candidate);
   out.corrections = [s, share = since(world)](double at_s) {
     return std::vector{turn(s, "zero jump", s.unit, share(at_s))};
   };

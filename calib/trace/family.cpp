@@ -136,12 +136,12 @@ double size_sigma(const Candidate& candidate, const Eigen::VectorXd& theta,
                   const Eigen::MatrixXd& covariance) {
   if (theta.size() == 1) return std::sqrt(std::max(0.0, covariance(0, 0)));
   const double size = size_of(candidate, theta);
-  if (!(size > 0.0)) return 0.0;
+  if (size == 0.0) return 0.0;
   Eigen::VectorXd slope = candidate.size_weights.cwiseProduct(theta) / size;
   if (candidate.size) {
     for (Eigen::Index k = 0; k < theta.size(); ++k) {
       Eigen::VectorXd moved = theta;
-      const double step = 1e-4 * std::max(size, std::abs(theta[k]));
+      const double step = 1e-4 * std::max(std::abs(size), std::abs(theta[k]));
       moved[k] += step;
       slope[k] = (candidate.size(moved) - size) / step;
     }

@@ -87,7 +87,8 @@ struct Candidate {
   /// The size that is reported is the parameter itself where there is one, else
   /// sqrt(sum of weight x parameter^2), in `size_unit`.
   Eigen::VectorXd size_weights;
-  /// Where that is no size: another function of the parameters. Empty: the above.
+  /// Where that is no size: another function of the parameters, which may have a sign. Empty: the
+  /// above.
   std::function<double(const Eigen::VectorXd& theta)> size;
   std::string size_unit;
   /// Parameters that can be: friction does not drive. Empty: all.
@@ -95,6 +96,8 @@ struct Candidate {
   /// As TraceOptions::floor, where the sensor errs by more in what this one touches; infinite: the
   /// recording cannot show it.
   double floor = 0.0;
+  /// The same where it depends on the scan. Empty: it does not.
+  std::function<double(double scan)> floor_at;
   /// The nonlinear parameter, searched: a period, a time, a width. Empty: none.
   std::vector<double> scan;
   bool scan_listed = false;  ///< only the listed values make sense; else those between them too

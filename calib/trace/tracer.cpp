@@ -164,7 +164,8 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   std::vector<const TestedMember*> hints;
   for (const TestedMember& member : family) {
     const Candidate& candidate = now->fit.candidates[member.index];
-    if (member.p_value <= kHint && may_be_added(candidate, member.score)) hints.push_back(&member);
+    if (member.p_value <= kHint && may_be_added(candidate, member.scan, member.score))
+      hints.push_back(&member);
   }
   std::ranges::stable_sort(hints, std::greater{},
                            [](const TestedMember* hint) { return hint->score.gain; });
@@ -217,7 +218,8 @@ bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember
   for (const TestedMember& member : family) {
     const Candidate& candidate = now_->fit.candidates[member.index];
     const bool counts = member.p_value <= level_ && !member.score.hidden() &&
-                        !is_large(candidate, member.score) && !removed_.contains(candidate.id);
+                        !is_large(candidate, member.scan, member.score) &&
+                        !removed_.contains(candidate.id);
     if (counts && (below == nullptr || member.score.gain > below->score.gain)) below = &member;
   }
   if (below == nullptr) return false;
@@ -261,7 +263,7 @@ const TestedMember* Tracer::most_telling(const Stage& stage,
                                          const std::vector<TestedMember>& family) const {
   const TestedMember* best = nullptr;
   for (const TestedMember& member : family) {
-    if (!may_be_added(stage.fit.candidates[member.index], member.score)) continue;
+    if (!may_be_added(stage.fit.candidates[member.index], member.scan, member.score)) continue;
     if (best == nullptr || member.score.gain > best->score.gain) best = &member;
   }
   return best;
@@ -371,13 +373,14 @@ void Tracer::sharpen(std::size_t index) {
   now_ = with_sizes_for_scans(now_);
 }
 
-bool Tracer::is_large(const Candidate& candidate, const Score& score) const {
+bool Tracer::is_large(const Candidate& candidate, double scan, const Score& score) const {
+  const double at_scan = candidate.floor_at ? candidate.floor_at(scan) : 0.0;
   return small_.contains(candidate.id) ||
-         (score.rms >= candidate.floor && trace::is_large(score, options_));
+         (score.rms >= std::max(candidate.floor, at_scan) && trace::is_large(score, options_));
 }
 
-bool Tracer::may_be_added(const Candidate& candidate, const Score& score) const {
-  return !score.hidden() && is_large(candidate, score) && !removed_.contains(candidate.id) &&
+bool Tracer::may_be_added(const Candidate& candidate, double scan, const Score& score) const {
+  return !score.hidden() && is_large(candidate, scan, score) && !removed_.contains(candidate.id) &&
          is_possible(candidate, score.theta) &&
          std::ranges::count(now_->added, candidate.id, &AddedEffect::id) < kMostAlike;
 }
@@ -388,7 +391,7 @@ std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,
   std::vector<Contender> out;
   for (const TestedMember& member : family) {
     const Candidate& candidate = candidates[member.index];
-    if (member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
+    if (member.p_value > level_ || !may_be_added(candidate, member.scan, member.score)) continue;
     const EffectId& id = candidate.id;
     const Score confirmed = jackknife_test(system, member.columns);
     if (confirmed.p_value * member.tests > level_) continue;

@@ -63,9 +63,10 @@ class Tracer {
   void search();
   void forward();
   /// Beyond what the sensor's own errors do, or shown by more than its own rows to be there.
-  [[nodiscard]] bool is_large(const Candidate& candidate, const Score& score) const;
+  [[nodiscard]] bool is_large(const Candidate& candidate, double scan, const Score& score) const;
   /// Seen at all, large enough, possible, and not taken out before; significance apart.
-  [[nodiscard]] bool may_be_added(const Candidate& candidate, const Score& score) const;
+  [[nodiscard]] bool may_be_added(const Candidate& candidate, double scan,
+                                  const Score& score) const;
   /// Of a family of the system, those that are shown for certain.
   [[nodiscard]] std::vector<Contender> contenders(const NormalSystem& system,
                                                   const std::vector<Candidate>& candidates,

@@ -193,8 +193,9 @@ bool Tracer::check(std::size_t index) {
       slight ? own.p_value <= kBeyondDoubt * level_ : own.p_value <= level_ || needed;
   const bool possible = is_possible(*candidate, now_->fit.values[index]);
   // What it does beside the others as they are, or once they have been fitted without it.
-  const bool large = is_large(*candidate, own.score) ||
-                     (needed && is_large(*candidate, refitted_score(*stage, *now_, own.columns)));
+  const bool large =
+      is_large(*candidate, effect.scan, own.score) ||
+      (needed && is_large(*candidate, effect.scan, refitted_score(*stage, *now_, own.columns)));
   if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
     removed_.insert(effect.id);
     mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
@@ -258,7 +259,8 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
     const Candidate& candidate = without.fit.candidates[member.index];
     const bool in_model = std::ranges::any_of(
         now_->added, [&](const AddedEffect& added) { return added.id == candidate.id; });
-    if (in_model || member.p_value > level_ || !may_be_added(candidate, member.score)) continue;
+    if (in_model || member.p_value > level_ || !may_be_added(candidate, member.scan, member.score))
+      continue;
     // What it says beyond the effect, the forward search would have found.
     if (refines(candidate, effect.id) || contains(candidate, effect.id)) continue;
     if (member.score.gain < least_gain) continue;

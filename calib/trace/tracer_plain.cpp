@@ -39,7 +39,7 @@ std::optional<AddedEffect> Tracer::plainest_at(const Stage& stage, const std::st
     if (!is_plain(candidate, place) || in_model(candidate.id)) continue;
     if (!std::ranges::all_of(candidate.refines, in_model)) continue;
     const Score score = score_test(stage.system, candidate.columns(0.0));
-    if (!may_be_added(candidate, score) || score.gain <= most) continue;
+    if (!may_be_added(candidate, 0.0, score) || score.gain <= most) continue;
     most = score.gain;
     best = AddedEffect{candidate.id};
   }

@@ -31,7 +31,9 @@ void Tracer::size_up(std::size_t index, const Eigen::MatrixXd& covariance,
     effect.interval.low = std::min(effect.interval.low, other.size.low);
     effect.interval.high = std::max(effect.interval.high, other.size.high);
   }
-  if (values.size() > 1) effect.interval.low = std::max(0.0, effect.interval.low);
+  // Of most effects of several parameters it is a length.
+  if (values.size() > 1 && effect.size > 0.0)
+    effect.interval.low = std::max(0.0, effect.interval.low);
   effect.values.clear();
   for (Eigen::Index k = 0; k < values.size(); ++k) {
     effect.values.push_back({candidate.parameters[static_cast<std::size_t>(k)], values[k],

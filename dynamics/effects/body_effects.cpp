@@ -19,7 +19,7 @@ Candidate payload(const SharedContext& c, int tip, int body) {
   Candidate out;
   const std::string& link = c->rigid.bodies[static_cast<std::size_t>(body)].name;
   out.id = {"payload", link};
-  out.words = fmt::format("{} carries a mass that the model lacks", link);
+  out.words = fmt::format("{} carries more mass than the model says (less: negative)", link);
   out.check = "tools, cables, sensors and loads at the link; its mass in the model";
   out.record = "tilt the link all ways under gravity, and repeat the motion without the load";
   const bool kilograms = c->torque_unit == "Nm";
@@ -30,6 +30,7 @@ Candidate payload(const SharedContext& c, int tip, int body) {
     out.parameters.push_back({std::string(kInertialNames[static_cast<std::size_t>(k)]), unit});
   }
   out.size_weights = Eigen::VectorXd::Unit(10, 0);
+  out.size = [](const Eigen::VectorXd& theta) { return theta[0]; };
   out.columns = [c, carriers, tip](double) {
     std::vector<EffectColumn> columns;
     for (int k = 0; k < 10; ++k) columns.push_back({carriers.body(tip, k), {}});

@@ -101,7 +101,8 @@ void widen_by_disagreement(const TorqueTracedModel& model, Trace& trace) {
     const double half = 0.5 * (effect.interval.high - effect.interval.low);
     const double wider =
         std::hypot(half, t * effect.size * std::sqrt(std::max(0.0, added_variance(shares))));
-    effect.interval = {std::max(0.0, effect.size - wider), effect.size + wider};
+    effect.interval = {effect.size - wider, effect.size + wider};
+    if (effect.size > 0.0) effect.interval.low = std::max(0.0, effect.interval.low);
   }
 }
 

@@ -39,6 +39,7 @@ Candidate spring(const SharedContext& c, std::size_t j) {
   out.size_unit = fmt::format("{}/{}", c->unit(j), c->angle(j));
   out.parameters = {{"stiffness", out.size_unit}, {"torque_at_zero", c->unit(j)}};
   out.size_weights = Eigen::Vector2d(1.0, 0.0);
+  out.size = [](const Eigen::VectorXd& theta) { return theta[0]; };
   out.refines = {{"torque_offset", c->joints[j]}};
   out.columns = [c, j](double) {
     const auto column = static_cast<Eigen::Index>(j);

@@ -281,7 +281,8 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   beside_identified.model.base = TorqueBaseKind::kIdentified;
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
-  if (advantage < kClear) return out;
+  // Masses that bend to what they are not ask for further effects.
+  if (advantage < kClear || rival.trace.accepted.size() > out.trace.accepted.size()) return out;
   rival.base.reason = fmt::format(
       "with the effects that were found, identified masses predict unseen stretches better than "
       "declared ones do with theirs (Student's t {:.1f})",

@@ -44,8 +44,12 @@ ResidualScale residual_scale(const ResidualParts& parts, double outlier_cost) {
     for (const double a : parts.along) squared.push_back(a * a);
     scale.along = std::max(1.0, trimmed_variance(squared, 1.0, 0.4549));
   }
+  // A coordinate that is free follows outliers, and joints in series are told apart by what they
+  // leave of all others.
+  const bool tailed = !parts.free_axis && outlier_cost <= kOutlierCost;
   for (std::size_t i = 0; i < parts.across.size(); ++i) {
-    scale.cost += tailed_cost(squared_of(parts, scale, i) + parts.penalty[i], outlier_cost);
+    const double squared = squared_of(parts, scale, i) + parts.penalty[i];
+    scale.cost += tailed ? tailed_cost(squared) : std::min(squared, outlier_cost);
   }
   scale.cost += samples * (dof * std::log(scale.across) + std::log(scale.along));
   return scale;
