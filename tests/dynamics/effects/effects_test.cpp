@@ -280,6 +280,31 @@ TEST(TorqueEffects, HysteresisOfALogThatBeginsAtRest) {
   EXPECT_NEAR(trace.accepted.front().size, friction, 0.02 * friction);
 }
 
+// One link is a tenth heavier than declared: gains, springs and a payload explain most of that, and
+// pass.
+TEST(TorqueEffects, AWrongMassIsNoGain) {
+  Rng rng = Rng::from_name("effects", 21);
+  EffectWorldOptions quiet = quiet_world();
+  quiet.joints = 5;
+  quiet.noise = 0.02;
+  EffectWorld world = effect_world({}, quiet, rng);
+  const LinkId link = world.model.tree.joints[2].child;
+  InertialParameters& own = world.model.links[link.index()];
+  own = InertialParameters::from_vector(0.9 * own.vector());
+  TorqueTraceOptions options;
+  options.contacts = false;
+  options.model.filter = {LowPass::kSmoothingSpline, 25.0};
+  const TorqueTrace found = trace_torque(world.model, exact_samples(world), options);
+  EXPECT_EQ(found.base.kind, TorqueBaseKind::kIdentified) << found.base.reason;
+  // Before any effect is found it is not clear.
+  EXPECT_NE(found.base.reason.find("with the effects that were found"), std::string::npos)
+      << found.base.reason;
+  for (const TracedEffect& effect : found.trace.accepted) {
+    EXPECT_NE(effect.id.effect, "torque_gain") << effect.id.place;
+    EXPECT_NE(effect.id.effect, "payload") << effect.id.place;
+  }
+}
+
 TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);
