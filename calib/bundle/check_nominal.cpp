@@ -116,14 +116,13 @@ Gain gain(const Errors& from, const Errors& to) {
   return out;
 }
 
-Pose turn_about(const Eigen::Vector3d& axis, double angle) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), Eigen::Vector3d::Zero()};
-}
-
 void mend(const NominalFault& fault, KinematicTree& tree) {
   Joint& joint = tree.joints[static_cast<std::size_t>(fault.joint)];
   if (fault.axis) joint.axis = *fault.axis;
-  if (fault.zero) joint.T_parent_joint = joint.T_parent_joint * turn_about(joint.axis, *fault.zero);
+  if (fault.zero) {
+    const Pose turn{exp_rotation(*fault.zero * joint.axis), Eigen::Vector3d::Zero()};
+    joint.T_parent_joint = joint.T_parent_joint * turn;
+  }
   if (fault.unit) joint.scale *= *fault.unit;
   if (fault.exchanged_with) {
     Joint& other = tree.joints[static_cast<std::size_t>(*fault.exchanged_with)];

@@ -115,22 +115,26 @@ PointFit refine(PointFit fit, const std::vector<PointPair>& pairs) {
   return fit;
 }
 
+// A point where all its sightings put it on average.
+PointFit point_beside(const Pose& T_camera_base, const std::vector<PointPair>& pairs) {
+  PointFit out{T_camera_base};
+  for (const PointPair& pair : pairs) {
+    const Pose T_camera_link = T_camera_base * pair.T_base_link;
+    out.point +=
+        T_camera_link.inverse() * *pair.observation->position_m / static_cast<double>(pairs.size());
+  }
+  out.rms_m = point_rms(out, pairs);
+  return out;
+}
+
 // Alternates the base's pose with the point's place on its link until neither moves much, then
 // refines both.
 PointFit fit_point(const std::vector<PointPair>& pairs) {
   constexpr int kMaxRounds = 100;
   PointFit fit;
   for (int round = 0; round < kMaxRounds; ++round) {
-    fit.T_camera_base = absolute_orientation(pairs, fit.point);
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    for (const PointPair& pair : pairs) {
-      const Pose T_camera_link = fit.T_camera_base * pair.T_base_link;
-      place += T_camera_link.inverse() * *pair.observation->position_m /
-               static_cast<double>(pairs.size());
-    }
     const double before = fit.rms_m;
-    fit.point = place;
-    fit.rms_m = point_rms(fit, pairs);
+    fit = point_beside(absolute_orientation(pairs, fit.point), pairs);
     if (before - fit.rms_m < 1e-9 && round > 10) break;
   }
   return refine(fit, pairs);
@@ -170,18 +174,6 @@ std::vector<PointSightings> sightings_of(const KinematicTree& nominal,
   std::vector<PointSightings> out;
   for (auto& [id, of] : by_id)
     if (of.on_link.front().size() >= kFewest) out.push_back(std::move(of));
-  return out;
-}
-
-// A point where all its sightings put it on average.
-PointFit point_beside(const Pose& T_camera_base, const std::vector<PointPair>& pairs) {
-  PointFit out{T_camera_base};
-  for (const PointPair& pair : pairs) {
-    const Pose T_camera_link = T_camera_base * pair.T_base_link;
-    out.point +=
-        T_camera_link.inverse() * *pair.observation->position_m / static_cast<double>(pairs.size());
-  }
-  out.rms_m = point_rms(out, pairs);
   return out;
 }
 

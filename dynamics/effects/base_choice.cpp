@@ -139,7 +139,8 @@ Eigen::VectorXd held_out(const BaseData& data, const Eigen::MatrixXd& target,
   return out;
 }
 
-/// Student's t of the folds' differences.
+}  // namespace
+
 double paired_t(const Eigen::VectorXd& worse, const Eigen::VectorXd& better) {
   const auto n = static_cast<double>(worse.size());
   const Eigen::VectorXd difference = worse - better;
@@ -147,8 +148,6 @@ double paired_t(const Eigen::VectorXd& worse, const Eigen::VectorXd& better) {
       (difference.array() - difference.mean()).square().sum() / std::max(1.0, n - 1.0);
   return variance > 0.0 ? difference.mean() / std::sqrt(variance / n) : 0.0;
 }
-
-}  // namespace
 
 WidestFit widest_fit(const BaseData& data) {
   WidestFit out{Eigen::MatrixXd(data.torque.rows(), data.torque.cols()),

@@ -37,6 +37,9 @@ struct WidestFit {
 /// not decide about masses.
 [[nodiscard]] BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened);
 
+/// Student's t of what held-out squares of the same folds (or stretches) differ by.
+[[nodiscard]] double paired_t(const Eigen::VectorXd& worse, const Eigen::VectorXd& better);
+
 /// Held-out error of rigid bodies as declared and identified, drives and common terms free for
 /// both: root mean square, whitened; Student's t of the folds' squares, declared less identified.
 struct BaseErrors {

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/effects/base_choice.h"
 #include "dynamics/effects/disagreement.h"
 #include "kinematics/core/error.h"
 
@@ -220,17 +221,16 @@ bool may_be_of_masses(const Trace& trace) {
 /// both know: positive where `rival` predicts better.
 double advantage_of(const TorqueTrace& rival, const TorqueTrace& trace) {
   const trace::Partition& partition = trace.trace.partition;
-  Eigen::VectorXd won = Eigen::VectorXd::Zero(partition.stretches);
+  Eigen::VectorXd own = Eigen::VectorXd::Zero(partition.stretches);
+  Eigen::VectorXd other = own;
   for (std::size_t i = 0; i < trace.rows.size(); ++i) {
     const auto same = std::ranges::lower_bound(rival.rows, trace.rows[i]);
     if (same == rival.rows.end() || *same != trace.rows[i]) continue;
-    won[partition.stretch[i]] +=
-        trace.trace.held_out_whitened[static_cast<Eigen::Index>(i)] -
-        rival.trace.held_out_whitened[std::distance(rival.rows.begin(), same)];
+    const int stretch = partition.stretch[i];
+    own[stretch] += trace.trace.held_out_whitened[static_cast<Eigen::Index>(i)];
+    other[stretch] += rival.trace.held_out_whitened[std::distance(rival.rows.begin(), same)];
   }
-  const auto n = static_cast<double>(won.size());
-  const double variance = (won.array() - won.mean()).square().sum() / std::max(1.0, n - 1.0);
-  return variance > 0.0 ? won.mean() / std::sqrt(variance * partition.widening / n) : 0.0;
+  return effects::paired_t(own, other) / std::sqrt(partition.widening);
 }
 
 TorqueTrace trace_beside_base(const DynamicModel& model, const TorqueSamples& samples,
