@@ -25,6 +25,7 @@
 #include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
+#include "kinematics/structure/resting_joint.h"
 #include "kinematics/structure/slight_turn.h"
 
 namespace kinescope {
@@ -190,7 +191,7 @@ class Explainer {
     Explanation now = with_rivals_judged(asked_again(begun_with(std::move(first), tried)));
     // Beside joints that no fit settles for, doubts about some of them are not worth their time.
     if (now.fitted && !is_converged(now.fitted->calibration)) now = improved(std::move(now), tried);
-    now = with_base_at_rest(with_couplings_doubted(std::move(now)));
+    now = with_joints_at_rest(with_base_at_rest(with_couplings_doubted(std::move(now))));
     return with_free_markers_attached(with_rivals_judged(improved(std::move(now), tried)));
   }
 
@@ -514,6 +515,19 @@ class Explainer {
     if (!resting) return now;
     Explanation other = asked_again(of_structure(std::move(*resting), {}));
     return is_better(other, now) ? other : now;
+  }
+
+  // Errors that stay for seconds look like a joint of some channel.
+  [[nodiscard]] Explanation with_joints_at_rest(Explanation now) const {
+    if (!now.fitted || !now.structure || !options_.trace) return now;
+    for (std::size_t j = now.structure->joints.size(); j-- > 0;) {
+      if (!hardly_moves(now.structure->joints[j])) continue;
+      const double value = usual_value(*now.structure, j, recording().log);
+      Explanation other = of_structure(kinescope::with_joint_at_rest(*now.structure, j, value),
+                                       {now.fitted->trace.added});
+      if (is_better(other, now)) now = std::move(other);
+    }
+    return now;
   }
 
   // A marker that is bent, or slips on its link, moves with no joint exactly. On the link in whose

@@ -2,9 +2,8 @@
 #include "kinematics/structure/slight_turn.h"
 
 #include <numbers>
-#include <vector>
 
-#include "kinematics/core/median.h"
+#include "kinematics/structure/resting_joint.h"
 
 namespace kinescope {
 namespace {
@@ -12,11 +11,6 @@ namespace {
 // The slide of 0.2 m that a lens bent (`undeclared`, 9538) turned by 0.5 deg about an axis at 20 m.
 // A turn of 5 deg leaves its tangent by 2 % of the way.
 constexpr double kSlight = 5.0 * std::numbers::pi / 180.0;
-
-double usual_reading(const JointLog& log, int channel) {
-  const auto column = log.values.col(channel);
-  return median_of(std::vector<double>(column.begin(), column.end()));
-}
 
 }  // namespace
 
@@ -26,8 +20,7 @@ std::optional<Structure> with_slide_for_slight_turn(const Structure& structure, 
   if (turn.type != JointType::kRevolute || !turn.channel || !turn.couplings.empty() ||
       turn.travel > kSlight)
     return std::nullopt;
-  const double reading = usual_reading(log, turn.channel->channel);
-  const double angle = turn.channel->scale * reading + turn.offset;
+  const double angle = usual_value(structure, joint, log);
   const Pose T_joint_marker =
       joint_motion(turn.type, Eigen::Vector3d::UnitZ(), angle) * turn.T_joint_child;
   // Metres of the marker per radian.
@@ -43,7 +36,7 @@ std::optional<Structure> with_slide_for_slight_turn(const Structure& structure, 
   slide.T_joint_child = slide.T_parent_joint.inverse() * turn.T_parent_joint * T_joint_marker;
   slide.channel->scale *= tangent.norm();
   slide.channel->scale_sigma *= tangent.norm();
-  slide.offset = -slide.channel->scale * reading;
+  slide.offset = (turn.offset - angle) * tangent.norm();
   slide.travel *= tangent.norm();
   return out;
 }
