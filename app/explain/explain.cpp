@@ -191,8 +191,9 @@ class Explainer {
     Explanation now = with_rivals_judged(asked_again(begun_with(std::move(first), tried)));
     // Beside joints that no fit settles for, doubts about some of them are not worth their time.
     if (now.fitted && !is_converged(now.fitted->calibration)) now = improved(std::move(now), tried);
-    now = with_joints_at_rest(with_base_at_rest(with_couplings_doubted(std::move(now))));
-    return with_free_markers_attached(with_rivals_judged(improved(std::move(now), tried)));
+    now = with_base_at_rest(with_couplings_doubted(std::move(now)));
+    now = with_fewer_joints(with_rivals_judged(improved(std::move(now), tried)));
+    return with_free_markers_attached(std::move(now));
   }
 
   [[nodiscard]] Explanation begun() const {
@@ -511,20 +512,24 @@ class Explainer {
   // What all that is seen moves with, and no channel drives, may be the camera.
   [[nodiscard]] Explanation with_base_at_rest(Explanation now) const {
     if (!now.structure || !options_.trace) return now;
-    std::optional<Structure> resting = kinescope::with_base_at_rest(*now.structure);
+    std::optional<Structure> resting =
+        kinescope::with_base_at_rest(*now.structure, recording().log);
     if (!resting) return now;
     Explanation other = asked_again(of_structure(std::move(*resting), {}));
     return is_better(other, now) ? other : now;
   }
 
-  // Errors that stay for seconds look like a joint of some channel.
-  [[nodiscard]] Explanation with_joints_at_rest(Explanation now) const {
+  // Some joints are but errors of the poses, or undo another one.
+  [[nodiscard]] Explanation with_fewer_joints(Explanation now) const {
     if (!now.fitted || !now.structure || !options_.trace) return now;
+    const JointLog& log = recording().log;
     for (std::size_t j = now.structure->joints.size(); j-- > 0;) {
-      if (!hardly_moves(now.structure->joints[j])) continue;
-      const double value = usual_value(*now.structure, j, recording().log);
-      Explanation other = of_structure(kinescope::with_joint_at_rest(*now.structure, j, value),
-                                       {now.fitted->trace.added});
+      const Structure& structure = *now.structure;
+      std::optional<Structure> without = with_joint_undone(structure, j, log);
+      if (!without && hardly_moves(structure.joints[j]))
+        without = with_joint_at_rest(structure, j, log);
+      if (!without) continue;
+      Explanation other = of_structure(*std::move(without), {now.fitted->trace.added});
       if (is_better(other, now)) now = std::move(other);
     }
     return now;

@@ -155,6 +155,7 @@ void doubt_allowance(const Answer& answer, Structure& out) {
 }
 
 void doubt_shared_channels(const JointLog& log, Structure& out) {
+  std::erase_if(out.doubts, [](const StructureDoubt& doubt) { return doubt.of_shared_channel; });
   std::map<int, int> joints;
   for (const StructureJoint& joint : out.joints) {
     if (joint.channel) ++joints[joint.channel->channel];
@@ -162,10 +163,12 @@ void doubt_shared_channels(const JointLog& log, Structure& out) {
   for (const auto& [channel, count] : joints) {
     if (count < 2) continue;
     const std::string& name = log.channels[static_cast<std::size_t>(channel)];
-    out.doubts.push_back({fmt::format("{} drives {} joints", name, count),
-                          "right where one motor moves them all; else check that their markers sit "
-                          "firmly and are wholly in view",
-                          {name}});
+    StructureDoubt doubt{fmt::format("{} drives {} joints", name, count),
+                         "right where one motor moves them all; else check that their markers sit "
+                         "firmly and are wholly in view",
+                         {name}};
+    doubt.of_shared_channel = true;
+    out.doubts.push_back(std::move(doubt));
   }
 }
 

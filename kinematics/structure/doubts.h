@@ -17,7 +17,8 @@ void doubt_clocks(const GrownTree& fitted, const Readings& readings, const Serie
 /// Errors that are no noise had to be allowed for.
 void doubt_allowance(const Answer& answer, Structure& out);
 
-/// One motor may move several joints; a marker seen wrongly looks like a second joint, too.
+/// One motor may move several joints; a marker seen wrongly looks like a second joint, too. In
+/// place of what was said of it before.
 void doubt_shared_channels(const JointLog& log, Structure& out);
 
 /// Columns that repeat others.

@@ -26,11 +26,10 @@ int joint_below_all(const Structure& structure) {
 
 }  // namespace
 
-std::optional<Structure> with_base_at_rest(const Structure& structure) {
+std::optional<Structure> with_base_at_rest(const Structure& structure, const JointLog& log) {
   const int below = joint_below_all(structure);
   if (below < 0 || structure.joint_values.cols() <= below) return std::nullopt;
-  const auto joint = static_cast<std::size_t>(below);
-  return with_joint_at_rest(structure, joint, usual_value(structure, joint, {}));
+  return with_joint_at_rest(structure, static_cast<std::size_t>(below), log);
 }
 
 }  // namespace kinescope

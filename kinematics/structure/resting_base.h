@@ -11,6 +11,7 @@
 namespace kinescope {
 
 /// The joint's child, where it mostly stands, becomes link 0. Nothing for other structures.
-[[nodiscard]] std::optional<Structure> with_base_at_rest(const Structure& structure);
+[[nodiscard]] std::optional<Structure> with_base_at_rest(const Structure& structure,
+                                                         const JointLog& log);
 
 }  // namespace kinescope

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kinematics/core/median.h"
+#include "kinematics/structure/doubts.h"
 
 namespace kinescope {
 namespace {
@@ -59,6 +60,41 @@ void find_idle_channels(const StructureJoint& without, Structure& out) {
   out.idle_channels.assign(idle.begin(), idle.end());
 }
 
+// Reference marker to reference marker, at the usual value.
+Pose T_parent_child(const Structure& structure, std::size_t joint, const JointLog& log) {
+  const StructureJoint& of = structure.joints[joint];
+  return of.T_parent_joint *
+         joint_motion(of.type, Eigen::Vector3d::UnitZ(), usual_value(structure, joint, log)) *
+         of.T_joint_child;
+}
+
+// Without the joint, what it carried being part of `link`.
+Structure with_child_on(const Structure& structure, std::size_t joint, int link,
+                        const Pose& T_link_child, const JointLog& log) {
+  const int child = structure.joints[joint].child_link;
+  const auto index = static_cast<std::ptrdiff_t>(joint);
+  Structure out = structure;
+  out.rivals.clear();
+  out.joints.erase(out.joints.begin() + index);
+  out.joint_values = without_column(structure.joint_values, index);
+  find_idle_channels(structure.joints[joint], out);
+  for (StructureJoint& other : out.joints) {
+    if (other.parent_link != child) continue;
+    other.parent_link = link;
+    other.T_parent_joint = T_link_child * other.T_parent_joint;
+  }
+  StructureLink& into = out.links[static_cast<std::size_t>(link)];
+  into = united(into, out.links[static_cast<std::size_t>(child)], T_link_child);
+  to_first_marker(out, link);
+  out.links.erase(out.links.begin() + child);
+  for (StructureJoint& other : out.joints) {
+    if (other.parent_link > child) --other.parent_link;
+    if (other.child_link > child) --other.child_link;
+  }
+  structure_search::doubt_shared_channels(log, out);
+  return out;
+}
+
 }  // namespace
 
 bool hardly_moves(const StructureJoint& joint) {
@@ -84,33 +120,23 @@ double usual_value(const Structure& structure, std::size_t joint, const JointLog
   return structure.joint_values.cols() > column ? median(structure.joint_values.col(column)) : 0.0;
 }
 
-Structure with_joint_at_rest(const Structure& structure, std::size_t joint, double value) {
-  const StructureJoint& without = structure.joints[joint];
-  const int parent = without.parent_link;
-  const int child = without.child_link;
-  const Pose T_parent_child = without.T_parent_joint *
-                              joint_motion(without.type, Eigen::Vector3d::UnitZ(), value) *
-                              without.T_joint_child;
-  const auto index = static_cast<std::ptrdiff_t>(joint);
-  Structure out = structure;
-  out.rivals.clear();
-  out.joints.erase(out.joints.begin() + index);
-  out.joint_values = without_column(structure.joint_values, index);
-  find_idle_channels(without, out);
-  for (StructureJoint& other : out.joints) {
-    if (other.parent_link != child) continue;
-    other.parent_link = parent;
-    other.T_parent_joint = T_parent_child * other.T_parent_joint;
-  }
-  StructureLink& link = out.links[static_cast<std::size_t>(parent)];
-  link = united(link, out.links[static_cast<std::size_t>(child)], T_parent_child);
-  to_first_marker(out, parent);
-  out.links.erase(out.links.begin() + child);
-  for (StructureJoint& other : out.joints) {
-    if (other.parent_link > child) --other.parent_link;
-    if (other.child_link > child) --other.child_link;
-  }
-  return out;
+Structure with_joint_at_rest(const Structure& structure, std::size_t joint, const JointLog& log) {
+  return with_child_on(structure, joint, structure.joints[joint].parent_link,
+                       T_parent_child(structure, joint, log), log);
+}
+
+std::optional<Structure> with_joint_undone(const Structure& structure, std::size_t joint,
+                                           const JointLog& log) {
+  const StructureJoint& undoes = structure.joints[joint];
+  const auto before =
+      std::ranges::find(structure.joints, undoes.parent_link, &StructureJoint::child_link);
+  if (before == structure.joints.end() || !undoes.channel || !before->channel ||
+      undoes.channel->channel != before->channel->channel)
+    return std::nullopt;
+  const auto index = static_cast<std::size_t>(before - structure.joints.begin());
+  return with_child_on(
+      structure, joint, before->parent_link,
+      T_parent_child(structure, index, log) * T_parent_child(structure, joint, log), log);
 }
 
 }  // namespace kinescope

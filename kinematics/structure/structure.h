@@ -75,6 +75,7 @@ struct StructureDoubt {
   std::vector<std::string> names;  ///< channels or tags concerned
   bool of_model = false;           ///< an effect that the model lacks may be its cause
   bool of_rivals = false;          ///< about Structure::rivals, and gone with them
+  bool of_shared_channel = false;  ///< one channel drives several joints
 };
 
 struct RivalStructure;

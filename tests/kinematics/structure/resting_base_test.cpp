@@ -49,7 +49,7 @@ Pose marker_2(const Structure& structure, const Eigen::VectorXd& values) {
 
 TEST(RestingBase, TheRobotStaysWhereItMostlyStood) {
   const Structure moving = moving_base();
-  const auto resting = with_base_at_rest(moving);
+  const auto resting = with_base_at_rest(moving, log_of_one());
   ASSERT_TRUE(resting);
   ASSERT_EQ(resting->links.size(), 2U);
   ASSERT_EQ(resting->joints.size(), 1U);
@@ -65,14 +65,14 @@ TEST(RestingBase, TheRobotStaysWhereItMostlyStood) {
 TEST(RestingBase, OtherStructuresStayAsTheyAre) {
   Structure driven = moving_base();
   driven.joints.front().channel = ChannelTerm{0, 1.0, 0.0};
-  EXPECT_FALSE(with_base_at_rest(driven));
+  EXPECT_FALSE(with_base_at_rest(driven, log_of_one()));
   Structure seen = moving_base();
   seen.links.front() = {{TagId{0}}, {Pose{}}};
-  EXPECT_FALSE(with_base_at_rest(seen));
+  EXPECT_FALSE(with_base_at_rest(seen, log_of_one()));
   Structure undriven = moving_base();
   undriven.joints.back().channel.reset();
-  EXPECT_FALSE(with_base_at_rest(undriven));
-  EXPECT_FALSE(with_base_at_rest(Structure{}));
+  EXPECT_FALSE(with_base_at_rest(undriven, log_of_one()));
+  EXPECT_FALSE(with_base_at_rest(Structure{}, log_of_one()));
 }
 
 }  // namespace

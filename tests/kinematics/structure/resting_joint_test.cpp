@@ -63,7 +63,7 @@ TEST(RestingJoint, EveryMarkerStaysWhereItStood) {
   const Structure moving = arm_of_three();
   const JointLog log = log_at({0.3, -0.2, 0.5});
   for (std::size_t joint = 0; joint < 3; ++joint) {
-    const Structure resting = with_joint_at_rest(moving, joint, usual_value(moving, joint, log));
+    const Structure resting = with_joint_at_rest(moving, joint, log);
     EXPECT_EQ(resting.links.size(), 3U);
     EXPECT_EQ(resting.joints.size(), 2U);
     EXPECT_EQ(resting.idle_channels, std::vector{static_cast<int>(joint)});
@@ -79,7 +79,30 @@ TEST(RestingJoint, EveryMarkerStaysWhereItStood) {
 TEST(RestingJoint, AChannelThatDrivesAnotherJointIsNotIdle) {
   Structure moving = arm_of_three();
   moving.joints[2].couplings = {{0, 0.5, 0.0}};
-  EXPECT_TRUE(with_joint_at_rest(moving, 0, 0.0).idle_channels.empty());
+  EXPECT_TRUE(with_joint_at_rest(moving, 0, log_at({0.3, -0.2, 0.5})).idle_channels.empty());
+}
+
+// Marker 9 stands on the link between the joints of channels 1 and 2, which was passed over.
+TEST(RestingJoint, AMarkerOnALinkThatWasPassedOverStaysWhereItStood) {
+  Structure moving = arm_of_three();
+  moving.links[2] = {};
+  StructureJoint undoes = moving.joints[2];
+  undoes.parent_link = 3;
+  undoes.child_link = 4;
+  undoes.T_parent_joint = turned_pose(2.0, {0.1, 0.0, 0.2});
+  moving.joints.push_back(undoes);
+  moving.links.push_back({{TagId{9}}, {Pose{}}});
+  const JointLog log = log_at({0.3, -0.2, 0.5});
+  EXPECT_FALSE(with_joint_undone(moving, 2, log));
+  const auto simpler = with_joint_undone(moving, 3, log);
+  ASSERT_TRUE(simpler);
+  EXPECT_EQ(simpler->links[2].markers, std::vector{TagId{9}});
+  EXPECT_TRUE(simpler->idle_channels.empty());
+  for (const int id : {0, 5, 7, 9}) {
+    const Pose before = marker_of(moving, TagId{id}, log);
+    const Pose after = marker_of(*simpler, TagId{id}, log);
+    EXPECT_LT(log_pose(before.inverse() * after).norm(), kExactProduct) << "tag " << id;
+  }
 }
 
 TEST(RestingJoint, AJointHardlyMovesWithinTheErrorsOfItsPoses) {
