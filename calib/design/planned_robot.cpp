@@ -48,7 +48,7 @@ effects::EffectWorld world_of(const PlannedRobot& robot, const ExpectedRecording
   }
   world.frames = motion_at(recording, world.tree);
   world.loaded = world.frames;
-  if (!recording.postures) world.log = effects::motion_of(recording.log, world.tree);
+  world.log = effects::motion_of(recording.log, world.tree);
   world.gravity_base = robot.gravity_base;
   world.first_s = world.frames.times_s.front();
   world.last_s = world.frames.times_s.back();

@@ -20,6 +20,7 @@ namespace {
 constexpr double kFirst_s = 4.0;
 constexpr double kRate_hz = 15.0;
 constexpr double kSigma_px = 0.1;
+constexpr double kRounding = 1e-12;
 
 truth::FilmedRobot test_robot(double seconds, double reach) {
   truth::FilmedRobotOptions options;
@@ -143,6 +144,26 @@ TEST_F(Plan, PosturesTellMoreThanDrawnOnesAndShowMarkers) {
     blind.candidates = 8;  // next to nothing to choose from
     EXPECT_GT(plan_recording(robot(), space(), {}, blind).after.goal_m, plan.after.goal_m);
   }
+}
+
+// The order of the postures tells from which side a joint comes.
+TEST_F(Plan, BacklashShowsAtPosturesAndInMotion) {
+  const double width = 0.01;
+  const ConsideredEffect play{
+      {"backlash", "q2"}, width, Eigen::VectorXd::Constant(1, width), Eigen::VectorXd::Ones(1)};
+  const Eigen::VectorXd there = space().middle();
+  const Eigen::VectorXd here = there + Eigen::VectorXd::Constant(3, 0.2);
+  const ExpectedRecording postures = recording_at(robot(), space(), {there, here, there, here});
+  const std::vector<Correction> at_postures = corrections_of(robot(), postures, play);
+  ASSERT_EQ(at_postures.size(), 1U);
+  EXPECT_NEAR((at_postures.front().share - Eigen::Vector4d(-0.5, -0.5, 0.5, -0.5)).norm(), 0.0,
+              kRounding);
+  const RecordingPlan plan = plan_recording(robot(), space(), {}, options());
+  const ExpectedRecording motion = recording_along(robot(), space(), *plan.path, kRate_hz);
+  const std::vector<Correction> in_motion = corrections_of(robot(), motion, play);
+  ASSERT_EQ(in_motion.size(), 1U);
+  EXPECT_NEAR(in_motion.front().share.minCoeff(), -0.5, kRounding);
+  EXPECT_NEAR(in_motion.front().share.maxCoeff(), 0.5, kRounding);
 }
 
 TEST_F(Plan, RefusesWhatNothingIsSeenOfAndWhatIsTooShort) {
