@@ -161,8 +161,9 @@ void add_run(CLI::App& app, CommandLine& line) {
                  "shell takes > for itself); may be given again")
       ->type_name("LIMIT")
       ->allow_extra_args(false);
-  run.add_flag("!--no-trace", line.run.trace,
-               "Do not look for effects that the calibration lacks (trace.json)");
+  run.add_flag_callback(
+      "--no-trace", [&line] { line.run.trace = false; },
+      "Do not look for effects that the calibration lacks (trace.json)");
   add_force(
       run, line.run.force,
       "Run every stage again, also where nothing changed, and replace what others wrote in the "

@@ -26,11 +26,13 @@
 #include "app/io/joint_values_file.h"
 #include "app/io/products.h"
 #include "app/report/answer.h"
+#include "app/report/findings.h"
 #include "app/report/recordings_json.h"
 #include "app/report/report.h"
 #include "app/report/stopwatch.h"
 #include "app/report/trace_json.h"
 #include "app/report/trace_lines.h"
+#include "app/report/verdict_words.h"
 #include "calib/bundle/branches.h"
 #include "calib/quality/error_summary.h"
 #include "calib/quality/odd_readings.h"
@@ -117,8 +119,10 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
   for (const std::string& line : second_column_lines(run.second_columns)) fmt::print("{}\n", line);
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
   if (report == kReport) {
+    if (const std::string words = report::beside_urdf_words(run); !words.empty())
+      fmt::print("{}\n", report::sentence(words));
     fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(),
-               judge(run).given ? "" : " (no answer: see below)");
+               judge(run).given ? "" : " (no answer: see above)");
   }
   fmt::print("report  {}\n", folder.file(report).string());
 }

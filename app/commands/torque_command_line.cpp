@@ -136,8 +136,9 @@ void add_dynamics(CLI::App& app, CommandLine& line) {
       "Robust regressions (trimmed, Student's t) beside the models; with --model all anyway");
   command.add_flag_callback(
       "--no-robust", [&dynamics] { dynamics.robust = false; }, "None, nor a payload at rest");
-  command.add_flag("!--no-trace", dynamics.trace,
-                   "Do not look for effects beyond rigid bodies (trace.json)");
+  command.add_flag_callback(
+      "--no-trace", [&dynamics] { dynamics.trace = false; },
+      "Do not look for effects beyond rigid bodies (trace.json)");
   command.add_flag("--learning-curve", dynamics.learning_curve,
                    "The score of every model against the number of samples (slow)");
   command

@@ -25,13 +25,15 @@ std::string names_of(const std::vector<TracedEffect>& effects) {
   return joined(names);
 }
 
-// What follows the joints in the verdict's one sentence.
-std::string outcome_words(const Trace& trace) {
+// What follows the joints in the verdict's one sentence. `declares_another`: a nominal robot that
+// the calibration differs from.
+std::string outcome_words(const Trace& trace, bool declares_another) {
   const std::string corrected =
       trace.accepted.empty() ? "" : ", corrected for " + names_of(trace.accepted);
   switch (trace.verdict) {
     case TraceVerdict::kClean:
-      return ", and nothing wrong with it that this recording shows";
+      return declares_another ? ", and nothing else wrong with it that this recording shows"
+                              : ", and nothing wrong with it that this recording shows";
     case TraceVerdict::kEffects:
       return corrected;
     case TraceVerdict::kAmbiguous:
@@ -56,7 +58,10 @@ std::string headline(const Facts& facts) {
   if (!verdict.at("answer").get<bool>())
     return sentence("No answer: " + verdict.at("no_answer").get<std::string>());
   const std::optional<Trace>& trace = facts.run.trace;
-  return sentence(joints_words(facts.run) + (trace ? outcome_words(*trace) : ""));
+  const std::string nominal = nominal_words(facts.run);
+  return sentence(joints_words(facts.run) +
+                  (trace ? outcome_words(*trace, !nominal.empty()) : "")) +
+         nominal;
 }
 
 // The error's place in the result document, data that the fit has not seen first, lengths first.

@@ -7,9 +7,11 @@
 
 #include "app/report/assets.h"
 #include "app/report/facts.h"
+#include "app/report/findings.h"
 #include "app/report/page.h"
 #include "app/report/sections.h"
 #include "app/report/trace_section.h"
+#include "app/report/verdict_words.h"
 
 namespace kinescope {
 namespace {
@@ -35,7 +37,10 @@ constexpr std::array<report::ContentsEntry, 13> kContents = {{
 std::string sections(const Facts& facts, std::string_view urdf) {
   return report::verdict_section(facts) + report::view_section(facts) +
          report::data_section(facts) + report::structure_section(facts) +
-         (facts.run.trace ? report::trace_section(*facts.run.trace) : "") +
+         (facts.run.trace
+              ? report::trace_section(*facts.run.trace,
+                                      report::sentence(report::beside_urdf_words(facts.run)))
+              : "") +
          report::parameters_section(facts) + report::errors_section(facts) +
          report::residuals_section(facts) + report::observability_section(facts) +
          report::torque_section(facts) + report::method_section(facts) +

@@ -240,12 +240,13 @@ std::string steps_list(const Trace& trace) {
 
 }  // namespace
 
-std::string trace_section(const Trace& trace) {
+std::string trace_section(const Trace& trace, const std::string& further) {
   std::string out = section_head("trace", "Closing the loop");
   const std::vector<std::string> lines = trace_lines(trace);
   if (lines.empty()) return "";
   out += paragraph(lines.front(), "lead");
   if (trace.verdict == TraceVerdict::kNothingToSay) return out + "</section>\n";
+  if (!further.empty()) out += paragraph(further);
   if (!trace.accepted.empty()) out += effects_table(trace);
   for (const TracedEffect& effect : trace.accepted) out += effect_figure(effect);
   for (const Ambiguity& ambiguity : trace.ambiguities) out += paragraph(ambiguity_words(ambiguity));

@@ -7,7 +7,8 @@
 
 namespace kinescope::report {
 
-/// The same for a calibration and for torques; empty where nothing was traced.
-[[nodiscard]] std::string trace_section(const Trace& trace);
+/// The same for a calibration and for torques; empty where nothing was traced. `further`: a
+/// sentence of what to do with what was found.
+[[nodiscard]] std::string trace_section(const Trace& trace, const std::string& further = "");
 
 }  // namespace kinescope::report

@@ -24,6 +24,13 @@ int digits_for(double value, double half_width) {
   return static_cast<int>(std::clamp(digits, 2.0, 6.0));
 }
 
+const AmountUnit kPercent{100.0, "%"};
+
+// Of numbers without a unit: coefficients of the lens, ratios of two motions; else shares.
+bool is_share(const EffectId& id, const std::string& unit) {
+  return unit.empty() && id.effect != "lens_distortion" && id.effect != "coupling";
+}
+
 // "0.0034", "64", "420": two digits, and no power of ten for what is large.
 std::string two_digits(double value) {
   return std::abs(value) < 10.0 ? fmt::format("{:.2g}", value) : fmt::format("{:.0f}", value);
@@ -68,12 +75,11 @@ std::string limit_text(const NotFoundEffect& missing) {
     return fmt::format("{}{}{}", two_digits(micro ? 1e3 * value : value),
                        unit.text == "°" ? "" : " ", micro ? "µs" : unit.text);
   }
-  // Of numbers without a unit: coefficients of the lens, ratios of two motions; else shares.
   if (missing.id.effect == "lens_distortion")
     return two_digits(missing.smallest_size) + " (coefficient)";
   if (missing.id.effect == "coupling")
     return two_digits(missing.smallest_size) + " of the other joint's motion";
-  return two_digits(100.0 * missing.smallest_size) + " %";
+  return fmt::format("{} {}", two_digits(kPercent.factor * missing.smallest_size), kPercent.text);
 }
 
 namespace {
@@ -98,7 +104,7 @@ std::string effect_name(const TracedEffect& effect) {
 }
 
 std::string size_words(const TracedEffect& effect) {
-  const AmountUnit unit = amount_unit(effect.unit);
+  const AmountUnit unit = is_share(effect.id, effect.unit) ? kPercent : amount_unit(effect.unit);
   const double half = 0.5 * (effect.interval.high - effect.interval.low);
   const bool small_time = effect.unit == "s" && std::abs(effect.size) < 1e-4;
   const double factor = unit.factor * (small_time ? 1e3 : 1.0);

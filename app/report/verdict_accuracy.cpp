@@ -53,12 +53,22 @@ std::string declared_words(const Calibration& calibration) {
                      : ", and what the declared intrinsics are wrong by comes on top.");
 }
 
+const FreedomLevel* level_of(const std::vector<FreedomLevel>& levels, bool exported) {
+  const auto found = std::ranges::find_if(levels, [exported](const FreedomLevel& level) {
+    return exported ? level.exported : level.free == FreeGeometry::kPlacement && level.effects == 0;
+  });
+  return found == levels.end() ? nullptr : &*found;
+}
+
+std::string held_out_words(const ErrorRow& errors) {
+  return error_words(errors.held_out_px, errors.held_out_m, errors.held_out_rad);
+}
+
 /// " Of the nominal robot, only placed: 9.6 mm; joint zeros free: 1.2 mm; .."
 std::string level_words(const RunSummary& run) {
   std::string text;
   for (const FreedomLevel& level : run.levels) {
-    const ErrorRow& all = level.errors;
-    const std::string error = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
+    const std::string error = held_out_words(level.errors);
     if (error.empty()) continue;
     text += fmt::format("{}{}: {}{}", text.empty() ? "" : "; ", words_of(level), error,
                         level.exported ? " (this one)" : "");
@@ -276,6 +286,17 @@ std::string clock_words(const RunSummary& run) {
 
 int least_certain_axis(const Calibration& calibration) {
   return Axes(calibration).told().worst_joint;
+}
+
+std::string nominal_words(const RunSummary& run) {
+  const FreedomLevel* declared = level_of(run.levels, false);
+  const FreedomLevel* taken = level_of(run.levels, true);
+  if (declared == nullptr || taken == nullptr || declared == taken) return "";
+  const std::string before = held_out_words(declared->errors);
+  const std::string after = held_out_words(taken->errors);
+  if (before.empty() || after.empty()) return "";
+  return fmt::format(" As declared it misses unseen postures by {}, as calibrated by {}.", before,
+                     after);
 }
 
 std::string accuracy_words(const RunSummary& run) {

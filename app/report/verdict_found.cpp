@@ -11,6 +11,7 @@
 #include "app/report/findings.h"
 #include "app/report/numbers.h"
 #include "app/report/verdict_words.h"
+#include "calib/effects/corrected_log.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::report {
@@ -227,6 +228,20 @@ std::string joints_words(const RunSummary& run) {
     return fmt::format("No joint found among {}", counted(tree.markers.size(), body_word(run)));
   return fmt::format("{} in a {}{}", counted(moving, "joint"), is_chain(tree) ? "chain" : "tree",
                      letters);
+}
+
+std::string beside_urdf_words(const RunSummary& run) {
+  const CorrectedLog corrected =
+      corrected_log(run.log, run.calibration.tree, run.effects, run.gravity_base);
+  std::vector<std::string> names;
+  for (const EffectId& id : corrected.undone) {
+    // The clocks' offset is the recording's, not the robot's.
+    if (id.place != "clock") names.push_back(fmt::format("{} at {}", id.effect, id.place));
+  }
+  if (names.empty()) return "";
+  return fmt::format(
+      "the URDF has no element for {}; `kinescope correct` takes {} out of joint readings",
+      joined(names), names.size() == 1 ? "it" : "them");
 }
 
 std::string found_words(const RunSummary& run) {

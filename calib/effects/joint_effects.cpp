@@ -32,6 +32,7 @@ CameraEffect late_reading(const Suspect& s) {
   out.candidate.possible = [](const Eigen::VectorXd& offset) {
     return std::abs(offset[0]) < kLatest;
   };
+  out.candidate.signed_words = {s.name + " is read late", s.name + " is read early"};
   out.candidate.check =
       "filters and bus cycles of this drive; a log of commanded in place of measured values";
   out.candidate.record = fmt::format("move {} faster, and at changing speed", s.name);
@@ -127,6 +128,9 @@ CameraEffect encoder_scale(const Suspect& s) {
                                         "proportion",
                                         s.name),
                             {{"scale", ""}}, "");
+  out.candidate.signed_words = {
+      fmt::format("{} moves by more than its encoder says, in proportion", s.name),
+      fmt::format("{} moves by less than its encoder says, in proportion", s.name)};
   out.candidate.check =
       "gear ratio, ticks a turn, belt, spindle pitch in the driver's configuration";
   // Where no other length is known, a page printed too large says the same.
@@ -308,8 +312,10 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
       gravity_loads(world.tree, world.loaded, s.joint, world.gravity_base);
   std::vector<EffectParameter> parameters;
   for (const Load& load : loads) parameters.push_back({"sag by " + load.what, s.unit});
-  CameraEffect out = effect(s, "compliance", fmt::format("{} gives way under its load", s.name),
-                            std::move(parameters), s.unit);
+  CameraEffect out =
+      effect(s, "compliance",
+             fmt::format("{} gives way under its load, by so much under the largest", s.name),
+             std::move(parameters), s.unit);
   out.candidate.check = "stiffness of the gear and the link; weight of tool and payload";
   out.candidate.record = fmt::format(
       "the same readings of {} with {}; declare the direction of gravity in recording.yaml", s.name,

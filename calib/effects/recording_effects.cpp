@@ -93,6 +93,7 @@ CameraEffect recording_mount(const EffectWorld& world, int marker, std::vector<i
 CameraEffect recording_growth(const EffectWorld& world) {
   CameraEffect out = effect("recording_growth", "robot", "the robot is larger (or smaller)",
                             {{"relative growth", "m/m"}}, "m/m");
+  out.candidate.signed_words = {"the robot is larger", "the robot is smaller"};
   in_one_of(world, all_recordings(world), out.candidate);
   out.candidate.check =
       "temperature of the links: aluminium grows by 0.023 mm/m a kelvin, steel by 0.012 mm/m; "

@@ -19,6 +19,8 @@ CameraEffect time_offset() {
   CameraEffect out =
       effect("time_offset", "clock", "the joint log's clock and the camera's do not agree",
              {{"offset", "s"}}, "s");
+  out.candidate.signed_words = {"the joint log's clock is ahead of the camera's",
+                                "the joint log's clock is behind the camera's"};
   out.candidate.check = "latency of the camera driver, time stamps at arrival instead of exposure";
   out.candidate.record = "move faster, and at changing speed";
   out.is_time_offset = true;
@@ -31,6 +33,8 @@ CameraEffect time_offset() {
 CameraEffect clock_drift(const EffectWorld& world) {
   CameraEffect out = effect("clock_drift", "clock", "one of the clocks runs faster than the other",
                             {{"drift", "s/s"}}, "s/s");
+  out.candidate.signed_words = {"the joint log's clock runs faster than the camera's",
+                                "the joint log's clock runs slower than the camera's"};
   out.candidate.check = "frame rate that the container declares, clock of the robot's controller";
   out.candidate.record = "a longer recording, with motion at its beginning and end";
   const Eigen::VectorXd time = frame_times(world);
@@ -132,6 +136,8 @@ CameraEffect tag_size(const EffectWorld& world, int marker) {
   const std::string name = marker_name(world, marker);
   CameraEffect out = effect("tag_size", name, fmt::format("{} is not as large as declared", name),
                             {{"relative size", ""}}, "");
+  out.candidate.signed_words = {name + " is larger than declared",
+                                name + " is smaller than declared"};
   out.candidate.check = "measure the black square's edge; printers scale";
   out.candidate.record = "bring the marker nearer to the camera and farther away";
   // One view, for ever: what it says of the size is the errors of its corners.
@@ -208,6 +214,8 @@ bool may_be_misprinted(const EffectWorld& world) {
 CameraEffect all_tag_sizes() {
   CameraEffect out = effect("tag_size", "tags", "all markers are larger (or smaller) than declared",
                             {{"relative size", ""}}, "");
+  out.candidate.signed_words = {"all markers are larger than declared",
+                                "all markers are smaller than declared"};
   out.candidate.check =
       "measure a black square's edge: printers scale a page. Were the markers right, the scale of "
       "every slide (of the nominal model) would be wrong";

@@ -231,6 +231,7 @@ std::vector<CameraEffect> bumps_in_recordings(const EffectWorld& world) {
 CameraEffect thermal_growth(const EffectWorld& world) {
   CameraEffect out = effect("thermal_growth", "robot", "the robot grows (or shrinks) slowly",
                             {{"relative growth", "m/m"}}, "m/m");
+  out.candidate.signed_words = {"the robot grows slowly", "the robot shrinks slowly"};
   out.candidate.check =
       "temperature of the links: aluminium grows by 0.023 mm/m a kelvin, steel by 0.012 mm/m";
   out.candidate.record = "let the robot warm up first, or log its temperature";

@@ -74,7 +74,9 @@ struct EffectId {
 /// An effect that the model may lack. All of its parameters are zero when it is absent.
 struct Candidate {
   EffectId id;
-  std::string words;   ///< "the encoder of joint3 runs out of centre"
+  std::string words;  ///< "the encoder of joint3 runs out of centre"
+  /// Of a first parameter above and below zero; empty: `words` say it all.
+  std::array<std::string, 2> signed_words;
   std::string check;   ///< what to look at on the robot
   std::string record;  ///< what to record so that it shows
   /// Effects that this one refines: it waits while one of them helps, and gives way to one that

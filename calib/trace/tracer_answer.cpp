@@ -48,6 +48,12 @@ bool same_place(const std::string& rest, const std::string& effect) {
   return rest == effect || rest.starts_with(effect + " ") || effect.starts_with(rest + " ");
 }
 
+// By the sign of what was found.
+std::string words_of(const Candidate& candidate, const Eigen::VectorXd& values) {
+  const std::string& of_sign = candidate.signed_words[values[0] < 0.0 ? 1 : 0];
+  return of_sign.empty() ? candidate.words : of_sign;
+}
+
 }  // namespace
 
 // Several waves at one place are what any function is made of. Where one curve in their stead
@@ -381,7 +387,7 @@ void Tracer::summarise() {
     const Candidate& candidate = *find_candidate(base_->fit, added.id);
     TracedEffect effect = details_[i].effect;
     effect.id = added.id;
-    effect.words = candidate.words;
+    effect.words = words_of(candidate, values);
     effect.check = candidate.check;
     effect.unit = candidate.size_unit;
     effect.scan_name = candidate.scan_name;
