@@ -444,7 +444,7 @@ class Explainer {
     const Measurements& measurements = evidence_.observed.measurements;
     return std::clamp(log_odds(predictive_score(one.fitted->calibration, measurements),
                                predictive_score(rival.fitted->calibration, measurements)),
-                      0.0, kMost);
+                      -kMost, kMost);
   }
 
   [[nodiscard]] PoseTracks undone(const Calibration& calibration) const {
@@ -490,8 +490,17 @@ class Explainer {
       odds.push_back(log_odds_of(
           alone, leaves_noise_only ? plainly_fitted(rival.structure)
                                    : of_structure(rival.structure, {now.fitted->trace.added})));
+    const auto best = std::ranges::min_element(odds);
+    const bool is_exchanged = best != odds.end() && *best < 0.0;
+    if (is_exchanged) {
+      const auto rival = static_cast<std::size_t>(best - odds.begin());
+      now = of_structure(with_rival(*now.structure, rival, recording().log), {});
+      const double over_before = -*best;
+      for (double& against : odds) against += over_before;
+      *best = over_before;
+    }
     now.structure = kinescope::with_rivals_judged(*std::move(now.structure), odds);
-    return now;
+    return is_exchanged ? asked_again(std::move(now)) : now;
   }
 
   // Joints that move in proportion may be coupled; or only one of them moves as it should not.

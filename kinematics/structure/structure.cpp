@@ -81,7 +81,7 @@ std::vector<RivalStructure> rivals_of(const Answer& answer, const EveryFrame& ev
     unknown.status = StructureStatus::kDetermined;
     unknown.link_log_odds.resize(tree.links.size());
     unknown.link_runner_up.resize(tree.links.size());
-    out.push_back({rival.words, assembled(tree, every, unknown)});
+    out.push_back({rival.words, rival.instead_of, assembled(tree, every, unknown)});
   }
   return out;
 }
@@ -139,6 +139,23 @@ Structure find_structure(const PoseTracks& tracks, const JointLog& log,
   doubt_clocks(fitted, every, full, own.log, options, out);
   out.time_offset_sigma_s = s.offset.sigma_s;
   doubt_rare(tracks, out);
+  return out;
+}
+
+Structure with_rival(const Structure& structure, std::size_t rival, const JointLog& log) {
+  Structure out = structure.rivals[rival].structure;
+  out.status = StructureStatus::kDetermined;
+  out.copied_channels = structure.copied_channels;
+  out.time_offset_sigma_s = structure.time_offset_sigma_s;
+  std::ranges::copy_if(
+      structure.doubts, std::back_inserter(out.doubts),
+      [](const StructureDoubt& doubt) { return !doubt.of_model && !doubt.of_rivals; });
+  structure_search::doubt_shared_channels(log, out);
+  out.rivals = structure.rivals;
+  RivalStructure& before = out.rivals[rival];
+  std::swap(before.words, before.instead_of);
+  before.structure = structure;
+  before.structure.rivals.clear();
   return out;
 }
 

@@ -109,6 +109,7 @@ struct Structure {
 /// Another answer for the same markers; of its own doubts nothing is known.
 struct RivalStructure {
   std::string words;
+  std::string instead_of;  ///< in words: what the structure has there
   Structure structure;
 };
 
@@ -132,6 +133,11 @@ struct StructureOptions {
 /// channels but for their numbering in the result.
 [[nodiscard]] Structure find_structure(const PoseTracks& tracks, const JointLog& log,
                                        const StructureOptions& options = {});
+
+/// The rival in the structure's place, and the structure among its rivals. What was in doubt about
+/// the recording is still, what was about the model is not: none is known of the rival.
+[[nodiscard]] Structure with_rival(const Structure& structure, std::size_t rival,
+                                   const JointLog& log);
 
 /// Judged by more than poses: `log_odds` of the structure against each of its rivals. Determined
 /// where all are ruled out; without rivals after that.

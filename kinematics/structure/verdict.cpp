@@ -66,6 +66,7 @@ struct Alternative {
   int link = -1;  // whose joint it is about; -1: of a body at rest
   std::size_t body = 0;
   const Attachment* place = nullptr;  // of the body; null: it is not about one body's place
+  std::string instead_of = {};        // where the answer has the body, in words
 };
 
 class Judge {
@@ -106,6 +107,7 @@ class Judge {
       alternative.link = own_link(tree_, b);
       alternative.body = b;
       alternative.place = &a;
+      alternative.instead_of = words(b, body.attachment);
       out.push_back(std::move(alternative));
     }
     const double free_loss = body.everywhere_cost / correlation - now;
@@ -368,7 +370,7 @@ std::vector<RivalPlace> rival_places(const std::vector<Alternative>& all, double
   std::ranges::stable_sort(close, {}, &Alternative::loss);
   if (close.size() > kMost) close.resize(kMost);
   std::vector<RivalPlace> out;
-  for (const Alternative* a : close) out.push_back({a->words, a->body, *a->place});
+  for (const Alternative* a : close) out.push_back({a->words, a->instead_of, a->body, *a->place});
   return out;
 }
 

@@ -13,6 +13,7 @@ namespace kinescope::structure_search {
 /// An answer that cannot be ruled out: a body that hangs elsewhere.
 struct RivalPlace {
   std::string words;
+  std::string instead_of;  ///< where the answer has the body, in words
   std::size_t body = 0;
   Attachment attachment;
 };
