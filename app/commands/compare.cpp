@@ -9,6 +9,7 @@
 #include "app/commands/carry_over.h"
 #include "app/commands/commands.h"
 #include "app/commands/compared_runs.h"
+#include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/io/same_place.h"
 #include "app/report/compare_summary.h"
@@ -148,7 +149,7 @@ ExitCode compare_command(const CompareOptions& options, const Console& console) 
   summary.differences = run_differences(runs, matches, options.level);
   summary.carried = carried_over(runs, matches, options.level, console.progress);
   if (folder) {
-    folder->write({{"compare.json", compare_json(summary).dump(1) + "\n"},
+    folder->write({{"compare.json", json_text(compare_json(summary))},
                    {"compare.html", compare_html(summary)}});
   }
   print_comparison(summary, options, console);

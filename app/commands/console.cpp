@@ -8,7 +8,7 @@
 namespace kinescope {
 
 void Console::print(const nlohmann::json& document) const {
-  const std::string text = document.dump(2);
+  const std::string text = document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
   if (result) {
     result(text);
   } else {

@@ -7,6 +7,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/control_bench.h"
 #include "app/commands/simulated_robot.h"
+#include "app/io/json_text.h"
 #include "app/io/torque_model_file.h"
 #include "app/torque/model_of_robot.h"
 #include "app/torque/model_torque.h"
@@ -268,8 +269,7 @@ ExitCode control_command(const ControlOptions& options, const Console& console) 
   Session(options, bench, folder, rounds, console.progress, summary).run();
   report_progress(console.progress, "", 0, 0);
   const nlohmann::json document = control_json(summary);
-  folder.write(
-      {{"control.json", document.dump(1) + "\n"}, {"control.html", control_html(summary)}});
+  folder.write({{"control.json", json_text(document)}, {"control.html", control_html(summary)}});
   if (console.json) {
     console.print(document);
     return ExitCode::kDone;

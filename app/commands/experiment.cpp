@@ -10,6 +10,7 @@
 
 #include "app/commands/commands.h"
 #include "app/experiments/experiments.h"
+#include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/torque/torque_inputs.h"
 #include "kinematics/core/error.h"
@@ -101,7 +102,7 @@ ExitCode experiment_command(const ExperimentOptions& options, const Console& con
   summary.inputs = std::move(inputs);
   const nlohmann::json document = experiment_json(summary);
   std::vector<std::pair<std::string, std::string>> products{
-      {"experiment.json", document.dump(1) + "\n"}, {"experiment.html", experiment_html(summary)}};
+      {"experiment.json", json_text(document)}, {"experiment.html", experiment_html(summary)}};
   for (const ExperimentTable& table : summary.tables)
     products.emplace_back(table.id + ".csv", experiment_csv(table));
   folder.write(products);

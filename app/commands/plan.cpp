@@ -7,6 +7,7 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/planned_run.h"
+#include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/report/plan_summary.h"
 #include "app/torque/torque_inputs.h"
@@ -164,8 +165,7 @@ ExitCode plan_command(const PlanCommandOptions& options, const Console& console)
   const design::RecordingPlan plan =
       plan_recording(run.robot, run.space, run.rivals, asked, console.progress);
   const PlanSummary summary = plan_summary_of(options, run, asked, plan);
-  folder.write(
-      {{"plan.csv", plan_csv(run, plan)}, {"plan.json", plan_json(summary).dump(1) + "\n"}});
+  folder.write({{"plan.csv", plan_csv(run, plan)}, {"plan.json", json_text(plan_json(summary))}});
   print_plan(summary, folder, console);
   return ExitCode::kDone;
 }

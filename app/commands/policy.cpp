@@ -7,6 +7,7 @@
 
 #include "app/commands/policy_search.h"
 #include "app/commands/policy_seeds.h"
+#include "app/io/json_text.h"
 
 namespace kinescope {
 namespace {
@@ -50,7 +51,7 @@ ExperimentSummary write_table(const OutputFolder& folder, const PolicyCommandOpt
   for (const ExperimentTable& table : out.tables) {
     folder.write(table.id + ".csv", experiment_csv(table));
   }
-  folder.write("experiment.json", experiment_json(out).dump(1) + "\n");
+  folder.write("experiment.json", json_text(experiment_json(out)));
   folder.write("experiment.html", experiment_html(out));
   return out;
 }

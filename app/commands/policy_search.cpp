@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
 #include "app/io/policy_system_file.h"
 #include "app/torque/torque_inputs.h"
 #include "dynamics/policy/systems/library.h"
@@ -239,7 +240,7 @@ void PolicySearch::write_products(const LearnerState& state) const {
                                                    .promised = state.records[best].promised,
                                                    .paid = state.records[best].paid}));
   }
-  folder_.write("policy_search.json", policy_search_json(summary_).dump(1) + "\n");
+  folder_.write("policy_search.json", json_text(policy_search_json(summary_)));
   folder_.write("policy.html", policy_html(summary_));
 }
 

@@ -24,6 +24,7 @@
 #include "app/explain/sighting_doubts.h"
 #include "app/io/effects_file.h"
 #include "app/io/joint_values_file.h"
+#include "app/io/json_text.h"
 #include "app/io/products.h"
 #include "app/report/answer.h"
 #include "app/report/findings.h"
@@ -133,7 +134,7 @@ void write_tracks(const RunSummary& run, RunFolder& folder) {
 
 void write_structure(const RunSummary& run, RunFolder& folder) {
   if (!run.structure) return;
-  folder.write("structure.json", structure_json(*run.structure, run.log).dump(2) + "\n");
+  folder.write("structure.json", json_text(structure_json(*run.structure, run.log), 2));
 }
 
 void write_products(const RunSummary& run, const std::string& urdf, RunFolder& folder) {
@@ -148,10 +149,10 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
     folder.write("camera_path.csv", camera_path_csv(run.calibration));
   folder.write("joint_values.csv", joint_values_csv(run.calibration));
   if (!run.log.unit_factors.empty()) calibration["unit_factors"] = run.log.unit_factors;
-  folder.write("calibration.json", calibration.dump(1) + "\n");
+  folder.write("calibration.json", json_text(calibration));
   folder.write("residuals.csv", residuals_csv(run.calibration));
-  if (run.trace) folder.write("trace.json", trace_json(*run.trace).dump(1) + "\n");
-  folder.write("result.json", result_json(run).dump(2) + "\n");
+  if (run.trace) folder.write("trace.json", json_text(trace_json(*run.trace)));
+  folder.write("result.json", json_text(result_json(run), 2));
 }
 
 /// A recording shows a part of what a robot may do; where it goes beyond the limits, so do they.
@@ -405,7 +406,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   clock.lap("report", run.times);
   folder.add_products({std::string(kRunFile)});
   folder.remove_stale_products();
-  folder.write(kRunFile, run_json(run, folder.products()).dump(2) + "\n");
+  folder.write(kRunFile, json_text(run_json(run, folder.products()), 2));
 
   print_result(run, folder, kReport, console);
   require(answer, "the report shows the details");

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
 #include "app/io/products.h"
 #include "app/io/same_place.h"
 #include "app/io/sha256.h"
@@ -221,7 +222,7 @@ void RunFolder::keep_observations(const Recording& recording, const TagObservati
                   {"width", observations.width},       {"height", observations.height},
                   {"times_s", observations.times_s},   {"rejected", std::move(rejected)},
                   {"warnings", observations.warnings}, {"lens_known", observations.lens_known}};
-  write(observations_file(recording.camera_name, "json"), kept.dump(1) + "\n");
+  write(observations_file(recording.camera_name, "json"), json_text(kept));
 }
 
 bool RunFolder::holds_answer() const {
@@ -242,8 +243,10 @@ void RunFolder::add_products(const std::vector<std::string>& names) {
 }
 
 void RunFolder::remove_stale_products() const {
+  // Only what a run writes, whatever the folder's list says.
+  const std::vector<std::string> known = run_products(true);
   for (const std::string& name : own_products()) {
-    if (!products_.contains(name)) remove(name);
+    if (!products_.contains(name) && std::ranges::find(known, name) != known.end()) remove(name);
   }
 }
 

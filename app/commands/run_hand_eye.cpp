@@ -10,6 +10,7 @@
 #include "app/commands/limits.h"
 #include "app/commands/run_folder.h"
 #include "app/explain/pipeline.h"
+#include "app/io/json_text.h"
 #include "app/io/products.h"
 #include "app/report/hand_eye_summary.h"
 #include "app/report/stopwatch.h"
@@ -75,15 +76,15 @@ void write_all(HandEyeSummary& summary, Stopwatch& clock, RunFolder& folder) {
   const std::string urdf = hand_eye_urdf(summary.hand_eye, summary.run.robot);
   if (!summary.run.tracks.tracks.empty())
     folder.write("tracks.csv", tracks_csv(summary.run.tracks));
-  folder.write("hand_eye.json", hand_eye_json(summary).dump(1) + "\n");
+  folder.write("hand_eye.json", json_text(hand_eye_json(summary)));
   folder.write("hand_eye.urdf", urdf);
   if (summary.hand_eye.trace)
-    folder.write("trace.json", trace_json(*summary.hand_eye.trace).dump(1) + "\n");
+    folder.write("trace.json", json_text(trace_json(*summary.hand_eye.trace)));
   folder.write("report.html", hand_eye_report_html(summary, urdf));
   clock.lap("write", summary.run.times);
   folder.add_products({std::string(kRunFile)});
   folder.remove_stale_products();
-  folder.write(kRunFile, run_json(summary.run, folder.products()).dump(2) + "\n");
+  folder.write(kRunFile, json_text(run_json(summary.run, folder.products()), 2));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "app/explain/moving_camera.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/log_faults.h"
+#include "kinematics/log/readings_apart.h"
 #include "kinematics/structure/flange_log.h"
 
 namespace kinescope {
@@ -165,13 +166,16 @@ bool is_mostly_driven(const Structure& structure) {
   return is_robot(structure) && 2 * driven > std::ssize(structure.joints);
 }
 
-// Without stretches in which the log repeats one row, or in a half of the recording: a log that is
-// frozen or goes wrong halfway is this recording's all the same.
+// Without single readings that no other comes near, without stretches in which the log repeats one
+// row, or in a half of the recording: a log that jumps once, is frozen or goes wrong halfway is
+// this recording's all the same.
 bool is_driven_in_part(const Recording& recording, const PoseTracks& tracks,
                        const CalibrateOptions& options) {
-  const std::vector<RepeatedStretch> frozen = repeated_stretches(recording.log, kMaxGap);
-  const JointLog moving = without_stretches(recording.log, frozen);
-  if (!frozen.empty()) {
+  const std::vector<ReadingApart> apart = readings_apart(recording.log);
+  const JointLog near = without_readings(recording.log, apart);
+  const std::vector<RepeatedStretch> frozen = repeated_stretches(near, kMaxGap);
+  const JointLog moving = without_stretches(near, frozen);
+  if (!apart.empty() || !frozen.empty()) {
     const auto whole = structure_of(recording, tracks, moving, options);
     if (!whole || is_driven(*whole)) return true;
   }

@@ -63,7 +63,9 @@ Owners owners_in(const fs::path& folder) {
   for (std::string line; std::getline(lines, line);) {
     const std::size_t space = line.find(' ');
     if (line.starts_with('#') || space == std::string::npos) continue;
-    owners[line.substr(space + 1)] = line.substr(0, space);
+    const std::string name = line.substr(space + 1);
+    // Files of this folder alone, whatever someone wrote into the list.
+    if (fs::path(name).filename() == name) owners[name] = line.substr(0, space);
   }
   return owners;
 }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
 #include "app/io/policy_json.h"
 #include "dynamics/models/saved_model_json.h"
 #include "kinematics/core/error.h"
@@ -192,7 +193,7 @@ std::string policy_file_text(const PolicyFile& file) {
                       {"trial", file.trial},
                       {"promised", file.promised},
                       {"paid", file.paid}};
-  return document.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+  return json_text(document);
 }
 
 PolicyFile read_policy_file(const std::filesystem::path& path) {
@@ -219,7 +220,7 @@ std::string policy_state_text(const PolicyStateFile& file) {
   const json document{{"schema", kStateSchema},          {"schema_version", kSchemaVersion},
                       {"version", file.version},         {"request", file.request},
                       {"state", state_json(file.state)}, {"bands", std::move(bands)}};
-  return document.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  return json_text(document, -1);
 }
 
 json read_policy_request(const std::filesystem::path& path) {
@@ -257,7 +258,7 @@ std::string velocity_model_text(const policy::VelocityModel& model, const std::s
                       {"columns", columns},
                       {"trials", trials},
                       {"model", velocity_model_json(model)}};
-  return document.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+  return json_text(document);
 }
 
 std::string trial_csv(const policy::Trial& trial, const StateLayout& layout,

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/io/json_text.h"
 #include "dynamics/models/saved_model_json.h"
 
 namespace kinescope {
@@ -111,7 +112,7 @@ std::string torque_model_json(const TorqueModelFile& file) {
   document["motion"] = filter_json(file.filter);
   document["motion"]["source"] = to_string(file.source);
   document["traced"] = traced_json(file.traced);
-  return document.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  return json_text(document, -1);
 }
 
 TorqueModelFile read_torque_model(const std::filesystem::path& path) {

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/torque/contact_model.h"
 #include "app/torque/contact_predictor.h"
@@ -308,7 +309,7 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   }
 
   folder.write({{"contacts.csv", contacts_csv(summary)},
-                {"contacts.json", contact_json(summary).dump(1) + "\n"},
+                {"contacts.json", json_text(contact_json(summary))},
                 {"contact.html", contact_report_html(summary)}});
   return summary;
 }

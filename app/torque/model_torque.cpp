@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/io/json_text.h"
 #include "app/io/nearest_name.h"
 #include "app/io/output_folder.h"
 #include "app/io/same_place.h"
@@ -379,7 +380,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
     clock.lap("payload at rest", summary.times);
   }
   report_progress(progress, "", 0, 0);
-  folder.write({{"dynamics.json", torque_json(summary).dump(1) + "\n"},
+  folder.write({{"dynamics.json", json_text(torque_json(summary))},
                 {"robot_dynamics.urdf", write_urdf(summary.consistent.model)},
                 {"dynamics.html", torque_report_html(summary)}});
   return summary;

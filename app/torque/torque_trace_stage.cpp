@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 #include "dynamics/data/torque_data.h"
@@ -166,7 +167,7 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
   document["effects"] = corrected_json(out.corrected);
   document["motion"] = motion_json(out.corrected);
   document["left_out"] = contacts_json(out.contacts, traced.samples);
-  folder.write(options.trace_file, document.dump(1) + "\n");
+  folder.write(options.trace_file, json_text(document));
   if (out.trace.verdict == TraceVerdict::kNothingToSay) {
     remove_corrected(folder);
     return {std::move(out), {}, traced.samples, trace_options};

@@ -197,7 +197,9 @@ std::vector<double> wave_numbers(const Suspect& s) {
   double most = s.turns ? kMostPeriods : kMostPeriods / range;
   if (step > 0.0) most = std::min(most, 0.5 / step);
   std::vector<double> out;
-  const double spacing = 0.35 / turns;
+  // Samples do not tell more waves apart than there are; one wild value makes for millions.
+  const double apart = 0.5 * std::max(0.0, most - fewest) / static_cast<double>(s.value.size());
+  const double spacing = std::max(0.35 / turns, apart);
   for (int k = 0; fewest + k * spacing <= most; ++k) out.push_back(fewest + k * spacing);
   return out;
 }
