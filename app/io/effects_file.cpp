@@ -15,6 +15,8 @@ using nlohmann::json;
 
 constexpr const char* kCalibrationRemedy = "give the calibration.json of a finished run";
 
+constexpr double kLargest = 1e6;  // rad, m, s or of a ratio
+
 Error wrong(const std::filesystem::path& path, const std::string& what) {
   return bad_input(path.string(), what, kCalibrationRemedy);
 }
@@ -100,6 +102,8 @@ FittedEffect effect_of(const json& entry, const std::filesystem::path& path) {
   for (const json& parameter : parameters) {
     out.parameters.push_back({word(parameter, "name", path), word(parameter, "unit", path)});
     out.values[next] = finite(parameter.value("value", json()), path, name + ": value");
+    if (std::abs(out.values[next]) > kLargest)
+      throw wrong(path, fmt::format("{}: no effect has a size of {:.3g}", name, out.values[next]));
     out.references[next] = finite(parameter.value("reference", json()), path, name + ": reference");
     if (out.references[next] == 0.0) throw wrong(path, name + ": reference is 0");
     ++next;

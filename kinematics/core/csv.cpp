@@ -263,16 +263,12 @@ Error CsvTable::ragged_error(const RaggedRow& row) const {
 double CsvTable::number(std::size_t row, std::size_t column) const {
   const std::string& cell = rows[row][column];
   const std::optional<double> value = parse_number(cell);
-  // Products of larger ones are no finite numbers.
-  constexpr double kLargest = 1e100;
-  if (!value || !(std::abs(*value) <= kLargest)) {
-    const bool large = value && std::isfinite(*value);
-    throw bad_input(place(row),
-                    fmt::format("column '{}' holds '{}', {}", header[column], cell,
-                                large ? "larger than anything measured" : "not a finite number"),
-                    is_date(cell)
-                        ? "write times in s, such as those since the first row, not as dates"
-                        : "correct or remove the line");
+  if (!value || !std::isfinite(*value)) {
+    throw bad_input(
+        place(row),
+        fmt::format("column '{}' holds '{}', not a finite number", header[column], cell),
+        is_date(cell) ? "write times in s, such as those since the first row, not as dates"
+                      : "correct or remove the line");
   }
   return factors.empty() ? *value : *value * factors[column];
 }

@@ -261,6 +261,8 @@ std::optional<UnsteadyReading> unsteady_reading(const std::vector<double>& times
   const std::optional<double> step = step_of(values);
   const double range = values.maxCoeff() - values.minCoeff();
   if (!step && noise_at_most(values) < kFinest * range) return std::nullopt;
+  // Of a wild value the squares are no finite numbers.
+  if (!std::isfinite(values.squaredNorm())) return std::nullopt;
   UnsteadyReading out;
   out.times_s = times_s;
   out.in_steps = step.has_value();

@@ -124,7 +124,6 @@ std::string forty_rows(const std::map<std::size_t, std::string>& otherwise) {
 TEST(JointLog, LeavesOutAFewBadRows) {
   const std::map<std::string, std::string> bad = {
       {"1.0,nan", "column 'a' holds 'nan', not a finite number"},
-      {"1.0,1e300", "column 'a' holds '1e300', larger than anything measured"},
       {"1.0,-inf", "column 'a' holds '-inf', not a finite number"},
       {"1.0,ERR (7)", "column 'a' holds 'ERR (7)', not a finite number"},
       {"1.0,", "column 'a' holds '', not a finite number"},
