@@ -12,14 +12,17 @@ namespace kinescope {
 ExitCode contact_command(const ContactCommandOptions& options, const Console& console) {
   const ContactSummary summary = find_contacts(options);
   for (const std::string& warning : warnings_of(summary.findings)) console.warn(warning);
+  // Of some joints the verdict says it.
+  const bool is_known = summary.unfit.size() < summary.joints.size();
+  const ExitCode code = is_known ? ExitCode::kDone : ExitCode::kUndetermined;
   if (console.json) {
     console.print(contact_json(summary));
-    return ExitCode::kDone;
+    return code;
   }
   fmt::print("{}\ncontacts  {}\nreport    {}\n", contact_verdict(summary),
              (options.output / "contacts.csv").string(),
              (options.output / "contact.html").string());
-  return ExitCode::kDone;
+  return code;
 }
 
 }  // namespace kinescope

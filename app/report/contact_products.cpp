@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/report/contact_summary.h"
 #include "app/report/result_values.h"
@@ -102,6 +103,14 @@ std::string found_words(const ContactSummary& summary) {
   return out;
 }
 
+std::string unfit_words(const ContactSummary& summary) {
+  if (summary.unfit.empty()) return "";
+  return fmt::format(
+      " Nothing is known of contact at {}: the model leaves more of the torque there than a constant "
+      "would. Check that the columns are this robot's joints, their units, signs and zeros.",
+      fmt::join(summary.unfit, ", "));
+}
+
 // How the momentum balance sees the same log.
 std::string momentum_words(const ContactSummary& summary) {
   const MomentumComparison& other = *summary.momentum;
@@ -153,6 +162,7 @@ json contact_json(const ContactSummary& summary) {
           {"inputs", report::inputs_json(summary.inputs)},
           {"findings", findings},
           {"new_motion", report::texts(summary.new_motion)},
+          {"unfit", report::texts(summary.unfit)},
           {"calibration", calibration_json(summary.calibration, summary.learn_clock)},
           {"check",
            {{"hours", number(summary.check.hours)},
@@ -181,9 +191,9 @@ std::vector<std::optional<std::size_t>> same_contacts(const ContactSummary& summ
 }
 
 std::string contact_verdict(const ContactSummary& summary) {
-  if (!summary.momentum) return found_words(summary);
-  return fmt::format("By what the {} model does not predict: {} {}", summary.method,
-                     found_words(summary), momentum_words(summary));
+  if (!summary.momentum) return found_words(summary) + unfit_words(summary);
+  return fmt::format("By what the {} model does not predict: {}{} {}", summary.method,
+                     found_words(summary), unfit_words(summary), momentum_words(summary));
 }
 
 }  // namespace kinescope

@@ -49,6 +49,9 @@ struct ContactSummary {
   std::vector<LogFinding> findings;
   std::vector<std::string> new_motion;  ///< where the torque model has not been, in sentences
   std::optional<MomentumComparison> momentum;  ///< beside a torque model
+  /// Joints of whose torque a constant would leave less than the model: contacts there are neither
+  /// found nor excluded.
+  std::vector<std::string> unfit;
 
   std::vector<std::string> joints;
   std::vector<JointType> types;    ///< beside joints
@@ -70,7 +73,8 @@ struct ContactSummary {
 /// contacts.json: schema "kinescope.contact". Torques in `unit`, times in s on the clock of
 /// the trajectory (the log's name, where it is one).
 ///
-///   robot, version, unit, joints, links, learned, method, model, inputs, findings, new_motion
+///   robot, version, unit, joints, links, learned, method, model, inputs, findings, new_motion,
+///   unfit
 ///   calibration  declared_per_hour, thresholds, exposure_s, excluded [trajectory, begin_s, end_s],
 ///   noise
 ///                {velocity_sigma, torque_sigma, model_sigma, model_time_s}

@@ -40,6 +40,7 @@ TorqueLogReport read_log(const std::vector<fs::path>& files, const DynamicModel&
 struct LogBalance {
   std::vector<BalanceSample> samples;
   LogClock clock;
+  Eigen::VectorXd torque_variance;  // about each joint's mean, as measured
 };
 
 // Far enough apart that detection begins anew in each, and what is left out around a contact stays
@@ -65,11 +66,26 @@ struct Balances {
   std::optional<LogBalance> learned;
 };
 
+Eigen::VectorXd variance_of_torque(const std::vector<TorqueSamples>& parts) {
+  Eigen::Index rows = 0;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(parts.front().torque.cols());
+  for (const TorqueSamples& part : parts) {
+    sum += part.torque.colwise().sum().transpose();
+    rows += part.size();
+  }
+  const Eigen::RowVectorXd mean = sum.transpose() / static_cast<double>(rows);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(sum.size());
+  for (const TorqueSamples& part : parts)
+    squares += (part.torque.rowwise() - mean).colwise().squaredNorm().transpose();
+  return squares / static_cast<double>(rows);
+}
+
 LogBalance on_one_clock(const std::vector<TorqueSamples>& parts,
                         const std::vector<std::vector<BalanceSample>>& samples,
                         const TorqueLog& log, double guard_s) {
   LogBalance out;
   out.clock = {apart(parts, guard_s), log.trajectory_names};
+  out.torque_variance = variance_of_torque(parts);
   for (const auto& part : samples) {
     out.samples.insert(out.samples.end(), part.begin(), part.end());
   }
@@ -153,6 +169,29 @@ Logs read_logs(const ContactCommandOptions& options, const DynamicModel& model) 
   return out;
 }
 
+// Joints of whose torque a constant would leave less, outside the contacts, than the model does.
+std::vector<std::string> unfit_joints(const LogBalance& of, const ContactSummary& summary) {
+  std::vector<std::string> out;
+  const auto is_free = [&](double stamp_s) {
+    return std::ranges::none_of(summary.events, [&](const ContactEvent& event) {
+      return event.onset_s <= stamp_s && stamp_s <= event.end_s;
+    });
+  };
+  for (Eigen::Index j = 0; j < of.torque_variance.size(); ++j) {
+    double count = 0.0, sum = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i < of.samples.size(); ++i) {
+      if (of.samples[i].may_stick(j) || !is_free(of.samples[i].stamp_s)) continue;
+      const double left = summary.external_torque(j, static_cast<Eigen::Index>(i));
+      count += 1.0;
+      sum += left;
+      squares += left * left;
+    }
+    if (count > 0.0 && squares - sum * sum / count > count * of.torque_variance[j])
+      out.push_back(summary.joints[static_cast<std::size_t>(j)]);
+  }
+  return out;
+}
+
 void report_detection(const Balances& balances, DetectedContacts found, ContactSummary& summary) {
   const LogBalance& looked_at = balances.looked_at;
   summary.clock = looked_at.clock;
@@ -165,6 +204,7 @@ void report_detection(const Balances& balances, DetectedContacts found, ContactS
   summary.check = check_false_alarms(summary.calibration, looked_at.samples, spans);
   summary.external_torque = observe_momentum(looked_at.samples, kObserverGain);
   summary.t_s = summary.clock.clock.time_s();
+  summary.unfit = unfit_joints(looked_at, summary);
 }
 
 Balances momentum_balances(const ContactModel& expected, const Logs& logs,
