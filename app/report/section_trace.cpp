@@ -188,7 +188,7 @@ std::string effects_table(const Trace& trace) {
         escaped(effect.check));
   }
   return fmt::format(
-      "<div class=\"scroll\"><table id=\"trace-table\"><caption>What the model lacked</caption>"
+      "<div class=\"scroll\"><table id=\"trace-table\"><caption>Effects</caption>"
       "<thead><tr><th>Effect</th><th>In words</th><th>Size (95 % interval)</th>"
       "<th>Of the residual</th><th>Error on unseen data, without → with it</th>"
       "<th>Check on the robot</th></tr></thead><tbody>{}</tbody></table></div>",

@@ -188,7 +188,8 @@ std::string unknown_words(const Trace& trace) {
       "{}; beyond that {}. Error on unseen data {} with the effects, {} with {} for the rest, "
       "which "
       "no product carries.",
-      trace::lacked_words(trace.accepted), trace.reason, whole_change_words(trace, with_effects),
+      trace::found_words(trace.found, trace.accepted), trace.reason,
+      whole_change_words(trace, with_effects),
       amount_text(trace.held_out_after.value, trace.held_out_after.unit), curves);
 }
 

@@ -159,7 +159,8 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
   trace.steps.insert(trace.steps.begin(),
                      {0, fmt::format("without {}", names), plain->rms(), plain->error});
   if (trace.verdict == TraceVerdict::kClean) trace.verdict = TraceVerdict::kEffects;
-  if (trace.verdict == TraceVerdict::kEffects) trace.reason = trace::lacked_words(trace.accepted);
+  if (trace.verdict == TraceVerdict::kEffects)
+    trace.reason = trace::found_words(trace.found, trace.accepted);
 }
 
 }  // namespace kinescope::effects

@@ -50,12 +50,12 @@ const Candidate* find_candidate(const TracedFit& fit, const EffectId& id) {
 
 std::string name_of(const EffectId& id) { return fmt::format("{} at {}", id.effect, id.place); }
 
-std::string lacked_words(const std::vector<TracedEffect>& accepted) {
+std::string found_words(std::string_view found, const std::vector<TracedEffect>& accepted) {
   std::string names;
   for (const TracedEffect& effect : accepted) {
     names += (names.empty() ? "" : ", ") + name_of(effect.id);
   }
-  return fmt::format("the model lacked {}", names);
+  return fmt::format("{} {}", found, names);
 }
 
 bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta) {

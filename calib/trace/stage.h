@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calib/trace/held_out.h"
@@ -40,8 +41,9 @@ using StagePtr = std::shared_ptr<const Stage>;
 
 /// "backlash at joint2".
 [[nodiscard]] std::string name_of(const EffectId& id);
-/// "the model lacked backlash at joint2, coupling at joint3".
-[[nodiscard]] std::string lacked_words(const std::vector<TracedEffect>& accepted);
+/// `found`, then "backlash at joint2, coupling at joint3".
+[[nodiscard]] std::string found_words(std::string_view found,
+                                      const std::vector<TracedEffect>& accepted);
 /// False for parameters that cannot be.
 [[nodiscard]] bool is_possible(const Candidate& candidate, const Eigen::VectorXd& theta);
 [[nodiscard]] bool refines(const Candidate& candidate, const EffectId& id);

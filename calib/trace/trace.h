@@ -11,6 +11,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "calib/trace/trace_result.h"
@@ -36,7 +37,8 @@ struct TraceOptions {
   /// So many effects without a scan may together name what is left at one place, judged among
   /// themselves: that something is left there has been shown. 0: none.
   int plain_causes = 0;
-  int fewest_stretches = 12;  ///< of time; with fewer nothing is said
+  int fewest_stretches = 12;               ///< of time; with fewer nothing is said
+  std::string found = "the model lacked";  ///< before the names of what was found, in words
 };
 
 /// Throws nothing: where nothing can be said the verdict and the reason say why.

@@ -169,10 +169,11 @@ struct TraceStep {
 
 struct Trace {
   TraceVerdict verdict = TraceVerdict::kNotRun;
-  std::string reason;                  ///< in one sentence
-  bool converged = true;               ///< the model without any effect did
-  std::vector<TracedEffect> accepted;  ///< in the order in which they were found
-  std::vector<AddedEffect> added;      ///< what the search found, as TracedModel::fit takes it
+  std::string reason;                      ///< in one sentence
+  std::string found = "the model lacked";  ///< TraceOptions::found
+  bool converged = true;                   ///< the model without any effect did
+  std::vector<TracedEffect> accepted;      ///< in the order in which they were found
+  std::vector<AddedEffect> added;          ///< what the search found, as TracedModel::fit takes it
   /// There are couplings by design, and a search that knows none names them before anything else.
   bool design_comes_first = false;
   std::vector<Ambiguity> ambiguities;

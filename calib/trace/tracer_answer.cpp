@@ -366,6 +366,7 @@ void Tracer::add_step(int round, std::string words, const Stage& stage) {
 }
 
 void Tracer::summarise() {
+  trace_.found = options_.found;
   trace_.held_out_before = base_->error;
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
@@ -518,7 +519,8 @@ void Tracer::conclude() {
     trace_.reason = fmt::format(
         "{}what is left, {:.3g} {}, is {:.1f} times what differs from one frame to the next: it "
         "lasts, and no known effect explains it",
-        trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ",
+        trace_.accepted.empty() ? ""
+                                : found_words(options_.found, trace_.accepted) + "; beyond that ",
         trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
   } else if (common && !is_of_readings(*common)) {
     const RestPlace& place = now_->fit.rest_places[common->place];
@@ -528,8 +530,9 @@ void Tracer::conclude() {
         "which makes {:.0f} % of what is left: a vibration or unsteady readings, that no known "
         "effect "
         "explains",
-        trace_.accepted.empty() ? "" : lacked_words(trace_.accepted) + "; beyond that ", place.name,
-        common->size, place.unit, 100.0 * std::min(1.0, common->share));
+        trace_.accepted.empty() ? ""
+                                : found_words(options_.found, trace_.accepted) + "; beyond that ",
+        place.name, common->size, place.unit, 100.0 * std::min(1.0, common->share));
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();
@@ -540,7 +543,7 @@ void Tracer::conclude() {
     trace_.reason = fmt::format("{}: this recording cannot tell them apart", names);
   } else if (!trace_.accepted.empty()) {
     trace_.verdict = TraceVerdict::kEffects;
-    trace_.reason = lacked_words(trace_.accepted);
+    trace_.reason = found_words(options_.found, trace_.accepted);
     for (const Rest& rest : trace_.rest) {
       trace_.reason += fmt::format(
           "; what is left at {} over {} is less than a thousandth of what they explain there",

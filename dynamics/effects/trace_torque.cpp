@@ -44,6 +44,7 @@ std::vector<ContactSpan> merged(std::vector<ContactSpan> spans, double gap_s) {
 Trace trace_with(const TorqueTracedModel& model, const TorqueTraceOptions& options,
                  const Progress& progress) {
   TraceOptions trace = options.trace;
+  trace.found = "beyond rigid bodies the torques show";
   trace.noise_floor = std::max(trace.noise_floor, options.noise_share);
   return trace_effects(model, trace, progress);
 }
