@@ -106,7 +106,8 @@ std::string found_words(const ContactSummary& summary) {
 std::string unfit_words(const ContactSummary& summary) {
   if (summary.unfit.empty()) return "";
   return fmt::format(
-      " Nothing is known of contact at {}: the model leaves more of the torque there than a constant "
+      " Nothing is known of contact at {}: the model leaves more of the torque there than a "
+      "constant "
       "would. Check that the columns are this robot's joints, their units, signs and zeros.",
       fmt::join(summary.unfit, ", "));
 }
