@@ -65,7 +65,7 @@ Owners owners_in(const fs::path& folder) {
     if (line.starts_with('#') || space == std::string::npos) continue;
     const std::string name = line.substr(space + 1);
     // Files of this folder alone, whatever someone wrote into the list.
-    if (fs::path(name).filename() == name) owners[name] = line.substr(0, space);
+    if (name != ".." && fs::path(name).filename() == name) owners[name] = line.substr(0, space);
   }
   return owners;
 }

@@ -178,6 +178,7 @@ Structure with_rivals_judged(Structure structure, const std::vector<double>& log
   structure.probability = std::min(most, 1.0 / (1.0 + odds));
   std::erase_if(structure.doubts, [](const StructureDoubt& doubt) { return doubt.of_rivals; });
   if (*closest < StructureOptions{}.min_log_odds) {
+    structure.status = StructureStatus::kAmbiguous;
     structure.doubts.push_back(rival_doubt(structure.runner_up));
   } else {
     structure.status = StructureStatus::kDetermined;

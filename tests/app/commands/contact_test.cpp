@@ -137,6 +137,20 @@ TEST_F(ContactCommand, TorquesThatAreNotTheMassesAreRefused) {
   expect_refusal(words(), ExitCode::kBadInput, "other sign");
 }
 
+// Columns of another joint: nothing that the thresholds of such a model exclude is known.
+TEST_F(ContactCommand, JointsThatTheModelSaysNothingOfAreNamed) {
+  TorqueSamples exchanged = touched_.samples;
+  exchanged.torque.col(1).swap(exchanged.torque.col(2));
+  folder_.write("log.csv", torque_log_csv(exchanged));
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  EXPECT_NE(outcome.out.find("Nothing is known of contact at"), std::string::npos)
+      << outcome.out << outcome.err;
+  EXPECT_FALSE(contacts().at("unfit").empty());
+  folder_.write("log.csv", torque_log_csv(touched_.samples));
+  ASSERT_EQ(run(words({"--learn", path("free.csv")})).code, 0);
+  EXPECT_TRUE(contacts().at("unfit").empty());
+}
+
 TEST_F(ContactCommand, AnOffsetOfASensorIsNoContact) {
   TorqueSamples shifted = touched_.samples;
   shifted.torque.col(0).array() += 20.0;  // N m

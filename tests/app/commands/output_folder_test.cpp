@@ -93,6 +93,19 @@ TEST_F(OwnFiles, AreWhatARunSaysAndNoMore) {
   }
 }
 
+// A list that was written by hand names files of its own folder, and no others.
+TEST_F(OwnFiles, AreInTheirFolder) {
+  out("export").write("a.txt", "one");
+  folder_.write("victim.txt", kForeign);
+  folder_.write("out/.kinescope_products", "export ../victim.txt\nexport " +
+                                               (folder_.path() / "victim.txt").string() +
+                                               "\nexport ..\nexport a.txt\n");
+  const OutputFolder again = out("export");
+  EXPECT_EQ(again.own_products(), std::set<std::string>{"a.txt"});
+  again.remove("../victim.txt");
+  EXPECT_TRUE(exists("victim.txt"));
+}
+
 TEST_F(OwnFiles, ASingleFileIsNewOrForced) {
   folder_.write("read.txt", kForeign).write("there.txt", kForeign);
   const auto refusal = [&](const std::string& name, bool force) {

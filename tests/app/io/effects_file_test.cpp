@@ -212,6 +212,9 @@ TEST_F(EffectsFile, WhatIsNoNumberIsRefused) {
   refused(std::string(R"({"schema": "kinescope.calibration", "effects": [NaN]})"),
           "no calibration");
   document = document_of({eccentricity()});
+  document["effects"][0]["parameters"][0]["value"] = 1e300;
+  refused(document, "eccentricity at joint2: no effect has a size of 1e+300");
+  document = document_of({eccentricity()});
   document["effects"][0]["at"] = "twice";
   refused(document, "eccentricity at joint2: at is no number");
   document = document_of({eccentricity()});

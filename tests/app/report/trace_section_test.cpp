@@ -74,6 +74,22 @@ TEST(TraceSection, TheHeadOfAnUnknownRestNamesTheEffectsAndTheModelThatIsExporte
   EXPECT_NE(beside.find("0.4 px → 0.15 px with the effects, 0.05 px"), std::string::npos) << beside;
 }
 
+TEST(TraceSection, SharesArePrintedInPerCent) {
+  Trace trace = trace_with_a_field();
+  TracedEffect effect;
+  effect.id = {"encoder_scale", "q2"};
+  effect.unit = "";
+  effect.size = 0.02;
+  effect.interval = {0.019, 0.021};
+  trace.accepted = {effect};
+  EXPECT_NE(trace_lines(trace)[1].find("2 (1.9 to 2.1) %"), std::string::npos)
+      << trace_lines(trace)[1];
+  // A coefficient is none.
+  trace.accepted.front().id.effect = "lens_distortion";
+  EXPECT_NE(trace_lines(trace)[1].find("0.02 (0.019 to 0.021);"), std::string::npos)
+      << trace_lines(trace)[1];
+}
+
 TEST(TraceSection, SaysThatTracingBeginsWithoutTheClocksOffset) {
   Trace trace = trace_with_a_field();
   EXPECT_EQ(trace_lines(trace).front().find("held at 0"), std::string::npos);
@@ -138,7 +154,7 @@ TEST(TraceSection, SizesGoToTheSecondDigitOfTheirInterval) {
   effect.interval = {-0.0400081, -0.0399775};
   EXPECT_EQ(size_words(effect), "-39.993 (-40.008 to -39.977) ms");
   effect.unit = "";
-  EXPECT_EQ(size_words(effect), "-0.039993 (-0.040008 to -0.039977)");
+  EXPECT_EQ(size_words(effect), "-3.9993 (-4.0008 to -3.9977) %");
 }
 
 // Curves are no wider than the other plots, and paper has the tests.

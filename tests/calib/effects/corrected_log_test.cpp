@@ -98,6 +98,15 @@ TEST(CorrectedLog, AScaleErrorIsUndoneInTheChannelsOwnUnit) {
   EXPECT_EQ(corrected.log.times_s, log_of(logged).times_s);
 }
 
+// Scans over a range that one wild value makes would take all memory.
+TEST(CorrectedLog, AWildValueCostsNoMemory) {
+  Eigen::MatrixXd logged = values_as_logged();
+  logged(300, 0) = 1e12;
+  Eigen::MatrixXd truth = logged;
+  truth.col(1) *= 1.01;
+  expect_values(undo({fitted("encoder_scale", "q2", {0.01})}, log_of(logged)), truth);
+}
+
 TEST(CorrectedLog, AnEccentricityIsUndone) {
   const Eigen::MatrixXd logged = values_as_logged();
   Eigen::MatrixXd truth = logged;

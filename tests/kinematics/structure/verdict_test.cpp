@@ -21,6 +21,39 @@ Attachment driven_by_the_first(JointType type, double cost) {
   return attachment;
 }
 
+// What is known of the recording stays known, and each has the other for a rival.
+TEST(Verdict, ARivalTakesTheStructuresPlace) {
+  JointLog log;
+  log.channels = {"q"};
+  Structure structure;
+  structure.links = {{{TagId{1}}, {Pose{}}}, {{TagId{2}}, {Pose{}}}};
+  StructureJoint joint;
+  joint.child_link = 1;
+  joint.channel = ChannelTerm{0, 1.0, 0.0};
+  structure.joints = {joint};
+  structure.time_offset_sigma_s = 0.01;
+  structure.doubts = {{"of the recording", "", {}}, {"of the model", "", {}, true}};
+  structure.doubts.push_back(rival_doubt("tag 2 slides"));
+  Structure other = structure;
+  other.joints.front().type = JointType::kPrismatic;
+  other.doubts.clear();
+  structure.rivals = {{"tag 2 slides", "tag 2 turns", other}};
+  const Structure taken = with_rival(structure, 0, log);
+  EXPECT_EQ(taken.joints.front().type, JointType::kPrismatic);
+  EXPECT_EQ(taken.time_offset_sigma_s, 0.01);
+  ASSERT_EQ(taken.doubts.size(), 1U);
+  EXPECT_EQ(taken.doubts.front().what, "of the recording");
+  ASSERT_EQ(taken.rivals.size(), 1U);
+  EXPECT_EQ(taken.rivals.front().words, "tag 2 turns");
+  EXPECT_EQ(taken.rivals.front().structure.joints.front().type, JointType::kRevolute);
+  const Structure clear = with_rivals_judged(taken, {20.0});
+  EXPECT_EQ(clear.status, StructureStatus::kDetermined);
+  EXPECT_EQ(clear.runner_up, "tag 2 turns");
+  const Structure open = with_rivals_judged(taken, {1.0});
+  EXPECT_EQ(open.status, StructureStatus::kAmbiguous);
+  EXPECT_EQ(open.doubts.size(), 2U);
+}
+
 // One marker turned by the only channel, or slid by it: whichever, no two channels are confused.
 TEST(Verdict, AChannelDoesNotMoveTogetherWithItself) {
   GrownTree tree;
