@@ -53,9 +53,11 @@ std::string outcome_words(const Trace& trace, bool declares_another) {
   return "";
 }
 
+bool is_answer(const Facts& facts) { return facts.result.at("verdict").at("answer").get<bool>(); }
+
 std::string headline(const Facts& facts) {
   const nlohmann::json& verdict = facts.result.at("verdict");
-  if (!verdict.at("answer").get<bool>())
+  if (!is_answer(facts))
     return sentence("No answer: " + verdict.at("no_answer").get<std::string>());
   const std::optional<Trace>& trace = facts.run.trace;
   const std::string nominal = nominal_words(facts.run);
@@ -162,12 +164,14 @@ std::string gains(const Facts& facts) {
 }  // namespace
 
 std::string first_screen(const Facts& facts, std::string_view lights) {
+  // Of what is no answer, no figure stands out and nothing is ticked.
+  const bool answer = is_answer(facts);
   return fmt::format(
       "<p class=\"headline\">{}</p>\n<div class=\"first\">\n<div class=\"said\">\n{}{}{}"
       "<p class=\"next\"><b>What to record next</b> {}</p>\n</div>\n<div class=\"shown\">\n{}"
       "<div id=\"viewer-still\">{}</div>\n{}</div>\n</div>\n",
-      escaped(headline(facts)), merit(facts), lights, gains(facts), escaped(facts.verdict.next),
-      viewer_panel(), robot_still(facts), film(facts));
+      escaped(headline(facts)), answer ? merit(facts) : "", answer ? lights : "", gains(facts),
+      escaped(facts.verdict.next), viewer_panel(), robot_still(facts), film(facts));
 }
 
 }  // namespace kinescope::report

@@ -159,10 +159,18 @@ std::string observability_section(const Facts& facts) {
   const Calibration& calibration = facts.run.calibration;
   std::string out =
       section_head("observability", "What the data see, and what they cannot tell apart");
-  out += "<p>Condition number of the scaled Jacobian: " +
-         inline_number(facts.result, "/observability/condition_number", Quantity::kPlain) +
-         ": so many times less well than the best determined combination of parameters is the "
-         "worst determined one known.</p>\n";
+  // Beyond what a double holds, the worst determined combination is not known at all.
+  constexpr double kSingular = 1e16;
+  if (calibration.observability.condition_number < kSingular) {
+    out += "<p>Condition number of the scaled Jacobian: " +
+           inline_number(facts.result, "/observability/condition_number", Quantity::kPlain) +
+           ": so many times less well than the best determined combination of parameters is the "
+           "worst determined one known.</p>\n";
+  } else {
+    out +=
+        "<p>Some combination of parameters is not determined at all: the Jacobian is "
+        "singular.</p>\n";
+  }
   out += weak_list(facts) + "<div class=\"figures\">";
   const std::string steps = ladder(calibration.observability.singular_values);
   if (!steps.empty()) {

@@ -276,6 +276,8 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   ceres::Solver::Summary summary;
   const SingleThreadedBlas same_bytes_on_any_number_of_cores;
   ceres::Solve(options, &built.problem(), &summary);
+  // It becomes a part of longer sentences.
+  if (summary.message.ends_with('.')) summary.message.pop_back();
   return {summary.termination_type == ceres::CONVERGENCE, summary.message,
           static_cast<int>(summary.iterations.size()), summary.initial_cost, summary.final_cost};
 }
