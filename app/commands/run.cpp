@@ -138,8 +138,7 @@ void write_structure(const RunSummary& run, RunFolder& folder) {
 }
 
 void write_products(const RunSummary& run, const std::string& urdf, RunFolder& folder) {
-  // Written last: without it, what a full disk or a kill left is no run.
-  folder.remove(kRunFile);
+  folder.begin_products();
   write_tracks(run, folder);
   write_structure(run, folder);
   folder.write("robot.urdf", urdf);

@@ -238,6 +238,11 @@ void RunFolder::write(std::string_view name, std::string_view content) {
   products_.emplace(name);
 }
 
+void RunFolder::begin_products() const {
+  list_own_products();
+  remove(kRunFile);
+}
+
 void RunFolder::add_products(const std::vector<std::string>& names) {
   products_.insert(names.begin(), names.end());
 }

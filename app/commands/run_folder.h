@@ -36,6 +36,8 @@ class RunFolder : public OutputFolder {
   [[nodiscard]] bool holds_answer() const;
 
   void write(std::string_view name, std::string_view content);
+  /// run.json is written last: without it, what a full disk or a kill leaves is no run.
+  void begin_products() const;
   /// Products that are written elsewhere.
   void add_products(const std::vector<std::string>& names);
   [[nodiscard]] const std::set<std::string>& products() const { return products_; }

@@ -74,8 +74,7 @@ void print_hand_eye(const HandEyeSummary& summary, const RunFolder& folder,
 
 void write_all(HandEyeSummary& summary, Stopwatch& clock, RunFolder& folder) {
   const std::string urdf = hand_eye_urdf(summary.hand_eye, summary.run.robot);
-  // Written last: without it, what a full disk or a kill left is no run.
-  folder.remove(kRunFile);
+  folder.begin_products();
   if (!summary.run.tracks.tracks.empty())
     folder.write("tracks.csv", tracks_csv(summary.run.tracks));
   folder.write("hand_eye.json", json_text(hand_eye_json(summary)));

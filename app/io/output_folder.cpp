@@ -54,11 +54,9 @@ void add_products_of_run(const fs::path& run_json, Owners& owners) {
   }
 }
 
-Owners owners_in(const fs::path& folder) {
-  Owners owners;
-  add_products_of_run(folder / "run.json", owners);
+void add_listed(const fs::path& folder, Owners& owners) {
   std::error_code error;
-  if (!fs::is_regular_file(folder / kList, error)) return owners;
+  if (!fs::is_regular_file(folder / kList, error)) return;
   std::istringstream lines(read_text_file(folder / kList));
   for (std::string line; std::getline(lines, line);) {
     const std::size_t space = line.find(' ');
@@ -67,6 +65,12 @@ Owners owners_in(const fs::path& folder) {
     // Files of this folder alone, whatever someone wrote into the list.
     if (name != ".." && fs::path(name).filename() == name) owners[name] = line.substr(0, space);
   }
+}
+
+Owners owners_in(const fs::path& folder) {
+  Owners owners;
+  add_products_of_run(folder / "run.json", owners);
+  add_listed(folder, owners);
   return owners;
 }
 
@@ -185,6 +189,14 @@ void OutputFolder::remove(std::string_view name) const {
   if (!fs::is_regular_file(folder_ / name, error)) return;
   fs::remove(folder_ / name, error);
   if (!error) remove_from_list(folder_, name);
+}
+
+void OutputFolder::list_own_products() const {
+  Owners listed;
+  add_listed(folder_, listed);
+  for (const std::string& name : own_products()) {
+    if (owner_of(name, listed) != command_) add_to_list(folder_, command_, name);
+  }
 }
 
 std::set<std::string> OutputFolder::own_products() const {

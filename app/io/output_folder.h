@@ -49,6 +49,8 @@ class OutputFolder {
   void remove(std::string_view name) const;
   /// Names of what this command wrote here, now or earlier.
   [[nodiscard]] std::set<std::string> own_products() const;
+  /// Those that only run.json names are in the folder's list after it.
+  void list_own_products() const;
 
  private:
   std::filesystem::path folder_;

@@ -106,6 +106,15 @@ TEST_F(OwnFiles, AreInTheirFolder) {
   EXPECT_TRUE(exists("victim.txt"));
 }
 
+// A run that is cut off leaves no run.json, and goes on in its own folder.
+TEST_F(OwnFiles, StayOwnWithoutTheRunThatNamesThem) {
+  const nlohmann::json run{{"schema", "kinescope.run"}, {"products", {"robot.urdf", "thesis.tex"}}};
+  folder_.write("out/run.json", run.dump());
+  out("run").list_own_products();
+  fs::remove(folder_.path() / "out/run.json");
+  EXPECT_EQ(out("run").own_products(), std::set<std::string>{"robot.urdf"});
+}
+
 TEST_F(OwnFiles, ASingleFileIsNewOrForced) {
   folder_.write("read.txt", kForeign).write("there.txt", kForeign);
   const auto refusal = [&](const std::string& name, bool force) {
