@@ -315,8 +315,7 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
   std::vector<EffectParameter> parameters;
   for (const Load& load : loads) parameters.push_back({"sag by " + load.what, s.unit});
   CameraEffect out =
-      effect(s, "compliance",
-             fmt::format("{} gives way under its load, at most by this", s.name),
+      effect(s, "compliance", fmt::format("{} gives way under its load, at most by this", s.name),
              std::move(parameters), s.unit);
   out.candidate.check = "stiffness of the gear and the link; weight of tool and payload";
   out.candidate.record = fmt::format(
