@@ -95,7 +95,7 @@ std::string scan_text(const TracedEffect& effect, double scan, const std::string
 }  // namespace
 
 std::string effect_name(const TracedEffect& effect) {
-  const std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
+  std::string name = fmt::format("{} at {}", effect.id.effect, effect.id.place);
   if (effect.scan_name.empty()) return name;
   std::string at = scan_text(effect, effect.scan, effect.scan_words);
   for (const ScanAlternative& other : effect.as_likely)

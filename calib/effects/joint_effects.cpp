@@ -307,8 +307,7 @@ void doubt_gravity(const EffectWorld& world, const Suspect& s, const Eigen::Vect
   };
 }
 
-// Gravity known: the joint's own link pulls from wherever its mass is (two unknowns across the
-// axis), those behind it from their middles, evenly or at the tip.
+// Gravity known: every link that it carries pulls from wherever its mass is.
 CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
   const std::vector<Load> loads =
       gravity_loads(world.tree, world.loaded, s.joint, world.gravity_base);

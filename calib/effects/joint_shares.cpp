@@ -161,9 +161,9 @@ struct Place {
   std::string what;
 };
 
-// Of the joint's own link two directions across its axis; of every link behind it its origin and
-// two directions across its own joint's axis. More would be combinations of these (Khalil and
-// Dombre 2002, section 9.4.2).
+// Of the joint's own link and of every one behind it that turns, two directions across its own
+// joint's axis; of one that slides its origin. More would be combinations of these (Khalil and
+// Dombre 2002, section 9.4.2): the origin of a link that turns rests on the link before it.
 std::vector<Place> places_of(const KinematicTree& tree, int joint,
                              const std::vector<std::size_t>& behind) {
   std::vector<Place> out;
@@ -172,8 +172,11 @@ std::vector<Place> places_of(const KinematicTree& tree, int joint,
     const Joint& carrier = tree.joints[own.index()];
     const std::string name = tree.links[link].name;
     const bool turns = carrier.type == JointType::kRevolute;
-    if (own.value != joint) out.push_back({link, Eigen::Vector3d::Zero(), "the origin of " + name});
-    if (!turns) continue;
+    if (!turns) {
+      if (own.value != joint)
+        out.push_back({link, Eigen::Vector3d::Zero(), "the origin of " + name});
+      continue;
+    }
     const Eigen::Quaterniond R = rotation_to_axis(carrier.axis);
     out.push_back({link, R * Eigen::Vector3d::UnitX(), name + " along x"});
     out.push_back({link, R * Eigen::Vector3d::UnitY(), name + " along y"});
@@ -206,8 +209,10 @@ Eigen::MatrixXd loads_over(const KinematicTree& tree, const JointMotion& motion,
 std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion, int joint,
                                 const std::optional<Eigen::Vector3d>& gravity_base) {
   const std::vector<std::size_t> behind = links_behind(tree, joint);
+  const Joint& suspect = tree.joints[static_cast<std::size_t>(joint)];
   std::vector<Load> out;
-  if (gravity_base) {
+  // A slide is pulled at alike wherever the masses are.
+  if (gravity_base && suspect.type == JointType::kRevolute) {
     const std::vector<Place> places = places_of(tree, joint, behind);
     const Eigen::MatrixXd loads = loads_over(tree, motion, joint, places, *gravity_base);
     for (std::size_t k = 0; k < places.size(); ++k) {
@@ -217,7 +222,6 @@ std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& mo
   }
   // All masses in one: the mean of the links' middles.
   const std::vector<Eigen::Vector3d> middle = middles(tree);
-  const Joint& suspect = tree.joints[static_cast<std::size_t>(joint)];
   Eigen::MatrixXd all(motion.value.rows(), 3);
   for (Eigen::Index i = 0; i < all.rows(); ++i) {
     const std::vector<Pose> T_base_link = forward_kinematics(tree, motion.value.row(i).transpose());

@@ -54,7 +54,7 @@ struct Load {
 };
 
 /// What gravity does to a joint from the places where masses may be: with a known gravity from
-/// every place that matters (up to three a link), else from one in the middle of all links behind
+/// every place that matters (up to two a link), else from one in the middle of all links behind
 /// it, for gravity along each axis of the base.
 [[nodiscard]] std::vector<Load> gravity_loads(const KinematicTree& tree, const JointMotion& motion,
                                               int joint,

@@ -252,8 +252,8 @@ TEST(CorrectedLog, ASagFollowsItsLoadIntoAnotherPosture) {
   marker.link = LinkId{1};
   tree.markers = {marker};
   const Eigen::MatrixXd logged = 0.5 * values_as_logged();
-  // Loads of q1: its own link along x and y, the next one's origin, along x, along y.
-  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0});
+  // Loads of q1: its own link along x and y, the next one along x and y.
+  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0});
   sag.references[0] = 2.0;
   const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
   const CorrectedLog corrected = corrected_log(log_of(logged), tree, {sag}, down);
@@ -350,7 +350,7 @@ TEST(CorrectedLog, ASagFadesOutBeyondTheRangeOfItsJoint) {
   tree.joints[0].T_parent_joint.rotation =
       Eigen::Quaterniond(Eigen::AngleAxisd(-std::acos(0.0), Eigen::Vector3d::UnitX()));
   const JointLog log = log_of(values_beyond(-2.0, 2.0));
-  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0});
+  FittedEffect sag = fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0});
   const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
   const Eigen::MatrixXd everywhere = corrected_log(log, tree, {sag}, down).log.values;
   sag.range = JointLimits{-1.0, 1.0};
@@ -439,7 +439,7 @@ TEST(CorrectedLog, AnotherLogOrRobotIsRefused) {
 TEST(CorrectedLog, ALogThatDoesNotSayWhereAJointStandsIsRefused) {
   JointLog log = log_of(values_as_logged());
   log.channels[0] = "another";
-  expect_bad_input({fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0, 0.0})}, log, "'axis2'");
+  expect_bad_input({fitted("compliance", "q1", {0.01, 0.0, 0.0, 0.0})}, log, "'axis2'");
   KinematicTree coupled = robot();
   coupled.joints[0].couplings = {{"axis2", -1.0}};
   EXPECT_THROW(static_cast<void>(corrected_log(

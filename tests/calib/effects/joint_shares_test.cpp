@@ -188,7 +188,7 @@ TEST(GravityLoads, ASlideIsPulledAlongItsAxisWhereverItStands) {
   EXPECT_LT((loads[0].arm_m + Eigen::VectorXd::Ones(kAngles.size())).norm(), kExact);
 }
 
-// The second arm's weight hangs on the first joint at the second joint's place.
+// Where the second joint is on the first arm is a place on that arm, and tells nothing more.
 TEST(GravityLoads, LinksBehindPullFromTheirOwnPlaces) {
   KinematicTree tree = pendulum(kLevelAxis);
   Joint elbow = tree.joints.front();
@@ -204,11 +204,19 @@ TEST(GravityLoads, LinksBehindPullFromTheirOwnPlaces) {
   motion.value << kAngles, 0.7 * kAngles;
   motion.rate = Eigen::MatrixXd::Zero(kAngles.size(), 2);
   const std::vector<Load> loads = gravity_loads(tree, motion, 0, -Eigen::Vector3d::UnitX());
-  ASSERT_EQ(loads.size(), 5U);
+  ASSERT_EQ(loads.size(), 4U);
   for (Eigen::Index i = 0; i < kAngles.size(); ++i) {
-    EXPECT_NEAR(loads[2].arm_m[i], 0.5 * std::sin(kAngles[i]), kExact);
-    EXPECT_NEAR(loads[3].arm_m[i], std::sin(1.7 * kAngles[i]), kExact);
+    EXPECT_NEAR(loads[0].arm_m[i], std::sin(kAngles[i]), kExact);
+    EXPECT_NEAR(loads[2].arm_m[i], std::sin(1.7 * kAngles[i]), kExact);
   }
+  // Where a slide is, none of the others says.
+  tree.joints.back().type = JointType::kPrismatic;
+  tree.joints.back().axis = Eigen::Vector3d::UnitX();
+  const std::vector<Load> slid = gravity_loads(tree, motion, 0, -Eigen::Vector3d::UnitX());
+  ASSERT_EQ(slid.size(), 3U);
+  for (Eigen::Index i = 0; i < kAngles.size(); ++i)
+    EXPECT_NEAR(slid[2].arm_m[i], (0.5 + 0.7 * kAngles[i]) * std::sin(kAngles[i]), kExact);
+  tree.joints.back().type = JointType::kRevolute;
   EXPECT_EQ(gravity_loads(tree, motion, 1, -Eigen::Vector3d::UnitX()).size(), 2U);
 }
 
