@@ -272,7 +272,6 @@ double tracing_cutoff_hz(const CutoffChoice& chosen) {
 
 TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples,
                          const TorqueTraceOptions& options, const Progress& progress) {
-  constexpr double kClear = 3.0;
   TorqueTrace out = trace_beside_base(model, samples, options, progress);
   if (options.model.base != TorqueBaseKind::kAuto || out.base.kind != TorqueBaseKind::kDeclared ||
       !may_be_of_masses(out.trace)) {
@@ -283,7 +282,9 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
   // Masses that bend to what they are not ask for further effects.
-  if (advantage < kClear || rival.trace.accepted.size() > out.trace.accepted.size()) return out;
+  if (advantage < effects::kClearlyBetter ||
+      rival.trace.accepted.size() > out.trace.accepted.size())
+    return out;
   rival.base.reason = fmt::format(
       "with the effects that were found, identified masses predict unseen stretches better than "
       "declared ones do with theirs (Student's t {:.1f})",

@@ -246,10 +246,8 @@ void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool m
   const effects::BaseErrors errors = effects::compare_bases(data, base.sigma);
   base.declared_error = errors.declared;
   base.identified_error = errors.identified;
-  // Identified masses bend to what a short or slow log shows: that they fit better must be clear.
-  constexpr double kClear = 3.0;
-  const bool trusted =
-      errors.declared <= options.trust_factor * errors.identified || errors.t < kClear;
+  const bool trusted = errors.declared <= options.trust_factor * errors.identified ||
+                       errors.t < effects::kClearlyBetter;
   if (trusted) base.kind = TorqueBaseKind::kDeclared;
   base.reason = fmt::format(
       "declared masses leave {:.3g} sigma on samples held out, identified ones {:.3g} "

@@ -15,7 +15,7 @@ namespace {
 // Woodbury's identity and the determinant lemma.
 double less_for_common_errors(const ChainFit& fit, const RelativeMotion& relative,
                               const Readings& readings) {
-  const double outlier = ChainFitOptions{}.outlier_cost;
+  const double outlier = kOutlierCost;
   if (relative.doubt.empty()) return 0.0;
   const Eigen::Index numbers = relative.doubt.front().cols();
   const ChainResiduals left = chain_residuals(relative.motion, fit.model, readings.value);

@@ -71,7 +71,8 @@ struct ChainFitOptions {
   int max_iterations = 8;
   double axis_weight =
       1.0;  ///< weight of the residual along the joint, 1: channels are exact, 0: not used
-  double outlier_cost = kOutlierCost;  ///< of a sample: what costs more is an outlier
+  /// Of a sample, which is an outlier beyond; none: outliers cost by their size (tailed_cost).
+  std::optional<double> most_cost = {};
   bool with_residuals = false;
 };
 

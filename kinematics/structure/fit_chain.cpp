@@ -82,7 +82,7 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
   const double axis_weight = free ? 0.0 : options.axis_weight;
   ChainModel model = std::move(start);
   ChainResiduals e = chain_residuals(motion, model, readings);
-  ResidualScale scale = residual_scale(e.parts, options.outlier_cost);
+  ResidualScale scale = residual_scale(e.parts, options.most_cost);
   double damping = model.joints.size() > 1 ? 1e-3 : 1e-7;
   NormalEquations normal;
   bool moved = true;  // since the last linearisation
@@ -99,7 +99,7 @@ ChainFit fit_chain(const Motion& motion, const Eigen::MatrixXd& readings, ChainM
     apply_step(next, step);
     if (free) update_coordinates(next, chain_residuals(motion, next, readings));
     ChainResiduals e_next = chain_residuals(motion, next, readings);
-    const ResidualScale scale_next = residual_scale(e_next.parts, options.outlier_cost);
+    const ResidualScale scale_next = residual_scale(e_next.parts, options.most_cost);
     const double gain = scale.cost - scale_next.cost;
     moved = gain > 0.0;
     if (moved) {

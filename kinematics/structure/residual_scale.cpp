@@ -32,7 +32,7 @@ double squared_of(const ResidualParts& p, const ResidualScale& s, std::size_t i)
 
 }  // namespace
 
-ResidualScale residual_scale(const ResidualParts& parts, double outlier_cost) {
+ResidualScale residual_scale(const ResidualParts& parts, std::optional<double> most_cost) {
   ResidualScale scale;
   const double dof = parts.split ? 5.0 : 6.0;
   scale.raw_across = trimmed_variance(parts.across, dof, parts.split ? kMedian5 : kMedian6);
@@ -44,12 +44,10 @@ ResidualScale residual_scale(const ResidualParts& parts, double outlier_cost) {
     for (const double a : parts.along) squared.push_back(a * a);
     scale.along = std::max(1.0, trimmed_variance(squared, 1.0, 0.4549));
   }
-  // A coordinate that is free follows outliers, and joints in series are told apart by what they
-  // leave of all others.
-  const bool tailed = !parts.free_axis && outlier_cost <= kOutlierCost;
+  if (parts.free_axis && !most_cost) most_cost = kOutlierCost;
   for (std::size_t i = 0; i < parts.across.size(); ++i) {
     const double squared = squared_of(parts, scale, i) + parts.penalty[i];
-    scale.cost += tailed ? tailed_cost(squared) : std::min(squared, outlier_cost);
+    scale.cost += most_cost ? std::min(squared, *most_cost) : tailed_cost(squared);
   }
   scale.cost += samples * (dof * std::log(scale.across) + std::log(scale.along));
   return scale;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "kinematics/core/pose.h"
@@ -48,9 +49,10 @@ inline constexpr double kOutlierCost = 30.0;
 }
 
 /// Cost = sum_i tailed_cost(across_i / s2 + along_i^2 / a2 + penalty_i) + dof ln s2 + ln a2 per
-/// sample; with another outlier_cost, or a free axis, at most that a sample.
+/// sample. With `most_cost` at most that a sample, of a free axis at most kOutlierCost: a
+/// coordinate that is free follows outliers.
 [[nodiscard]] ResidualScale residual_scale(const ResidualParts& parts,
-                                           double outlier_cost = kOutlierCost);
+                                           std::optional<double> most_cost = {});
 
 /// Weight of every sample: 1 near zero, redescending to 0 (Geman and McClure).
 [[nodiscard]] std::vector<double> robust_weights(const ResidualParts& parts,

@@ -152,7 +152,7 @@ ChainFit fit_outwards(const Problem& p, ChainModel model, std::size_t most_sampl
     std::ranges::sort(part, {}, &MotionSample::instant);
     const bool first = at_once.samples == 0;
     fit = fit_chain(part, p.readings, model,
-                    {.max_iterations = share < 1.0 ? 8 : 25, .outlier_cost = kOutlier});
+                    {.max_iterations = share < 1.0 ? 8 : 25, .most_cost = kOutlier});
     if (first) {
       at_once = fit;
       if (is_good(fit)) return fit;
@@ -271,7 +271,7 @@ std::vector<OrderDoubt> order_doubts(const Problem& p, const ChainFit& fit) {
   std::vector<OrderDoubt> doubts;
   for (std::size_t k = 0; k + 1 < fit.model.joints.size(); ++k) {
     const ChainFit other = fit_chain(p.motion, p.readings, swapped(fit.model, k),
-                                     {.max_iterations = 25, .outlier_cost = kOutlier});
+                                     {.max_iterations = 25, .most_cost = kOutlier});
     const double loss = other.cost - fit.cost;
     if (loss > 40.0) continue;
     doubts.push_back({fit.model.joints[k].terms.front().channel,
@@ -288,7 +288,7 @@ ChainFit pruned(const Problem& p, ChainFit fit) {
     ChainModel model = fit.model;
     model.joints.erase(model.joints.begin() + static_cast<std::ptrdiff_t>(k));
     ChainFit without = fit_chain(p.motion, p.readings, std::move(model),
-                                 {.max_iterations = 15, .outlier_cost = kOutlier});
+                                 {.max_iterations = 15, .most_cost = kOutlier});
     if (without.cost - fit.cost < kWorth) {
       fit = std::move(without);
       k = 0;
@@ -321,7 +321,7 @@ ChainFit with_plain_slides(const Problem& p, ChainFit fit, const Readings& readi
     if (joint.type == JointType::kPrismatic || std::abs(joint.terms.front().scale) > kTurned)
       continue;
     ChainFit slide = fit_chain(p.motion, p.readings, with_slide(fit.model, k),
-                               {.max_iterations = 25, .outlier_cost = kOutlier});
+                               {.max_iterations = 25, .most_cost = kOutlier});
     const double loss = (slide.cost - fit.cost) / std::min(slide.correlation, fit.correlation) +
                         penalty_of(slide, readings) - penalty_of(fit, readings);
     if (loss < 0.0) fit = std::move(slide);
@@ -376,7 +376,7 @@ std::optional<Attachment> find_serial_attachment(const Body& body, int parent, c
       ordered.fit = std::move(coupled);
     }
     ChainFit fit = pruned(*p, fit_chain(p->motion, p->readings, ordered.fit.model,
-                                        {.max_iterations = 25, .outlier_cost = kOutlier}));
+                                        {.max_iterations = 25, .most_cost = kOutlier}));
     if (fit.model.joints.size() < 2) continue;
     fit = with_plain_slides(*p, std::move(fit), readings);
     if (best && best->data_cost <= fit.cost) continue;
