@@ -5,10 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "app/io/json_text.h"
+
 namespace kinescope {
 
 void Console::print(const nlohmann::json& document) const {
-  const std::string text = document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = dumped(document, 2);
   if (result) {
     result(text);
   } else {

@@ -9,6 +9,7 @@
 
 #include "app/commands/export_form.h"
 #include "app/io/foxglove_json.h"
+#include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/io/residuals_file.h"
 #include "app/report/result_values.h"
@@ -174,8 +175,7 @@ class McapOfRun {
     return content_.channels.size() - 1;
   }
   void say(std::size_t channel, std::uint64_t now, const json& message) {
-    content_.messages.push_back(
-        {channel, now, message.dump(-1, ' ', false, json::error_handler_t::replace)});
+    content_.messages.push_back({channel, now, dumped(message, -1)});
   }
   [[nodiscard]] std::uint64_t stamp(std::size_t frame) const {
     return clock_.at(recorded_.joints.times_s[frame]);

@@ -35,6 +35,7 @@
 #include "app/report/trace_lines.h"
 #include "app/report/verdict_words.h"
 #include "calib/bundle/branches.h"
+#include "calib/effects/corrected_log.h"
 #include "calib/quality/error_summary.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
@@ -263,11 +264,22 @@ ExplainOptions explain_options(const RunOptions& options, RunSummary& run, Stopw
   return out;
 }
 
+// What `kinescope correct` takes out of a log like this one.
+std::vector<EffectId> shown_by_log(const RunSummary& run) {
+  if (run.effects.empty()) return {};
+  try {
+    return corrected_log(run.log, run.calibration.tree, run.effects, run.gravity_base).undone;
+  } catch (const Error&) {
+    return {};  // it says why, when it is asked
+  }
+}
+
 void take(TracedCalibration fitted, const Recording& recording, const Observed& observed,
           const RunOptions& options, RunSummary& run) {
   run.calibration = std::move(fitted.calibration);
   run.effects = std::move(fitted.effects);
   run.gravity_base = fitted.gravity_base;
+  run.shown_by_log = shown_by_log(run);
   if (options.trace) {
     run.trace = std::move(fitted.trace);
     run.second_columns =

@@ -7,10 +7,14 @@
 
 namespace kinescope {
 
-/// A document as it goes into a file; indent -1: in one line. What is no UTF-8 (names of files,
-/// columns of a table) becomes U+FFFD.
+/// Indent -1: in one line. What is no UTF-8 (names of files, columns of a table) becomes U+FFFD.
+[[nodiscard]] inline std::string dumped(const nlohmann::json& document, int indent) {
+  return document.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+/// A document as it goes into a file.
 [[nodiscard]] inline std::string json_text(const nlohmann::json& document, int indent = 1) {
-  return document.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dumped(document, indent) + "\n";
 }
 
 }  // namespace kinescope

@@ -93,6 +93,7 @@ struct RunSummary {
   Calibration calibration;
   std::optional<Trace> trace;                   ///< none where it was not asked for
   std::vector<FittedEffect> effects;            ///< that the calibration has in it
+  std::vector<EffectId> shown_by_log;           ///< of them, what `correct` takes out of the log
   std::vector<SecondColumn> second_columns;     ///< of the joints' copies; none without a trace
   std::optional<Eigen::Vector3d> gravity_base;  ///< unit vector, where it is known
   ErrorSummary errors;

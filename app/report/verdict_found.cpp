@@ -11,7 +11,6 @@
 #include "app/report/findings.h"
 #include "app/report/numbers.h"
 #include "app/report/verdict_words.h"
-#include "calib/effects/corrected_log.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::report {
@@ -216,16 +215,6 @@ std::string camera_motion_words(const RunSummary& run) {
          "the place in the image.";
 }
 
-// What `kinescope correct` takes out of a log like this one.
-std::vector<EffectId> shown_by_log(const RunSummary& run) {
-  if (run.effects.empty()) return {};
-  try {
-    return corrected_log(run.log, run.calibration.tree, run.effects, run.gravity_base).undone;
-  } catch (const Error&) {
-    return {};  // it says why, when it is asked
-  }
-}
-
 }  // namespace
 
 std::string joints_words(const RunSummary& run) {
@@ -242,7 +231,7 @@ std::string joints_words(const RunSummary& run) {
 
 std::string beside_urdf_words(const RunSummary& run) {
   std::vector<std::string> names;
-  for (const EffectId& id : shown_by_log(run)) {
+  for (const EffectId& id : run.shown_by_log) {
     // The clocks' offset is the recording's, not the robot's.
     if (id.place != "clock") names.push_back(fmt::format("{} at {}", id.effect, id.place));
   }

@@ -177,16 +177,23 @@ std::vector<std::string> unfit_joints(const LogBalance& of, const ContactSummary
       return event.onset_s <= stamp_s && stamp_s <= event.end_s;
     });
   };
-  for (Eigen::Index j = 0; j < of.torque_variance.size(); ++j) {
-    double count = 0.0, sum = 0.0, squares = 0.0;
-    for (std::size_t i = 0; i < of.samples.size(); ++i) {
-      if (of.samples[i].may_stick(j) || !is_free(of.samples[i].stamp_s)) continue;
+  const Eigen::Index joints = of.torque_variance.size();
+  Eigen::ArrayXd count = Eigen::ArrayXd::Zero(joints);
+  Eigen::ArrayXd sum = count;
+  Eigen::ArrayXd squares = count;
+  for (std::size_t i = 0; i < of.samples.size(); ++i) {
+    if (!is_free(of.samples[i].stamp_s)) continue;
+    for (Eigen::Index j = 0; j < joints; ++j) {
+      if (of.samples[i].may_stick(j)) continue;
       const double left = summary.external_torque(j, static_cast<Eigen::Index>(i));
-      count += 1.0;
-      sum += left;
-      squares += left * left;
+      count[j] += 1.0;
+      sum[j] += left;
+      squares[j] += left * left;
     }
-    if (count > 0.0 && squares - sum * sum / count > count * of.torque_variance[j])
+  }
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    if (count[j] > 0.0 &&
+        squares[j] - sum[j] * sum[j] / count[j] > count[j] * of.torque_variance[j])
       out.push_back(summary.joints[static_cast<std::size_t>(j)]);
   }
   return out;

@@ -8,19 +8,17 @@
 #include "kinematics/core/error.h"
 
 namespace kinescope {
-namespace {
 
-// Of a link whose reference marker is another one now: what was given from the old one.
-void take_reference(Structure& structure, int link, const Pose& T_new_old) {
-  for (Pose& T : structure.links[static_cast<std::size_t>(link)].T_reference_marker)
-    T = T_new_old * T;
+void take_first_reference(Structure& structure, int link) {
+  StructureLink& of = structure.links[static_cast<std::size_t>(link)];
+  if (link == 0 || of.markers.empty()) return;
+  const Pose T_new_old = of.T_reference_marker.front().inverse();
+  for (Pose& T : of.T_reference_marker) T = T_new_old * T;
   for (StructureJoint& joint : structure.joints) {
     if (joint.parent_link == link) joint.T_parent_joint = T_new_old * joint.T_parent_joint;
     if (joint.child_link == link) joint.T_joint_child = joint.T_joint_child * T_new_old.inverse();
   }
 }
-
-}  // namespace
 
 Structure with_marker_on(Structure structure, TagId marker, int link, const Pose& T_link_marker) {
   const auto l = static_cast<std::size_t>(link);
@@ -32,8 +30,7 @@ Structure with_marker_on(Structure structure, TagId marker, int link, const Pose
   on.markers.insert(on.markers.begin() + at, marker);
   on.T_reference_marker.insert(on.T_reference_marker.begin() + at,
                                T_link_reference.inverse() * T_link_marker);
-  if (at == 0 && link != 0)
-    take_reference(structure, link, Pose(on.T_reference_marker.front()).inverse());
+  if (at == 0) take_first_reference(structure, link);
   std::erase(structure.free_markers, marker);
   const std::string name = fmt::format("tag_{}", marker.value);
   std::erase_if(structure.doubts, [&](const StructureDoubt& doubt) {

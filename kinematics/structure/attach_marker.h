@@ -13,4 +13,8 @@ namespace kinescope {
 [[nodiscard]] Structure with_marker_on(Structure structure, TagId marker, int link,
                                        const Pose& T_link_marker);
 
+/// Of a link whose first marker is another one now: what was given from the old one is given from
+/// it. The camera's link stays as it is.
+void take_first_reference(Structure& structure, int link);
+
 }  // namespace kinescope

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kinematics/core/median.h"
+#include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/doubts.h"
 
 namespace kinescope {
@@ -18,18 +19,6 @@ Eigen::MatrixXd without_column(const Eigen::MatrixXd& matrix, Eigen::Index colum
   Eigen::MatrixXd out(matrix.rows(), matrix.cols() - 1);
   out << matrix.leftCols(column), matrix.rightCols(matrix.cols() - column - 1);
   return out;
-}
-
-// The frame of a link that is no camera's is its first marker.
-void to_first_marker(Structure& structure, int link) {
-  StructureLink& of = structure.links[static_cast<std::size_t>(link)];
-  if (link == 0 || of.markers.empty()) return;
-  const Pose T_first_old = of.T_reference_marker.front().inverse();
-  for (Pose& T : of.T_reference_marker) T = T_first_old * T;
-  for (StructureJoint& joint : structure.joints) {
-    if (joint.parent_link == link) joint.T_parent_joint = T_first_old * joint.T_parent_joint;
-    if (joint.child_link == link) joint.T_joint_child = joint.T_joint_child * T_first_old.inverse();
-  }
 }
 
 // Markers by id.
@@ -85,7 +74,7 @@ Structure with_child_on(const Structure& structure, std::size_t joint, int link,
   }
   StructureLink& into = out.links[static_cast<std::size_t>(link)];
   into = united(into, out.links[static_cast<std::size_t>(child)], T_link_child);
-  to_first_marker(out, link);
+  take_first_reference(out, link);
   out.links.erase(out.links.begin() + child);
   for (StructureJoint& other : out.joints) {
     if (other.parent_link > child) --other.parent_link;
