@@ -103,9 +103,10 @@ void note_units(const std::vector<ChannelFacts>& channels, std::vector<Finding>&
 // `run` judges them by the markers.
 void note_readings_apart(const JointLog& log, const std::vector<ReadingApart>& apart,
                          std::vector<Finding>& findings) {
-  for (const ReadingApart& reading : apart) {
+  for (const std::vector<ReadingApart>& readings : told_together(apart)) {
     findings.push_back(
-        {false, words_of(log, reading) + ": `run` puts it aside unless the markers say the same"});
+        {false, fmt::format("{}: `run` puts {} aside unless the markers say the same",
+                            words_of(log, readings), readings.size() > 1 ? "them" : "it")});
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/shown_shapes.h"
+#include "calib/tracks/shown_sizes.h"
 
 namespace kinescope {
 namespace {
@@ -70,6 +71,19 @@ std::optional<Sight> with_other_markers(const Recording& recording, const Observ
     for (const Eigen::Vector3d& corner : recording.markers.corners_m(shown.id))
       corners_m.push_back(shown.shape.corner_m(corner));
     out.told_by.push_back({{"bent_tag", fmt::format("tag_{}", shown.id.value)}, 0.0});
+  }
+  if (out.told_by.empty()) return std::nullopt;
+  return out;
+}
+
+std::optional<Sight> with_other_sizes(const Recording& recording, const Observed& observed,
+                                      const PoseTracks& tracks, const CameraModel& declared) {
+  if (observed.tags.observations.empty()) return std::nullopt;
+  Sight out{declared, recording.markers, false, {}};
+  for (const ShownSize& shown : shown_sizes(tracks)) {
+    if (recording.markers.boards.contains(shown.id)) continue;
+    out.markers.sizes_m[shown.id] = shown.factor * recording.markers.size_m(shown.id);
+    out.told_by.push_back({{"tag_size", fmt::format("tag_{}", shown.id.value)}, 0.0});
   }
   if (out.told_by.empty()) return std::nullopt;
   return out;

@@ -3,9 +3,10 @@
 // Takes   the markers' images, and what was declared of the camera and the markers.
 // Gives   other cameras and other markers, where the images speak for them whatever carries the
 //         markers: a focal length that is far off, a marker that is not flat bend the tracks that
-//         the structure is searched for on.
-// Method  each view with a pose of its own: calib/tracks/camera_from_tags.h, shown_shapes.h. They
-//         propose; what predicts the recording better is for whoever asks to judge.
+//         the structure is searched for on, one of another size hangs nowhere.
+// Method  each view with a pose of its own: calib/tracks/camera_from_tags.h, shown_shapes.h; two
+//         markers about a shared point: shown_sizes.h. They propose; what predicts the recording
+//         better is for whoever asks to judge.
 #pragma once
 
 #include <vector>
@@ -40,5 +41,12 @@ struct Sight {
 [[nodiscard]] std::optional<Sight> with_other_markers(const Recording& recording,
                                                       const Observed& observed,
                                                       const CameraModel& declared);
+
+/// Markers of other sizes, as motion about shared points shows them; nothing where all are as
+/// declared. `tracks`: of the declared sizes.
+[[nodiscard]] std::optional<Sight> with_other_sizes(const Recording& recording,
+                                                    const Observed& observed,
+                                                    const PoseTracks& tracks,
+                                                    const CameraModel& declared);
 
 }  // namespace kinescope

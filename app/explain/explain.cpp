@@ -168,6 +168,8 @@ class Explainer {
   /// found no robot.
   [[nodiscard]] std::optional<Explanation> carried_over(const Explanation& of) const {
     if (!of.fitted || !of.structure) return std::nullopt;
+    // What needs effects here and none there is no better for them.
+    if (of.fitted->effects.empty()) return plainly_fitted(*of.structure);
     return of_structure(*of.structure, {of.fitted->trace.added});
   }
 
@@ -357,8 +359,8 @@ class Explainer {
   [[nodiscard]] Explanation begun_with(Explanation first, Tried& tried) const {
     std::optional<Explanation> best;
     TraceStart begin;
-    if (options_.trace && misses_more_than_shapes(first)) {
-      for (const std::optional<Sight>& sight : contradicted_sights()) {
+    if (options_.trace) {
+      for (const std::optional<Sight>& sight : contradicted_sights(first)) {
         std::optional<Explanation> with = sight ? fitted_with(*sight) : std::nullopt;
         if (!with || !with->fitted || !is_better(*with, best ? *best : first)) continue;
         begin = {sight->told_by, with->fitted->calibration};
@@ -373,17 +375,22 @@ class Explainer {
     return of_structure(*std::move(best->structure), begin);
   }
 
-  [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights() const {
+  [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights(const Explanation& of) const {
     const Observed& observed = evidence_.observed;
-    return {with_shown_camera(recording(), observed, evidence_.camera, options_.calibrate),
-            with_other_markers(recording(), observed, evidence_.camera)};
+    if (!observed.cameras.empty()) return {};
+    std::vector<std::optional<Sight>> out = {
+        with_other_sizes(recording(), observed, evidence_.tracks, evidence_.camera)};
+    if (!misses_more_than_shapes(of)) return out;
+    out.push_back(with_shown_camera(recording(), observed, evidence_.camera, options_.calibrate));
+    out.push_back(with_other_markers(recording(), observed, evidence_.camera));
+    return out;
   }
 
   /// Worth the second that a look at the shapes takes: more than half of what the robot misses is
   /// no noise of the corners.
   [[nodiscard]] bool misses_more_than_shapes(const Explanation& of) const {
     const TagObservations& tags = evidence_.observed.tags;
-    if (tags.observations.empty() || !evidence_.observed.cameras.empty()) return false;
+    if (tags.observations.empty()) return false;
     if (!of.fitted) return true;
     constexpr double kHalf = 2.0;
     return scale_of_corners(of.fitted->calibration) >
@@ -668,11 +675,13 @@ ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart
   return out;
 }
 
-std::string words_of(const ReadingApart& reading, const Explanation& of, const Evidence& evidence) {
+std::string words_of(const std::vector<ReadingApart>& readings, const Explanation& of,
+                     const Evidence& evidence) {
   const JointLog& log = evidence.recording.log;
-  const double time_s = log.times_s[reading.row];
-  const std::string& channel = log.channels[static_cast<std::size_t>(reading.channel)];
-  std::string out = words_of(log, reading) + ": put aside";
+  std::string out = words_of(log, readings) + ": put aside";
+  if (readings.size() > 1 || !of.fitted) return out;
+  const double time_s = log.times_s[readings.front().row];
+  const std::string& channel = log.channels[static_cast<std::size_t>(readings.front().channel)];
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   const auto frame = std::ranges::find(times_s, time_s);
   if (frame == times_s.end()) return out;
@@ -719,8 +728,8 @@ Explanation explain(const Evidence& evidence, const ExplainOptions& options,
     }
   }
   warnings.insert(warnings.end(), said.begin(), said.end());
-  for (const ReadingApart& reading : apart)
-    warnings.push_back(words_of(reading, without_them, evidence));
+  for (const std::vector<ReadingApart>& readings : told_together(apart))
+    warnings.push_back(words_of(readings, without_them, evidence));
   return without_them;
 }
 

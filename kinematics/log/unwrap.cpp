@@ -155,7 +155,12 @@ std::optional<double> period_of_jumps(const Channel& channel) {
   Steps steps(channel.steps());
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = channel.step(i);
   std::vector<double> periods;
-  for (const std::size_t i : channel.jumps_above(0.5 * channel.range)) {
+  const std::vector<std::size_t> jumps = channel.jumps_above(0.5 * channel.range);
+  for (const std::size_t i : jumps) {
+    // A single reading that is wrong.
+    if (std::ranges::binary_search(jumps, i + 1) ||
+        (i > 0 && std::ranges::binary_search(jumps, i - 1)))
+      continue;
     const auto motion = predicted_step(channel, steps, i);
     if (!motion || !(*motion * steps[i] < 0.0)) continue;
     periods.push_back(std::abs(steps[i]) + std::abs(*motion));

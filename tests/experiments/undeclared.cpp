@@ -330,7 +330,7 @@ void run(const Request& request) {
   std::map<std::string, Count> counts;
   Reliability reliability;
   for (int number = request.first; number < request.first + request.count; ++number) {
-    const UndeclaredCase of = undeclared_case(number);
+    const UndeclaredCase of = undeclared_case(number, request.damage);
     if (!request.kind.empty() && to_string(of.kind) != request.kind) continue;
     if (of.postures ? !request.postures : !request.films) continue;
     if (request.only_list) {
@@ -366,14 +366,17 @@ int main(int argc, char** argv) {
   app.add_flag("--no-postures", no_postures, "only those that move");
   app.add_flag("--only-postures", no_films, "only those at rest before a tracker");
   app.add_flag("--list", request.only_list, "say what they are, without running them");
-  app.add_option("--damage", request.damage, "what happens to joints.csv")
+  app.add_option("--damage", request.damage,
+                 "what happens to joints.csv, or is forgotten in tags.yaml")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Damage>{{"none", Damage::kNone},
                                         {"corrupted_row", Damage::kCorruptedRow},
+                                        {"corrupted_rows", Damage::kCorruptedRows},
                                         {"degrees", Damage::kDegrees},
                                         {"shuffled_rows", Damage::kShuffledRows},
                                         {"dropped_column", Damage::kDroppedColumn},
-                                        {"swapped_columns", Damage::kSwappedColumns}}));
+                                        {"swapped_columns", Damage::kSwappedColumns},
+                                        {"forgotten_size", Damage::kForgottenSize}}));
   app.add_option("--keep", request.keep, "leave the recordings and their run folders there");
   app.add_option("--program", request.program, "kinescope of another build, to compare");
   return kinescope::run_experiment(app, argc, argv, [&] {

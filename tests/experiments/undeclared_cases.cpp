@@ -77,6 +77,24 @@ void draw_effects(std::size_t count, UndeclaredCase& of, Rng& rng) {
   }
 }
 
+// Of a marker that moves: the distance of one at rest takes its size.
+void forget_a_size(UndeclaredCase& of) {
+  constexpr double kLeast = 1.3, kMost = 2.5;  // times the others, or one over it
+  Rng rng = Rng::from_name("forgotten size", static_cast<std::uint64_t>(of.number));
+  std::vector<InjectedEffect> places =
+      truth::weakest_effects("tag_size", truth::robot_of(of.world));
+  std::erase_if(places, [&](const InjectedEffect& effect) {
+    return effect.place == "tags" || clashes(effect, of.world.effects);
+  });
+  if (places.empty()) return;
+  InjectedEffect effect =
+      places[static_cast<std::size_t>(rng.index(static_cast<int>(places.size())))];
+  const double factor = kLeast * std::pow(kMost / kLeast, rng.uniform());
+  effect.size = (rng.index(2) == 0 ? factor : 1.0 / factor) - 1.0;
+  of.world.effects.push_back(std::move(effect));
+  if (of.kind == UndeclaredKind::kClean) of.kind = UndeclaredKind::kSingle;
+}
+
 // Exchanged columns name each other's joints: the truth of the files as they are.
 void exchange(std::string a, std::string b, World& world) {
   for (Joint& joint : world.tree.joints) {
@@ -113,6 +131,15 @@ std::string joints_csv(const UndeclaredCase& of, World& world, Damage damage) {
   const auto column = static_cast<Eigen::Index>(rng.index(static_cast<int>(columns)));
   if (damage == Damage::kCorruptedRow)
     log.values(rng.index(static_cast<int>(rows)), column) = rng.uniform(10.0, 20.0);
+  if (damage == Damage::kCorruptedRows) {
+    constexpr Eigen::Index kOneIn = 100;
+    const Eigen::MatrixXd truth = log.values;
+    for (Eigen::Index k = 0; k < rows / kOneIn; ++k) {
+      const Eigen::Index row = rng.index(static_cast<int>(rows));
+      for (Eigen::Index c = 0; c < columns; ++c)
+        log.values(row, c) = rng.uniform(truth.col(c).minCoeff(), truth.col(c).maxCoeff());
+    }
+  }
   if (damage == Damage::kDegrees) log.values.col(column) /= kDegree;
   std::vector<std::size_t> order(static_cast<std::size_t>(rows));
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -189,7 +216,7 @@ std::string_view to_string(UndeclaredKind kind) {
   return "";
 }
 
-UndeclaredCase undeclared_case(int number) {
+UndeclaredCase undeclared_case(int number, Damage damage) {
   using enum UndeclaredKind;
   constexpr std::array kKinds{kClean, kSingle, kSingle, kSingle, kSingle,
                               kPair,  kSingle, kPair,   kTriple, kOwn};
@@ -240,6 +267,7 @@ UndeclaredCase undeclared_case(int number) {
       draw_effects(3, out, rng);
       break;
   }
+  if (damage == Damage::kForgottenSize && !out.postures) forget_a_size(out);
   return out;
 }
 

@@ -20,14 +20,17 @@ namespace kinescope {
 enum class UndeclaredKind { kClean, kSingle, kPair, kTriple, kOwn };
 [[nodiscard]] std::string_view to_string(UndeclaredKind kind);
 
-/// What goes wrong with a file on its way to the user.
+/// What goes wrong with a file on its way to the user; or what the user forgot, the size of a
+/// marker that is not as large as the others.
 enum class Damage {
   kNone,
-  kCorruptedRow,
+  kCorruptedRow,   ///< one reading, far out
+  kCorruptedRows,  ///< one row in a hundred, within the range of each channel
   kDegrees,
   kShuffledRows,
   kDroppedColumn,
-  kSwappedColumns
+  kSwappedColumns,
+  kForgottenSize
 };
 
 struct UndeclaredCase {
@@ -39,7 +42,8 @@ struct UndeclaredCase {
 };
 
 /// A third are postures, as many are clean as hold one of each number of effects.
-[[nodiscard]] UndeclaredCase undeclared_case(int number);
+/// A forgotten size is an effect more, where there are images.
+[[nodiscard]] UndeclaredCase undeclared_case(int number, Damage damage = Damage::kNone);
 
 /// Writes corners.csv or poses.csv, joints.csv, camera.yaml and tags.yaml into a folder that
 /// exists; gives the truth, joints named after their columns.

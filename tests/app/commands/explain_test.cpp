@@ -28,7 +28,7 @@ struct Answered {
 
 Answered run_case(int number, Damage damage = Damage::kNone) {
   const RecordingFolder folder;
-  const truth::World world = write_case(undeclared_case(number), folder.path(), damage);
+  const truth::World world = write_case(undeclared_case(number, damage), folder.path(), damage);
   const std::filesystem::path out = folder.path() / "out";
   Answered answered;
   answered.outcome = run({"run", folder.path().string(), "--output", out.string()});
@@ -116,6 +116,28 @@ TEST(Explain, AReadingThatContradictsEverythingIsPutAsideAndNamed) {
       << answered.outcome.err;
   EXPECT_NE(answered.outcome.err.find("the markers say 0.40"), std::string::npos)
       << answered.outcome.err;
+}
+
+// Within the range of what was read: no reading of a motion comes from nowhere and goes there.
+TEST(Explain, CorruptedRowsArePutAsideByWhatIsReadBeforeAndAfter) {
+  const Answered answered = run_case(10, Damage::kCorruptedRows);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(answered.trace["verdict"], "clean") << answered.outcome.out;
+  EXPECT_NE(answered.outcome.err.find("are not near those before and after: put aside"),
+            std::string::npos)
+      << answered.outcome.err;
+}
+
+// A line of `sizes:` that was forgotten: the marker moves with no joint.
+TEST(Explain, AForgottenSizeIsShownByWhatMovesAboutTheSamePoint) {
+  const Answered answered = run_case(10, Damage::kForgottenSize);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  ASSERT_EQ(effects(answered).size(), 1U);
+  const auto truth = undeclared_case(10, Damage::kForgottenSize).world.effects.front();
+  EXPECT_EQ(only_effect(answered), "tag_size " + truth.place);
+  EXPECT_NEAR(answered.trace["accepted"][0]["size"].get<double>(), truth.size, 2e-3);
 }
 
 TEST(Explain, AReadingThatTheFitLeftOutIsNamed) {

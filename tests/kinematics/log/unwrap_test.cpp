@@ -143,6 +143,10 @@ TEST(Unwrap, RealMovesStay) {
                         return 3.0 * std::tanh(40.0 * (s - 10.0)) + 0.1 * std::sin(s);
                       })));
   EXPECT_FALSE(unwrap(t, sampled(t, [](double s) { return s == 5.0 ? 359.0 : 20.0 * sway(s); })));
+  // Readings out of nowhere against the motion, each the same way as far as the last one.
+  EXPECT_FALSE(unwrap(t, sampled(t, [](double s) {
+                        return 0.5 * s + (s == 5.0 || s == 9.0 || s == 14.0 ? -30.0 : 0.0);
+                      })));
   // A motion that stays within its turn.
   EXPECT_FALSE(unwrap(t, sampled(t, [](double s) { return 2.0 * std::numbers::pi * sway(s); })));
 }
