@@ -114,9 +114,11 @@ std::optional<std::size_t> Tracer::one_without_size() {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const Eigen::VectorXd& values = now_->fit.values[i];
     const Candidate& candidate = *find_candidate(base_->fit, now_->added[i].id);
-    const Eigen::Index count = values.size();
-    const double sigma = size_sigma(candidate, values, covariance.block(at, at, count, count));
+    const Eigen::Index count = values.size(), first = at;
     at += count;
+    if (candidate.is_curve()) continue;  // its prior says that it may be nothing
+    const double sigma =
+        size_sigma(candidate, values, covariance.block(first, first, count, count));
     if (!(sigma > 0.0)) continue;
     const double ratio = std::abs(size_of(candidate, values)) / sigma;
     if (ratio < t) weak.emplace_back(ratio, i);
