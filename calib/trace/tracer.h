@@ -100,6 +100,7 @@ class Tracer {
   [[nodiscard]] bool backward();
   /// An added effect whose size may be nothing.
   [[nodiscard]] std::optional<std::size_t> one_without_size();
+  [[nodiscard]] bool is_usual(const EffectId& id) const;
   [[nodiscard]] bool drop_without_size();
   /// What an effect does, from the model without it.
   void compare_without(const Stage& without, TracedEffect& detail) const;

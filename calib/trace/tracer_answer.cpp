@@ -210,12 +210,18 @@ bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
          kDoubtfulShare * details_[effect].effect.explained * base_->system.total().rr;
 }
 
+bool Tracer::is_usual(const EffectId& id) const {
+  const Candidate* candidate = find_candidate(now_->fit, id);
+  return candidate != nullptr && candidate->is_usual;
+}
+
 // Effects that explain nothing where what is left is in the model as curves: they stood in for it,
 // at whatever place.
 bool Tracer::drop_what_rests_explain() {
   bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const AddedEffect effect = now_->added[i];
+    if (is_usual(effect.id)) continue;
     // A curve at the effect's own place takes its shape, whatever that is; it puts the name in
     // doubt where it is large.
     std::vector<FoundRest> others;
@@ -264,7 +270,7 @@ bool Tracer::says_as_much(const Stage& without, FoundRest alone, const FoundRest
 bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
-    if (!same_place(found.rest.place, id.place)) continue;
+    if (!same_place(found.rest.place, id.place) || is_usual(id)) continue;
     const bool doubtful = is_doubtful(found, i);
     if (found.rest.is_field() && !doubtful) continue;
     StagePtr stage = stage_of(without(now_->added, i));
@@ -321,8 +327,8 @@ bool Tracer::drop_what_leaves_too_much() {
   bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const double explained = details_[i].effect.explained * base_->system.total().rr;
-    if (left < kDoubtfulShare * explained) continue;
     const EffectId id = now_->added[i].id;
+    if (left < kDoubtfulShare * explained || is_usual(id)) continue;
     removed_.insert(id);
     now_ = stage_of(without(now_->added, i));
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));

@@ -27,6 +27,7 @@ std::vector<EffectColumn> one_column(std::size_t joint, Eigen::VectorXd share) {
 
 Candidate viscous(const SharedContext& c, std::size_t j) {
   Candidate out = joint_effect(*c, j, "viscous");
+  out.is_usual = true;
   out.words = fmt::format("{} has viscous friction", c->joints[j]);
   out.check = "lubrication and seals of the joint; the drive's own damping";
   out.record = "move the joint at several speeds, both ways";
@@ -41,6 +42,7 @@ Candidate viscous(const SharedContext& c, std::size_t j) {
 
 Candidate coulomb(const SharedContext& c, std::size_t j) {
   Candidate out = joint_effect(*c, j, "coulomb");
+  out.is_usual = true;
   out.words = fmt::format("{} has Coulomb friction", c->joints[j]);
   out.check = "gear, bearings and brake of the joint: preload, a brake that drags";
   out.record = "move the joint both ways at low speed";

@@ -119,7 +119,7 @@ bool TorqueFitter::at_a_bound(Eigen::Index turning, double change) const {
          (change > 0.0 && ratio >= kWidest * (1.0 - kRounding));
 }
 
-Eigen::VectorXd TorqueFitter::solve(const Normal& normal) const {
+Eigen::VectorXd TorqueFitter::solve(const Normal& normal, bool move) const {
   const Eigen::Index p = base_values_.size();
   Eigen::MatrixXd H = normal.H + own_prior();
   Eigen::VectorXd g = normal.g;
@@ -128,10 +128,11 @@ Eigen::VectorXd TorqueFitter::solve(const Normal& normal) const {
     const Eigen::Index joint = turning_[static_cast<std::size_t>(k)];
     g[p + k] -= kWidthPrior * std::log(context_.widths[joint] / parts_.context.widths[joint]);
   }
-  Eigen::VectorXd change = scaled_solve(H, g);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(g.size());
+  if (move || free_widths() == 0) change = scaled_solve(H, g);
   bool held = false;
   for (Eigen::Index k = 0; k < free_widths(); ++k) {
-    if (!at_a_bound(k, change[p + k])) continue;
+    if (move && !at_a_bound(k, change[p + k])) continue;
     H.row(p + k).setZero();
     H.col(p + k).setZero();
     g[p + k] = 0.0;
@@ -146,11 +147,32 @@ double TorqueFitter::step() {
   make_design();
   const Normal equations = normal();
   if (equations.g.size() == 0) return 0.0;
-  const Eigen::VectorXd change = solve(equations);
+  if (free_widths() > 0) keep_best_widths(equations);
+  const Eigen::VectorXd change = solve(equations, true);
   const double length = std::sqrt(std::max(0.0, change.dot(equations.H * change)) /
                                   std::max(equations.squares, 1e-300));
   apply(change);
   return length;
+}
+
+/// By what is left when all that is linear is fitted beside them.
+void TorqueFitter::keep_best_widths(const Normal& equations) {
+  const double left = equations.squares - equations.g.dot(solve(equations, false));
+  if (best_widths_.size() > 0 && !(left < least_left_)) return;
+  least_left_ = left;
+  best_widths_ = context_.widths;
+}
+
+/// All that is linear, beside the best widths there were: a last step that moved them far has left
+/// the rest where it was.
+void TorqueFitter::settle_on_best_widths() {
+  make_design();
+  keep_best_widths(normal());
+  set_widths(best_widths_);
+  make_design();
+  const Eigen::VectorXd change = solve(normal(), false);
+  last_widths_.resize(0);
+  apply(change);
 }
 
 /// Widths bend the model: Gauss-Newton alone halves their error in a step or two. Each is nearly a
@@ -237,6 +259,7 @@ TracedFit TorqueFitter::run() {
   if (gravity != added_.end()) choose_gravity_start(*gravity);
   bool converged = false;
   for (int k = 0; k < kMostSteps && !converged; ++k) converged = step() < kSettled;
+  if (free_widths() > 0 && !converged) settle_on_best_widths();
   make_design();
   const bool finite = std::ranges::all_of(
       design_, [](const JointDesign& rows) { return rows.residual.allFinite(); });

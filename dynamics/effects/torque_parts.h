@@ -107,7 +107,10 @@ class TorqueFitter {
   void set_widths(const Eigen::VectorXd& widths);
   void choose_gravity_start(Added& gravity);
   [[nodiscard]] double step();
-  [[nodiscard]] Eigen::VectorXd solve(const Normal& normal) const;
+  /// `move`: widths, too.
+  [[nodiscard]] Eigen::VectorXd solve(const Normal& normal, bool move) const;
+  void keep_best_widths(const Normal& equations);
+  void settle_on_best_widths();
   void apply(const Eigen::VectorXd& change);
   void move_widths(const Eigen::VectorXd& change);
   [[nodiscard]] bool at_a_bound(Eigen::Index turning, double change) const;
@@ -143,6 +146,8 @@ class TorqueFitter {
   Eigen::VectorXd base_values_;
   // Logarithms of the widths a step ago, and what that step asked for: for the secant.
   Eigen::VectorXd last_widths_, last_change_;
+  Eigen::VectorXd best_widths_;  ///< so far; empty before the first step
+  double least_left_ = 0.0;      ///< beside them, sum of squares
   // Of the last step, one a joint. Parameters: base, widths, effects.
   std::vector<JointDesign> design_;
 };
