@@ -39,19 +39,22 @@ Error not_determined(const std::string& source, std::string_view what) {
 
 struct Estimate {
   CameraModel camera;
-  std::vector<ViewFit> fits;  // of the views used
+  std::vector<ViewFit> fits;               // of the views used
+  std::optional<std::size_t> unexplained;  // the first of the views that the lens has no pose for
 };
 
 Estimate estimate(const BoardAlbum& album, const std::vector<std::size_t>& used,
                   const BoardOptions& options, const std::string& source) {
   const std::vector<BoardSight> views = pick(album, used);
   const auto camera = estimate_intrinsics(views, album.width, album.height, options);
-  if (!camera) throw not_determined(source, "OpenCV's calibration fails on these views");
-  Estimate out{*camera, {}};
-  for (const BoardSight& view : views) {
-    const auto fit = fit_view(*camera, view);
-    if (!fit) throw not_determined(source, "the estimated lens does not explain a view");
-    out.fits.push_back(*fit);
+  if (!camera) throw not_determined(source, "no lens explains these views");
+  Estimate out{*camera, {}, std::nullopt};
+  for (std::size_t i = 0; i < views.size() && !out.unexplained; ++i) {
+    if (const auto fit = fit_view(*camera, views[i])) {
+      out.fits.push_back(*fit);
+    } else {
+      out.unexplained = i;
+    }
   }
   return out;
 }
@@ -78,7 +81,7 @@ std::optional<std::size_t> worst_view(const std::vector<ViewFit>& fits) {
   return static_cast<std::size_t>(worst - rms.begin());
 }
 
-// Estimates, takes out the view that stands out, and again.
+// Estimates, takes out the view that has no pose or stands out, and again.
 Estimate estimate_robustly(BoardAlbum& album, std::vector<std::size_t>& used,
                            const BoardOptions& options, const std::string& source,
                            const Progress& progress) {
@@ -87,12 +90,20 @@ Estimate estimate_robustly(BoardAlbum& album, std::vector<std::size_t>& used,
   while (true) {
     report_progress(progress, "estimating the lens", static_cast<int>(removed), 0);
     Estimate now = estimate(album, used, options, source);
-    const std::optional<std::size_t> worst = worst_view(now.fits);
-    if (!worst || removed >= most || used.size() <= kMinBoardViews) return now;
+    const bool may_remove = removed < most && used.size() > kMinBoardViews;
+    if (now.unexplained && !may_remove) {
+      throw not_determined(source, "the estimated lens does not explain a view");
+    }
+    const auto worst = now.unexplained ? now.unexplained : worst_view(now.fits);
+    if (!worst || !may_remove) return now;
     BoardView& view = album.views[used[*worst]];
-    view.rms_px = now.fits[*worst].rms_px;
-    view.reason = fmt::format("stands out: {:.2f} px where the others have {:.2f} px", view.rms_px,
-                              rms_of(now.fits));
+    if (now.unexplained) {
+      view.reason = "the lens that the others give does not explain it";
+    } else {
+      view.rms_px = now.fits[*worst].rms_px;
+      view.reason = fmt::format("stands out: {:.2f} px where the others have {:.2f} px",
+                                view.rms_px, rms_of(now.fits));
+    }
     used.erase(used.begin() + static_cast<std::ptrdiff_t>(*worst));
     ++removed;
   }

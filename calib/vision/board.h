@@ -2,9 +2,9 @@
 //
 // Takes   images or a video of a chessboard, ChArUco board or AprilGrid.
 // Gives   intrinsics with uncertainties, coverage of the image, what was left out and why.
-// Method  OpenCV's detectors and cv::calibrateCamera (Zhang 2000); standard deviations from its
-// normal
-//         equations. A board whose layout does not fit is refused.
+// Method  OpenCV's detectors and cv::calibrateCamera (Zhang 2000), for an equidistant lens our own
+//         fit; standard deviations from the normal equations. A board whose layout does not fit is
+//         refused.
 #pragma once
 
 #include <array>

@@ -6,16 +6,11 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include "calib/vision/equidistant_fit.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope {
 namespace {
-
-cv::Mat initial_matrix(int width, int height) {
-  const double f = std::max(width, height);
-  return (cv::Mat_<double>(3, 3) << f, 0.0, 0.5 * (width - 1), 0.0, f, 0.5 * (height - 1), 0.0, 0.0,
-          1.0);
-}
 
 // d pixel / d (rotation, translation) of the board's pose, perturbed on the right.
 Eigen::Matrix<double, 2, 6> pose_jacobian(const Projection& projection, const Pose& pose,
@@ -78,7 +73,9 @@ CameraModel from_opencv(const cv::Mat& K, const cv::Mat& distortion, int width, 
 
 std::optional<CameraModel> estimate_intrinsics(const std::vector<BoardSight>& views, int width,
                                                int height, const BoardOptions& options) {
-  const bool fisheye = options.model == DistortionModel::kEquidistant;
+  if (options.model == DistortionModel::kEquidistant) {
+    return estimate_equidistant(views, width, height);
+  }
   std::vector<std::vector<cv::Point3f>> places;
   std::vector<std::vector<cv::Point2f>> pixels;
   for (const BoardSight& view : views) {
@@ -91,28 +88,20 @@ std::optional<CameraModel> estimate_intrinsics(const std::vector<BoardSight>& vi
                                  static_cast<float>(view.pixels[i].y()));
     }
   }
-  cv::Mat K = initial_matrix(width, height);
-  cv::Mat distortion = cv::Mat::zeros(1, fisheye ? 4 : 8, CV_64F);
+  cv::Mat K;
+  cv::Mat distortion = cv::Mat::zeros(1, 8, CV_64F);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
   const cv::TermCriteria criteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 200, 1e-12);
+  int flags = 0;
+  if (options.model == DistortionModel::kRationalPolynomial) {
+    flags |= cv::CALIB_RATIONAL_MODEL;
+  } else if (options.fix_k3) {
+    flags |= cv::CALIB_FIX_K3;
+  }
   try {
-    if (fisheye) {
-      cv::fisheye::calibrate(places, pixels, {width, height}, K, distortion, rotations,
-                             translations,
-                             cv::fisheye::CALIB_RECOMPUTE_EXTRINSIC | cv::fisheye::CALIB_FIX_SKEW |
-                                 cv::fisheye::CALIB_USE_INTRINSIC_GUESS,
-                             criteria);
-    } else {
-      int flags = 0;
-      if (options.model == DistortionModel::kRationalPolynomial) {
-        flags |= cv::CALIB_RATIONAL_MODEL;
-      } else if (options.fix_k3) {
-        flags |= cv::CALIB_FIX_K3;
-      }
-      cv::calibrateCamera(places, pixels, {width, height}, K, distortion, rotations, translations,
-                          flags, criteria);
-    }
+    cv::calibrateCamera(places, pixels, {width, height}, K, distortion, rotations, translations,
+                        flags, criteria);
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
@@ -178,6 +167,26 @@ std::vector<int> free_intrinsics(const BoardOptions& options) {
   return free;
 }
 
+std::optional<ViewNormals> view_normals(const CameraModel& camera, const Pose& pose,
+                                        const BoardSight& view, const std::vector<int>& free) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  ViewNormals out{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, 6),
+                  Eigen::MatrixXd::Zero(6, 6), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(6)};
+  for (std::size_t i = 0; i < view.pixels.size(); ++i) {
+    const auto p = project_with_derivatives(camera, pose * view.places_m[i]);
+    if (!p) return std::nullopt;
+    const Eigen::MatrixXd Ji = p->d_intrinsics(Eigen::all, free);
+    const auto Jp = pose_jacobian(*p, pose, view.places_m[i]);
+    const Eigen::Vector2d r = view.pixels[i] - p->pixel;
+    out.A += Ji.transpose() * Ji;
+    out.B += Ji.transpose() * Jp;
+    out.C += Jp.transpose() * Jp;
+    out.g_intrinsics += Ji.transpose() * r;
+    out.g_pose += Jp.transpose() * r;
+  }
+  return out;
+}
+
 std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
                                                     const std::vector<BoardSight>& views,
                                                     const std::vector<ViewFit>& fits,
@@ -187,22 +196,13 @@ std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
   double squared = 0.0;
   Eigen::Index measured = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-    Eigen::MatrixXd B = Eigen::MatrixXd::Zero(n, 6);
-    Matrix6d C = Matrix6d::Zero();
-    for (std::size_t i = 0; i < views[v].pixels.size(); ++i) {
-      const auto p =
-          project_with_derivatives(camera, fits[v].T_camera_board * views[v].places_m[i]);
-      if (!p) return std::nullopt;
-      const Eigen::MatrixXd Ji = p->d_intrinsics(Eigen::all, free);
-      const auto Jp = pose_jacobian(*p, fits[v].T_camera_board, views[v].places_m[i]);
-      A += Ji.transpose() * Ji;
-      B += Ji.transpose() * Jp;
-      C += Jp.transpose() * Jp;
-      squared += fits[v].residuals_px[i].squaredNorm();
+    const auto view = view_normals(camera, fits[v].T_camera_board, views[v], free);
+    if (!view) return std::nullopt;
+    for (const Eigen::Vector2d& residual : fits[v].residuals_px) {
+      squared += residual.squaredNorm();
       measured += 2;
     }
-    S += A - B * solve_symmetric(Eigen::MatrixXd(C), Eigen::MatrixXd(B.transpose()));
+    S += view->A - view->B * solve_symmetric(view->C, Eigen::MatrixXd(view->B.transpose()));
   }
   const Eigen::Index freedom = measured - n - 6 * static_cast<Eigen::Index>(views.size());
   if (freedom <= 0) return std::nullopt;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   views of a board: pixels and places.
-// Gives   intrinsics (OpenCV's estimation), each view's pose and residual, the covariance of the
-// intrinsics.
+// Gives   intrinsics, each view's pose and residual, the covariance of the intrinsics.
 #pragma once
 
 #include <optional>
@@ -17,8 +16,8 @@
 
 namespace kinescope {
 
-/// Intrinsics by cv::calibrateCamera (Zhang 2000) or cv::fisheye::calibrate. Nothing where OpenCV
-/// gives up.
+/// Intrinsics by cv::calibrateCamera (Zhang 2000), those of an equidistant lens by
+/// estimate_equidistant(). Nothing where the estimation fails.
 [[nodiscard]] std::optional<CameraModel> estimate_intrinsics(const std::vector<BoardSight>& views,
                                                              int width, int height,
                                                              const BoardOptions& options);
@@ -34,6 +33,21 @@ struct ViewFit {
 
 /// Which of the intrinsics (fx fy cx cy, distortion) the fit estimates.
 [[nodiscard]] std::vector<int> free_intrinsics(const BoardOptions& options);
+
+/// Blocks of the normal equations J'J x = J'r of one view: intrinsics (n), and the board's pose
+/// perturbed on the right (rotation, translation).
+struct ViewNormals {
+  Eigen::MatrixXd A;  ///< n x n, intrinsics
+  Eigen::MatrixXd B;  ///< n x 6, intrinsics and pose
+  Eigen::MatrixXd C;  ///< 6 x 6, pose
+  Eigen::VectorXd g_intrinsics;
+  Eigen::VectorXd g_pose;
+};
+
+/// Nothing where a point has no image.
+[[nodiscard]] std::optional<ViewNormals> view_normals(const CameraModel& camera, const Pose& pose,
+                                                      const BoardSight& view,
+                                                      const std::vector<int>& free);
 
 /// Covariance of the free intrinsics, poses marginalised, with the noise of the residuals. Nothing
 /// where the views do not determine them.
