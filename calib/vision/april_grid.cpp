@@ -2,13 +2,17 @@
 //
 // Kalibr's AprilGrid: markers in rows from the bottom left corner, with either border.
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
 
 #include "calib/camera/marker_set.h"
 #include "calib/vision/board_markers.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -37,7 +41,8 @@ class AprilGridFinder final : public BoardFinder {
     return sight;
   }
 
-  void settle(std::vector<BoardSight>& sights, const std::string& source) const override {
+  std::vector<std::string> settle(std::vector<BoardSight>& sights,
+                                  const std::string& source) const override {
     double best = std::numeric_limits<double>::infinity();
     int best_turn = 0;
     bool best_up = true;
@@ -54,6 +59,7 @@ class AprilGridFinder final : public BoardFinder {
           "check columns, rows, tag size and spacing; ids must run row by row from 0");
     }
     for (BoardSight& sight : sights) fill(sight, best_up, best_turn);
+    return check_spacing(sights, best_up, best_turn, source);
   }
 
  private:
@@ -78,6 +84,79 @@ class AprilGridFinder final : public BoardFinder {
         sight.places_m.push_back(place(marker.id, corner, upward, turn));
       }
     }
+  }
+
+  // Spacings from tag b beside or below tag a: the cross ratio of the four corners along an edge of
+  // both is the same in every view, (1 + s)^2 / ((2 + s) s), and lens distortion hardly bends so
+  // short a line.
+  static void add_spacings(const BoardMarker& a, const BoardMarker& b, int axis, int turn,
+                           std::vector<double>& spacings) {
+    for (const bool far_side : {false, true}) {
+      const std::size_t start = corner_at(turn, axis, false, far_side);
+      const std::size_t end = corner_at(turn, axis, true, far_side);
+      const double ratio =
+          (b.pixels[start] - a.pixels[start]).norm() * (b.pixels[end] - a.pixels[end]).norm() /
+          ((b.pixels[end] - a.pixels[start]).norm() * (b.pixels[start] - a.pixels[end]).norm());
+      if (ratio > 1.0) spacings.push_back(std::sqrt(ratio / (ratio - 1.0)) - 1.0);
+    }
+  }
+
+  std::vector<double> spacings_in(const BoardSight& sight, bool upward, int turn) const {
+    const double pitch = board_.square_m * (1.0 + board_.spacing);
+    std::vector<double> out;
+    for (const BoardMarker& a : sight.markers) {
+      for (const BoardMarker& b : sight.markers) {
+        const Eigen::Vector3d step = place(b.id, 0, upward, turn) - place(a.id, 0, upward, turn);
+        for (const int axis : {0, 1}) {
+          const bool next = std::abs(step[axis] - pitch) + std::abs(step[1 - axis]) < 0.5 * pitch;
+          if (next) add_spacings(a, b, axis, turn, out);
+        }
+      }
+    }
+    return out;
+  }
+
+  // Index of the corner at the start or end of an edge along `axis` (0 right, 1 down), on the near
+  // or far side of the tag.
+  static std::size_t corner_at(int turn, int axis, bool end, bool far_side) {
+    const bool right = axis == 0 ? end : far_side;
+    const bool down = axis == 0 ? far_side : end;
+    const int k = down ? (right ? 1 : 0) : (right ? 2 : 3);
+    return static_cast<std::size_t>((k - turn + 4) % 4);
+  }
+
+  // The fit cannot tell a wrong spacing from a poor lens: the tags' own pictures can.
+  std::vector<std::string> check_spacing(const std::vector<BoardSight>& sights, bool upward,
+                                         int turn, const std::string& source) const {
+    std::vector<double> spacings;
+    std::vector<double> edges_px;
+    for (const BoardSight& sight : sights) {
+      std::ranges::copy(spacings_in(sight, upward, turn), std::back_inserter(spacings));
+      for (const BoardMarker& tag : sight.markers) {
+        edges_px.push_back((tag.pixels[0] - tag.pixels[1]).norm());
+      }
+    }
+    if (spacings.empty()) return {};
+    const double measured = median_of(spacings);
+    const double off = std::abs(measured - board_.spacing);
+    for (double& spacing : spacings) spacing = std::abs(spacing - measured);
+    constexpr double kSigmaOfMedian = 1.4826;  // of normal noise, from the median deviation
+    constexpr double kSigmas = 3.0;            // of one pair of tags, many though there are
+    if (off <= kSigmas * kSigmaOfMedian * median_of(spacings)) return {};
+    // The distance takes up the pitch; tags are then too large or small by off / (1 + s), and
+    // their corners lie half a diagonal from the middle.
+    const double edge_px = median_of(edges_px);
+    const double misfit_px = off / (1.0 + measured) * edge_px / std::numbers::sqrt2;
+    const std::string what = fmt::format(
+        "by the images the gap between tags is {:.3f} of a tag's edge, declared is {:.3f}",
+        measured, board_.spacing);
+    const std::string remedy = "measure the tag's black edge and the gap on the print";
+    if (misfit_px > max_size_misfit_px(edge_px)) {
+      throw bad_input(source,
+                      fmt::format("{}: corners miss the board by {:.1f} px", what, misfit_px),
+                      remedy + "; the spacing is their ratio");
+    }
+    return {what + ": " + remedy};
   }
 
   double misfit(const std::vector<BoardSight>& sights, bool upward, int turn) const {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 #include "calib/vision/board_album.h"
 #include "calib/vision/board_coverage.h"
 #include "calib/vision/board_fit.h"
+#include "calib/vision/board_markers.h"
 #include "calib/vision/board_points.h"
 #include "kinematics/core/error.h"
 
@@ -23,7 +25,6 @@ constexpr double kOutlierLeast_px = 0.3;  // and in px
 constexpr double kMaxOutlierShare = 0.34;
 constexpr double kMinTilt_deg = 4.0;    // below, focal length and distance cannot be told apart
 constexpr double kMaxFocalSigma = 0.1;  // share of the focal length: beyond, nothing was determined
-constexpr double kMaxMarkerMisfit = 0.03;  // of a square: markers against the calibrated board
 
 std::vector<BoardSight> pick(const BoardAlbum& album, const std::vector<std::size_t>& which) {
   std::vector<BoardSight> out;
@@ -163,7 +164,7 @@ void check_markers(const BoardAlbum& album, const std::vector<std::size_t>& used
   if (count == 0) return;
   const double rms = std::sqrt(sum / count);
   square_px /= count;
-  if (rms <= std::max(1.0, kMaxMarkerMisfit * square_px)) return;
+  if (rms <= max_size_misfit_px(square_px)) return;
   const double measured = board.marker_m * larger / count;
   throw bad_input(source,
                   fmt::format("the markers' corners miss the declared board by {:.1f} px", rms),
@@ -188,7 +189,7 @@ IntrinsicCalibration calibrate_intrinsics(const std::filesystem::path& images_or
     throw bad_input(source, "no such file or folder", "name a folder of photographs or a video");
   }
   BoardAlbum album = read_album(images_or_video, *finder, progress);
-  finder->settle(album.sights, source);
+  std::ranges::move(finder->settle(album.sights, source), std::back_inserter(album.warnings));
   std::vector<std::size_t> used = usable_views(album, options, source);
   const Estimate best = estimate_robustly(album, used, options, source, progress);
   check_markers(album, used, best, board, source);

@@ -60,7 +60,8 @@ class ChessboardFinder final : public BoardFinder {
   }
 
   // Part of a larger board passes for the declared one; the views then show different parts of it.
-  void settle(std::vector<BoardSight>&, const std::string& source) const override {
+  std::vector<std::string> settle(std::vector<BoardSight>&,
+                                  const std::string& source) const override {
     for (std::size_t i = 0; i < 2; ++i) {
       if (larger_[i] == 0 || 2 * larger_[i] < searched_larger_) continue;
       throw bad_input(
@@ -70,6 +71,7 @@ class ChessboardFinder final : public BoardFinder {
                       board_.columns, board_.rows),
           "count the inner corners, one fewer than the squares");
     }
+    return {};
   }
 
  private:
@@ -125,9 +127,10 @@ class CharucoFinder final : public BoardFinder {
     return sight;
   }
 
-  void settle(std::vector<BoardSight>& sights, const std::string& source) const override {
+  std::vector<std::string> settle(std::vector<BoardSight>& sights,
+                                  const std::string& source) const override {
     const double declared = misfit(sights, board_.legacy_charuco);
-    if (declared <= kMaxMisfit) return;
+    if (declared <= kMaxMisfit) return {};
     const double other = misfit(sights, !board_.legacy_charuco);
     const double px = square_px(sights);
     const std::string what =

@@ -36,8 +36,9 @@ class BoardFinder {
   virtual ~BoardFinder() = default;
   /// Empty when there is no board in the image.
   [[nodiscard]] virtual BoardSight find(const ImageView& image) = 0;
-  /// Completes what needs all views. Throws bad_input when the layout does not fit.
-  virtual void settle(std::vector<BoardSight>& sights, const std::string& source) const = 0;
+  /// Completes what needs all views. Gives warnings; throws bad_input when the layout does not fit.
+  virtual std::vector<std::string> settle(std::vector<BoardSight>& sights,
+                                          const std::string& source) const = 0;
 };
 
 /// Throws bad_request for a board that makes no sense.

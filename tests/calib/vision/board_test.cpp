@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/board.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -220,6 +221,27 @@ TEST_F(Board, AprilGridsWithBothBorders) {
   const BoardSpec wrong{BoardType::kAprilGrid, 3, 3, 0.04, 0.0, 0.9, ""};
   EXPECT_NE(complaint(wrong, ExitCode::kBadInput).find("miss the declared grid"),
             std::string::npos);
+}
+
+// The lens' own error hides a wrong gap between the tags; neighbouring tags show it.
+TEST_F(Board, TheSpacingOfAnAprilGridIsMeasured) {
+  photograph(lens(DistortionModel::kPlumbBob), aprilgrid(3, 1), (3 * 11 - 3) * 0.004);
+  BoardSpec board{BoardType::kAprilGrid, 3, 3, 0.032, 0.0, 3.0 / 8.0, ""};
+  const auto says_gap = [](const std::string& text) {
+    return text.find("gap between tags is 0.37") != std::string::npos;
+  };
+  const auto warned = [&] {
+    const IntrinsicCalibration found = calibrate_intrinsics(folder_, board);
+    return std::ranges::any_of(found.warnings, says_gap);
+  };
+  EXPECT_FALSE(warned());
+  board.spacing = 0.35;
+  EXPECT_TRUE(warned());
+  for (const double wrong : {0.25, 0.5}) {
+    board.spacing = wrong;
+    const std::string text = complaint(board, ExitCode::kBadInput);
+    EXPECT_TRUE(says_gap(text)) << text;
+  }
 }
 
 TEST_F(Board, FrontalViewsDetermineNothing) {
