@@ -15,6 +15,8 @@
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
+#include "kinematics/log/header_units.h"
+#include "kinematics/log/joint_log_table.h"
 
 namespace kinescope {
 namespace {
@@ -39,6 +41,12 @@ std::filesystem::path find_times(const std::filesystem::path& folder) {
   throw bad_input(folder.string(),
                   "a folder of images needs their times, and there is no times.csv",
                   "put a times.csv with the columns image,t (file name, s) into the folder");
+}
+
+// EuRoC writes filename.
+std::size_t image_column(const CsvTable& table) {
+  const auto filename = table.column("filename");
+  return filename && !table.column("image") ? *filename : table.require_column("image");
 }
 
 struct TimedImage {
@@ -81,13 +89,13 @@ class ImageFolderReader final : public VideoReader {
                       "name a video file or a folder of png or jpg images");
     }
     const CsvTable table = read_csv(find_times(folder_));
-    const std::size_t image_column = table.require_column("image");
-    const std::size_t time_column = table.require_column("t");
+    const std::size_t names = image_column(table);
+    const std::size_t stamps = time_column(table);
+    const double unit_s = header_factor(table.header[stamps]);
     std::map<std::string, double> times;
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
-      const std::string name =
-          std::filesystem::path(table.rows[row][image_column]).filename().string();
-      if (!times.emplace(name, table.number(row, time_column)).second) {
+      const std::string name = std::filesystem::path(table.rows[row][names]).filename().string();
+      if (!times.emplace(name, unit_s * table.number(row, stamps)).second) {
         throw bad_input(table.place(row), fmt::format("image '{}' has two times", name),
                         "give every image one line");
       }

@@ -40,16 +40,24 @@ class Lines {
   std::optional<std::string_view> next_content() {
     while (const auto line = next()) {
       const std::string_view content = trim(*line);
-      if (!content.empty() && !content.starts_with('#')) return line;
+      if (content.empty()) continue;
+      if (!content.starts_with('#')) return line;
+      last_comment_ = {content.substr(1), number_};
     }
     return std::nullopt;
   }
+  struct Comment {
+    std::string_view text;   ///< behind the '#'
+    std::size_t number = 0;  ///< of its line; 0: there was none
+  };
+  [[nodiscard]] const Comment& last_comment() const { return last_comment_; }
   [[nodiscard]] std::size_t number() const { return number_; }
 
  private:
   std::string_view rest_;
   char end_;
   std::size_t number_ = 0;
+  Comment last_comment_;
 };
 
 std::size_t count_cells(std::string_view line, char delimiter) {
@@ -103,9 +111,14 @@ class TableParser {
       : table_(table), lines_(text), binary_(looks_binary(text)) {}
 
   void read_header() {
-    const auto line = lines_.next_content();
+    auto line = lines_.next_content();
     if (!line) throw bad_input(table_.source, "is empty", "record it again");
     table_.header_line = lines_.number();
+    if (is_headed_by_comment(*line)) {
+      first_row_ = line;
+      line = lines_.last_comment().text;
+      table_.header_line = lines_.last_comment().number;
+    }
     delimiter_ = find_delimiter(trim(*line));
     if (count_cells(*line, delimiter_) > kMostColumns + 1) {
       refuse(
@@ -119,6 +132,7 @@ class TableParser {
   }
 
   void read_rows(RaggedRows ragged) {
+    if (first_row_) add_row(*first_row_, ragged);
     while (const auto line = lines_.next_content()) add_row(*line, ragged);
     if (!table_.rows.empty()) return;
     if (!table_.ragged.empty()) throw table_.ragged_error(table_.ragged.front());
@@ -169,6 +183,18 @@ class TableParser {
              "use one of them, or commas");
     }
     return semicolon ? ';' : tab ? '\t' : ',';
+  }
+
+  /// EuRoC's tables: "#timestamp [ns],filename" above rows that begin with a number.
+  [[nodiscard]] bool is_headed_by_comment(std::string_view line) const {
+    const std::string_view comment = lines_.last_comment().text;
+    const char delimiter = find_delimiter(trim(line));
+    if (!parse_number(split(line, delimiter).front())) return false;
+    const std::vector<std::string> names = split(comment, delimiter);
+    return names.size() > 1 && names.size() == count_cells(line, delimiter) &&
+           std::ranges::none_of(names, [](const std::string& name) {
+             return name.empty() || parse_number(name).has_value();
+           });
   }
 
   void check_header(std::string_view line) const {
@@ -227,6 +253,7 @@ class TableParser {
   bool binary_;
   char delimiter_ = ',';
   bool unnamed_end_ = false;
+  std::optional<std::string_view> first_row_;  ///< where a comment above it was the header
 };
 
 // As of ISO 8601 or a clock: digits with two colons between them.

@@ -23,7 +23,8 @@ struct RaggedRow {
 };
 
 /// A table as text. Rows are as long as the header; blank lines and lines that begin with '#' are
-/// passed over.
+/// passed over, but for the last one above a table that has no header else: where it names as many
+/// columns, it is the header (EuRoC).
 struct CsvTable {
   std::string source;                          ///< file name, for messages
   std::vector<std::string> header;             ///< column names, trimmed, no two alike

@@ -208,6 +208,24 @@ TEST_F(Video, AFolderOfImagesIsReadByTime) {
   EXPECT_NE(reader->warnings()[0].find("no time"), std::string::npos);
 }
 
+TEST_F(Video, TimesOfImagesHaveTheUnitOfTheirHeader) {
+  write_image("a.png", 20);
+  write_image("b.png", 30);
+  for (const char* times :
+       {"image,t\na.png,1.5\nb.png,2\n", "image,t_ms\na.png,1500\nb.png,2000\n",
+        "image,t [ms]\na.png,1500\nb.png,2000\n", "filename,timestamp\na.png,1.5\nb.png,2\n",
+        "image,Time (s)\na.png,1.5\nb.png,2\n",
+        "#timestamp [ns],filename\n1500000000,a.png\n2000000000,b.png\n"}) {
+    write_file_atomically(folder_ / "times.csv", times);
+    const auto reader = open_video(folder_);
+    for (const double time_s : {1.5, 2.0}) {
+      const auto frame = reader->next();
+      ASSERT_TRUE(frame) << times;
+      EXPECT_NEAR(frame->time_s, time_s, 1e-12) << times;
+    }
+  }
+}
+
 TEST_F(Video, AFolderOfImagesWithoutTimesOrWithBadOnesIsRefused) {
   write_image("a.png", 20);
   write_image("b.png", 30);
@@ -226,7 +244,8 @@ TEST_F(Video, AFolderOfImagesWithoutTimesOrWithBadOnesIsRefused) {
   EXPECT_NE(with("image,t\na.png,1\nb.png,1\n").find("same time"), std::string::npos);
   EXPECT_NE(with("image,t\na.png,1\na.png,2\n").find("two times"), std::string::npos);
   EXPECT_NE(with("image,t\na.png,nan\nb.png,2\n").find(":2"), std::string::npos);
-  EXPECT_NE(with("image,time\na.png,1\nb.png,2\n").find("'t'"), std::string::npos);
+  EXPECT_NE(with("image,when\na.png,1\nb.png,2\n").find("'t'"), std::string::npos);
+  EXPECT_NE(with("picture,t\na.png,1\nb.png,2\n").find("'image'"), std::string::npos);
   EXPECT_NE(with("image,t\nc.png,1\n").find("listed"), std::string::npos);
   write_image("b.png", 30, 40);
   EXPECT_NE(with("image,t\na.png,1\nb.png,2\n").find("40 x 24"), std::string::npos);

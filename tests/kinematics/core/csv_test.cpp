@@ -128,6 +128,18 @@ TEST(Csv, SetsRowsOfAnotherLengthAside) {
             std::string::npos);
 }
 
+TEST(Csv, ACommentMayBeTheHeader) {
+  const CsvTable table = parse_csv("# recorded by hand\n#timestamp [ns],filename\n1,a\n2,b\n", "a");
+  EXPECT_EQ(table.header, (std::vector<std::string>{"timestamp [ns]", "filename"}));
+  EXPECT_EQ(table.header_line, 2U);
+  EXPECT_EQ(table.lines, (std::vector<std::size_t>{3, 4}));
+  // Not a comment that only looks like one, nor where there is a header.
+  EXPECT_NE(parse_refusal("# first, second, third\n1,2\n3,4\n").find("not column names"),
+            std::string::npos);
+  EXPECT_EQ(parse_csv("# seconds, rad\nt,x\n1,2\n", "a").header,
+            (std::vector<std::string>{"t", "x"}));
+}
+
 TEST(Csv, NamesTheLineOfAHeaderBelowComments) {
   EXPECT_EQ(parse_refusal("# made by a logger\n\nt,x,x\n1,2,3\n"),
             "a.csv:3: two columns are named 'x' (give every column its own name)");
