@@ -113,22 +113,27 @@ std::string effect_joint(const FittedEffect& effect, const KinematicTree& tree) 
   return tree.joint(effect.id.place) ? effect.id.place : std::string();
 }
 
-// The model without markers, its joints driven by the channels of the recording.
+// The model without markers, its joints driven by the channels of the recording, in its units.
 KinematicTree driven_by(const StoredRun& model, const StoredRun& onto, const RobotMatch& match) {
   KinematicTree out = model.calibration.tree;
   out.markers.clear();
-  std::map<std::string, std::string> renamed;
+  std::map<std::string, std::pair<std::string, double>> renamed;  // and units of it in one of ours
   for (std::size_t j = 0; j < out.joints.size(); ++j) {
     if (match.joint_of[j] < 0) continue;
     const Joint& there = onto.calibration.tree.joints[static_cast<std::size_t>(match.joint_of[j])];
-    renamed[out.joints[j].channel] = there.channel;
+    renamed[out.joints[j].channel] = {there.channel, match.reading_ratio[j]};
     out.joints[j].channel = there.channel;
     out.joints[j].copies = there.copies;
+    out.joints[j].scale /= match.reading_ratio[j];
   }
-  for (Joint& joint : out.joints)
-    for (ChannelShare& share : joint.couplings)
-      if (const auto found = renamed.find(share.channel); found != renamed.end())
-        share.channel = found->second;
+  for (std::size_t j = 0; j < out.joints.size(); ++j) {
+    for (ChannelShare& share : out.joints[j].couplings) {
+      const auto found = renamed.find(share.channel);
+      if (found == renamed.end()) continue;
+      share.channel = found->second.first;
+      share.ratio *= match.reading_ratio[j] / found->second.second;
+    }
+  }
   return out;
 }
 
@@ -306,6 +311,13 @@ double rms_of(const std::vector<double>& squares, double count) {
 
 CarriedOver tried(const StoredRun& model, const StoredRun& onto, const RobotMatch& match,
                   double level) {
+  CarriedOver out;
+  for (std::size_t j = 0; j < match.own_unit.size(); ++j) {
+    if (!match.own_unit[j]) continue;
+    out.skipped = fmt::format("the log counts {} in another unit, from a zero of its own",
+                              model.calibration.tree.joints[j].name);
+    return out;
+  }
   const Remeasured seen = recording_again(onto);
   const OwnErrors own = read_own_errors(onto.folder / "residuals.csv");
   const KinematicTree driven = driven_by(model, onto, match);
@@ -317,7 +329,6 @@ CarriedOver tried(const StoredRun& model, const StoredRun& onto, const RobotMatc
   options.estimate_intrinsics = false;
   options.estimate_scales = false;
   options.fold_of_frame = same_folds(seen.measurements.times_s, own, options.folds);
-  CarriedOver out;
   if (options.folds < 2) {
     out.skipped = "its run held nothing out (--folds 0)";
     return out;

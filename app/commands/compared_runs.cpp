@@ -157,6 +157,32 @@ void sort_worst_first(std::vector<QuantityDifference>& quantities) {
   });
 }
 
+// Logs of one robot in different units: nothing of the robot.
+void note_units(const StoredRun& first, const StoredRun& other, const RobotMatch& match,
+                std::vector<std::string>& notes) {
+  std::vector<std::string> known, own;
+  for (std::size_t j = 0; j < match.reading_ratio.size(); ++j) {
+    if (match.reading_ratio[j] == 1.0) continue;
+    const std::string& name = first.calibration.tree.joints[j].name;
+    if (match.own_unit[j]) {
+      own.push_back(name);
+    } else {
+      known.push_back(fmt::format("{} {:.6g}", name, match.reading_ratio[j]));
+    }
+  }
+  if (!known.empty()) {
+    notes.push_back(fmt::format(
+        "The logs are in other units (readings of {} by those of {}: {}): compared in rad and m.",
+        other.name, first.name, fmt::join(known, ", ")));
+  }
+  if (!own.empty()) {
+    notes.push_back(
+        fmt::format("The logs count {} in other units, from zeros of their own: their zeros and "
+                    "ratios are not compared.",
+                    fmt::join(own, ", ")));
+  }
+}
+
 RunDifference difference_of(const RobotLayout& layout, const StoredRun& first,
                             RobotNumbers first_numbers, const StoredRun& other,
                             RobotNumbers numbers, const RobotMatch& match, const RobotMatch& own) {
@@ -164,6 +190,7 @@ RunDifference difference_of(const RobotLayout& layout, const StoredRun& first,
   out.by_order = match.by_order;
   if (match.by_order)
     out.notes.emplace_back("The channels have other names: joints are matched by their order.");
+  note_units(first, other, match, out.notes);
   const RobotNumbers before = first_numbers;
   take_unseen_ratio(layout, first, own, numbers, first_numbers);
   take_unseen_ratio(layout, other, match, before, numbers);

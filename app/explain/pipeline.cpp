@@ -23,13 +23,10 @@
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/rotation_between.h"
+#include "kinematics/model/usual_unit.h"
 
 namespace kinescope {
 namespace {
-
-// A channel whose slope is this near to a known unit is in that unit; what is left is an effect of
-// the robot.
-constexpr double kUnitTolerance = 0.05;
 
 // What the video does show, where no marker of the declared family is found in it.
 struct Hint {
@@ -79,17 +76,6 @@ void require_markers(const Recording& recording, const TagObservations& tags) {
         fmt::format("no size for the markers seen with id {}", fmt::join(unsized, ", ")),
         "give default_size, or the size of each, in metres");
   }
-}
-
-// Nothing where no usual unit is near.
-std::optional<double> usual_unit(JointType type, double scale) {
-  const std::vector<double> units = type == JointType::kRevolute
-                                        ? std::vector<double>{1.0, kRadPerDegree}
-                                        : std::vector<double>{1.0, kMetrePerMillimetre};
-  for (const double unit : units) {
-    if (std::abs(scale / unit - 1.0) < kUnitTolerance) return unit;
-  }
-  return std::nullopt;
 }
 
 // Couplings by design: a counter-commanded joint follows another one to one. What is smaller than

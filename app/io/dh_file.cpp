@@ -53,6 +53,7 @@ std::string state_words(NumberState state) {
   switch (state) {
     case NumberState::kEstimated:
     case NumberState::kHeld:
+    case NumberState::kOwnUnit:  // of two logs, never of one calibration
       return {};
     case NumberState::kUndetermined:
       return "not determined";

@@ -12,6 +12,7 @@
 #include "calib/bundle/correction.h"
 #include "calib/quality/robot_parameters.h"
 #include "kinematics/core/error.h"
+#include "kinematics/model/usual_unit.h"
 
 namespace kinescope {
 namespace {
@@ -65,21 +66,61 @@ void compare_place(const KinematicTree& first, const KinematicTree& other, int a
   }
 }
 
-// The channels that move it by design, beside its own.
-void compare_couplings(const Joint& one, const Joint& two, bool by_order,
-                       std::vector<std::string>& differences) {
-  const auto shares = [](const Joint& joint) {
+// A change of gear is nearer to 1 than to what lies between two units of logs.
+bool is_of_unit(JointType type, double ratio) {
+  const double units = type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
+  return 2.0 * std::abs(std::log(ratio)) > std::abs(std::log(units));
+}
+
+// How the two logs count the joint.
+void compare_units(const Joint& one, const Joint& two, std::size_t at, RobotMatch& match) {
+  if (one.type != two.type || one.scale == 0.0 || two.scale == 0.0) return;
+  const auto here = usual_unit(one.type, std::abs(one.scale));
+  const auto there = usual_unit(two.type, std::abs(two.scale));
+  const double ratio = std::abs(one.scale / two.scale);
+  if (here && there) {
+    match.reading_ratio[at] = *here / *there;
+  } else if (is_of_unit(one.type, ratio)) {
+    match.reading_ratio[at] = ratio;
+    match.own_unit[at] = true;
+  }
+}
+
+// The channels that move it by design, beside its own, in the units of the first's log.
+void compare_couplings(const KinematicTree& first, const KinematicTree& other, int a,
+                       const RobotMatch& match, std::vector<std::string>& differences) {
+  const Joint& one = joint_at(first, a);
+  const Joint& two = joint_at(other, match.joint_of[static_cast<std::size_t>(a)]);
+  const auto ratio_of = [&](const std::string& channel) {
+    for (std::size_t j = 0; j < first.joints.size(); ++j) {
+      const int there = match.joint_of[j];
+      if (there >= 0 && joint_at(other, there).channel == channel) return match.reading_ratio[j];
+    }
+    return 1.0;
+  };
+  const auto shares = [&](const Joint& joint, bool of_other) {
     std::string out;
-    for (const ChannelShare& share : joint.couplings)
-      out += fmt::format(" {:+.4g} {}", share.ratio, share.channel);
+    for (const ChannelShare& share : joint.couplings) {
+      const double unit = of_other ? ratio_of(share.channel) / ratio_of(joint.channel) : 1.0;
+      out += fmt::format(" {:+.4g} {}", unit * share.ratio, share.channel);
+    }
     return out.empty() ? std::string(" nothing") : out;
   };
-  if (by_order ? one.couplings.size() == two.couplings.size() : shares(one) == shares(two)) return;
-  differences.push_back(fmt::format("{} is coupled to{} in one, to{} in the other", one.name,
-                                    shares(one), shares(two)));
+  const std::string here = shares(one, false);
+  const std::string there = shares(two, true);
+  if (match.by_order ? one.couplings.size() == two.couplings.size() : here == there) return;
+  differences.push_back(
+      fmt::format("{} is coupled to{} in one, to{} in the other", one.name, here, there));
 }
 
 void compare_structure(const KinematicTree& first, const KinematicTree& other, RobotMatch& match) {
+  match.reading_ratio.assign(first.joints.size(), 1.0);
+  match.own_unit.assign(first.joints.size(), false);
+  for (const int a : moving_joints(first)) {
+    const auto at = static_cast<std::size_t>(a);
+    if (match.joint_of[at] >= 0)
+      compare_units(joint_at(first, a), joint_at(other, match.joint_of[at]), at, match);
+  }
   std::set<int> found;
   for (const int a : moving_joints(first)) {
     const int b = match.joint_of[static_cast<std::size_t>(a)];
@@ -89,7 +130,7 @@ void compare_structure(const KinematicTree& first, const KinematicTree& other, R
     }
     found.insert(b);
     compare_place(first, other, a, match.joint_of, match.differences);
-    compare_couplings(joint_at(first, a), joint_at(other, b), match.by_order, match.differences);
+    compare_couplings(first, other, a, match, match.differences);
   }
   for (const int b : moving_joints(other)) {
     if (!found.contains(b))
@@ -126,6 +167,13 @@ bool move_model(Model& model, const Calibration& run, const Parameter& parameter
   return move_robot(model.tree, run, parameter, step);
 }
 
+// rad or m per unit of the first's log.
+double scale_in_first(const Model& model, int joint, const RobotMatch& match) {
+  const auto at = static_cast<std::size_t>(joint);
+  const int own = match.joint_of[at];
+  return joint_at(model.tree, own).scale * model.stretch[own] * match.reading_ratio[at];
+}
+
 // The axes in the order of the layout, at its readings; each points to where its channel grows.
 std::vector<PlacedAxis> axes_at(const Model& model, const RobotLayout& layout,
                                 const RobotMatch& match) {
@@ -133,7 +181,7 @@ std::vector<PlacedAxis> axes_at(const Model& model, const RobotLayout& layout,
   std::vector<int> own;
   for (std::size_t k = 0; k < layout.joints.size(); ++k) {
     own.push_back(match.joint_of[static_cast<std::size_t>(layout.joints[k])]);
-    values[own.back()] = joint_at(model.tree, own.back()).scale * model.stretch[own.back()] *
+    values[own.back()] = scale_in_first(model, layout.joints[k], match) *
                          layout.readings[static_cast<Eigen::Index>(k)];
   }
   std::vector<JointId> joints;
@@ -153,9 +201,8 @@ Eigen::VectorXd values_of(const Model& model, const RobotLayout& layout, const R
   Eigen::VectorXd out(std::ssize(layout.quantities));
   out.head(of_axes.size()) = of_axes;
   for (std::size_t k = 0; k < layout.joints.size(); ++k) {
-    const int own = match.joint_of[static_cast<std::size_t>(layout.joints[k])];
     out[of_axes.size() + static_cast<Eigen::Index>(k)] =
-        std::log(std::abs(joint_at(model.tree, own).scale * model.stretch[own]));
+        std::log(std::abs(scale_in_first(model, layout.joints[k], match)));
   }
   return out;
 }
@@ -239,10 +286,12 @@ double middle_reading(std::span<const Calibration> runs, std::span<const RobotMa
   double sum = 0.0;
   int count = 0;
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    const int own = matches[r].joint_of[static_cast<std::size_t>(joint)];
+    const auto at = static_cast<std::size_t>(joint);
+    const int own = matches[r].joint_of[at];
     const JointLimits& range = runs[r].joints[static_cast<std::size_t>(own)].range;
-    const double middle = 0.5 * (range.lower + range.upper) / joint_at(runs[r].tree, own).scale;
-    if (!std::isfinite(middle)) continue;
+    const double middle = 0.5 * (range.lower + range.upper) / joint_at(runs[r].tree, own).scale /
+                          matches[r].reading_ratio[at];
+    if (!std::isfinite(middle) || matches[r].own_unit[at]) continue;
     sum += middle;
     ++count;
   }
@@ -326,6 +375,31 @@ void take_out_height(const Eigen::VectorXd& by_height, double extent_m,
   }
 }
 
+// Those that change with the zeros of channels that count in a unit of their own, and their ratios.
+void leave_out_own_units(const RobotLayout& layout, const Calibration& run, const RobotMatch& match,
+                         std::vector<NumberState>& states) {
+  const Model model = model_of(run);
+  const std::size_t ratios = layout.quantities.size() - layout.joints.size();
+  for (std::size_t k = 0; k < layout.joints.size(); ++k) {
+    if (!match.own_unit[static_cast<std::size_t>(layout.joints[k])]) continue;
+    const double step = parameter_step(run.tree, {});  // rad or m
+    const auto turned = [&](double by) {
+      RobotLayout there = layout;
+      there.readings[static_cast<Eigen::Index>(k)] +=
+          by / scale_in_first(model, layout.joints[k], match);
+      return values_of(model, there, match);
+    };
+    const Eigen::VectorXd above = turned(step);
+    const Eigen::VectorXd below = turned(-step);
+    for (std::size_t i = 0; i < ratios; ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      const double change = difference_of(layout.quantities[i], below[at], above[at]);
+      if (has_influence(change / (2.0 * step))) states[i] = NumberState::kOwnUnit;
+    }
+    states[ratios + k] = NumberState::kOwnUnit;
+  }
+}
+
 std::string why_not(NumberState state) {
   switch (state) {
     case NumberState::kEstimated:
@@ -336,6 +410,8 @@ std::string why_not(NumberState state) {
       return "not determined by the recording";
     case NumberState::kNoChannel:
       return "no channel drives the joint";
+    case NumberState::kOwnUnit:
+      return "the logs count it in other units, from zeros of their own";
   }
   return {};
 }
@@ -407,6 +483,7 @@ RobotNumbers robot_numbers(const RobotLayout& layout, const Calibration& run,
       state = NumberState::kNoChannel;
     out.states.push_back(state);
   }
+  leave_out_own_units(layout, run, match, out.states);
   return out;
 }
 
@@ -421,7 +498,8 @@ std::vector<QuantityDifference> robot_differences(const RobotLayout& layout,
     one.first = first.values[at];
     one.second = second.values[at];
     one.difference = difference_of(one.of, one.first, one.second);
-    const bool in_first = first.states[i] == NumberState::kEstimated;
+    const bool in_first =
+        first.states[i] == NumberState::kEstimated || second.states[i] == NumberState::kOwnUnit;
     one.not_compared = why_not(in_first ? second.states[i] : first.states[i]);
     if (one.not_compared.empty())
       one.sigma = std::sqrt(first.covariance(at, at) + second.covariance(at, at));

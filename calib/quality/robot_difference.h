@@ -25,6 +25,12 @@ namespace kinescope {
 struct RobotMatch {
   std::vector<int> joint_of;  ///< beside the first tree's joints; -1: fixed, or not there
   bool by_order = false;      ///< channels have other names, and stand for one another by order
+  /// Beside the first tree's joints: the other's reading is this many times the first's (180/pi:
+  /// its log is in degrees, the first's in rad).
+  std::vector<double> reading_ratio;
+  /// Likewise: its channel counts in a unit of its own, from a zero of its own (encoder ticks
+  /// beside rad), so that the ratio says nothing of the robot.
+  std::vector<bool> own_unit;
   std::vector<std::string> differences;  ///< of the structure, in words; empty: the same
 };
 
@@ -43,7 +49,8 @@ struct RobotQuantity {
 struct RobotLayout {
   std::vector<int> joints;   ///< those that move, of the first tree
   std::vector<int> parents;  ///< of each the one before it, among them; -1: the base
-  Eigen::VectorXd readings;  ///< beside `joints`: scale * reading is the joint's value
+  Eigen::VectorXd readings;  ///< beside `joints`, as the first's log has them: scale * reading is
+                             ///< the joint's value
   AxisLayout axes;
   double extent_m = 0.0;                  ///< largest distance between axes
   std::vector<RobotQuantity> quantities;  ///< of the axes, then the ratio of every joint
@@ -54,7 +61,8 @@ struct RobotLayout {
                                        std::span<const RobotMatch> matches);
 
 struct RobotNumbers {
-  Eigen::VectorXd values;      ///< beside RobotLayout::quantities; of a ratio its logarithm
+  Eigen::VectorXd values;      ///< beside RobotLayout::quantities; of a ratio its logarithm, in
+                               ///< the unit of the first's log
   Eigen::MatrixXd covariance;  ///< likewise
   std::vector<NumberState> states;
   /// d value / d m of the height at which distances of parallel axes are meant (axis_geometry.h).

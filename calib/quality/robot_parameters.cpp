@@ -57,11 +57,13 @@ bool move_robot(KinematicTree& tree, const Calibration& run, const Parameter& pa
   return false;
 }
 
+bool has_influence(double derivative) { return std::abs(derivative) >= kNoInfluence; }
+
 NumberState number_state(const Eigen::RowVectorXd& derivatives, const Calibration& run) {
   bool any = false;
   for (std::size_t p = 0; p < run.parameters.size(); ++p) {
     const double unit = parameter_step(run.tree, run.parameters[p]) / kParameterStep;
-    if (std::abs(derivatives[static_cast<Eigen::Index>(p)]) * unit < kNoInfluence) continue;
+    if (!has_influence(derivatives[static_cast<Eigen::Index>(p)] * unit)) continue;
     if (!run.parameters[p].sigma) return NumberState::kUndetermined;
     any = true;
   }

@@ -15,7 +15,8 @@ enum class NumberState {
   kEstimated,
   kHeld,          ///< as declared
   kUndetermined,  ///< the recording does not show it
-  kNoChannel      ///< of a joint that no channel drives: nothing says where it stood
+  kNoChannel,     ///< of a joint that no channel drives: nothing says where it stood
+  kOwnUnit        ///< of a channel whose unit and zero are another log's own
 };
 
 /// By which a parameter is moved for a central difference: in its own unit, of scales (whose unit
@@ -26,6 +27,9 @@ enum class NumberState {
 /// or scale, and nothing was moved.
 [[nodiscard]] bool move_robot(KinematicTree& tree, const Calibration& run,
                               const Parameter& parameter, double step);
+
+/// Whether a derivative (by a parameter in its own unit) is more than rounding.
+[[nodiscard]] bool has_influence(double derivative);
 
 /// Of a number with these derivatives by run.parameters.
 [[nodiscard]] NumberState number_state(const Eigen::RowVectorXd& derivatives,

@@ -66,13 +66,16 @@ class Compare : public testing::Test {
     record("far", with_moved_zero(15.0 * kZero_rad), 6);
     record("two", compared_arm(2), 5);
     record("geared", compared_arm(3), 8, 1.0 + kRatio);
+    record("degrees", compared_arm(3), 9, 1.0, kRadPerDegree);
+    record("ticks", compared_arm(3), 10, 1.0, 2.0 * std::numbers::pi / 65536.0, 32768.0);
   }
   static fs::path runs() { return truth::temporary_path("compared"); }
   static std::string of(const std::string& name) { return (runs() / (name + "_run")).string(); }
   static void record(const std::string& name, const KinematicTree& robot, std::uint64_t seed,
-                     double ratio_of_q2 = 1.0) {
+                     double ratio_of_q2 = 1.0, double unit = 1.0, double zero = 0.0) {
     truth::World world = view_of(robot, seed);
     world.log.values.col(1) /= ratio_of_q2;
+    world.log.values = (world.log.values / unit).array() + zero;
     truth::write_world(world, runs() / name);
     const Outcome made = run({"run", (runs() / name).string(), "-o", of(name), "--quiet"});
     ASSERT_EQ(made.code, 0) << name << ": " << made.err;
@@ -115,6 +118,26 @@ TEST_F(Compare, TheSameRobotFilmedAnewIsTheSameAndItsModelCarriesOver) {
   const Outcome again = run({"compare", of("a"), of("b"), "--fail-on", "any", "--quiet"});
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_TRUE(again.out.starts_with("Same robot within noise")) << again.out;
+}
+
+TEST_F(Compare, ALogInDegreesIsOfTheSameRobotAndItsModelCarriesOver) {
+  const ComparedJson found = compared({"a", "degrees"});
+  EXPECT_EQ(found.at("changed"), false) << found.at("verdict");
+  EXPECT_NE(found.at("findings").dump().find("other units"), std::string::npos);
+  for (const ComparedJson& one : found.at("carried_over"))
+    EXPECT_EQ(one.at("carries"), true) << one;
+  const Outcome again = run({"compare", of("degrees"), of("a"), "--fail-on", "any", "--quiet"});
+  EXPECT_EQ(again.code, 0) << again.out << again.err;
+}
+
+TEST_F(Compare, ALogInTicksIsComparedInWhatItTells) {
+  const ComparedJson found = compared({"a", "ticks"});
+  EXPECT_EQ(found.at("changed"), false) << found.at("verdict");
+  EXPECT_NE(found.at("findings").dump().find("zeros of their own"), std::string::npos);
+  for (const ComparedJson& one : found.at("carried_over"))
+    EXPECT_NE(one.at("skipped").dump().find("in another unit"), std::string::npos) << one;
+  const Outcome again = run({"compare", of("a"), of("ticks"), "--fail-on", "change", "--quiet"});
+  EXPECT_EQ(again.code, 0) << again.out << again.err;
 }
 
 TEST_F(Compare, AZeroThatMovedIsNamedWithItsSize) {

@@ -107,6 +107,64 @@ TEST(RobotDifference, AnAxisThatPointsTheOtherWayWithANegativeScaleIsTheSame) {
   EXPECT_LT(largest(differences(first, other)), kSameDifference);
 }
 
+// The same robot as its log in another unit shows it; `shift` is of the channels' zeros, rad.
+Calibration counted_in(const Calibration& run, double unit, double shift) {
+  Calibration out = run;
+  for (Joint& joint : out.tree.joints) {
+    joint.scale *= unit;
+    joint.T_parent_joint =
+        joint.T_parent_joint * joint_motion(joint.type, joint.axis, -joint.scale / unit * shift);
+  }
+  for (JointEstimate& joint : out.joints)
+    joint.range = {joint.range.lower + shift, joint.range.upper + shift};
+  return out;
+}
+
+TEST(RobotDifference, DegreesAndRadiansAreOneRobot) {
+  const KinematicTree tree = arm_of_four();
+  const Calibration rad = known_to(tree, 1e-4);
+  const Calibration deg = counted_in(rad, kRadPerDegree, 0.0);
+  for (const auto& [one, two] : {std::pair{rad, deg}, std::pair{deg, rad}}) {
+    const auto found = differences(one, two);
+    EXPECT_LT(largest(found), kSameDifference);
+    for (const QuantityDifference& quantity : found) EXPECT_TRUE(quantity.sigma);
+  }
+  Calibration moved = deg;
+  Joint& joint = moved.tree.joints[1];
+  joint.T_parent_joint = joint.T_parent_joint * joint_motion(joint.type, joint.axis, 3e-3);
+  joint.scale *= 1.001;
+  const auto found = differences(rad, moved);
+  EXPECT_NEAR(named(found, "ratio of q2").difference, std::log(1.001), kSameDifference);
+  EXPECT_NEAR(named(found, "zero of q2 (towards q3)").difference, 3e-3, 0.5 * 1e-3);
+}
+
+TEST(RobotDifference, TicksBesideRadiansSayNothingOfZerosAndRatios) {
+  const Calibration rad = known_to(arm_of_four(), 1e-4);
+  const Calibration ticks = counted_in(rad, 2.0 * std::numbers::pi / 4096.0, 0.7);
+  for (const auto& [one, two] : {std::pair{rad, ticks}, std::pair{ticks, rad}}) {
+    for (const QuantityDifference& quantity : differences(one, two)) {
+      const bool of_log =
+          quantity.of.name.starts_with("zero") || quantity.of.name.starts_with("ratio");
+      EXPECT_EQ(quantity.sigma.has_value(), !of_log) << quantity.of.name;
+      if (of_log) continue;
+      EXPECT_LT(std::abs(quantity.difference), kSameDifference) << quantity.of.name;
+    }
+  }
+}
+
+// One joint's log in degrees: by design it follows another one to one, in rad.
+TEST(RobotDifference, ACouplingIsTheSameInAnyUnit) {
+  KinematicTree first = arm_of_four();
+  first.joints[2].couplings.push_back({first.joints[1].channel, -1.0});
+  KinematicTree other = first;
+  other.joints[1].scale *= kRadPerDegree;
+  other.joints[2].couplings.front().ratio *= kRadPerDegree;
+  EXPECT_TRUE(match_robots(first, other).differences.empty());
+  EXPECT_TRUE(match_robots(other, first).differences.empty());
+  other.joints[2].couplings.front().ratio *= -1.0;
+  EXPECT_EQ(match_robots(first, other).differences.size(), 1U);
+}
+
 TEST(RobotDifference, UncertaintyIsThatOfBothAndTwiceTheNoiseIsTwiceTheUncertainty) {
   const KinematicTree tree = arm_of_four();
   const auto one = differences(known_to(tree, 1e-4), known_to(tree, 1e-4));
