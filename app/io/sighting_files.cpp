@@ -165,15 +165,11 @@ PoseSample read_pose(const CsvTable& table, std::size_t row, int frame, bool uni
 }
 
 /// Width of the middle nine tenths of the positions along the axis where it is largest.
-double span_m(const PoseTracks& tracks) {
+double span_m(const std::vector<Eigen::Vector3d>& positions) {
   double widest = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> along;
-    for (const PoseTrack& track : tracks.tracks) {
-      for (const PoseSample& sample : track.samples) {
-        along.push_back(sample.T_camera_marker.translation[axis]);
-      }
-    }
+    for (const Eigen::Vector3d& position : positions) along.push_back(position[axis]);
     if (along.empty()) return 0.0;
     std::ranges::sort(along);
     widest =
@@ -182,11 +178,25 @@ double span_m(const PoseTracks& tracks) {
   return widest;
 }
 
+/// No robot spans as much, as of the poses of a flange (flange_file.cpp); one of 0.2 m does in cm.
+void ask_for_unit(double span, const std::string& source, std::vector<std::string>& warnings) {
+  constexpr double kNoCellM = 20.0;
+  if (span <= kNoCellM) return;
+  warnings.push_back(
+      fmt::format("{}: the positions span {:.0f} m: are they in another unit? Say it in the header "
+                  "(x [cm],y [cm],z [cm])",
+                  source, span));
+}
+
 /// No camera or tracker sees a robot over 100 m; one of half a metre spans more than that in mm.
 void read_as_metres(ReadSightings<PoseTracks>& poses, const std::string& source) {
   constexpr double kNoHall = 100.0;
-  const double span = span_m(poses.found);
-  if (span <= kNoHall) return;
+  std::vector<Eigen::Vector3d> positions;
+  for (const PoseTrack& track : poses.found.tracks)
+    for (const PoseSample& sample : track.samples)
+      positions.push_back(sample.T_camera_marker.translation);
+  const double span = span_m(positions);
+  if (span <= kNoHall) return ask_for_unit(span, source, poses.warnings);
   for (PoseTrack& track : poses.found.tracks) {
     for (PoseSample& sample : track.samples) sample.T_camera_marker.translation *= 1e-3;
   }
@@ -320,6 +330,10 @@ ReadSightings<PointObservations> read_points(const std::filesystem::path& path) 
               out.found.observations.push_back(std::move(point));
             });
   append(out.warnings, bad);
+  std::vector<Eigen::Vector3d> positions;
+  for (const PointObservation& point : out.found.observations)
+    if (point.position_m) positions.push_back(*point.position_m);
+  ask_for_unit(span_m(positions), table.source, out.warnings);
   return out;
 }
 

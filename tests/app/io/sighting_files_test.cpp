@@ -195,6 +195,15 @@ TEST_F(SightingFiles, PositionsThatSpanAHallAreMillimetres) {
       << "one position far off changes no unit";
 }
 
+TEST_F(SightingFiles, PositionsThatSpanMoreThanACellAreAskedFor) {
+  const ReadSightings<PoseTracks> read = read_poses_of(forty_poses("41,1,0,0,0,0,0,0,1", 1e2));
+  EXPECT_NEAR(read.found.tracks[0].samples[10].T_camera_marker.translation.x(), 10.0, 1e-9);
+  ASSERT_EQ(read.warnings.size(), 1U);
+  EXPECT_NE(read.warnings[0].find("are they in another unit?"), std::string::npos);
+  folder_.write("points.csv", "t,point,x,y,z\n0,1,0,0,0\n1,1,30,0,0\n2,1,48,0,0\n");
+  EXPECT_EQ(read_points(folder_.path() / "points.csv").warnings.size(), 1U);
+}
+
 TEST_F(SightingFiles, UnitsInTheHeaderAreUsed) {
   const PoseTracks found =
       poses("t [ms],body,x [mm],y [mm],z [m],qx,qy,qz,qw\n500,1,10,20,3,0,0,0,1\n");
