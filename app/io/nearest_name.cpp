@@ -33,13 +33,17 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string did_you_mean(std::string_view name, std::span<const std::string> known) {
-  std::string list = fmt::format("known: {}", fmt::join(known, ", "));
+std::string nearest_name(std::string_view name, std::span<const std::string> known) {
   const auto nearest = std::ranges::min_element(
       known, {}, [&](const std::string& other) { return edit_distance(name, other); });
-  if (nearest == known.end() || edit_distance(name, *nearest) > 1 + nearest->size() / 3)
-    return list;
-  return fmt::format("did you mean '{}'? {}", *nearest, list);
+  if (nearest == known.end() || edit_distance(name, *nearest) > 1 + nearest->size() / 3) return {};
+  return *nearest;
+}
+
+std::string did_you_mean(std::string_view name, std::span<const std::string> known) {
+  std::string list = fmt::format("known: {}", fmt::join(known, ", "));
+  const std::string nearest = nearest_name(name, known);
+  return nearest.empty() ? list : fmt::format("did you mean '{}'? {}", nearest, list);
 }
 
 }  // namespace kinescope

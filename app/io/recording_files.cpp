@@ -5,10 +5,12 @@
 #include <array>
 #include <cctype>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/io/nearest_name.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
@@ -23,6 +25,8 @@ using MaybePath = std::optional<fs::path>;
 
 constexpr std::array kVideoEndings = {".mp4", ".avi",  ".mkv", ".mov", ".webm", ".m4v",
                                       ".mpg", ".mpeg", ".wmv", ".ts",  ".ogv",  ".flv"};
+
+const std::vector<std::string> kTables = {"joints", "flange", "corners", "poses", "points"};
 
 bool is_video_file(const fs::path& path) {
   std::string ending = path.extension().string();
@@ -218,6 +222,23 @@ std::optional<RecordingEntry> declared_entry(const RecordingPaths& paths) {
   return named.front().first;
 }
 
+/// Tables of the folder that nothing reads, where the joint log or poses of the flange are missing:
+/// a file under another name is no file to the rest.
+std::vector<fs::path> unread_tables(const RecordingFiles& files) {
+  const std::vector<fs::path> read = files.all();
+  std::vector<fs::path> out;
+  for (const fs::path& path : sorted_files(files.folder)) {
+    const std::string name = path.filename().string();
+    const bool plain = path.extension() == ".csv";
+    const bool known =
+        plain && (std::ranges::find(kTables, path.stem().string()) != kTables.end() ||
+                  name_behind(path.stem().string(), "corners"));
+    const bool table = plain || name.ends_with(".csv.gz");
+    if (table && !known && std::ranges::find(read, path) == read.end()) out.push_back(path);
+  }
+  return out;
+}
+
 RecordingEntry choose_entry(const RecordingPaths& paths, RecordingFiles& files) {
   const std::array<std::pair<RecordingEntry, const MaybePath*>, 4> ways = {
       {{RecordingEntry::kVideo, &files.video},
@@ -235,18 +256,27 @@ RecordingEntry choose_entry(const RecordingPaths& paths, RecordingFiles& files) 
     }
   }
   if (entry) return *entry;
+  std::string unread;
+  for (const fs::path& path : unread_tables(files))
+    unread += fmt::format("{}{}", unread.empty() ? "; not read: " : ", ", path.filename().string());
   throw bad_input(paths.folder.string(),
-                  "holds no video, bag, dataset, corners.csv, poses.csv or points.csv",
+                  "holds no video, bag, dataset, corners.csv, poses.csv or points.csv" + unread,
                   "add one of them, or name it with --video, --corners, --poses or --points");
 }
 
-/// The only bag or dataset of a folder. Throws where there are several.
-MaybePath container_in(const fs::path& folder) {
+/// The bags or datasets of a folder.
+std::vector<fs::path> containers_in(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
     if (recorded::container_of(entry.path())) found.push_back(entry.path());
   std::ranges::sort(found);
+  return found;
+}
+
+/// The only one. Throws where there are several.
+MaybePath container_in(const fs::path& folder) {
+  const std::vector<fs::path> found = containers_in(folder);
   if (found.empty()) return std::nullopt;
   if (found.size() == 1) return found.front();
   std::vector<std::string> names;
@@ -271,7 +301,8 @@ void take_from_bag(const bags::Source& source, RecordingFiles& files) {
     return names_one_of(all) ? source.topic : std::string();
   };
   const bool names_joints = names_one_of(contents.joints);
-  const bool seen = files.video || files.corners || files.poses || files.points;
+  const bool seen =
+      files.video || files.corners || files.poses || files.points || !files.cameras.empty();
   if (!seen) {
     const bool detected = names_one_of(contents.detections) ||
                           (contents.images.empty() && !contents.detections.empty());
@@ -290,13 +321,17 @@ void take_from_bag(const bags::Source& source, RecordingFiles& files) {
   }
   const MaybePath& images = files.video ? files.video : files.corners;
   const auto shown = images ? bags::bag_source(*images) : std::nullopt;
-  if (!files.camera && shown && bags::camera_of(contents, shown->topic)) files.camera = images;
+  if (files.camera || !images || !files.cameras.empty()) return;
+  // Of images that are none of the bag's it is the bag's only camera.
+  if (bags::camera_of(contents, shown ? shown->topic : std::string()))
+    files.camera = shown ? images : source.bag;
 }
 
 /// What a dataset gives in place of files that are not there: a camera's videos, joints.
 void take_from_dataset(const datasets::Source& source, RecordingFiles& files) {
   const datasets::Dataset& dataset = datasets::look_into(source.folder);
-  const bool seen = files.video || files.corners || files.poses || files.points;
+  const bool seen =
+      files.video || files.corners || files.poses || files.points || !files.cameras.empty();
   if (!seen) {
     const std::string& camera = datasets::choose_camera(dataset, source).name;
     files.video = datasets::Source{source.folder, camera, source.episodes}.path();
@@ -308,6 +343,67 @@ void take_from_dataset(const datasets::Source& source, RecordingFiles& files) {
 void take_from_container(const fs::path& path, RecordingFiles& files) {
   if (const auto bag = bags::bag_source(path)) take_from_bag(*bag, files);
   if (const auto dataset = datasets::dataset_source(path)) take_from_dataset(*dataset, files);
+}
+
+/// The topic of a bag that --video or --corners named: of several that is the one that is chosen.
+void name_topic(MaybePath& path, const auto& choose) {
+  const auto source = path ? bags::bag_source(*path) : std::nullopt;
+  if (source && source->topic.empty())
+    path = with_topic(source->bag, choose(bags::look_into(source->bag), std::string()).topic);
+}
+
+/// The bag that shows the robot has its joints, too; else one beside what shows it.
+void take_from_beside(RecordingFiles& files) {
+  name_topic(files.video, bags::choose_images);
+  name_topic(files.corners, bags::choose_detections);
+  const MaybePath& shown = files.video ? files.video : files.corners;
+  const auto own = shown ? recorded::container_of(*shown) : std::nullopt;
+  if (own) take_from_container(*shown, files);
+  std::vector<fs::path> others = containers_in(files.folder);
+  std::erase_if(others, [&](const fs::path& path) {
+    std::error_code error;
+    return own && fs::equivalent(path, own->path, error);
+  });
+  const bool complete = files.joints && (files.camera || !shown);
+  if (others.size() == 1 && !complete) {
+    const MaybePath joints = files.joints, camera = files.camera;
+    take_from_container(others.front(), files);
+    if (files.joints != joints || files.camera != camera) return;
+  }
+  for (const fs::path& path : others) {
+    files.warnings.push_back(
+        fmt::format("{} is not used: {}", path.string(),
+                    files.joints ? fmt::format("the joint log is {}", files.joints->string())
+                                 : "name the one that holds the joint log with --joints"));
+  }
+}
+
+void warn_of_unread_tables(RecordingFiles& files) {
+  if (files.joints || files.flange) return;
+  for (const fs::path& path : unread_tables(files)) {
+    const bool poses = nearest_name(path.stem().stem().string(), kTables) == "flange";
+    files.warnings.push_back(
+        fmt::format("{} is not read: {}", path.string(),
+                    poses ? "is it the poses of the flange? Name it flange.csv"
+                          : "is it the joint log? Name it joints.csv, or give --joints"));
+  }
+}
+
+/// Poses in a bag that has no joints: they may be the flange's.
+void warn_of_unread_poses(RecordingFiles& files) {
+  static const std::set<std::string> kPoses = {
+      "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped",
+      "geometry_msgs/TransformStamped", "tf2_msgs/TFMessage", "tf/tfMessage"};
+  const MaybePath& shown = files.video ? files.video : files.corners;
+  const auto bag = shown ? bags::bag_source(*shown) : std::nullopt;
+  if (!bag || files.joints || files.flange) return;
+  std::vector<std::string> topics;
+  for (const bags::TopicCount& count : bags::look_into(bag->bag).topics)
+    if (kPoses.contains(count.topic.type)) topics.push_back(count.topic.name);
+  if (topics.empty()) return;
+  files.warnings.push_back(
+      fmt::format("{}: {} {} not read: are these poses of the flange? Write them to flange.csv",
+                  bag->bag.string(), fmt::join(topics, ", "), topics.size() == 1 ? "is" : "are"));
 }
 
 /// Poses of the flange take the place of joint values where there are none.
@@ -389,9 +485,13 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
     take_from_container(paths.folder, files);
   } else if (!seen) {
     if (const MaybePath alone = container_in(folder)) take_from_container(*alone, files);
+  } else {
+    take_from_beside(files);
   }
   if (files.cameras.empty()) files.entry = choose_entry(paths, files);
   find_flange(files);
+  if (!container) warn_of_unread_tables(files);
+  warn_of_unread_poses(files);
   return files;
 }
 

@@ -177,6 +177,57 @@ TEST(BagRecording, OfImagesIsARecordingOfAVideo) {
   EXPECT_EQ(calibration_of(from_bag), before);
 }
 
+// Images that are named, or a film beside the bag, take nothing of what else the bag holds.
+TEST(BagRecording, BesideANamedVideoHasTheLogAndTheCamera) {
+  const fs::path sample = fs::path(KINESCOPE_SOURCE_DIR) / "sample_videos/scara4_none";
+  const RecordingFolder folder;
+  folder.write("tags.yaml", read_text_file(sample / "tags.yaml"));
+  const fs::path path = folder.path() / "recording.mcap";
+  truth::BagWriter bag(path);
+  write_joints(bag, read_joint_log(sample / "joints.csv"));
+  bag.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp_ns(0.0),
+            truth::camera_info(stamp_ns(0.0), fields_of(read_camera(sample / "camera.yaml"))));
+  bag.write("/tool", "geometry_msgs/msg/PoseStamped", stamp_ns(0.0), std::string(64, '\0'));
+  bag.write("/camera/image_raw", "sensor_msgs/msg/Image", stamp_ns(0.0) + kTravelNs,
+            truth::image(stamp_ns(0.0), 2, 1, "mono8", 2, "ab"));
+  bag.finish();
+
+  RecordingPaths paths = folder.paths();
+  for (const std::string& topic : {std::string(), std::string(":/camera/image_raw")}) {
+    paths.video = path.string() + topic;
+    const Recording named = read_recording(paths);
+    EXPECT_EQ(named.log.channels.size(), 4U) << topic;
+    EXPECT_TRUE(named.camera) << topic;
+    EXPECT_TRUE(named.warnings.empty()) << topic;
+  }
+  paths.video.reset();
+  folder.write("video.mp4", "x");
+  const Recording beside = read_recording(paths);
+  EXPECT_EQ(beside.video.filename(), "video.mp4");
+  EXPECT_EQ(beside.log.channels.size(), 4U);
+  EXPECT_TRUE(beside.camera);
+  EXPECT_NE(std::ranges::find(beside.files, path), beside.files.end()) << "`inspect` lists it";
+  folder.write("joints.csv", read_text_file(sample / "joints.csv"));
+  folder.write("camera.yaml", read_text_file(sample / "camera.yaml"));
+  const Recording replaced = read_recording(paths);
+  EXPECT_EQ(replaced.log.source, (folder.path() / "joints.csv").string());
+  ASSERT_EQ(replaced.warnings.size(), 1U);
+  EXPECT_NE(replaced.warnings[0].find("recording.mcap is not used"), std::string::npos);
+}
+
+TEST(BagRecording, PosesWithoutJointsAreAskedFor) {
+  const RecordingFolder folder;
+  folder.write("tags.yaml", "default_size: 0.05\n");
+  truth::BagWriter bag(folder.path() / "recording.mcap");
+  bag.write("/tcp_pose", "geometry_msgs/msg/PoseStamped", stamp_ns(0.0), std::string(64, '\0'));
+  bag.write("/camera/image_raw", "sensor_msgs/msg/Image", stamp_ns(0.0) + kTravelNs,
+            truth::image(stamp_ns(0.0), 2, 1, "mono8", 2, "ab"));
+  bag.finish();
+  const std::vector<std::string> warnings = read_recording(folder.paths()).warnings;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("/tcp_pose is not read"), std::string::npos) << warnings[0];
+}
+
 TEST(BagRecording, OfTorquesIsATorqueLog) {
   Rng rng = Rng::from_name("torques in a bag");
   const RandomRobot robot = random_robot({.joints = 2, .prismatic_share = 0.0}, rng);

@@ -284,6 +284,26 @@ TEST_F(ReadRecording, NamedFilesTakeThePlaceOfThoseInTheFolder) {
       std::string::npos);
 }
 
+TEST_F(ReadRecording, ALogUnderAnotherNameIsAskedFor) {
+  const std::string log = read_text_file(folder_.path() / "joints.csv");
+  folder_.remove("joints.csv");
+  EXPECT_TRUE(read_recording(folder_.paths()).warnings.empty());
+  for (const char* name : {"joint_states.csv", "Joints.csv", "log.csv"}) {
+    folder_.write(name, log);
+    const std::vector<std::string> warnings = read_recording(folder_.paths()).warnings;
+    ASSERT_EQ(warnings.size(), 1U) << name;
+    EXPECT_EQ(warnings[0], (folder_.path() / name).string() +
+                               " is not read: is it the joint log? Name it joints.csv, or give "
+                               "--joints");
+    folder_.remove(name);
+  }
+  folder_.write("Flange.csv", "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n");
+  EXPECT_NE(read_recording(folder_.paths()).warnings.at(0).find("Name it flange.csv"),
+            std::string::npos);
+  folder_.write("joints.csv", log);
+  EXPECT_TRUE(read_recording(folder_.paths()).warnings.empty()) << "nothing is missing";
+}
+
 TEST_F(ReadRecording, PointsWithTargets) {
   folder_.remove("poses.csv");
   folder_.write("points.csv", "t,point,x,y,z,target\n0,0,,,,left\n1,0,,,,right\n");
