@@ -211,7 +211,7 @@ bool Tracer::is_doubtful(const FoundRest& found, std::size_t effect) const {
 }
 
 bool Tracer::is_usual(const EffectId& id) const {
-  const Candidate* candidate = find_candidate(now_->fit, id);
+  const Candidate* candidate = find_candidate(base_->fit, id);
   return candidate != nullptr && candidate->is_usual;
 }
 
