@@ -13,6 +13,7 @@
 #include "app/commands/inspection.h"
 #include "app/explain/nominal_channels.h"
 #include "app/explain/sighting_doubts.h"
+#include "calib/vision/repeated_frames.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/datasets/dataset.h"
 #include "kinematics/recorded/container.h"
@@ -258,8 +259,11 @@ void look_at_sightings(const Recording& recording, std::vector<Finding>& finding
   }
   std::vector<std::string> words = uncovered_words(recording.log, *times_s);
   if (recording.corners) {
-    for (std::string& more : unlisted_marker_words(*recording.corners))
-      words.push_back(std::move(more));
+    TagObservations tags = *recording.corners;
+    leave_out_repeated_frames(tags);
+    for (const std::vector<std::string>& more :
+         {unlisted_marker_words(tags), repeated_frame_words(tags)})
+      words.insert(words.end(), more.begin(), more.end());
   }
   for (std::string& sentence : words) findings.push_back({false, std::move(sentence)});
 }

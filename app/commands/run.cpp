@@ -40,6 +40,7 @@
 #include "calib/quality/odd_readings.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "calib/tracks/several_cameras.h"
+#include "calib/vision/repeated_frames.h"
 #include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
 #include "kinematics/urdf/camera_links.h"
@@ -77,7 +78,7 @@ void describe_recording(const Recording& recording, const Observed& observed,
   for (const std::vector<std::string>& more :
        {clock_jump_words(recording.log), frozen_log_words(recording.log, observed),
         uncovered_words(recording.log, observed.measurements.times_s),
-        unlisted_marker_words(observed.tags)}) {
+        unlisted_marker_words(observed.tags), repeated_frame_words(observed.tags)}) {
     run.warnings.insert(run.warnings.end(), more.begin(), more.end());
   }
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();

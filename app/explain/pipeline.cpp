@@ -19,6 +19,7 @@
 #include "calib/tracks/camera_from_tags.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "calib/tracks/several_cameras.h"
+#include "calib/vision/repeated_frames.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -240,6 +241,7 @@ Observed observe(const Recording& recording, const SightOptions& options,
   }
   if (recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners) {
     require_markers(recording, out.tags);
+    leave_out_repeated_frames(out.tags);
     out.measurements.times_s = out.tags.times_s;
     out.measurements.corners = out.tags.observations;
   }

@@ -167,26 +167,6 @@ std::vector<int> free_intrinsics(const BoardOptions& options) {
   return free;
 }
 
-std::optional<ViewNormals> view_normals(const CameraModel& camera, const Pose& pose,
-                                        const BoardSight& view, const std::vector<int>& free) {
-  const auto n = static_cast<Eigen::Index>(free.size());
-  ViewNormals out{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, 6),
-                  Eigen::MatrixXd::Zero(6, 6), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(6)};
-  for (std::size_t i = 0; i < view.pixels.size(); ++i) {
-    const auto p = project_with_derivatives(camera, pose * view.places_m[i]);
-    if (!p) return std::nullopt;
-    const Eigen::MatrixXd Ji = p->d_intrinsics(Eigen::all, free);
-    const auto Jp = pose_jacobian(*p, pose, view.places_m[i]);
-    const Eigen::Vector2d r = view.pixels[i] - p->pixel;
-    out.A += Ji.transpose() * Ji;
-    out.B += Ji.transpose() * Jp;
-    out.C += Jp.transpose() * Jp;
-    out.g_intrinsics += Ji.transpose() * r;
-    out.g_pose += Jp.transpose() * r;
-  }
-  return out;
-}
-
 std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
                                                     const std::vector<BoardSight>& views,
                                                     const std::vector<ViewFit>& fits,
@@ -196,13 +176,22 @@ std::optional<Eigen::MatrixXd> intrinsic_covariance(const CameraModel& camera,
   double squared = 0.0;
   Eigen::Index measured = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const auto view = view_normals(camera, fits[v].T_camera_board, views[v], free);
-    if (!view) return std::nullopt;
-    for (const Eigen::Vector2d& residual : fits[v].residuals_px) {
-      squared += residual.squaredNorm();
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+    Eigen::MatrixXd B = Eigen::MatrixXd::Zero(n, 6);
+    Matrix6d C = Matrix6d::Zero();
+    for (std::size_t i = 0; i < views[v].pixels.size(); ++i) {
+      const auto p =
+          project_with_derivatives(camera, fits[v].T_camera_board * views[v].places_m[i]);
+      if (!p) return std::nullopt;
+      const Eigen::MatrixXd Ji = p->d_intrinsics(Eigen::all, free);
+      const auto Jp = pose_jacobian(*p, fits[v].T_camera_board, views[v].places_m[i]);
+      A += Ji.transpose() * Ji;
+      B += Ji.transpose() * Jp;
+      C += Jp.transpose() * Jp;
+      squared += fits[v].residuals_px[i].squaredNorm();
       measured += 2;
     }
-    S += view->A - view->B * solve_symmetric(view->C, Eigen::MatrixXd(view->B.transpose()));
+    S += A - B * solve_symmetric(Eigen::MatrixXd(C), Eigen::MatrixXd(B.transpose()));
   }
   const Eigen::Index freedom = measured - n - 6 * static_cast<Eigen::Index>(views.size());
   if (freedom <= 0) return std::nullopt;

@@ -34,21 +34,6 @@ struct ViewFit {
 /// Which of the intrinsics (fx fy cx cy, distortion) the fit estimates.
 [[nodiscard]] std::vector<int> free_intrinsics(const BoardOptions& options);
 
-/// Blocks of the normal equations J'J x = J'r of one view: intrinsics (n), and the board's pose
-/// perturbed on the right (rotation, translation).
-struct ViewNormals {
-  Eigen::MatrixXd A;  ///< n x n, intrinsics
-  Eigen::MatrixXd B;  ///< n x 6, intrinsics and pose
-  Eigen::MatrixXd C;  ///< 6 x 6, pose
-  Eigen::VectorXd g_intrinsics;
-  Eigen::VectorXd g_pose;
-};
-
-/// Nothing where a point has no image.
-[[nodiscard]] std::optional<ViewNormals> view_normals(const CameraModel& camera, const Pose& pose,
-                                                      const BoardSight& view,
-                                                      const std::vector<int>& free);
-
 /// Covariance of the free intrinsics, poses marginalised, with the noise of the residuals. Nothing
 /// where the views do not determine them.
 [[nodiscard]] std::optional<Eigen::MatrixXd> intrinsic_covariance(

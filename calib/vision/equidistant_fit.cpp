@@ -5,10 +5,13 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
+
+#include <ceres/cost_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
 
 #include "calib/vision/board_fit.h"
-#include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/silence_glog.h"
 
 namespace kinescope {
 namespace {
@@ -58,89 +61,90 @@ PosedViews best_start(const std::vector<BoardSight>& views, int width, int heigh
   return best;
 }
 
-std::optional<double> squared_error(const Bundle& bundle) {
-  double sum = 0.0;
-  for (std::size_t v = 0; v < bundle.views.size(); ++v) {
-    const BoardSight& view = bundle.views[v];
-    for (std::size_t i = 0; i < view.pixels.size(); ++i) {
-      const auto pixel = project(bundle.camera, bundle.poses[v] * view.places_m[i]);
-      if (!pixel) return std::nullopt;
-      sum += (view.pixels[i] - *pixel).squaredNorm();
-    }
-  }
-  return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
-}
+constexpr int kIntrinsics = 8;  // fx, fy, cx, cy, k1 to k4
+using Intrinsics = Eigen::Matrix<double, kIntrinsics, 1>;
 
-void move_intrinsics(CameraModel& camera, const Eigen::VectorXd& step) {
-  camera.fx += step(0);
-  camera.fy += step(1);
-  camera.cx += step(2);
-  camera.cy += step(3);
-  for (Eigen::Index i = 4; i < step.size(); ++i) {
-    camera.distortion[static_cast<std::size_t>(i - 4)] += step(i);
-  }
-}
-
-// One step of Levenberg-Marquardt with Marquardt's scaling; nothing where it cannot be taken.
-std::optional<Bundle> stepped(const Bundle& bundle, const std::vector<ViewNormals>& normals,
-                              double damping) {
-  const Eigen::Index n = normals.front().A.rows();
-  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
-  for (const ViewNormals& view : normals) S += view.A;
-  S.diagonal() *= 1.0 + damping;
-  std::vector<Eigen::MatrixXd> C(normals.size());
-  for (std::size_t v = 0; v < normals.size(); ++v) {
-    const ViewNormals& view = normals[v];
-    C[v] = view.C;
-    C[v].diagonal() *= 1.0 + damping;
-    S -= view.B * solve_symmetric(C[v], Eigen::MatrixXd(view.B.transpose()));
-    g += view.g_intrinsics - view.B * solve_symmetric(C[v], view.g_pose);
-  }
-  // Terms of theta^3 to theta^9 beside focal lengths in px: scaled to a unit diagonal.
-  const Eigen::VectorXd scale = unit_scale(S);
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
-  const Eigen::VectorXd right = scale.cwiseProduct(g);
-  const Eigen::VectorXd step = scale.cwiseProduct(solve_symmetric(scaled, right));
-  if (!step.allFinite()) return std::nullopt;
-  Bundle out = bundle;
-  move_intrinsics(out.camera, step);
-  if (!(out.camera.fx > 0.0) || !(out.camera.fy > 0.0)) return std::nullopt;
-  for (std::size_t v = 0; v < normals.size(); ++v) {
-    const Eigen::VectorXd right_pose = normals[v].g_pose - normals[v].B.transpose() * step;
-    const Vector6d move = solve_symmetric(C[v], right_pose);
-    if (!move.allFinite()) return std::nullopt;
-    out.poses[v] = out.poses[v] * exp_pose(move);
-  }
+Intrinsics intrinsics_of(const CameraModel& camera) {
+  Intrinsics out;
+  out << camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion[0], camera.distortion[1],
+      camera.distortion[2], camera.distortion[3];
   return out;
 }
 
-Bundle refined(Bundle bundle, const std::vector<int>& free) {
-  constexpr int kRounds = 200;
-  constexpr double kConverged = 1e-12;  // change of the squared error, as a share
-  constexpr double kMaxDamping = 1e10;
-  auto now = squared_error(bundle);
-  double damping = 1e-3;
-  for (int round = 0; round < kRounds && now; ++round) {
-    std::vector<ViewNormals> normals;
-    for (std::size_t v = 0; v < bundle.views.size(); ++v) {
-      const auto view = view_normals(bundle.camera, bundle.poses[v], bundle.views[v], free);
-      if (!view) return bundle;
-      normals.push_back(*view);
-    }
-    std::optional<double> next;
-    for (; damping < kMaxDamping; damping *= 10.0) {
-      const auto trial = stepped(bundle, normals, damping);
-      next = trial ? squared_error(*trial) : std::nullopt;
-      if (!next || !(*next <= *now)) continue;
-      bundle = *trial;
-      damping *= 0.1;
-      break;
-    }
-    if (damping >= kMaxDamping || *now - *next <= kConverged * *now) break;
-    now = next;
+CameraModel camera_of(CameraModel camera, const double* intrinsics) {
+  camera.fx = intrinsics[0];
+  camera.fy = intrinsics[1];
+  camera.cx = intrinsics[2];
+  camera.cy = intrinsics[3];
+  std::copy_n(intrinsics + 4, kIntrinsics - 4, camera.distortion.begin());
+  return camera;
+}
+
+// Blocks: intrinsics, and a step (6) of the board's pose from its start.
+class BoardCost final : public ceres::CostFunction {
+ public:
+  BoardCost(const CameraModel& camera, const BoardSight& view, const Pose& start)
+      : camera_(&camera), view_(&view), start_(start) {
+    set_num_residuals(2 * static_cast<int>(view.pixels.size()));
+    *mutable_parameter_block_sizes() = {kIntrinsics, 6};
   }
-  return bundle;
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const CameraModel camera = camera_of(*camera_, parameters[0]);
+    const Vector6d step = Eigen::Map<const Vector6d>(parameters[1]);
+    const Pose T = start_ * exp_pose(step);
+    const Eigen::Matrix3d R = T.matrix3();
+    const Matrix6d right = inverse_right_jacobian(step).inverse();
+    for (std::size_t i = 0; i < view_->pixels.size(); ++i) {
+      const Eigen::Vector3d& place_m = view_->places_m[i];
+      const auto at = project_with_derivatives(camera, T * place_m);
+      if (!at) return false;
+      const auto row = static_cast<Eigen::Index>(2 * i);
+      Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()).segment<2>(row) =
+          at->pixel - view_->pixels[i];
+      if (jacobians == nullptr) continue;
+      if (jacobians[0] != nullptr) {
+        Eigen::Map<RowMajor>(jacobians[0], num_residuals(), kIntrinsics).middleRows<2>(row) =
+            at->d_intrinsics.leftCols<kIntrinsics>();
+      }
+      if (jacobians[1] != nullptr) {
+        Eigen::Matrix<double, 3, 6> d_point;
+        d_point << -R * skew(place_m), R;
+        Eigen::Map<RowMajor>(jacobians[1], num_residuals(), 6).middleRows<2>(row) =
+            at->d_point * d_point * right;
+      }
+    }
+    return true;
+  }
+
+ private:
+  const CameraModel* camera_;
+  const BoardSight* view_;
+  Pose start_;
+};
+
+// Lens and poses together.
+CameraModel refined(const Bundle& start) {
+  Intrinsics intrinsics = intrinsics_of(start.camera);
+  std::vector<Vector6d> steps(start.views.size(), Vector6d::Zero());
+  ceres::Problem problem;
+  for (std::size_t v = 0; v < start.views.size(); ++v) {
+    problem.AddResidualBlock(new BoardCost(start.camera, start.views[v], start.poses[v]), nullptr,
+                             intrinsics.data(), steps[v].data());
+  }
+  silence_glog();
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  const bool sane =
+      summary.IsSolutionUsable() && intrinsics.allFinite() && intrinsics.head<2>().minCoeff() > 0.0;
+  return sane ? camera_of(start.camera, intrinsics.data()) : start.camera;
 }
 
 }  // namespace
@@ -148,11 +152,10 @@ Bundle refined(Bundle bundle, const std::vector<int>& free) {
 std::optional<CameraModel> estimate_equidistant(const std::vector<BoardSight>& views, int width,
                                                 int height) {
   PosedViews posed = best_start(views, width, height);
-  const std::vector<int> free = free_intrinsics({.model = DistortionModel::kEquidistant});
   // Twice: views at the rim have a pose only once the lens is about right.
   for (int pass = 0; pass < 2; ++pass) {
     if (!std::isfinite(posed.median_rms_px)) return std::nullopt;
-    posed = pose_views(refined(std::move(posed.bundle), free).camera, views);
+    posed = pose_views(refined(posed.bundle), views);
   }
   if (!std::isfinite(posed.median_rms_px)) return std::nullopt;
   return posed.bundle.camera;

@@ -2,8 +2,7 @@
 //
 // Takes   views of a board: pixels and places.
 // Gives   the intrinsics of an equidistant lens (Kannala and Brandt 2006).
-// Method  a start by search over the focal length, then all parameters and poses jointly by
-//         Levenberg-Marquardt, poses eliminated (Triggs et al. 2000, sec. 6.1).
+// Method  a start by search over the focal length, then lens and poses together (Ceres).
 #pragma once
 
 #include <optional>
