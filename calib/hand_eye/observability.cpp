@@ -57,10 +57,20 @@ double misfit_rad(const Model& model, const Fit& fit) {
 void require_turns(const Model& model, const Fit& fit) {
   // Below it noise alone would seem to show where the camera is along the first axis.
   constexpr double kAboveNoise = 3.0;
-  constexpr double kLeastTurn = 1e-4;  // rad: what logs round to
+  constexpr double kLeastTurn = 1e-4;                   // rad: what logs round to
+  constexpr double kEnoughTurn = 20.0 * kRadPerDegree;  // between poses that turn as kRemedy asks
   const SymmetricEigen turns = turns_of(model, fit);
   const double least = std::max(kLeastTurn, kAboveNoise * misfit_rad(model, fit));
   const auto about = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, turns.values[k])); };
+  if (about(2) < least && about(2) > kEnoughTurn) {
+    throw undetermined(
+        model.log().source,
+        fmt::format("the hand turns by {:.2g} deg (rms between two poses), and its rotations miss "
+                    "what the camera sees by {:.2g} deg",
+                    about(2) / kRadPerDegree, misfit_rad(model, fit) / kRadPerDegree),
+        "check their convention, the order of the quaternion (w or x first) or of the angles, and "
+        "that each row belongs to its image: t in both, or both in one order");
+  }
   if (about(2) < least) {
     throw undetermined(
         model.log().source,

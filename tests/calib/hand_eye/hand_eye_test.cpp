@@ -191,6 +191,25 @@ TEST(HandEye, AHandThatDoesNotTurnIsRefused) {
   EXPECT_NE(refusal(options).find("the hand turns by"), std::string::npos);
 }
 
+// Of quaternions with w first that are read with x first, no more of these poses would help.
+TEST(HandEye, RotationsInAnotherConventionAreNoLackOfTurns) {
+  HandEyeWorldOptions options;
+  HandEyeWorld world = make_hand_eye_world(options);
+  for (FlangeReading& reading : world.input.readings) {
+    for (Pose& pose : reading.log.poses) {
+      const Eigen::Quaterniond q = pose.rotation;
+      pose.rotation = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+    }
+  }
+  try {
+    static_cast<void>(calibrate_hand_eye(world.input, untraced()));
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("order of the quaternion"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(HandEye, FivePosesAreTooFew) {
   HandEyeWorldOptions options;
   options.poses = 5;
