@@ -11,6 +11,7 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
+#include "calib/camera/view_cost.h"
 #include "calib/tracks/planar_pose.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "kinematics/core/silence_glog.h"
@@ -29,72 +30,15 @@ constexpr double kLossWidth = 3.0;
 constexpr double kCentreSigma = 0.03;  // of the image's width
 constexpr double kDistortionSigma = 0.3;
 
-// Blocks: intrinsics (focal length, cx, cy, k1, k2) and a step (6) of the view's pose from its
-// start.
+// One focal length, cx, cy, k1, k2.
 constexpr int kIntrinsics = 5;
-using Intrinsics = Eigen::Matrix<double, kIntrinsics, 1>;
 
-CameraModel camera_of(CameraModel camera, const double* intrinsics) {
-  camera.fx = camera.fy = intrinsics[0];
-  camera.cx = intrinsics[1];
-  camera.cy = intrinsics[2];
-  camera.distortion[0] = intrinsics[3];
-  camera.distortion[1] = intrinsics[4];
-  return camera;
-}
-
-Intrinsics intrinsics_of(const CameraModel& camera) {
-  Intrinsics out;
-  out << camera.fx, camera.cx, camera.cy, camera.distortion[0], camera.distortion[1];
+FreeIntrinsics free_intrinsics() {
+  FreeIntrinsics out = FreeIntrinsics::Zero(kMaxIntrinsics, kIntrinsics);
+  out(0, 0) = 1.0;
+  out.bottomRows<kMaxIntrinsics - 1>().topRows<kIntrinsics>().setIdentity();
   return out;
 }
-
-class ViewCost final : public ceres::CostFunction {
- public:
-  ViewCost(const CameraModel& camera, const TagObservation& view,
-           std::vector<Eigen::Vector3d> corners_m, const Pose& start)
-      : camera_(&camera), view_(&view), corners_m_(std::move(corners_m)), start_(start) {
-    set_num_residuals(2 * static_cast<int>(corners_m_.size()));
-    *mutable_parameter_block_sizes() = {kIntrinsics, 6};
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const CameraModel camera = camera_of(*camera_, parameters[0]);
-    const Vector6d step = Eigen::Map<const Vector6d>(parameters[1]);
-    const Pose T = start_ * exp_pose(step);
-    const Eigen::Matrix3d R = T.matrix3();
-    const Matrix6d right = inverse_right_jacobian(step).inverse();
-    for (std::size_t i = 0; i < corners_m_.size(); ++i) {
-      const auto at = project_with_derivatives(camera, T * corners_m_[i]);
-      if (!at) return false;
-      const auto row = static_cast<Eigen::Index>(2 * i);
-      Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()).segment<2>(row) =
-          (at->pixel - view_->corners_px[i]) / view_->sigma_px;
-      if (jacobians == nullptr) continue;
-      if (jacobians[0] != nullptr) {
-        Eigen::Map<RowMajor> out(jacobians[0], num_residuals(), kIntrinsics);
-        out.middleRows<2>(row).col(0) = at->d_intrinsics.col(0) + at->d_intrinsics.col(1);
-        out.middleRows<2>(row).rightCols<4>() = at->d_intrinsics.middleCols<4>(2);
-        out.middleRows<2>(row) /= view_->sigma_px;
-      }
-      if (jacobians[1] != nullptr) {
-        Eigen::Matrix<double, 3, 6> d_point;
-        d_point << -R * skew(corners_m_[i]), R;
-        Eigen::Map<RowMajor>(jacobians[1], num_residuals(), 6).middleRows<2>(row) =
-            at->d_point * d_point * right / view_->sigma_px;
-      }
-    }
-    return true;
-  }
-
- private:
-  const CameraModel* camera_;
-  const TagObservation* view_;
-  std::vector<Eigen::Vector3d> corners_m_;
-  Pose start_;
-};
 
 // Spread evenly over the recording, whatever they look like: the most tilted ones would be those
 // whose noise looks like tilt.
@@ -113,14 +57,15 @@ void add_prior(const CameraModel& guess, double* intrinsics, ceres::Problem& pro
   ceres::Matrix weights = ceres::Matrix::Zero(kIntrinsics, kIntrinsics);
   weights(1, 1) = weights(2, 2) = 1.0 / (kCentreSigma * guess.width);
   weights(3, 3) = weights(4, 4) = 1.0 / kDistortionSigma;
-  problem.AddResidualBlock(new ceres::NormalPrior(weights, intrinsics_of(guess)), nullptr,
-                           intrinsics);
+  problem.AddResidualBlock(new ceres::NormalPrior(weights, numbers_of(guess, free_intrinsics())),
+                           nullptr, intrinsics);
 }
 
 // Intrinsics and poses from a camera that is nearly right; the camera itself where that fails.
 CameraModel refined(const CameraModel& camera, const CameraModel& guess,
                     const std::vector<const TagObservation*>& views, const MarkerSet& markers) {
-  Intrinsics intrinsics = intrinsics_of(camera);
+  const FreeIntrinsics free = free_intrinsics();
+  Eigen::VectorXd intrinsics = numbers_of(camera, free);
   std::vector<Vector6d> steps(views.size(), Vector6d::Zero());
   ceres::Problem problem;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -129,8 +74,10 @@ CameraModel refined(const CameraModel& camera, const CameraModel& guess,
     const auto pose = estimate_planar_pose(camera, corners_m, view.corners_px, view.sigma_px);
     if (!pose) continue;
     if (pose->other && pose->other->chi_square - pose->best.chi_square < kUndecided) continue;
-    problem.AddResidualBlock(new ViewCost(camera, view, corners_m, pose->best.T_camera_marker),
-                             new ceres::CauchyLoss(kLossWidth), intrinsics.data(), steps[v].data());
+    auto cost = make_view_cost(
+        camera, free, {corners_m, view.corners_px, view.sigma_px, pose->best.T_camera_marker});
+    problem.AddResidualBlock(cost.release(), new ceres::CauchyLoss(kLossWidth), intrinsics.data(),
+                             steps[v].data());
   }
   if (problem.NumResidualBlocks() == 0) return camera;
   add_prior(guess, intrinsics.data(), problem);
@@ -142,7 +89,7 @@ CameraModel refined(const CameraModel& camera, const CameraModel& guess,
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   const bool sane = summary.IsSolutionUsable() && intrinsics.allFinite() && intrinsics[0] > 0.0;
-  return sane ? camera_of(camera, intrinsics.data()) : camera;
+  return sane ? camera_at(camera, free, intrinsics.data()) : camera;
 }
 
 }  // namespace

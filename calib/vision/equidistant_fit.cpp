@@ -10,6 +10,7 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
+#include "calib/camera/view_cost.h"
 #include "calib/vision/board_fit.h"
 #include "kinematics/core/silence_glog.h"
 
@@ -61,78 +62,23 @@ PosedViews best_start(const std::vector<BoardSight>& views, int width, int heigh
   return best;
 }
 
-constexpr int kIntrinsics = 8;  // fx, fy, cx, cy, k1 to k4
-using Intrinsics = Eigen::Matrix<double, kIntrinsics, 1>;
-
-Intrinsics intrinsics_of(const CameraModel& camera) {
-  Intrinsics out;
-  out << camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion[0], camera.distortion[1],
-      camera.distortion[2], camera.distortion[3];
-  return out;
+// fx, fy, cx, cy, k1 to k4.
+FreeIntrinsics free_intrinsics() {
+  constexpr int kFree = 8;
+  return FreeIntrinsics::Identity(kMaxIntrinsics, kFree);
 }
-
-CameraModel camera_of(CameraModel camera, const double* intrinsics) {
-  camera.fx = intrinsics[0];
-  camera.fy = intrinsics[1];
-  camera.cx = intrinsics[2];
-  camera.cy = intrinsics[3];
-  std::copy_n(intrinsics + 4, kIntrinsics - 4, camera.distortion.begin());
-  return camera;
-}
-
-// Blocks: intrinsics, and a step (6) of the board's pose from its start.
-class BoardCost final : public ceres::CostFunction {
- public:
-  BoardCost(const CameraModel& camera, const BoardSight& view, const Pose& start)
-      : camera_(&camera), view_(&view), start_(start) {
-    set_num_residuals(2 * static_cast<int>(view.pixels.size()));
-    *mutable_parameter_block_sizes() = {kIntrinsics, 6};
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const CameraModel camera = camera_of(*camera_, parameters[0]);
-    const Vector6d step = Eigen::Map<const Vector6d>(parameters[1]);
-    const Pose T = start_ * exp_pose(step);
-    const Eigen::Matrix3d R = T.matrix3();
-    const Matrix6d right = inverse_right_jacobian(step).inverse();
-    for (std::size_t i = 0; i < view_->pixels.size(); ++i) {
-      const Eigen::Vector3d& place_m = view_->places_m[i];
-      const auto at = project_with_derivatives(camera, T * place_m);
-      if (!at) return false;
-      const auto row = static_cast<Eigen::Index>(2 * i);
-      Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()).segment<2>(row) =
-          at->pixel - view_->pixels[i];
-      if (jacobians == nullptr) continue;
-      if (jacobians[0] != nullptr) {
-        Eigen::Map<RowMajor>(jacobians[0], num_residuals(), kIntrinsics).middleRows<2>(row) =
-            at->d_intrinsics.leftCols<kIntrinsics>();
-      }
-      if (jacobians[1] != nullptr) {
-        Eigen::Matrix<double, 3, 6> d_point;
-        d_point << -R * skew(place_m), R;
-        Eigen::Map<RowMajor>(jacobians[1], num_residuals(), 6).middleRows<2>(row) =
-            at->d_point * d_point * right;
-      }
-    }
-    return true;
-  }
-
- private:
-  const CameraModel* camera_;
-  const BoardSight* view_;
-  Pose start_;
-};
 
 // Lens and poses together.
 CameraModel refined(const Bundle& start) {
-  Intrinsics intrinsics = intrinsics_of(start.camera);
+  const FreeIntrinsics free = free_intrinsics();
+  Eigen::VectorXd intrinsics = numbers_of(start.camera, free);
   std::vector<Vector6d> steps(start.views.size(), Vector6d::Zero());
   ceres::Problem problem;
   for (std::size_t v = 0; v < start.views.size(); ++v) {
-    problem.AddResidualBlock(new BoardCost(start.camera, start.views[v], start.poses[v]), nullptr,
-                             intrinsics.data(), steps[v].data());
+    const BoardSight& view = start.views[v];
+    auto cost =
+        make_view_cost(start.camera, free, {view.places_m, view.pixels, 1.0, start.poses[v]});
+    problem.AddResidualBlock(cost.release(), nullptr, intrinsics.data(), steps[v].data());
   }
   silence_glog();
   ceres::Solver::Options options;
@@ -144,7 +90,7 @@ CameraModel refined(const Bundle& start) {
   ceres::Solve(options, &problem, &summary);
   const bool sane =
       summary.IsSolutionUsable() && intrinsics.allFinite() && intrinsics.head<2>().minCoeff() > 0.0;
-  return sane ? camera_of(start.camera, intrinsics.data()) : start.camera;
+  return sane ? camera_at(start.camera, free, intrinsics.data()) : start.camera;
 }
 
 }  // namespace
