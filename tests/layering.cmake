@@ -56,7 +56,7 @@ set(third_parties
     "apriltag: calib/vision"
     "libav: calib/vision"
     "libsw: calib/vision"
-    "ceres/: calib/tracks calib/bundle calib/hand_eye dynamics/identify dynamics/gp"
+    "ceres/: calib/camera calib/vision calib/tracks calib/bundle calib/hand_eye dynamics/identify dynamics/gp"
     "glog/: kinematics/core"
     "cblas: dynamics/gp kinematics/core"
     "urdf_: kinematics/urdf"

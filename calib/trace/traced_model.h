@@ -85,8 +85,8 @@ struct Candidate {
   /// Effects that are special cases of this one, which therefore is no rival of theirs: what it
   /// says beyond them the search would have found.
   std::vector<EffectId> contains;
-  /// All that is of this kind has some of it (friction): what is left at its place is beside it, and
-  /// puts no doubt on its name.
+  /// All that is of this kind has some of it (friction): what is left at its place and is less than
+  /// it explains is beside it, and puts no doubt on its name.
   bool is_usual = false;
   std::vector<EffectParameter> parameters;
   /// The size that is reported is the parameter itself where there is one, else

@@ -221,12 +221,12 @@ bool Tracer::drop_what_rests_explain() {
   bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const AddedEffect effect = now_->added[i];
-    if (is_usual(effect.id)) continue;
     // A curve at the effect's own place takes its shape, whatever that is; it puts the name in
     // doubt where it is large.
     std::vector<FoundRest> others;
     std::ranges::copy_if(rests_, std::back_inserter(others), [&](const FoundRest& found) {
-      return !same_place(found.rest.place, effect.id.place) || is_doubtful(found, i);
+      const bool elsewhere = !same_place(found.rest.place, effect.id.place);
+      return (elsewhere && !is_usual(effect.id)) || is_doubtful(found, i);
     });
     if (others.empty()) continue;
     StagePtr stage = stage_of(without(now_->added, i));
@@ -270,9 +270,9 @@ bool Tracer::says_as_much(const Stage& without, FoundRest alone, const FoundRest
 bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const EffectId id = now_->added[i].id;
-    if (!same_place(found.rest.place, id.place) || is_usual(id)) continue;
+    if (!same_place(found.rest.place, id.place)) continue;
     const bool doubtful = is_doubtful(found, i);
-    if (found.rest.is_field() && !doubtful) continue;
+    if ((found.rest.is_field() || is_usual(id)) && !doubtful) continue;
     StagePtr stage = stage_of(without(now_->added, i));
     const auto alone = found.rest.is_field()
                            ? find_field(stage->system, stage->fit.rest_fields, rest_level())
@@ -327,8 +327,8 @@ bool Tracer::drop_what_leaves_too_much() {
   bool dropped = false;
   for (std::size_t i = now_->added.size(); i-- > 0;) {
     const double explained = details_[i].effect.explained * base_->system.total().rr;
+    if (left < kDoubtfulShare * explained) continue;
     const EffectId id = now_->added[i].id;
-    if (left < kDoubtfulShare * explained || is_usual(id)) continue;
     removed_.insert(id);
     now_ = stage_of(without(now_->added, i));
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
