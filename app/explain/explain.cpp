@@ -660,13 +660,12 @@ ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart
   ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
   const JointLog& log = evidence.recording.log;
   out.recording.log = without_readings(log, apart);
-  std::set<int> frames;
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
-  for (const ReadingApart& reading : apart) {
-    const auto frame = std::ranges::find(times_s, log.times_s[reading.row]);
-    if (frame != times_s.end()) frames.insert(static_cast<int>(frame - times_s.begin()));
-  }
-  const auto is_aside = [&](const auto& seen) { return frames.contains(seen.frame); };
+  std::set<double> stamps;
+  for (const ReadingApart& reading : apart) stamps.insert(log.times_s[reading.row]);
+  const auto is_aside = [&](const auto& seen) {
+    return stamps.contains(times_s[static_cast<std::size_t>(seen.frame)]);
+  };
   Measurements& measured = out.observed.measurements;
   std::erase_if(measured.corners, is_aside);
   std::erase_if(measured.points.observations, is_aside);

@@ -60,14 +60,15 @@ void require_turns(const Model& model, const Fit& fit) {
   constexpr double kLeastTurn = 1e-4;                   // rad: what logs round to
   constexpr double kEnoughTurn = 20.0 * kRadPerDegree;  // between poses that turn as kRemedy asks
   const SymmetricEigen turns = turns_of(model, fit);
-  const double least = std::max(kLeastTurn, kAboveNoise * misfit_rad(model, fit));
+  const double misfit = misfit_rad(model, fit);
+  const double least = std::max(kLeastTurn, kAboveNoise * misfit);
   const auto about = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, turns.values[k])); };
   if (about(2) < least && about(2) > kEnoughTurn) {
     throw undetermined(
         model.log().source,
         fmt::format("the hand turns by {:.2g} deg (rms between two poses), and its rotations miss "
                     "what the camera sees by {:.2g} deg",
-                    about(2) / kRadPerDegree, misfit_rad(model, fit) / kRadPerDegree),
+                    about(2) / kRadPerDegree, misfit / kRadPerDegree),
         "check their convention, the order of the quaternion (w or x first) or of the angles, and "
         "that each row belongs to its image: t in both, or both in one order");
   }

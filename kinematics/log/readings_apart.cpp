@@ -135,20 +135,18 @@ std::vector<ReadingApart> readings_apart(const JointLog& log) {
 }
 
 std::vector<std::vector<ReadingApart>> told_together(const std::vector<ReadingApart>& apart) {
+  std::map<int, std::size_t> count;  // of a channel
+  for (const ReadingApart& reading : apart) ++count[reading.channel];
   std::vector<std::vector<ReadingApart>> out;
+  std::map<int, std::size_t> group_of;
   for (const ReadingApart& reading : apart) {
-    const auto is_of_it = [&](const ReadingApart& other) {
-      return other.channel == reading.channel;
-    };
-    const bool is_alone =
-        std::ranges::count_if(apart, is_of_it) <= static_cast<std::ptrdiff_t>(kFewToldAlone);
-    const auto with = std::ranges::find_if(
-        out, [&](const std::vector<ReadingApart>& group) { return is_of_it(group.front()); });
-    if (is_alone || with == out.end()) {
-      out.push_back({reading});
-    } else {
-      with->push_back(reading);
+    const auto with = group_of.find(reading.channel);
+    if (with != group_of.end()) {
+      out[with->second].push_back(reading);
+      continue;
     }
+    if (count[reading.channel] > kFewToldAlone) group_of[reading.channel] = out.size();
+    out.push_back({reading});
   }
   return out;
 }
@@ -171,10 +169,10 @@ std::string words_of(const JointLog& log, std::span<const ReadingApart> readings
 }
 
 JointLog without_readings(JointLog log, const std::vector<ReadingApart>& apart) {
+  std::set<std::pair<std::size_t, int>> places;
+  for (const ReadingApart& reading : apart) places.emplace(reading.row, reading.channel);
   const auto is_apart = [&](std::size_t row, int channel) {
-    return std::ranges::any_of(apart, [&](const ReadingApart& reading) {
-      return reading.row == row && reading.channel == channel;
-    });
+    return places.contains({row, channel});
   };
   for (const ReadingApart& reading : apart) {
     std::size_t before = reading.row;
