@@ -80,6 +80,7 @@ void Tracer::search() {
     look_for_rest();
   } while (name_the_rest() || name_by_plain_causes() || choose_by_rest() ||
            drop_what_leaves_too_much());
+  take_a_curve_for_what_cancels();
   while (take_the_rest_as_curves()) look_beside_curves();
   describe_curves();
   summarise();

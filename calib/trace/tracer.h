@@ -118,6 +118,7 @@ class Tracer {
   [[nodiscard]] bool take_the_rest_as_curves();
   [[nodiscard]] bool is_part_of_a_curve(std::size_t wave, std::size_t curve, const Stage& without);
   void drop_what_curves_contain();
+  void take_a_curve_for_what_cancels();
   void look_beside_curves();
   void describe_curves();
   void replace_waves_by_a_curve();

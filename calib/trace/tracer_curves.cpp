@@ -2,6 +2,7 @@
 //
 // What is left, repeats, and has no name: curves that become part of the model.
 #include <algorithm>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,46 @@ namespace kinescope::trace {
 namespace {
 
 constexpr int kTunings = 3;
+
+// What an effect makes of the one carrier that it acts through, about its mean; nothing where there
+// are several.
+std::optional<Eigen::VectorXd> course_of(const Candidate& candidate, double scan,
+                                         const Eigen::VectorXd& theta) {
+  const std::vector<EffectColumn> columns = candidate.columns(scan);
+  Eigen::VectorXd course = Eigen::VectorXd::Zero(columns.front().share.size());
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (columns[k].carrier != columns.front().carrier || columns[k].share.size() != course.size())
+      return std::nullopt;
+    course += theta[static_cast<Eigen::Index>(k)] * columns[k].share;
+  }
+  if (course.size() > 0) course.array() -= course.mean();
+  return course;
+}
+
+// True of effects that are less together than each of them is.
+bool cancel(const Stage& stage, const std::vector<std::size_t>& members) {
+  std::vector<Eigen::VectorXd> courses;
+  for (const std::size_t i : members) {
+    const Candidate* candidate = find_candidate(stage.fit, stage.added[i].id);
+    if (candidate == nullptr) return false;
+    auto course = course_of(*candidate, stage.added[i].scan, stage.fit.values[i]);
+    if (!course || (!courses.empty() && course->size() != courses.front().size())) return false;
+    courses.push_back(std::move(*course));
+  }
+  Eigen::VectorXd together = Eigen::VectorXd::Zero(courses.front().size());
+  for (const Eigen::VectorXd& course : courses) together += course;
+  return std::ranges::all_of(courses, [&](const Eigen::VectorXd& course) {
+    return together.squaredNorm() < course.squaredNorm();
+  });
+}
+
+// Of the stage's effects, those that are special cases of a curve.
+std::vector<std::size_t> special_cases(const Stage& stage, const Candidate& curve) {
+  std::vector<std::size_t> members;
+  for (std::size_t i = 0; i < stage.added.size(); ++i)
+    if (contains(curve, stage.added[i].id)) members.push_back(i);
+  return members;
+}
 
 }  // namespace
 
@@ -98,6 +139,40 @@ void Tracer::drop_what_curves_contain() {
     details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
     tune_curves();
     add_step(round_, fmt::format("{} removed: it is part of a curve", name_of(id)), *now_);
+  }
+}
+
+// Large effects that cancel are a small one of another shape: over a part of a turn a straight line
+// and a sine are whatever a sensor's curve is (a cubic of 0.6 deg: 7.5 deg and 13 %).
+void Tracer::take_a_curve_for_what_cancels() {
+  const StagePtr before = now_;
+  for (const Candidate& curve : before->fit.candidates) {
+    if (!curve.is_curve() || removed_.contains(curve.id)) continue;
+    const std::vector<std::size_t> members = special_cases(*now_, curve);
+    if (members.size() < 2 || !cancel(*now_, members)) continue;
+    std::vector<AddedEffect> effects = now_->added;
+    for (const std::size_t i : members | std::views::reverse)
+      effects = kinescope::trace::without(std::move(effects), i);
+    const StagePtr none = stage_of(effects);
+    const auto likeliest = likeliest_curve(none->system, curve);
+    if (!likeliest) continue;
+    effects.push_back(*likeliest);
+    StagePtr stage = stage_of(std::move(effects));
+    if (!stage->fit.converged) continue;
+    const double lost = stage->held_out_sum() - now_->held_out_sum();
+    if (lost > kSmallLoss * (none->held_out_sum() - now_->held_out_sum()) &&
+        predicts_clearly_worse(stage->held_out.whitened, now_->held_out.whitened))
+      continue;
+    for (const std::size_t i : members | std::views::reverse) {
+      removed_.insert(now_->added[i].id);
+      mark(round_, now_->added[i].id, CandidateState::kRemoved, none->error.value);
+      details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    now_ = std::move(stage);
+    tune_curves();
+    details_.resize(now_->added.size());
+    add_step(round_, fmt::format("{} takes the place of effects that cancel", name_of(curve.id)),
+             *now_);
   }
 }
 

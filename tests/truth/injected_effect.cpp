@@ -59,11 +59,11 @@ constexpr std::array<Strength, 33> kWeakest{{
     {"thermal_growth", 0.15e-3},
 }};
 
-constexpr std::array<std::string_view, 18> kOnJoints{
+constexpr std::array<std::string_view, 19> kOnJoints{
     "encoder_scale", "eccentricity", "gear_error",  "backlash",      "compliance",
     "coupling",      "helical",      "axis_wobble", "curved_slider", "zero_jump",
     "zero_drift",    "own_tanh",     "own_speed",   "own_product",   "own_acceleration",
-    "own_vibration", "own_creep",    "quantisation"};
+    "own_vibration", "own_creep",    "quantisation", "own_cubic"};
 constexpr std::array<std::string_view, 4> kAtATime{"tag_slip", "camera_bump", "zero_jump",
                                                    "clock_jump"};
 constexpr std::array<std::string_view, 6> kByAnother{

@@ -52,6 +52,7 @@ namespace kinescope::truth {
 /// and of the test's own making, in no library:
 ///   own_tanh         true value of `place` +=
 ///                    size x tanh(5 (logged value of `with` - detail) / reach)
+///   own_cubic        true value of `place` += size x (its value / reach)^3; not drawn at random
 ///   own_speed        true value of `place` += size x (speed of `with` / its largest)^2
 ///   own_chequer      px, corners shift one way on the black fields of a chequered image and back
 ///                    on the white ones; detail: px, edge of a field

@@ -123,6 +123,10 @@ Mechanics::Law law_of(const InjectedEffect& effect, const FilmedRobot& robot, st
   if (Mechanics::Law law = law_of_time(effect, robot, phase)) return law;
   if (Mechanics::Law law = encoder_law(effect, turns, phase)) return law;
   const double size = effect.size;
+  if (effect.effect == "own_cubic") {
+    const double reach = largest_value(robot, joint);
+    return [=](double q, const auto&, double) { return q + size * std::pow(q / reach, 3); };
+  }
   const std::size_t other = joint_named(robot.tree, effect.with);
   const auto k = static_cast<Eigen::Index>(other);
   if (effect.effect == "coupling") {

@@ -237,6 +237,8 @@ TEST(Mechanics, EffectsOfTheTestsOwnMaking) {
   const Eigen::VectorXd step = error_of(robot, {"own_tanh", "q3", 0.01, 0.0, "q1"}, 2);
   EXPECT_NEAR(step.maxCoeff(), 0.01, 1e-4);
   EXPECT_NEAR(step.minCoeff(), -0.01, 1e-4);
+  const Eigen::VectorXd cubic = error_of(robot, {"own_cubic", "q3", 0.01}, 2);
+  EXPECT_NEAR(cubic.cwiseAbs().maxCoeff(), 0.01, 5e-4);
   const Eigen::VectorXd speed = error_of(robot, {"own_speed", "q3", 0.01, 0.0, "q1"}, 2);
   EXPECT_NEAR(speed.maxCoeff(), 0.01, 1e-4);
   EXPECT_GE(speed.minCoeff(), 0.0);

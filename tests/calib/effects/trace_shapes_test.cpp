@@ -62,6 +62,19 @@ TEST(TraceCalibration, WhatRepeatsWithAJointsValueIsAMapOfIt) {
   EXPECT_EQ(table.at(Eigen::VectorXd::Constant(1, -10.0))[0], 0.0);
 }
 
+// Over a part of a turn it is a sine of many times its size and a scale that takes most of it back.
+TEST(TraceCalibration, ACubicIsAMapAndNoEffectsThatCancel) {
+  constexpr double kSize = 0.02;  // rad, at the end of the reach
+  const World world = make_effect_world(filmed({{"own_cubic", "q2", kSize}}, 400));
+  const Trace trace = trace_of(world).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& map = trace.accepted.front();
+  EXPECT_EQ(map.id, (EffectId{"joint_map", "q2"}));
+  EXPECT_LT(map.size, 1.5 * kSize);
+  EXPECT_LT(map.held_out_after.value,
+            kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
+}
+
 TEST(TraceCalibration, GravityIsToldBesideACurve) {
   const World world = make_effect_world(filmed({strong("compliance", "q2")}));
   CalibrationTraceOptions options;
