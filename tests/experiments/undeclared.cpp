@@ -376,6 +376,7 @@ int main(int argc, char** argv) {
                                         {"shuffled_rows", Damage::kShuffledRows},
                                         {"dropped_column", Damage::kDroppedColumn},
                                         {"swapped_columns", Damage::kSwappedColumns},
+                                        {"exchanged_halfway", Damage::kExchangedHalfway},
                                         {"forgotten_size", Damage::kForgottenSize}}));
   app.add_option("--keep", request.keep, "leave the recordings and their run folders there");
   app.add_option("--program", request.program, "kinescope of another build, to compare");

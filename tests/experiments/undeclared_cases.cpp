@@ -153,6 +153,12 @@ std::string joints_csv(const UndeclaredCase& of, World& world, Damage damage) {
     exchange(one, other, world);
     std::swap(one, other);
   }
+  if (damage == Damage::kExchangedHalfway && columns > 1) {
+    const Eigen::Index other = (column + 1) % columns;
+    const Eigen::MatrixXd behind = log.values.bottomRows(rows / 2);
+    log.values.col(column).tail(rows / 2) = behind.col(other);
+    log.values.col(other).tail(rows / 2) = behind.col(column);
+  }
   const auto is_written = [&](Eigen::Index c) {
     return damage != Damage::kDroppedColumn || c != column;
   };

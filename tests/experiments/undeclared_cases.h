@@ -30,6 +30,7 @@ enum class Damage {
   kShuffledRows,
   kDroppedColumn,
   kSwappedColumns,
+  kExchangedHalfway,  ///< two columns, from the middle of the log on
   kForgottenSize
 };
 

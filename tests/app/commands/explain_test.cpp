@@ -129,6 +129,16 @@ TEST(Explain, CorruptedRowsArePutAsideByWhatIsReadBeforeAndAfter) {
       << answered.outcome.err;
 }
 
+// A plug in the wrong socket, half-way: no column is any joint's as a whole.
+TEST(Explain, ColumnsExchangedHalfwayAreMended) {
+  const Answered answered = run_case(10, Damage::kExchangedHalfway);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(answered.trace["verdict"], "clean") << answered.outcome.out;
+  EXPECT_NE(answered.outcome.err.find("from there on; taken so"), std::string::npos)
+      << answered.outcome.err;
+}
+
 // A line of `sizes:` that was forgotten: the marker moves with no joint.
 TEST(Explain, AForgottenSizeIsShownByWhatMovesAboutTheSamePoint) {
   const Answered answered = run_case(10, Damage::kForgottenSize);
