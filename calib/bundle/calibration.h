@@ -128,7 +128,8 @@ struct Calibration {
   Sigma time_offset_sigma_s;
   Eigen::MatrixXd joint_values;  ///< frames x joints, rad or m; NaN where the log has a gap
   /// The same with what corrections turn or shift each joint by along its own axis: where the robot
-  /// stood. What else they do to it (an axis that wobbles) no joint value can say.
+  /// stood. What else they do to it (an axis that wobbles) no joint value can say. Of a joint that
+  /// no channel drives without whole turns between frames, and NaN where no marker shows it.
   Eigen::MatrixXd corrected_values;
   std::vector<double> times_s;  ///< of the frames
 

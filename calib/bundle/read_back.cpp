@@ -6,7 +6,9 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "calib/bundle/axis_uncertainty.h"
 #include "calib/bundle/corrected.h"
@@ -106,6 +108,32 @@ std::vector<int> shown_by(const Spec& spec, const RobustSolution& robust, std::s
   out.resize(spec.sightings.size());
   std::iota(out.begin(), out.end(), 0);
   return out;
+}
+
+// Of a joint that no channel drives: known where it was seen, and whole turns are no motion.
+void keep_what_was_seen(const Spec& spec, const RobustSolution& robust, Calibration& out) {
+  std::vector<Eigen::Index> order(out.times_s.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](Eigen::Index f) {
+    return std::pair(out.times_s[static_cast<std::size_t>(f)], f);
+  });
+  for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
+    if (!spec.free_value[j]) continue;
+    std::vector<bool> shown(out.times_s.size(), false);
+    for (const int index : shown_by(spec, robust, j))
+      shown[static_cast<std::size_t>(spec.sightings[static_cast<std::size_t>(index)].frame)] = true;
+    const bool turns = spec.tree.joints[j].type == JointType::kRevolute;
+    double last = 0.0;
+    for (const Eigen::Index f : order) {
+      double& value = out.corrected_values(f, static_cast<Eigen::Index>(j));
+      if (!shown[static_cast<std::size_t>(f)]) {
+        value = std::numeric_limits<double>::quiet_NaN();
+        continue;
+      }
+      if (turns) value = last + std::remainder(value - last, 2.0 * std::numbers::pi);
+      last = value;
+    }
+  }
 }
 
 // The middle one of the frames in which the camera's place is known.
@@ -271,6 +299,7 @@ void read_back(const Spec& spec, const State& state, const RobustSolution& robus
   out.noise_widening = uncertainty.noise_widening;
   fill_joint_values(spec, state, readings, out);
   fill_corrected_values(spec, state, out);
+  keep_what_was_seen(spec, robust, out);
   fill_tree(spec, state, robust, out);
   fill_joints(spec, state, uncertainty, out);
   fill_markers(spec, state, robust, uncertainty, out);

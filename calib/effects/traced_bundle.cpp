@@ -572,6 +572,12 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   linear.first_row = std::move(fit.first_row);
   linear.unit = std::move(fit.unit);
   linear.body = std::move(fit.series);
+  // Of one camera after the other.
+  const std::size_t cameras = std::max<std::size_t>(1, world.cameras.size());
+  for (std::size_t c = 0; c < cameras; ++c) {
+    for (const Marker& marker : world.tree.markers)
+      linear.body_names.push_back(fmt::format("tag_{}", marker.id.value));
+  }
   linear.unit_name = world.kind == MeasurementKind::kCorners ? "px" : "m";
   linear.coordinates = world.kind == MeasurementKind::kCorners ? 2 : 3;
   linear.independent_instants = world.postures;

@@ -72,29 +72,13 @@ struct CommonFrames {
   Eigen::VectorXd value;        ///< frames; the joint's
 };
 
-// Frames in which a marker behind the joint was seen, and believed.
-std::vector<bool> shown_in(const Calibration& calibration, std::size_t joint) {
-  std::set<TagId> behind;
-  for (const Marker& marker : calibration.tree.markers) {
-    const std::vector<JointId> path = calibration.tree.path_to(marker.link);
-    if (std::ranges::find(path, JointId{static_cast<int>(joint)}) != path.end())
-      behind.insert(marker.id);
-  }
-  std::vector<bool> out(calibration.times_s.size(), false);
-  for (const SightingResidual& residual : calibration.residuals) {
-    if (residual.used && behind.contains(residual.id))
-      out[static_cast<std::size_t>(residual.frame)] = true;
-  }
-  return out;
-}
-
 CommonFrames common_frames(const Calibration& calibration, const JointLog& log,
                            const std::vector<int>& channels, std::size_t joint) {
   const Eigen::MatrixXd all = resample(log, calibration.times_s, calibration.time_offset_s);
-  const std::vector<bool> shown = shown_in(calibration, joint);
+  const Eigen::VectorXd value = calibration.corrected_values.col(static_cast<Eigen::Index>(joint));
   std::vector<Eigen::Index> frames;
   for (Eigen::Index f = 0; f < all.rows(); ++f) {
-    bool known = shown[static_cast<std::size_t>(f)];
+    bool known = std::isfinite(value[f]);
     for (const int c : channels) known = known && std::isfinite(all(f, c));
     if (known) frames.push_back(f);
   }
@@ -102,9 +86,7 @@ CommonFrames common_frames(const Calibration& calibration, const JointLog& log,
     return calibration.times_s[static_cast<std::size_t>(f)];
   };
   std::ranges::sort(frames, {}, time);
-  CommonFrames out{{},
-                   all(frames, channels),
-                   calibration.joint_values(frames, static_cast<Eigen::Index>(joint))};
+  CommonFrames out{{}, all(frames, channels), value(frames)};
   for (const Eigen::Index f : frames) out.times_s.push_back(time(f) + calibration.time_offset_s);
   return out;
 }
@@ -206,7 +188,7 @@ FollowedPart as_reading_of(const FollowedPart& part, const FollowedPart& main) {
 std::vector<PartlyFollowed> partly_followed(const Calibration& calibration, const JointLog& log,
                                             const std::vector<int>& idle) {
   std::vector<PartlyFollowed> out;
-  if (idle.empty() || calibration.joint_values.size() == 0) return out;
+  if (idle.empty() || calibration.corrected_values.size() == 0) return out;
   for (const std::size_t joint : undriven_joints(calibration)) {
     const CommonFrames common = common_frames(calibration, log, idle, joint);
     const auto frames = static_cast<Eigen::Index>(common.times_s.size());

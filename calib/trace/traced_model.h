@@ -37,6 +37,7 @@ struct Linearisation {
   std::string unit_name;  ///< "px", "m", "N m"
   /// Rows: the body (marker) that was seen, those of one together; empty: rows are of none.
   std::vector<int> body;
+  std::vector<std::string> body_names;  ///< "tag_12", by the numbers of `body`
   /// Counted rows that are the coordinates of one point: errors are given as distances.
   int coordinates = 1;
   /// Instants were taken one by one (postures): noise does not carry over from one to the next.

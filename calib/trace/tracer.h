@@ -155,6 +155,8 @@ class Tracer {
   /// What is left, in squares, over what differs between neighbours in time: as an rms; nothing
   /// where that is not known.
   [[nodiscard]] std::optional<double> over_neighbours(double squares) const;
+  /// "what tag_12 leaves, .., lasts": of one body, which all the others hide; empty: of none.
+  [[nodiscard]] std::string lasting_words() const;
   /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
   /// left.
   [[nodiscard]] std::optional<CommonMotion> common_motion() const;

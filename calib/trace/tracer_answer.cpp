@@ -11,6 +11,7 @@
 #include "calib/trace/curve.h"
 #include "calib/trace/distribution.h"
 #include "calib/trace/field.h"
+#include "calib/trace/lasting_body.h"
 #include "calib/trace/scan_slope.h"
 #include "calib/trace/tracer.h"
 
@@ -506,11 +507,24 @@ std::string Tracer::reading_words(const CommonMotion& motion) const {
       place.name, motion.size, place.unit, 100.0 * std::min(1.0, motion.share));
 }
 
+std::string Tracer::lasting_words() const {
+  const Linearisation& linear = now_->fit.linear;
+  if (!linear.whitened_by_neighbours) return "";
+  const auto found = find_lasting_body(linear, now_->system.freedom(), kLasts);
+  if (!found || std::cmp_greater_equal(found->body, linear.body_names.size())) return "";
+  return fmt::format(
+      "what {} leaves, {:.3g} {}, is {:.1f} times what it differs by from one frame to the next: "
+      "it lasts, and no known effect explains it",
+      linear.body_names[static_cast<std::size_t>(found->body)], found->rms, linear.unit_name,
+      found->over_differences);
+}
+
 void Tracer::conclude() {
   const bool slight =
       std::ranges::all_of(trace_.rest, [&](const Rest& rest) { return is_slight(rest); });
   if (slight) trace_.held_out_after = now_->error;  // without curves
   const std::optional<CommonMotion> common = slight ? common_motion() : std::nullopt;
+  const std::string lasting = lasting_words();
   if (!slight) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
@@ -539,6 +553,12 @@ void Tracer::conclude() {
         trace_.accepted.empty() ? ""
                                 : found_words(options_.found, trace_.accepted) + "; beyond that ",
         place.name, common->size, place.unit, 100.0 * std::min(1.0, common->share));
+  } else if (!lasting.empty()) {
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason = (trace_.accepted.empty()
+                         ? ""
+                         : found_words(options_.found, trace_.accepted) + "; beyond that ") +
+                    lasting;
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();

@@ -2,6 +2,7 @@
 #include "calib/quality/partly_followed.h"
 
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@ constexpr int kFrames = 200;
 constexpr double kFrameS = 0.05;
 constexpr int kChange = 120;
 
-// A joint that no channel drives, with a marker behind it in every frame; channels "a" and "b".
+// A joint that no channel drives; channels "a" and "b".
 struct World {
   Calibration calibration;
   JointLog log;
@@ -21,12 +22,8 @@ struct World {
     Joint joint;
     joint.name = "joint1";
     joint.type = JointType::kRevolute;
-    joint.parent = LinkId{0};
-    joint.child = LinkId{1};
-    calibration.tree.links.resize(2);
     calibration.tree.joints.push_back(joint);
-    calibration.tree.markers.push_back({TagId{7}, LinkId{1}, {}});
-    calibration.joint_values.resize(kFrames, 1);
+    calibration.corrected_values.resize(kFrames, 1);
     log.source = "joints.csv";
     log.channels = {"a", "b"};
     log.values.resize(kFrames, 2);
@@ -35,11 +32,7 @@ struct World {
       calibration.times_s.push_back(t);
       log.times_s.push_back(t);
       log.values.row(i) << std::sin(1.3 * t), 0.5 * std::cos(2.1 * t) + 0.1 * t;
-      calibration.joint_values(i, 0) = value(i, log.values(i, 0), log.values(i, 1));
-      SightingResidual seen;
-      seen.frame = i;
-      seen.id = TagId{7};
-      calibration.residuals.push_back(seen);
+      calibration.corrected_values(i, 0) = value(i, log.values(i, 0), log.values(i, 1));
     }
   }
   [[nodiscard]] std::vector<PartlyFollowed> followed() const {
@@ -75,19 +68,16 @@ TEST(PartlyFollowed, AnExchangeIsMended) {
   ASSERT_TRUE(mended);
   for (int i = 0; i < kFrames; ++i) {
     if (std::abs(i - kChange) < 4) continue;
-    EXPECT_NEAR(mended->values(i, 0) + 0.3, world.calibration.joint_values(i, 0), 2e-3) << i;
+    EXPECT_NEAR(mended->values(i, 0) + 0.3, world.calibration.corrected_values(i, 0), 2e-3) << i;
   }
   EXPECT_EQ(mended->values.col(1), world.log.values.col(1));
 }
 
-// No marker of it is seen there: its value is none.
 TEST(PartlyFollowed, FramesThatDoNotShowTheJointDoNotCount) {
-  World world([](int i, double a, double b) {
-    return i % 10 == 3 ? 5.0 : (i < kChange ? a : b) + slight(i);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const World world([](int i, double a, double b) {
+    return i % 10 == 3 ? kNone : (i < kChange ? a : b) + slight(i);
   });
-  EXPECT_TRUE(world.followed().empty());
-  std::erase_if(world.calibration.residuals,
-                [](const SightingResidual& seen) { return seen.frame % 10 == 3; });
   ASSERT_EQ(world.followed().size(), 1U);
   EXPECT_EQ(world.followed()[0].after.size(), 1U);
 }
