@@ -131,6 +131,15 @@ json not_found_json(const NotFoundEffect& missing) {
   return out;
 }
 
+json left_over_json(const LeftOver& left) {
+  json out = {{"place", text(left.place)}, {"times", number(left.times)}, {"lasts", left.lasts}};
+  if (!left.covariate.empty()) {
+    out["depends_on"] = text(left.covariate);
+    out["explained"] = number(left.explained);
+  }
+  return out;
+}
+
 template <typename Item, typename Function>
 json list_of(const std::vector<Item>& items, Function to_json_item) {
   json list = json::array();
@@ -148,6 +157,7 @@ json trace_json(const Trace& trace) {
           {"stretches", trace.stretches},
           {"noise", number(trace.noise)},
           {"over_neighbours", number(trace.over_neighbours)},
+          {"left_over", list_of(trace.left_over, left_over_json)},
           {"held_out_before", error_json(trace.held_out_before)},
           {"held_out_after", error_json(trace.held_out_after)},
           {"accepted", list_of(trace.accepted, effect_json)},

@@ -252,6 +252,11 @@ std::optional<Driven> first_shown(const NormalSystem& system, const std::vector<
   return std::nullopt;
 }
 
+std::size_t test_knots_of(const NormalSystem& system) {
+  return std::clamp<std::size_t>(
+      static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
+}
+
 // By how much the sum of squares falls in the step to the system's own solution.
 double still_to_gain(const NormalSystem& system) {
   const Eigen::VectorXd& step = system.step();
@@ -285,8 +290,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
                                    const std::vector<FoundRest>& known, double level,
                                    const TraceOptions& options) {
   const double tests = static_cast<double>(places.size() * covariates.size());
-  const std::size_t test_knots = std::clamp<std::size_t>(
-      static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
+  const std::size_t test_knots = test_knots_of(system);
   const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
     return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
   };
@@ -312,6 +316,19 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   if (!earns_its_place(system, out, gain)) return std::nullopt;
   if (!moves_enough(system, gain, out.columns, options)) return std::nullopt;
   return out;
+}
+
+std::pair<const Covariate*, double> most_telling(const NormalSystem& system, const RestPlace& place,
+                                                 const std::vector<Covariate>& covariates) {
+  std::vector<std::vector<EffectColumn>> curves;
+  for (const Covariate& covariate : covariates) {
+    curves.push_back(
+        hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots_of(system))));
+  }
+  const std::vector<double> gains = gains_of(system, curves);
+  const auto best = std::ranges::max_element(gains);
+  if (best == gains.end() || !(*best > 0.0)) return {nullptr, 0.0};
+  return {&covariates[static_cast<std::size_t>(best - gains.begin())], *best};
 }
 
 }  // namespace kinescope::trace

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "calib/trace/stage.h"
@@ -38,5 +39,10 @@ struct FoundRest {
                                                  const std::vector<Covariate>& covariates,
                                                  const std::vector<FoundRest>& known, double level,
                                                  const TraceOptions& options);
+
+/// The covariate over which a curve takes most from the squares that are left at a place, and how
+/// much: to say where it shows, not whether it is there. nullptr: no curve takes anything.
+[[nodiscard]] std::pair<const Covariate*, double> most_telling(
+    const NormalSystem& system, const RestPlace& place, const std::vector<Covariate>& covariates);
 
 }  // namespace kinescope::trace

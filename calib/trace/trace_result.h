@@ -159,6 +159,15 @@ struct Rest {
   [[nodiscard]] bool is_field() const { return field.at.rows() > 0; }
 };
 
+/// What is left at a place beside the noise there, where that is known by itself.
+struct LeftOver {
+  std::string place;
+  double times = 0.0;      ///< of the most that noise makes there, by medians
+  bool lasts = false;      ///< for certain more than noise makes
+  std::string covariate;   ///< over which a curve explains most of it; empty: none does
+  double explained = 0.0;  ///< by that curve: share of the squares at this place
+};
+
 /// One round, for a reader who wants to follow.
 struct TraceStep {
   int round = 0;
@@ -185,9 +194,11 @@ struct Trace {
   HeldOutError held_out_after;
   double noise = 0.0;  ///< rms distance that is left, in the residual's unit
   /// Of what is left over what rows differ by from their neighbours in time, rms: noise makes it 1
-  /// or less, what lasts more; 0 where rows were not weighted so.
+  /// or less, what lasts more; where it is known place by place, the most of
+  /// `left_over`. 0 where neither is known.
   double over_neighbours = 0.0;
-  int stretches = 0;  ///< of time, over which the noise was judged
+  std::vector<LeftOver> left_over;  ///< of every place whose noise is known, the most first
+  int stretches = 0;                ///< of time, over which the noise was judged
   /// Of every instant, its fold held out: squared errors beside the effects, in variances.
   Eigen::VectorXd held_out_whitened;
   trace::Partition partition;  ///< of the instants

@@ -44,6 +44,9 @@ struct Linearisation {
   bool independent_instants = false;
   /// Rows are whitened by how much they differ from their neighbours in time.
   bool whitened_by_neighbours = false;
+  /// Rows: the most that noise alone can make of them, whitened (rms), where the model knows that
+  /// apart from what it leaves; empty: not known.
+  Eigen::VectorXd noise;
   double correlation_time_s = 0.0;  ///< integral time of the residual's autocorrelation
 
   [[nodiscard]] Eigen::Index instants() const { return time_s.size(); }

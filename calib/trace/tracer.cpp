@@ -79,7 +79,7 @@ void Tracer::search() {
   do {
     look_for_rest();
   } while (name_the_rest() || name_by_plain_causes() || choose_by_rest() ||
-           drop_what_leaves_too_much());
+           drop_what_leaves_too_much() || drop_beside_what_lasts());
   take_a_curve_for_what_cancels();
   while (take_the_rest_as_curves()) look_beside_curves();
   describe_curves();
@@ -376,6 +376,7 @@ void Tracer::sharpen(std::size_t index) {
 
 bool Tracer::is_large(const Candidate& candidate, double scan, const Score& score) const {
   const double at_scan = candidate.floor_at ? candidate.floor_at(scan) : 0.0;
+  if (std::isinf(at_scan)) return false;  // not to be seen, by whatever else
   return small_.contains(candidate.id) ||
          (score.rms >= std::max(candidate.floor, at_scan) && trace::is_large(score, options_));
 }

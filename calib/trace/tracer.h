@@ -14,6 +14,7 @@
 
 #include "calib/trace/common_motion.h"
 #include "calib/trace/family.h"
+#include "calib/trace/lasting.h"
 #include "calib/trace/rest.h"
 #include "calib/trace/stage.h"
 #include "calib/trace/trace.h"
@@ -27,10 +28,6 @@ inline constexpr double kSmallLoss = 0.05;
 // A rest that explains this much of what a named effect at its place explains puts that name in
 // doubt.
 inline constexpr double kDoubtfulShare = 0.1;
-// What is left over what differs between neighbours in time. Noise, with the sensor's own errors
-// counted in, makes it 0.6 to 1.0 (`undeclared`, sample videos); what lasts is no noise.
-inline constexpr double kLasts = 1.2;
-
 class Tracer {
  public:
   Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress);
@@ -149,6 +146,8 @@ class Tracer {
   /// True where a rest is large enough beside what an effect explains to put its name in doubt.
   [[nodiscard]] bool is_doubtful(const FoundRest& found, std::size_t effect) const;
   [[nodiscard]] bool drop_what_rests_explain();
+  [[nodiscard]] bool predicts_beside(const std::vector<FoundRest>& curves,
+                                     const NormalSystem& less) const;
   [[nodiscard]] bool says_as_much(const Stage& without, FoundRest alone,
                                   const FoundRest& found) const;
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
@@ -156,7 +155,7 @@ class Tracer {
   /// where that is not known.
   [[nodiscard]] std::optional<double> over_neighbours(double squares) const;
   /// "what tag_12 leaves, .., lasts": of one body, which all the others hide; empty: of none.
-  [[nodiscard]] std::string lasting_words() const;
+  [[nodiscard]] std::string lasting_body_words() const;
   /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
   /// left.
   [[nodiscard]] std::optional<CommonMotion> common_motion() const;
@@ -166,6 +165,9 @@ class Tracer {
   /// Squares that neither effects nor what was found beside them explain.
   [[nodiscard]] double left_over() const;
   [[nodiscard]] bool drop_what_leaves_too_much();
+  /// The same place by place, where their noise is known by itself.
+  [[nodiscard]] bool drop_beside_what_lasts();
+  [[nodiscard]] std::vector<LeftOver> left_by_place() const;
   void record(const std::vector<TestedMember>& family, const Stage& stage, int round);
   void mark(int round, const EffectId& id, CandidateState state, std::optional<double> held_out);
   void add_step(int round, std::string words, const Stage& stage);

@@ -216,6 +216,13 @@ bool Tracer::is_usual(const EffectId& id) const {
   return candidate != nullptr && candidate->is_usual;
 }
 
+// With all effects there are, beside curves: whether that predicts better than `less` does.
+bool Tracer::predicts_beside(const std::vector<FoundRest>& curves, const NormalSystem& less) const {
+  const Linearisation linear = with_rests(now_->fit.linear, curves);
+  const NormalSystem system(linear, now_->system.partition());
+  return held_out_instants(system).whitened.sum() < held_out_instants(less).whitened.sum();
+}
+
 // Effects that explain nothing where what is left is in the model as curves: they stood in for it,
 // at whatever place.
 bool Tracer::drop_what_rests_explain() {
@@ -235,6 +242,7 @@ bool Tracer::drop_what_rests_explain() {
     if (candidate == nullptr) continue;
     const Linearisation linear = with_rests(stage->fit.linear, others);
     const NormalSystem system(linear, stage->system.partition());
+    if (is_usual(effect.id) && predicts_beside(others, system)) continue;
     const Score score = jackknife_test(system, candidate->columns(effect.scan));
     const double tests = tests_of(stage->fit.candidates, *candidate);
     if (!score.hidden() && score.p_value * tests < level_) continue;
@@ -280,7 +288,9 @@ bool Tracer::rest_replaces_an_effect(const FoundRest& found) {
                            : find_rest(stage->system, stage->fit.rest_places, stage->fit.covariates,
                                        {}, rest_level(), options_);
     if (!alone || alone->rest.place != found.rest.place) continue;
-    if (!doubtful && alone->held_out.sum() >= found.held_out.sum()) continue;
+    // What all of its kind has stays where it predicts beside the curve, however large that is.
+    const bool stays = !doubtful || is_usual(id);
+    if (stays && alone->held_out.sum() >= found.held_out.sum()) continue;
     const bool is_its_slope = alone->rest.covariate == found.rest.covariate &&
                               is_straight_over(*now_, now_->added[i], found.rest);
     if (!is_its_slope && !says_as_much(*stage, *alone, found)) continue;
@@ -340,6 +350,38 @@ bool Tracer::drop_what_leaves_too_much() {
   return dropped;
 }
 
+std::vector<LeftOver> Tracer::left_by_place() const {
+  return kinescope::trace::left_over(now_->system, now_->fit.rest_places, now_->fit.covariates,
+                                     level_);
+}
+
+// What every joint has stays: it is there, whatever else is.
+bool Tracer::drop_beside_what_lasts() {
+  for (const LeftOver& left : left_by_place()) {
+    if (!left.lasts) continue;
+    const auto place = std::ranges::find(now_->fit.rest_places, left.place, &RestPlace::name);
+    double squares = squares_at(now_->fit.linear, *place);
+    for (const FoundRest& found : rests_) {
+      if (found.rest.place == left.place) squares -= found.rest.explained * now_->system.total().rr;
+    }
+    for (std::size_t i = now_->added.size(); i-- > 0;) {
+      const EffectId id = now_->added[i].id;
+      if (!same_place(left.place, id.place) || is_usual(id)) continue;
+      const double explained = details_[i].effect.explained * base_->system.total().rr;
+      if (squares < kDoubtfulShare * explained) continue;
+      removed_.insert(id);
+      std::erase_if(trace_.ambiguities,
+                    [&](const Ambiguity& a) { return a.effects.front() == id; });
+      now_ = stage_of(without(now_->added, i));
+      details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+      mark(round_, id, CandidateState::kRemoved, now_->error.value);
+      add_step(round_, fmt::format("{} removed: what it leaves is no noise", name_of(id)), *now_);
+      return true;
+    }
+  }
+  return false;
+}
+
 void Tracer::record(const std::vector<TestedMember>& family, const Stage& stage, int round) {
   for (const TestedMember& member : family) {
     const Candidate& candidate = stage.fit.candidates[member.index];
@@ -378,6 +420,8 @@ void Tracer::summarise() {
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
   if (const auto over = over_neighbours(now_->system.total().rr)) trace_.over_neighbours = *over;
+  trace_.left_over = left_by_place();
+  if (!trace_.left_over.empty()) trace_.over_neighbours = trace_.left_over.front().times;
   trace_.partition = now_->system.partition();
   trace_.stretches = trace_.partition.stretches;
   trace_.held_out_whitened = now_->held_out.whitened;
@@ -507,7 +551,7 @@ std::string Tracer::reading_words(const CommonMotion& motion) const {
       place.name, motion.size, place.unit, 100.0 * std::min(1.0, motion.share));
 }
 
-std::string Tracer::lasting_words() const {
+std::string Tracer::lasting_body_words() const {
   const Linearisation& linear = now_->fit.linear;
   if (!linear.whitened_by_neighbours) return "";
   const auto found = find_lasting_body(linear, now_->system.freedom(), kLasts);
@@ -524,24 +568,31 @@ void Tracer::conclude() {
       std::ranges::all_of(trace_.rest, [&](const Rest& rest) { return is_slight(rest); });
   if (slight) trace_.held_out_after = now_->error;  // without curves
   const std::optional<CommonMotion> common = slight ? common_motion() : std::nullopt;
-  const std::string lasting = lasting_words();
+  const std::string lasting = lasting_words(trace_.left_over);
+  const std::string beyond = trace_.accepted.empty()
+                                 ? ""
+                                 : found_words(options_.found, trace_.accepted) + "; beyond that ";
+  const std::string of_a_body = lasting_body_words();
   if (!slight) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format("structure is left at {}, over {}, that no known effect explains",
                                 trace_.rest.front().place, trace_.rest.front().covariate);
+    if (!lasting.empty()) trace_.reason += "; without that curve, what is left is " + lasting;
   } else if (const std::string curves = curve_words(trace_.accepted); !curves.empty()) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format(
         "{}, for a reason that no known effect has the shape of; it is part of the model as it is",
         curves);
-  } else if (trace_.over_neighbours > kLasts) {
+  } else if (!lasting.empty()) {
+    trace_.verdict = TraceVerdict::kUnknown;
+    trace_.reason =
+        fmt::format("{}what is left is {}: no known effect explains it", beyond, lasting);
+  } else if (now_->fit.linear.whitened_by_neighbours && trace_.over_neighbours > kLasts) {
     trace_.verdict = TraceVerdict::kUnknown;
     trace_.reason = fmt::format(
         "{}what is left, {:.3g} {}, is {:.1f} times what differs from one frame to the next: it "
         "lasts, and no known effect explains it",
-        trace_.accepted.empty() ? ""
-                                : found_words(options_.found, trace_.accepted) + "; beyond that ",
-        trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
+        beyond, trace_.held_out_after.value, trace_.held_out_after.unit, trace_.over_neighbours);
   } else if (common && !is_of_readings(*common)) {
     const RestPlace& place = now_->fit.rest_places[common->place];
     trace_.verdict = TraceVerdict::kUnknown;
@@ -550,15 +601,10 @@ void Tracer::conclude() {
         "which makes {:.0f} % of what is left: a vibration or unsteady readings, that no known "
         "effect "
         "explains",
-        trace_.accepted.empty() ? ""
-                                : found_words(options_.found, trace_.accepted) + "; beyond that ",
-        place.name, common->size, place.unit, 100.0 * std::min(1.0, common->share));
-  } else if (!lasting.empty()) {
+        beyond, place.name, common->size, place.unit, 100.0 * std::min(1.0, common->share));
+  } else if (!of_a_body.empty()) {
     trace_.verdict = TraceVerdict::kUnknown;
-    trace_.reason = (trace_.accepted.empty()
-                         ? ""
-                         : found_words(options_.found, trace_.accepted) + "; beyond that ") +
-                    lasting;
+    trace_.reason = beyond + of_a_body;
   } else if (!trace_.ambiguities.empty()) {
     trace_.verdict = TraceVerdict::kAmbiguous;
     const Ambiguity& first = trace_.ambiguities.front();

@@ -53,6 +53,11 @@ struct Carriers {
 /// `count` values from `first` to `last` in equal ratios.
 [[nodiscard]] std::vector<double> ratios(double first, double last, int count);
 
+/// Stribeck speeds that are looked for, rad/s or m/s; EffectContext::least_stribeck_speed of a
+/// joint.
+[[nodiscard]] std::vector<double> stribeck_speeds(const JointTravel& travel);
+[[nodiscard]] double least_stribeck_speed(const EffectContext& context, std::size_t joint);
+
 /// Periods a turn (or a metre) that a log can show.
 [[nodiscard]] std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint);
 

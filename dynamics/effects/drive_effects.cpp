@@ -21,6 +21,10 @@ Candidate motor_inertia(const SharedContext& c, std::size_t j) {
   out.size_unit = fmt::format("{} s^2/{}", c->unit(j), c->angle(j));
   if (c->torque_unit == "Nm") out.size_unit = c->turns[j] != 0 ? "kg m^2" : "kg";
   out.parameters = {{"inertia", out.size_unit}};
+  if (c->least_motor_inertia.size() > 0) {
+    const double least = c->least_motor_inertia[static_cast<Eigen::Index>(j)];
+    out.possible = [least](const Eigen::VectorXd& theta) { return theta[0] >= least; };
+  }
   out.columns = [c, j](double) {
     return std::vector<EffectColumn>{
         {static_cast<int>(j),

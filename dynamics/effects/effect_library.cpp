@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -140,6 +141,23 @@ std::vector<double> ratios(double first, double last, int count) {
     out.push_back(first * std::pow(last / first, static_cast<double>(k) / (count - 1)));
   }
   return out;
+}
+
+std::vector<double> stribeck_speeds(const JointTravel& travel) {
+  return ratios(0.03 * travel.rms_speed, 0.7 * travel.rms_speed, 10);
+}
+
+double least_stribeck_speed(const EffectContext& context, std::size_t joint) {
+  constexpr double kHalf = 0.5;
+  const double width = context.widths[static_cast<Eigen::Index>(joint)];
+  for (const double speed : stribeck_speeds(context.travels[joint])) {
+    const Eigen::VectorXd share = joint_column(
+        context, joint, fmt::format("nominal stribeck {:.17g}", speed), [&](const FinePath& path) {
+          return (direction(path.dq, width) * stribeck_decay(path.dq, speed)).eval();
+        });
+    if (share.cwiseAbs().maxCoeff() > kHalf) return speed;
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 std::vector<double> ripple_periods(const EffectContext& context, std::size_t joint) {

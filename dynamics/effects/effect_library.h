@@ -60,9 +60,16 @@ struct EffectContext {
   std::vector<JointTravel> travels;
   LogSpan log;
   Eigen::VectorXd widths;  ///< of each joint's sign of the speed, rad/s or m/s
-  /// Least viscous and Coulomb friction that can be added to what the model declares: friction does
-  /// not drive. Empty: anything, where the model is one of differences.
-  Eigen::VectorXd least_viscous, least_coulomb;
+  /// Least viscous and Coulomb friction and motor inertia that can be added to what the model
+  /// declares: friction does not drive, and no rotor has less than no inertia. Empty: anything,
+  /// where the model is one of differences.
+  Eigen::VectorXd least_viscous, least_coulomb, least_motor_inertia;
+  /// Of the Stribeck speeds that are looked for, the least of which the log shows more than half of
+  /// the excess at some instant, through the low-pass; infinite: of none. A slower one is seen by
+  /// its tail alone, and its size is an extrapolation (joints that move in turn gave three times
+  /// the Coulomb friction where there is no excess; true ones are attained to 0.5 to 1). Empty: not
+  /// asked for.
+  Eigen::VectorXd least_stribeck_speed;
   std::string torque_unit = "Nm";  ///< "Nm" or "A"
 
   [[nodiscard]] std::string unit(std::size_t joint) const;  ///< of the joint's torque

@@ -52,6 +52,8 @@ EffectMotion::EffectMotion(TorqueSamples samples, const EffectMotionOptions& opt
   choose_instants();
 }
 
+int EffectMotion::filter_order() const { return order_of(options_.filter.kind); }
+
 void EffectMotion::lay_out() {
   clock_ = OneClock(samples_.t_s, samples_.trajectory);
   for (Eigen::Index row = 0; row < samples_.size(); ++row) {
@@ -134,7 +136,7 @@ Eigen::VectorXd EffectMotion::column_of(
     if (piece.rows < kFewestRows) continue;
     Eigen::VectorXd values = torque(paths[p]).matrix();
     if (parts_ > 1) {
-      values = filter_zero_phase(values, order_of(options_.filter.kind), options_.filter.cutoff_hz,
+      values = filter_zero_phase(values, filter_order(), options_.filter.cutoff_hz,
                                  parts_ / piece.step_s);
     }
     for (Eigen::Index k = 0; k < piece.rows; ++k) all(piece.begin + k) = values(k * parts_);

@@ -53,6 +53,8 @@ class EffectMotion {
   [[nodiscard]] Eigen::Index instants() const { return static_cast<Eigen::Index>(kept_.size()); }
   [[nodiscard]] Eigen::Index joints() const { return samples_.joints(); }
   [[nodiscard]] const TorqueFilter& filter() const { return options_.filter; }
+  /// Of filter_response() (dynamics/data/cutoff.h).
+  [[nodiscard]] int filter_order() const;
 
   /// Of every sample, increasing: trajectories whose clocks start anew are laid one behind the
   /// other.

@@ -2,6 +2,7 @@
 //
 // What a joint rubs. Armstrong-Helouvry, Dupont, Canudas de Wit 1994; pre-sliding: Dahl 1968.
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -75,7 +76,15 @@ Candidate stribeck(const SharedContext& c, std::size_t j) {
   out.record = "move the joint slowly for a while, with many reversals";
   out.size_unit = c->unit(j);
   out.parameters = {{"excess_at_rest", out.size_unit}};
-  out.scan = ratios(0.03 * c->travels[j].rms_speed, 0.7 * c->travels[j].rms_speed, 10);
+  out.scan = stribeck_speeds(c->travels[j]);
+  // Where a speed that the log does not show explains most, another one is no better for it.
+  if (c->least_stribeck_speed.size() > 0) {
+    const double least = c->least_stribeck_speed[static_cast<Eigen::Index>(j)];
+    if (std::isinf(least)) out.floor = least;
+    out.floor_at = [least](double speed) {
+      return speed < least ? std::numeric_limits<double>::infinity() : 0.0;
+    };
+  }
   out.scan_name = "Stribeck speed";
   out.scan_unit = c->angle(j) + "/s";
   out.columns = [c, j](double speed) {

@@ -130,6 +130,7 @@ class TorqueFitter {
   [[nodiscard]] Normal normal() const;
   [[nodiscard]] Eigen::Matrix2d turn_of_tilt(const Eigen::Vector2d& tilt_deg) const;
   [[nodiscard]] TracedFit read_back(bool converged) const;
+  [[nodiscard]] Eigen::MatrixXd residual() const;
   [[nodiscard]] double noise_memory(const Eigen::VectorXi& trajectory) const;
   [[nodiscard]] Eigen::MatrixXd own_prior() const;
   void name_covariates(TracedFit& out) const;

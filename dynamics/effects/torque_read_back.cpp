@@ -5,6 +5,7 @@
 
 #include <Eigen/SVD>
 
+#include "dynamics/effects/noise_reference.h"
 #include "dynamics/effects/torque_parts.h"
 #include "dynamics/identify/block_jackknife.h"
 
@@ -16,17 +17,22 @@ bool TorqueFitter::is_open(const EffectId& id) const {
   return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
 }
 
+/// Whitened, instants x joints.
+Eigen::MatrixXd TorqueFitter::residual() const {
+  Eigen::MatrixXd out(instants_, joints_);
+  for (Eigen::Index j = 0; j < joints_; ++j) {
+    out.col(j) = design_[static_cast<std::size_t>(j)].residual;
+  }
+  return out;
+}
+
 /// Integral time of the noise, in instants: not of what the model still lacks, which the widest
 /// description knows best, nor of what that lacks and the model has by now. What is left in either
 /// makes it seem longer.
 double TorqueFitter::noise_memory(const Eigen::VectorXi& trajectory) const {
-  Eigen::MatrixXd residual(instants_, joints_);
-  for (Eigen::Index j = 0; j < joints_; ++j) {
-    residual.col(j) = design_[static_cast<std::size_t>(j)].residual;
-  }
   constexpr double kBothSides = 0.5;
   return kBothSides * std::min(identify::correlation_samples(parts_.widest, trajectory),
-                               identify::correlation_samples(residual, trajectory));
+                               identify::correlation_samples(residual(), trajectory));
 }
 
 /// How gravity turns from where it points by now, a degree of the tilt that took it there.
@@ -82,6 +88,7 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   for (const Eigen::Index row : parts_.motion->kept()) {
     linear.fold.push_back(parts_.fold[static_cast<std::size_t>(row)]);
   }
+  linear.noise = noise_at_most(*parts_.motion, residual()).replicate(instants_, 1);
   linear.unit = parts_.base.sigma.replicate(instants_, 1);
   linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
   const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());

@@ -194,6 +194,11 @@ void TorqueTracedModel::Parts::refresh() {
     context.temperature_c = motion->at_instants(options.temperature_c);
   }
   describe_log(context);
+  context.least_stribeck_speed.resize(q.cols());
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    context.least_stribeck_speed[j] =
+        effects::least_stribeck_speed(context, static_cast<std::size_t>(j));
+  }
   const RigidModel nominal = make_rigid_model(model);
   context.load = inverse_dynamics_of_samples(nominal, q, dq, ddq);
   viscous = declared(model, &JointDynamics::viscous);
@@ -228,6 +233,11 @@ void TorqueTracedModel::Parts::refresh() {
   if (has_masses(nominal) || base.kind == TorqueBaseKind::kIdentified) {
     context.least_viscous = -viscous;
     context.least_coulomb = -coulomb;
+    context.least_motor_inertia.resize(std::ssize(base.rigid.bodies));
+    for (std::size_t b = 0; b < base.rigid.bodies.size(); ++b) {
+      context.least_motor_inertia[static_cast<Eigen::Index>(b)] =
+          -base.rigid.bodies[b].motor_inertia;
+    }
   }
   upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
 }
