@@ -29,29 +29,6 @@ constexpr std::size_t kFewLevels =
 constexpr double kLagReachS = 0.3;
 constexpr double kCommandLagGain = 0.8;
 
-/// The distance between neighbouring values of a channel that takes few, equally spaced values.
-std::optional<double> grid_step(const std::vector<double>& values) {
-  std::vector<double> levels = values;
-  std::ranges::sort(levels);
-  std::vector<double> gaps;
-  const double range = levels.back() - levels.front();
-  const double rounding = 1e-9 * std::max(range, std::abs(levels.back()));
-  for (std::size_t k = 1; k < levels.size(); ++k) {
-    if (levels[k] - levels[k - 1] > rounding) gaps.push_back(levels[k] - levels[k - 1]);
-  }
-  if (gaps.size() < kFewValues || 2 * gaps.size() > values.size()) return std::nullopt;
-  const double step = quantile(gaps, 0.1);
-  std::size_t on_grid = 0;
-  for (const double gap : gaps) {
-    const double multiple = gap / step;
-    if (std::abs(multiple - std::round(multiple)) < kGridTolerance * std::max(1.0, multiple))
-      ++on_grid;
-  }
-  if (static_cast<double>(on_grid) < kOnGrid * static_cast<double>(gaps.size()))
-    return std::nullopt;
-  return step;
-}
-
 struct Channel {
   std::string name;
   std::vector<double> values;
@@ -248,6 +225,28 @@ std::optional<LogFinding> command_lag(const TorqueLog& log) {
 }
 
 }  // namespace
+
+std::optional<double> grid_step(const std::vector<double>& values) {
+  std::vector<double> levels = values;
+  std::ranges::sort(levels);
+  std::vector<double> gaps;
+  const double range = levels.back() - levels.front();
+  const double rounding = 1e-9 * std::max(range, std::abs(levels.back()));
+  for (std::size_t k = 1; k < levels.size(); ++k) {
+    if (levels[k] - levels[k - 1] > rounding) gaps.push_back(levels[k] - levels[k - 1]);
+  }
+  if (gaps.size() < kFewValues || 2 * gaps.size() > values.size()) return std::nullopt;
+  const double step = quantile(gaps, 0.1);
+  std::size_t on_grid = 0;
+  for (const double gap : gaps) {
+    const double multiple = gap / step;
+    if (std::abs(multiple - std::round(multiple)) < kGridTolerance * std::max(1.0, multiple))
+      ++on_grid;
+  }
+  if (static_cast<double>(on_grid) < kOnGrid * static_cast<double>(gaps.size()))
+    return std::nullopt;
+  return step;
+}
 
 CheckedLog check_channels(TorqueLog log) {
   CheckedLog out;

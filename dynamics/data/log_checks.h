@@ -9,6 +9,7 @@
 // Not here: torque against a model (torque_scale.h), filtering (motion.h).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "dynamics/data/log_findings.h"
@@ -53,5 +54,7 @@ struct CheckedLog {
 /// Channels that are constant, clipped, quantised, renewed too slowly; the lag behind the command.
 /// Signals that are constant while the joint moves are removed from the log.
 [[nodiscard]] CheckedLog check_channels(TorqueLog log);
+/// The distance between neighbouring values of a channel that takes few, equally spaced values.
+[[nodiscard]] std::optional<double> grid_step(const std::vector<double>& values);
 
 }  // namespace kinescope

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/data/acceleration_share.h"
+#include "dynamics/data/log_checks.h"
 #include "dynamics/data/predictive_cutoff.h"
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
@@ -346,6 +347,9 @@ class MotionDeriver {
   void name_samples() {
     for (const WantedJoint& joint : log_.joints) out_.samples.joint_names.push_back(joint.name);
     out_.samples.torque_unit = log_.torque_unit;
+    out_.samples.torque_step.resize(log_.torque.cols());
+    for (Eigen::Index j = 0; j < log_.torque.cols(); ++j)
+      out_.samples.torque_step[j] = grid_step(to_vector(log_.torque.col(j))).value_or(0.0);
   }
 
   const TorqueLog& log_;

@@ -22,6 +22,9 @@ struct TorqueSamples {
   std::vector<std::string> joint_names;       ///< one a column; empty when made by hand
   std::vector<std::string> trajectory_names;  ///< what each trajectory number is called in the log
   std::string torque_unit = "Nm";             ///< "Nm" (N for prismatic joints) or "A"
+  /// Of each joint: what its logged torque is a multiple of; 0 where it is of none. Empty: not
+  /// known.
+  Eigen::VectorXd torque_step = {};
 
   [[nodiscard]] Eigen::Index size() const { return t_s.size(); }
   [[nodiscard]] Eigen::Index joints() const { return q.cols(); }

@@ -63,7 +63,8 @@ double noise_over_differences(const EffectMotion& motion, double step_s) {
 
 }  // namespace
 
-Eigen::VectorXd noise_at_most(const EffectMotion& motion, const Eigen::MatrixXd& residual) {
+Eigen::VectorXd noise_at_most(const EffectMotion& motion, const Eigen::MatrixXd& residual,
+                              const Eigen::VectorXd& sigma) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(residual.cols());
   const Triples triples = triples_of(motion);
   if (triples.middle.size() < kFewest || !(triples.step_s > 0.0)) return out;
@@ -72,7 +73,9 @@ Eigen::VectorXd noise_at_most(const EffectMotion& motion, const Eigen::MatrixXd&
     std::vector<double> sizes;
     for (const Eigen::Index i : triples.middle)
       sizes.push_back(std::abs(residual(i - 1, j) - 2.0 * residual(i, j) + residual(i + 1, j)));
-    out[j] = factor * kNormal * median_of(std::move(sizes));
+    const double rounding =
+        motion.samples().torque_step.size() > j ? motion.samples().torque_step[j] / sigma[j] : 0.0;
+    out[j] = std::hypot(factor * kNormal * median_of(std::move(sizes)), rounding / std::sqrt(12.0));
   }
   return out;
 }

@@ -394,6 +394,31 @@ TEST(TorqueEffects, NoiseIsNoiseWhateverItsSizeAndColour) {
   }
 }
 
+// The rounding of a torque lasts as long as it stays on one step.
+TEST(TorqueEffects, StepsOfTheLoggedTorqueAreNoise) {
+  constexpr double kStep = 1.0;  // N m
+  Rng rng = Rng::from_name("noise", 2);
+  EffectWorldOptions quiet = quiet_world();
+  quiet.noise = 0.01;
+  EffectWorld world = effect_world({}, quiet, rng);
+  world.log.torque = (world.log.torque.array() / kStep).round() * kStep;
+  const TorqueSamples samples = exact_samples(world, 12.0);
+  ASSERT_EQ(samples.torque_step.size(), 3);
+  EXPECT_NEAR(samples.torque_step.minCoeff(), kStep, 1e-9);
+  EXPECT_NEAR(samples.torque_step.maxCoeff(), kStep, 1e-9);
+  TorqueTraceOptions options;
+  options.contacts = false;
+  options.model = declared_options(12.0);
+  const auto most_left = [&](const TorqueSamples& of) {
+    return trace_torque(world.model, of, options).trace.left_over.front();
+  };
+  const LeftOver known = most_left(samples);
+  EXPECT_FALSE(known.lasts) << known.times;
+  TorqueSamples not_known = samples;
+  not_known.torque_step.resize(0);
+  EXPECT_GT(most_left(not_known).times, 1.3 * known.times);
+}
+
 TEST(TorqueEffects, NoRotorHasLessThanNoInertia) {
   constexpr double kDeclared = 0.2;
   Rng rng = Rng::from_name("effects", 13);
