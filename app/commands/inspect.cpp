@@ -87,8 +87,10 @@ void print_flange(const Recording& recording) {
       "hand\n",
       log.poses.size(), log.time_column, log.times_s.front(), log.times_s.back(),
       log.numbered ? "" : " s", recording.flange.front().rotation);
-  for (std::size_t k = 1; k < recording.flange.size(); ++k)
+  for (std::size_t k = 1; k < recording.flange.size(); ++k) {
+    if (!recording.flange[k].usual) continue;
     fmt::print("          or read as {}: `run` tells\n", recording.flange[k].rotation);
+  }
 }
 
 void print_inspection(const Inspection& inspection) {
@@ -171,7 +173,8 @@ nlohmann::json log_json(const LogFacts& log) {
 nlohmann::json flange_json(const Recording& recording) {
   const PoseLog& log = recording.flange.front().log;
   nlohmann::json readings = nlohmann::json::array();
-  for (const FlangeReading& reading : recording.flange) readings.push_back(reading.rotation);
+  for (const FlangeReading& reading : recording.flange)
+    if (reading.usual) readings.push_back(reading.rotation);
   return {{"poses", log.poses.size()},  {"time_column", log.time_column},
           {"numbered", log.numbered},   {"first", log.times_s.front()},
           {"last", log.times_s.back()}, {"rotations", readings}};

@@ -3,6 +3,7 @@
 // `kinescope run` where the log holds poses of the flange: from markers to a camera on its hand.
 #include "app/commands/run_hand_eye.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include <fmt/format.h>
@@ -10,6 +11,7 @@
 #include "app/commands/limits.h"
 #include "app/commands/run_folder.h"
 #include "app/explain/pipeline.h"
+#include "app/io/flange_convention.h"
 #include "app/io/json_text.h"
 #include "app/io/products.h"
 #include "app/report/hand_eye_summary.h"
@@ -41,8 +43,33 @@ HandEyeInput hand_eye_input(const Recording& recording, Observed observed, const
   out.markers = recording.markers;
   out.camera = camera;
   out.readings = recording.flange;
+  // A moving hand that is one row late is late by a time, which tracing knows.
+  const bool postures = is_posture_log(out.readings.front().log, out.measurements.times_s);
+  if (postures && !recording.settings.flange) out.readings = with_moved_rows(out.readings);
   out.mount = recording.settings.camera_mount;
   return out;
+}
+
+std::string error_words(const HandEyeError& e) {
+  return e.px > 0.0 ? fmt::format("{:.2g} px", e.px) : fmt::format("{:.2g} mm", 1e3 * e.m);
+}
+
+// That the log is read otherwise than it is documented, and how to make that sure.
+std::optional<std::string> unusual_reading(const HandEye& result, const HandEyeInput& input) {
+  const auto chosen =
+      std::ranges::find(input.readings, result.hypothesis.rotation, &FlangeReading::rotation);
+  if (chosen == input.readings.end() || chosen->declaration == FlangeDeclaration{})
+    return std::nullopt;
+  std::string out = fmt::format("{}: read as {}, which predicts unseen poses to {} (rms)",
+                                chosen->log.source, chosen->rotation, error_words(result.held_out));
+  const auto usual = std::ranges::find_if(result.rivals, [&](const HandEyeRival& rival) {
+    return rival.hypothesis.rotation == input.readings.front().rotation;
+  });
+  if (usual != result.rivals.end() && !chosen->usual) {
+    out += fmt::format(", as {} to {}", usual->hypothesis.rotation, error_words(usual->held_out));
+  }
+  return out + fmt::format(": if that is so, write \"{}\" into recording.yaml",
+                           to_string(chosen->declaration));
 }
 
 // What limits of --fail-on speak of.
@@ -117,9 +144,12 @@ ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
   hand_eye.reject_sigma = options.calibrate.reject_sigma;
   hand_eye.folds = options.calibrate.folds;
   hand_eye.trace = options.trace;
-  summary.hand_eye =
-      calibrate_hand_eye(hand_eye_input(recording, std::move(observed), run.tracks, camera),
-                         hand_eye, console.progress);
+  const HandEyeInput input = hand_eye_input(recording, std::move(observed), run.tracks, camera);
+  summary.hand_eye = calibrate_hand_eye(input, hand_eye, console.progress);
+  if (const auto unusual = unusual_reading(summary.hand_eye, input)) {
+    run.warnings.push_back(*unusual);
+    console.warn(*unusual);
+  }
   clock.lap("calibrate", run.times);
   take_errors(summary.hand_eye, run);
   folder.keep_observations(recording, tags);

@@ -131,7 +131,8 @@ void read_log(Recording& recording, const RecordingFiles& files) {
 
 void read_flange_poses(Recording& recording, const RecordingFiles& files) {
   if (!files.flange) return;
-  ReadSightings<std::vector<FlangeReading>> read = read_flange(*files.flange);
+  ReadSightings<std::vector<FlangeReading>> read =
+      read_flange(*files.flange, recording.settings.flange);
   recording.flange = std::move(read.found);
   recording.warnings.insert(recording.warnings.end(), read.warnings.begin(), read.warnings.end());
 }

@@ -36,7 +36,7 @@ struct RecordingPaths {
 
 /// recording.yaml as a value. Its keys: name, torques, gravity, fixed_tags, video_start,
 /// target_distances (list of from, to, distance, sigma), units (channel: unit), camera_mount,
-/// gravity_camera; video_start may hold one number for each of several cameras.
+/// gravity_camera, flange; video_start may hold one number for each of several cameras.
 struct RecordingSettings {
   std::string name;                          ///< of the robot; default: the folder's name
   std::vector<std::string> torque_channels;  ///< columns of joints.csv beside those named tau*
@@ -52,6 +52,8 @@ struct RecordingSettings {
   std::map<std::string, std::string> units;
   /// "hand" (on the robot), "fixed" or "carried" (by a person: not beside a flange.csv).
   std::optional<CameraMount> camera_mount;
+  /// How flange.csv is to be read: flange (rotation, conjugate, unit, row_offset).
+  std::optional<FlangeDeclaration> flange;
 };
 
 /// How far into the path the recording enters.
@@ -142,10 +144,14 @@ struct ReadSightings {
 [[nodiscard]] ReadSightings<PoseTracks> read_poses(const std::filesystem::path& path);
 /// flange.csv: t (or row, index, frame, image, pose: a number), x,y,z, and qx,qy,qz,qw (by name in
 /// any order) or three angles: roll,pitch,yaw; w,p,r; a,b,c; rx,ry,rz (a rotation vector or angles:
-/// two readings). Names in any case; rad unless the header says [deg]; positions beyond any robot's
-/// reach are taken as mm, with a warning.
+/// two readings). Names in any case, also q1..q4 and those of ROS messages (pose.position.x).
+/// Angles are in the header's unit, else in rad; in degrees where one is beyond a turn. Positions
+/// beyond any robot's reach are taken as mm, with a warning. Behind the usual readings stand those
+/// of other conventions (FlangeReading::usual), unless `as` says which one it is.
 [[nodiscard]] ReadSightings<std::vector<FlangeReading>> read_flange(
-    const std::filesystem::path& path);
+    const std::filesystem::path& path, const std::optional<FlangeDeclaration>& as = {});
+/// And behind them each with the poses one row (or number) later and earlier, as off by one.
+[[nodiscard]] std::vector<FlangeReading> with_moved_rows(std::vector<FlangeReading> readings);
 /// points.csv: t,point,x,y,z[,sigma][,target]; empty x,y,z: held in the named target, whose place
 /// is unknown.
 [[nodiscard]] ReadSightings<PointObservations> read_points(const std::filesystem::path& path);

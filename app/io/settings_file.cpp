@@ -5,12 +5,15 @@
 
 #include <fmt/format.h>
 
+#include "app/io/flange_convention.h"
 #include "app/io/nearest_name.h"
 #include "app/io/recording.h"
 #include "app/io/yaml_value.h"
 
 namespace kinescope {
 namespace {
+
+constexpr int kMostRowOffset = 1'000'000;
 
 Eigen::Vector3d read_direction(const YamlValue& value) {
   const std::vector<YamlValue> items = value.items();
@@ -45,12 +48,34 @@ CameraMount read_mount(const YamlValue& value) {
   throw value.error(fmt::format("is '{}'", value.text()), "write hand, fixed or carried");
 }
 
+std::string read_rotation(const YamlValue& value) {
+  const std::vector<std::string> known = rotation_convention_names();
+  const std::string name = value.text();
+  if (std::ranges::find(known, name) != known.end()) return name;
+  throw value.error(fmt::format("is '{}', a convention nobody knows", name),
+                    did_you_mean(name, known));
+}
+
+FlangeDeclaration read_flange_declaration(const YamlValue& value) {
+  value.only_keys({"rotation", "conjugate", "unit", "row_offset"});
+  FlangeDeclaration out;
+  if (const auto rotation = value.find("rotation")) out.rotation = read_rotation(*rotation);
+  if (const auto conjugate = value.find("conjugate")) out.conjugate = conjugate->flag();
+  if (const auto unit = value.find("unit")) {
+    if (unit->text() != "rad" && unit->text() != "deg")
+      throw unit->error(fmt::format("is '{}'", unit->text()), "write rad or deg");
+    out.degrees = unit->text() == "deg";
+  }
+  if (const auto offset = value.find("row_offset")) out.row_offset = offset->whole(-kMostRowOffset);
+  return out;
+}
+
 }  // namespace
 
 RecordingSettings read_recording_settings(const std::filesystem::path& path) {
   const YamlValue file = YamlValue::read(path);
   file.only_keys({"name", "torques", "gravity", "fixed_tags", "video_start", "target_distances",
-                  "units", "camera_mount", "gravity_camera", "dynamics"});
+                  "units", "camera_mount", "gravity_camera", "dynamics", "flange"});
   RecordingSettings settings;
   if (const auto name = file.find("name")) settings.name = name->text();
   if (const auto list = file.find("torques")) {
@@ -78,6 +103,7 @@ RecordingSettings read_recording_settings(const std::filesystem::path& path) {
     for (const auto& [channel, unit] : units->entries()) settings.units[channel] = read_unit(unit);
   }
   if (const auto mount = file.find("camera_mount")) settings.camera_mount = read_mount(*mount);
+  if (const auto flange = file.find("flange")) settings.flange = read_flange_declaration(*flange);
   return settings;
 }
 

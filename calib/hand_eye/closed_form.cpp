@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include "calib/bundle/hand_eye.h"
 #include "kinematics/core/dense_algebra.h"
@@ -100,6 +101,7 @@ struct Solver {
 constexpr std::array<Solver, 3> kSolvers{{{"Park and Martin 1994", park},
                                           {"Shah 2013", shah},
                                           {"Dornaika and Horaud 1998", from_everywhere}}};
+constexpr std::size_t kLinearSolvers = 2;  // the first ones
 
 // Thousands of frames of a film say no more than some, spread evenly.
 std::vector<MotionPair> thinned(const std::vector<MotionPair>& pairs) {
@@ -152,7 +154,10 @@ HandEyeStart target_for(std::vector<MotionPair> pairs, const Pose& X) {
   return {X, Y, misfit_of(pairs, X, Y), ""};
 }
 
-std::optional<HandEyeStart> closed_form(std::vector<MotionPair> pairs) {
+namespace {
+
+std::optional<HandEyeStart> best_start(std::vector<MotionPair> pairs,
+                                       std::span<const Solver> solvers) {
   constexpr int kRounds = 3;
   if (pairs.size() < kFewestPairs) return std::nullopt;
   pairs = thinned(pairs);
@@ -160,7 +165,7 @@ std::optional<HandEyeStart> closed_form(std::vector<MotionPair> pairs) {
   const auto keep = [&](const HandEyeStart& start) {
     if (std::isfinite(start.misfit) && (!best || start.misfit < best->misfit)) best = start;
   };
-  for (const Solver& solver : kSolvers) {
+  for (const Solver& solver : solvers) {
     std::vector<MotionPair> in = pairs;
     for (int round = 0; round < kRounds; ++round) {
       HandEyeStart start = target_for(pairs, solver.solve(in));
@@ -172,6 +177,16 @@ std::optional<HandEyeStart> closed_form(std::vector<MotionPair> pairs) {
     }
   }
   return best;
+}
+
+}  // namespace
+
+std::optional<HandEyeStart> closed_form(std::vector<MotionPair> pairs) {
+  return best_start(std::move(pairs), kSolvers);
+}
+
+std::optional<HandEyeStart> linear_closed_form(std::vector<MotionPair> pairs) {
+  return best_start(std::move(pairs), std::span(kSolvers).first(kLinearSolvers));
 }
 
 }  // namespace kinescope::hand_eye

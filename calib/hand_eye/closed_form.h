@@ -36,6 +36,9 @@ struct HandEyeStart {
 /// The best start, over all solvers. Nothing with fewer than three pairs.
 [[nodiscard]] std::optional<HandEyeStart> closed_form(std::vector<MotionPair> pairs);
 
+/// The same by the linear solvers alone, for a first comparison of many readings.
+[[nodiscard]] std::optional<HandEyeStart> linear_closed_form(std::vector<MotionPair> pairs);
+
 /// Y of the least misfit where X is known, median-trimmed; its misfit in `misfit`.
 [[nodiscard]] HandEyeStart target_for(std::vector<MotionPair> pairs, const Pose& X);
 

@@ -57,13 +57,17 @@ Sightings sightings_of(const HandEyeInput& input) {
 
 constexpr int kFewestViews = 3;  // of a target: two poses leave the equation open
 
-// Frames that the log has a pose for; targets seen in three of them or more.
-Data make_data(const HandEyeInput& input) {
-  const PoseLog& log = input.readings.front().log;
+// Readings of the file that are judged beside each other.
+using Readings = std::vector<const FlangeReading*>;
+
+// Frames that each reading has a pose for; targets seen in three of them or more.
+Data make_data(const HandEyeInput& input, const Readings& readings) {
   const std::vector<double>& times_s = input.measurements.times_s;
   Sightings sightings = sightings_of(input);
   std::erase_if(sightings, [&](const auto& frame) {
-    return !pose_at(log, times_s[static_cast<std::size_t>(frame.first)]);
+    const double time_s = times_s[static_cast<std::size_t>(frame.first)];
+    return std::ranges::any_of(
+        readings, [&](const FlangeReading* reading) { return !pose_at(reading->log, time_s); });
   });
   std::map<TagId, int> views;
   for (const auto& [frame, seen] : sightings)
@@ -85,7 +89,7 @@ Data make_data(const HandEyeInput& input) {
     }
     if (!frame.sightings.empty()) out.frames.push_back(std::move(frame));
   }
-  out.postures = is_posture_log(log, times_s);
+  out.postures = is_posture_log(readings.front()->log, times_s);
   return out;
 }
 
@@ -145,8 +149,52 @@ std::optional<Started> start_of(const Model& model, const HandEyeInput& input) {
   return best;
 }
 
+// How well a reading closes the loop in closed form, over the target that was seen most, the
+// camera on the hand or fixed: infinite where it cannot be said.
+double closed_form_misfit(const Data& data, const FlangeReading& reading,
+                          const HandEyeInput& input) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed}) {
+    const Model model(data, reading.log, {mount, PoseDirection::kBaseFlange, reading.rotation});
+    std::vector<MotionPair> most;
+    for (int k = 0; k < static_cast<int>(data.targets.size()); ++k) {
+      std::vector<MotionPair> pairs = pairs_of(model, input, k);
+      if (pairs.size() > most.size()) most = std::move(pairs);
+    }
+    const auto start = linear_closed_form(std::move(most));
+    if (start) least = std::min(least, start->misfit);
+  }
+  return least;
+}
+
+Readings usual_readings(const HandEyeInput& input) {
+  Readings out;
+  for (const FlangeReading& reading : input.readings)
+    if (reading.usual) out.push_back(&reading);
+  return out;
+}
+
+// Of the other conventions the one that closes the loop best, where it does better than the usual
+// ones: a proposal, which the likelihood of unseen poses judges.
+const FlangeReading* proposed_reading(const Data& usual_data, const HandEyeInput& input) {
+  const PoseLog& first = input.readings.front().log;
+  const FlangeReading* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const FlangeReading& reading : input.readings) {
+    const bool same_rows = reading.log.times_s == first.times_s;
+    const double misfit = same_rows
+                              ? closed_form_misfit(usual_data, reading, input)
+                              : closed_form_misfit(make_data(input, {&reading}), reading, input);
+    if (!(misfit < least)) continue;
+    least = misfit;
+    best = &reading;
+  }
+  return best != nullptr && !best->usual ? best : nullptr;
+}
+
 // A hypothesis with its fit.
 struct Rival {
+  const FlangeReading* reading = nullptr;
   std::unique_ptr<Model> model;
   Fit fit;
   std::string start;
@@ -157,6 +205,7 @@ std::optional<Rival> fit_rival(const Data& data, const FlangeReading& reading,
                                const HandEyeInput& input, CameraMount mount,
                                const HandEyeOptions& options, const std::vector<int>& fold) {
   Rival out;
+  out.reading = &reading;
   out.model = std::make_unique<Model>(
       data, reading.log, HandEyeHypothesis{mount, PoseDirection::kBaseFlange, reading.rotation});
   const auto start = start_of(*out.model, input);
@@ -179,6 +228,7 @@ Rival renamed(const Rival& rival, const HandEyeOptions& options, const std::vect
   other.direction = other.direction == PoseDirection::kBaseFlange ? PoseDirection::kFlangeBase
                                                                   : PoseDirection::kBaseFlange;
   Rival out;
+  out.reading = rival.reading;
   out.model = std::make_unique<Model>(rival.model->data(), rival.model->log(), other);
   out.start = rival.start;
   out.fit = fit(*out.model, rival.fit.state, options.reject_sigma);
@@ -239,9 +289,10 @@ HandEyeRival summary_of(const Rival& rival, double score, double probability, bo
   return {rival.model->hypothesis(), held_out_error(rival.held_out), score, probability, same};
 }
 
+constexpr double kTold = 0.99;
+
 void require_told_apart(const std::vector<Rival>& rivals, const std::vector<double>& probability,
                         std::size_t best) {
-  constexpr double kTold = 0.99;
   if (probability[best] >= kTold) return;
   std::size_t second = best == 0 ? 1 : 0;
   for (std::size_t k = 0; k < rivals.size(); ++k)
@@ -269,12 +320,30 @@ std::vector<double> posterior(const std::vector<Rival>& rivals, std::size_t best
   return out;
 }
 
-// The best rival, under the likelier of its two names (or the declared one).
-Chosen choose(std::vector<Rival> rivals, const HandEyeInput& input, const HandEyeOptions& options,
-              const std::vector<int>& fold) {
+std::size_t best_of(const std::vector<Rival>& rivals) {
   std::size_t best = 0;
   for (std::size_t k = 1; k < rivals.size(); ++k)
     if (log_score(rivals[k], rivals[best]) > 0.0) best = k;
+  return best;
+}
+
+// Rivals that stand on what is usual, but where another convention is clearly better.
+bool is_another_convention(const std::vector<Rival>& rivals, std::size_t conventions) {
+  if (rivals.empty()) return false;
+  const std::size_t best = best_of(rivals);
+  if (rivals[best].reading->usual) return false;
+  // As likely before as any other departure from what is documented, all of them together.
+  const double prior = kUsualInverted / (1.0 - kUsualInverted) / static_cast<double>(conventions);
+  double usual = 0.0;
+  for (const Rival& rival : rivals)
+    if (rival.reading->usual) usual += std::exp(log_score(rival, rivals[best])) / prior;
+  return 1.0 / (1.0 + usual) >= kTold;
+}
+
+// The best rival, under the likelier of its two names (or the declared one).
+Chosen choose(std::vector<Rival> rivals, const HandEyeInput& input, const HandEyeOptions& options,
+              const std::vector<int>& fold) {
+  const std::size_t best = best_of(rivals);
   require_observable(*rivals[best].model, rivals[best].fit);
   const std::vector<double> probability = posterior(rivals, best);
   require_told_apart(rivals, probability, best);
@@ -419,39 +488,67 @@ void trace_into(Rival& rival, const HandEyeOptions& options, const std::vector<i
   rival.fit = std::move(with);
 }
 
+// What readings are judged on, and their fits.
+struct Judged {
+  std::unique_ptr<Data> data;
+  std::vector<int> fold;
+  std::vector<Rival> rivals;
+};
+
+Judged judge(const HandEyeInput& input, const Readings& readings, const HandEyeOptions& options,
+             const Progress& progress) {
+  Judged out;
+  out.data = std::make_unique<Data>(make_data(input, readings));
+  const PoseLog& log = readings.front()->log;
+  require_enough_frames(*out.data, log.source);
+  out.fold = folds_of(*out.data, log, options.folds);
+  int done = 0;
+  const int all = 2 * static_cast<int>(readings.size());
+  for (const FlangeReading* reading : readings) {
+    for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed}) {
+      report_progress(progress, "rival readings", done++, all);
+      auto rival = fit_rival(*out.data, *reading, input, mount, options, out.fold);
+      if (rival) out.rivals.push_back(std::move(*rival));
+    }
+  }
+  return out;
+}
+
+// The usual readings, beside another convention where one is clearly better.
+Judged judge_all(const HandEyeInput& input, const HandEyeOptions& options,
+                 const Progress& progress) {
+  const Readings usual = usual_readings(input);
+  Readings readings = usual;
+  if (const FlangeReading* other = proposed_reading(make_data(input, usual), input)) {
+    readings.push_back(other);
+    Judged with = judge(input, readings, options, progress);
+    if (is_another_convention(with.rivals, input.readings.size() - usual.size())) return with;
+  }
+  return judge(input, usual, options, progress);
+}
+
 }  // namespace
 }  // namespace hand_eye
 
 HandEye calibrate_hand_eye(const HandEyeInput& input, const HandEyeOptions& options,
                            const Progress& progress) {
   using namespace hand_eye;
-  KINESCOPE_CHECK(!input.readings.empty(), "a log can be read");
-  const std::string& source = input.readings.front().log.source;
-  const Data data = make_data(input);
-  require_enough_frames(data, source);
-  const std::vector<int> fold = folds_of(data, input.readings.front().log, options.folds);
-  std::vector<Rival> rivals;
-  int done = 0;
-  const int all = 2 * static_cast<int>(input.readings.size());
-  for (const FlangeReading& reading : input.readings) {
-    for (const CameraMount mount : {CameraMount::kOnHand, CameraMount::kFixed}) {
-      report_progress(progress, "rival readings", done++, all);
-      auto rival = fit_rival(data, reading, input, mount, options, fold);
-      if (rival) rivals.push_back(std::move(*rival));
-    }
-  }
-  if (rivals.empty()) {
-    throw undetermined(source, "no reading of the poses closes the loop with the markers",
+  KINESCOPE_CHECK(!input.readings.empty() && input.readings.front().usual, "a log can be read");
+  Judged judged = judge_all(input, options, progress);
+  if (judged.rivals.empty()) {
+    throw undetermined(input.readings.front().log.source,
+                       "no reading of the poses closes the loop with the markers",
                        "check that each pose belongs to its image");
   }
-  Chosen chosen = choose(std::move(rivals), input, options, fold);
+  const std::vector<int>& fold = judged.fold;
+  Chosen chosen = choose(std::move(judged.rivals), input, options, fold);
   HandEye out;
   out.hypothesis = chosen.rival.model->hypothesis();
   out.rivals = std::move(chosen.rivals);
   const Cleaned cleaned = clean(chosen.rival, options, fold);
   out.odd_sightings = cleaned.left_out;
   out.rivals.front().held_out = held_out_error(chosen.rival.held_out);
-  out.postures = data.postures;
+  out.postures = judged.data->postures;
   if (options.trace) trace_into(chosen.rival, options, fold, out, progress);
   const Rival& rival = chosen.rival;
   out.start = rival.start;

@@ -26,10 +26,14 @@
 
 namespace kinescope {
 
-/// The log, one way to read its columns as rotations.
+/// The log, one way to read its columns.
 struct FlangeReading {
-  std::string rotation;  ///< in words: "quaternion", "rotation vector"
+  std::string rotation;  ///< in words, of each reading its own: "quaternion", "rotation vector"
   PoseLog log;
+  /// false: as another convention would have it. Such a one is judged where its closed form closes
+  /// the loop better than those of all usual ones, and taken where it is clearly better.
+  bool usual = true;
+  FlangeDeclaration declaration = {};  ///< that says so; {}: nothing has to be said
 };
 
 struct HandEyeInput {
@@ -37,7 +41,7 @@ struct HandEyeInput {
   PoseTracks tracks;          ///< of the markers: where the search starts
   MarkerSet markers;
   CameraModel camera;                   ///< known; unused for poses
-  std::vector<FlangeReading> readings;  ///< of one file: rivals
+  std::vector<FlangeReading> readings;  ///< of one file: rivals; the first one is usual
   std::optional<CameraMount> mount;     ///< declared; none: to be told from the data
 };
 

@@ -3,6 +3,7 @@
 // What a log of flange poses beside a camera may mean.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -25,6 +26,16 @@ enum class PoseDirection { kBaseFlange, kFlangeBase };
 [[nodiscard]] constexpr std::string_view to_string(PoseDirection direction) {
   return direction == PoseDirection::kBaseFlange ? "base_from_flange" : "flange_from_base";
 }
+
+/// How a log of flange poses is to be read (the key `flange` of recording.yaml); what is not said
+/// is as usual.
+struct FlangeDeclaration {
+  std::string rotation;              ///< name of a convention; empty: as the columns are named
+  bool conjugate = false;            ///< the rotations are inverted, the positions not
+  std::optional<bool> degrees = {};  ///< of angles; none: by the header
+  int row_offset = 0;                ///< image n has the pose of row (or number) n + row_offset
+  bool operator==(const FlangeDeclaration&) const = default;
+};
 
 /// One reading of a recording.
 struct HandEyeHypothesis {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 namespace kinescope {
 namespace {
@@ -87,6 +88,24 @@ std::optional<PoseAtTime> pose_at(const PoseLog& log, double time_s, double max_
   const bool before_near = i > 0 && time_s - log.times_s[i - 1] <= max_gap_s;
   if (!log.numbered && before_near) return between(log, i - 1, time_s, max_gap_s);
   return PoseAtTime{log.poses[i], Vector6d::Zero()};
+}
+
+PoseLog with_rows_moved(PoseLog log, int offset) {
+  if (log.numbered) {
+    for (double& number : log.times_s) number -= offset;
+    return log;
+  }
+  const auto rows = std::ssize(log.poses);
+  const auto cut = std::min<std::ptrdiff_t>(std::abs(offset), rows);
+  const auto drop = [&](auto& values, bool from_front) {
+    if (values.empty()) return;
+    const auto first = from_front ? values.begin() : values.end() - cut;
+    values.erase(first, first + cut);
+  };
+  drop(log.times_s, offset < 0);
+  drop(log.poses, offset > 0);
+  drop(log.lines, offset > 0);
+  return log;
 }
 
 bool is_posture_log(const PoseLog& log, const std::vector<double>& times_s) {

@@ -36,6 +36,10 @@ struct PoseAtTime {
 [[nodiscard]] std::optional<PoseAtTime> pose_at(const PoseLog& log, double time_s,
                                                 double max_gap_s = kMaxGap);
 
+/// Row i with the pose of row i + offset (a numbered log: of number n + offset), so far as there is
+/// one.
+[[nodiscard]] PoseLog with_rows_moved(PoseLog log, int offset);
+
 /// As is_posture_log() of joints; always true for a numbered log.
 [[nodiscard]] bool is_posture_log(const PoseLog& log, const std::vector<double>& times_s);
 

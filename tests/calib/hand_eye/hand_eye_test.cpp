@@ -224,6 +224,40 @@ TEST(HandEye, TheDeclaredMountNamesTheEquation) {
   EXPECT_EQ(result.hypothesis.direction, PoseDirection::kFlangeBase);
 }
 
+// The readings of a world, and behind them those of another convention: poses changed by `change`.
+HandEyeInput with_other_convention(HandEyeInput input, void (*change)(Pose&)) {
+  FlangeReading other = input.readings.front();
+  other.rotation = "another convention";
+  other.usual = false;
+  for (Pose& pose : other.log.poses) change(pose);
+  input.readings.push_back(std::move(other));
+  return input;
+}
+
+void conjugate(Pose& pose) { pose.rotation = pose.rotation.conjugate(); }
+
+TEST(HandEye, AnotherConventionIsTakenWhereItIsClearlyBetter) {
+  const HandEyeWorld world = make_hand_eye_world({});
+  HandEyeInput input = with_other_convention(world.input, conjugate);
+  const HandEye usual = calibrate_hand_eye(input, untraced());
+  EXPECT_EQ(usual.hypothesis.rotation, world.input.readings.front().rotation);
+  std::swap(input.readings[0].log, input.readings[1].log);
+  const HandEye other = calibrate_hand_eye(input, untraced());
+  EXPECT_EQ(other.hypothesis.rotation, "another convention");
+  EXPECT_EQ(other.camera.T.matrix4(), usual.camera.T.matrix4());
+  EXPECT_GT(other.rivals.front().probability, 0.5);
+}
+
+TEST(HandEye, TheUsualConventionStaysWhereAnotherIsAsGood) {
+  // A hand that is turned by a constant more: another camera, the same equation.
+  const HandEyeWorld world = make_hand_eye_world({});
+  const HandEyeInput input = with_other_convention(world.input, [](Pose& pose) {
+    pose = pose * Pose{exp_rotation({1e-9, 0.0, 0.0}), Eigen::Vector3d::Zero()};
+  });
+  const HandEye result = calibrate_hand_eye(input, untraced());
+  EXPECT_EQ(result.hypothesis.rotation, world.input.readings.front().rotation);
+}
+
 TEST(HandEye, TheOrderOfSightingsDoesNotMatter) {
   HandEyeWorldOptions options;
   options.targets = 3;

@@ -2,6 +2,7 @@
 #include "kinematics/log/pose_log.h"
 
 #include <cmath>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -68,6 +69,24 @@ TEST(PoseLog, ANumberedLogHasItsRowsAlone) {
   EXPECT_FALSE(pose_at(log, 1.05));
   ASSERT_TRUE(pose_at(log, 1.0));
   EXPECT_EQ(pose_at(log, 1.0)->twist, Vector6d(Vector6d::Zero()));
+}
+
+TEST(PoseLog, RowsAreMovedBesideTheirTimes) {
+  PoseLog log = curve(10.0);
+  log.lines.resize(log.poses.size());
+  std::iota(log.lines.begin(), log.lines.end(), std::size_t{2});
+  const PoseLog later = with_rows_moved(log, 1);
+  ASSERT_EQ(later.times_s.size(), log.times_s.size() - 1);
+  EXPECT_EQ(later.times_s.front(), log.times_s.front());
+  EXPECT_EQ(later.poses.front().matrix4(), log.poses[1].matrix4());
+  EXPECT_EQ(later.lines.front(), 3U);
+  const PoseLog earlier = with_rows_moved(log, -1);
+  EXPECT_EQ(earlier.times_s.front(), log.times_s[1]);
+  EXPECT_EQ(earlier.poses.front().matrix4(), log.poses.front().matrix4());
+  EXPECT_EQ(earlier.lines.back(), log.lines[log.lines.size() - 2]);
+  EXPECT_TRUE(with_rows_moved(log, 1000).poses.empty());
+  log.numbered = true;
+  EXPECT_EQ(with_rows_moved(log, 1).times_s.front(), log.times_s.front() - 1.0);
 }
 
 }  // namespace
