@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <functional>
 #include <set>
 #include <tuple>
@@ -11,15 +10,9 @@
 
 #include "kinematics/bags/bag_contents.h"
 #include "kinematics/core/error.h"
+#include "kinematics/log/commanded.h"
 
 namespace kinescope::bags {
-
-bool is_commanded(std::string topic) {
-  std::ranges::transform(topic, topic.begin(), [](unsigned char c) { return std::tolower(c); });
-  constexpr std::array kCommanded = {"command", "cmd", "desired", "target", "goal", "reference"};
-  return std::ranges::any_of(
-      kCommanded, [&](const char* word) { return topic.find(word) != std::string::npos; });
-}
 
 namespace {
 
@@ -105,17 +98,7 @@ const JointSeries& choose_joints(const Contents& contents, const std::string& to
                       series->topic.ends_with("joint_states"), series->times_s.size());
   };
   std::ranges::stable_sort(found, std::greater{}, rank);
-  const JointSeries& best = *found.front();
-  std::vector<std::string> rivals{best.topic};
-  for (std::size_t i = 1; i < found.size(); ++i) {
-    const JointSeries& other = *found[i];
-    const bool as_good =
-        !is_commanded(other.topic) && other.names.size() == best.names.size() &&
-        other.topic.ends_with("joint_states") == best.topic.ends_with("joint_states");
-    if (as_good && other.topic != best.topic) rivals.push_back(other.topic);
-  }
-  if (topic.empty() && rivals.size() > 1) refuse_several(contents, "joint states", rivals);
-  return best;
+  return *found.front();
 }
 
 const ImageSeries& choose_images(const Contents& contents, const std::string& topic) {

@@ -96,16 +96,15 @@ struct Contents {
 // rule that stands with each. All throw bad_input, naming the topics: none of that kind, a topic
 // that is not there or of another kind, several among which the rule does not choose.
 
-/// Joint states with positions. The topic with the most joints; of several with as many one that is
-/// named joint_states. A name with command, desired, target, goal or reference in it is no
-/// measurement.
+/// Joint states with positions: the series that gives a log its clock, beside which other joints
+/// stand (bag_log.h). The one with the most joints; of several with as many one that is named
+/// joint_states, then the one with the most messages. Commands are no measurement (is_commanded()).
+/// Never refuses several.
 [[nodiscard]] const JointSeries& choose_joints(const Contents& contents, const std::string& topic);
 /// Images, not depths. Of one camera those that the others are made from (image_raw).
 [[nodiscard]] const ImageSeries& choose_images(const Contents& contents, const std::string& topic);
 [[nodiscard]] const DetectionSeries& choose_detections(const Contents& contents,
                                                        const std::string& topic);
-/// True for topics that are named as commands, targets or references: no measurement.
-[[nodiscard]] bool is_commanded(std::string topic);
 /// The camera of the images (or of detections): the one in whose namespace they are, else the only
 /// one of the bag. Nothing where none was published, or it was never calibrated (a focal length of
 /// 0).

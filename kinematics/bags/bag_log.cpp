@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "kinematics/bags/bag_contents.h"
+#include "kinematics/log/commanded.h"
 #include "kinematics/log/joint_log.h"
 
 namespace kinescope::bags {
@@ -36,10 +38,19 @@ struct Chosen {
   std::vector<std::string> warnings;
 };
 
-bool shares_a_joint(const JointSeries& a, const JointSeries& b) {
-  return std::ranges::any_of(a.names, [&](const std::string& name) {
-    return std::ranges::find(b.names, name) != b.names.end();
-  });
+/// The part of a series whose joints are not among these names.
+JointSeries without_joints(JointSeries series, const std::vector<std::string>& names) {
+  std::vector<Eigen::Index> kept;
+  std::vector<std::string> kept_names;
+  for (std::size_t joint = 0; joint < series.names.size(); ++joint) {
+    if (std::ranges::find(names, series.names[joint]) != names.end()) continue;
+    kept.push_back(static_cast<Eigen::Index>(joint));
+    kept_names.push_back(series.names[joint]);
+  }
+  series.names = std::move(kept_names);
+  for (Eigen::MatrixXd* values : {&series.position, &series.velocity, &series.effort})
+    if (values->size() > 0) *values = (*values)(Eigen::all, kept).eval();
+  return series;
 }
 
 void append_columns(Eigen::MatrixXd& to, const Eigen::MatrixXd& more, Eigen::Index rows,
@@ -110,6 +121,37 @@ bool logs_as_much(const JointSeries& other, const JointSeries& log) {
          (other.effort.size() > 0 || log.effort.size() == 0);
 }
 
+std::string not_used(const Contents& contents, const JointSeries& other,
+                     const std::vector<std::string>& names, const std::string& beside) {
+  const bool one = other.times_s.size() == 1;
+  return fmt::format("{}: {} message{} of {} with {} {} not used beside {}{}", contents.source,
+                     other.times_s.size(), one ? "" : "s", other.topic, fmt::join(names, ", "),
+                     one ? "is" : "are", beside,
+                     other.topic == beside
+                         ? ""
+                         : fmt::format(" (name {}:{} to use them)", contents.source, other.topic));
+}
+
+/// Joints of `all` that stand in the log from elsewhere, or not at all.
+std::vector<std::string> unused_names(const JointSeries& all, const JointSeries& added) {
+  std::vector<std::string> out;
+  for (const std::string& name : all.names)
+    if (std::ranges::find(added.names, name) == added.names.end()) out.push_back(name);
+  return out;
+}
+
+/// Those beside the log: of its own topic first, then those with most messages, whose joints are
+/// taken where several publish them.
+std::vector<const JointSeries*> beside(const JointSeries& log, const Contents& contents) {
+  std::vector<const JointSeries*> out;
+  for (const JointSeries& other : contents.joints)
+    if (&other != &log) out.push_back(&other);
+  std::ranges::stable_sort(out, std::greater{}, [&](const JointSeries* other) {
+    return std::pair(other->topic == log.topic, other->times_s.size());
+  });
+  return out;
+}
+
 Chosen choose(const Source& source, Needs needs) {
   const Contents& contents = look_into(source.bag);
   const JointSeries& log = choose_joints(contents, source.topic);
@@ -118,22 +160,16 @@ Chosen choose(const Source& source, Needs needs) {
   warn_of_stamps(out.series, contents.source, out.warnings);
   constexpr std::size_t kMostNamed = 4;
   std::size_t unused = 0;
-  for (const JointSeries& other : contents.joints) {
-    if (&other == &log) continue;
+  for (const JointSeries* series : beside(log, contents)) {
+    const JointSeries& other = *series;
     const bool here = other.topic == topic || (source.topic.empty() && !is_commanded(other.topic));
     const bool enough = needs == Needs::kPositions || logs_as_much(other, log);
-    if (here && enough && other.position.size() > 0 && !shares_a_joint(out.series, other) &&
-        add_series(out.series, other)) {
-      continue;
-    }
-    if (unused++ >= kMostNamed) continue;
-    out.warnings.push_back(
-        fmt::format("{}: {} message{} of {} with {} {} not used beside {}{}", contents.source,
-                    other.times_s.size(), other.times_s.size() == 1 ? "" : "s", other.topic,
-                    fmt::join(other.names, ", "), other.times_s.size() == 1 ? "is" : "are", topic,
-                    other.topic == topic
-                        ? ""
-                        : fmt::format(" (name {}:{} to use them)", contents.source, other.topic)));
+    JointSeries added = without_joints(other, out.series.names);
+    const bool joins = here && enough && added.position.size() > 0 && add_series(out.series, added);
+    if (!joins) added.names.clear();
+    const std::vector<std::string> names = unused_names(other, added);
+    if (names.empty() || unused++ >= kMostNamed) continue;
+    out.warnings.push_back(not_used(contents, other, names, topic));
   }
   if (unused > kMostNamed) {
     out.warnings.push_back(fmt::format("{}: neither are {} more sets of joints", contents.source,

@@ -4,8 +4,9 @@
 // Gives   the tables that a joint log and a torque log are read from, as if somebody had written
 //         them.
 // Units   t in s after the bag's first message; values as published (rad, m, N m).
-// Method  One topic and set of joints is the log (bags::choose_joints); joints that others publish
-//         are interpolated at its stamps, where they cover nine tenths of it.
+// Method  One topic and set of joints is the log (bags::choose_joints); joints of other names that
+//         others publish (a second arm, a gripper) are interpolated at its stamps, where they cover
+//         nine tenths of it. Nothing of topics of commands is.
 #pragma once
 
 #include <string>

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "kinematics/log/commanded.h"
+
 namespace kinescope::structure_search {
 
 OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups, std::vector<int> chosen) {
@@ -15,8 +17,14 @@ OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups, std::vecto
 }
 
 OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups) {
+  // Where the markers follow a command and its measured value alike, the latter.
   std::vector<int> first;
-  for (const SameQuantity& group : groups) first.push_back(group.front());
+  for (const SameQuantity& group : groups) {
+    const auto measured = std::ranges::find_if(group, [&](int channel) {
+      return !is_commanded(log.channels[static_cast<std::size_t>(channel)]);
+    });
+    first.push_back(measured == group.end() ? group.front() : *measured);
+  }
   return own_log(log, std::move(groups), std::move(first));
 }
 

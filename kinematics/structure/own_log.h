@@ -22,7 +22,7 @@ struct OwnLog {
 
 [[nodiscard]] OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups,
                              std::vector<int> chosen);
-/// With the first of each group.
+/// With the first of each group that is no command by its name (is_commanded()).
 [[nodiscard]] OwnLog own_log(const JointLog& log, std::vector<SameQuantity> groups);
 
 /// Channels of the log without copies become those of the whole log; copies of such that drive a

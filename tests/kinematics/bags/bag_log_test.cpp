@@ -143,6 +143,57 @@ TEST(BagLog, CommandsDoNotJoinMeasurements) {
   EXPECT_NE(log.warnings[0].find("/gripper/joint_commands"), std::string::npos);
 }
 
+// A topic's joints, a message every `every` of 200 hundredths of a second.
+struct Published {
+  std::string topic;
+  std::vector<std::string> names;
+  double rate = 0.0;  ///< of all joints, rad/s
+  int every = 1;
+};
+
+fs::path bag_of(const std::string& name, const std::vector<Published>& all) {
+  const fs::path path = truth::temporary_path(name);
+  truth::BagWriter writer(path);
+  for (int k = 0; k <= 200; ++k) {
+    const std::int64_t t = kStart + 10 * kMillisecond * k;
+    for (const Published& one : all) {
+      if (k % one.every != 0) continue;
+      const std::vector<double> values(one.names.size(), one.rate * 0.01 * k);
+      writer.write(one.topic, kType, t, truth::joint_state(t, one.names, values));
+    }
+  }
+  writer.finish();
+  return path;
+}
+
+TEST(BagLog, TwoArmsAreOneLog) {
+  const JointLog log = recorded::read_joint_log(
+      bag_of("two_arms.mcap", {{"/left/joint_states", {"l_a", "l_b"}, 0.1, 4},
+                               {"/right/joint_states", {"r_a", "r_b"}, 0.2}}));
+  EXPECT_EQ(log.channels, (std::vector<std::string>{"r_a", "r_b", "l_a", "l_b"}));
+  ASSERT_EQ(log.size(), 201U) << "the denser clock";
+  EXPECT_NEAR(log.values(41, 0), 0.082, 1e-9);
+  EXPECT_NEAR(log.values(41, 2), 0.041, 1e-9);
+  EXPECT_TRUE(log.warnings.empty());
+}
+
+TEST(BagLog, JointsThatTwoTopicsPublishAreThoseWithMostMessages) {
+  const JointLog log = recorded::read_joint_log(
+      bag_of("same_names.mcap", {{"/left/joint_states", {"a", "b"}, 0.1, 4},
+                                 {"/hand/joint_states", {"g"}, 0.3},
+                                 {"/right/joint_states", {"b", "a"}, 0.2},
+                                 {"/slow/joint_states", {"g", "h"}, 0.4, 2}}));
+  EXPECT_EQ(log.channels, (std::vector<std::string>{"a", "b", "g", "h"}));
+  EXPECT_NEAR(log.values(40, 0), 0.08, 1e-9);
+  EXPECT_NEAR(log.values(40, 2), 0.12, 1e-9);
+  EXPECT_NEAR(log.values(40, 3), 0.16, 1e-9);
+  ASSERT_EQ(log.warnings.size(), 2U);
+  EXPECT_NE(log.warnings[0].find("/slow/joint_states with g are not used"), std::string::npos)
+      << log.warnings[0];
+  EXPECT_NE(log.warnings[1].find("/left/joint_states with a, b are not used"), std::string::npos)
+      << log.warnings[1];
+}
+
 TEST(BagLog, OrderOfArrivalDoesNotMatter) {
   const JointLog straight = recorded::read_joint_log(bag("straight.mcap"));
   const JointLog shuffled = recorded::read_joint_log(bag("shuffled.mcap", {.shuffled = true}));

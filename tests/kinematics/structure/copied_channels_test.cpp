@@ -87,14 +87,21 @@ TEST(CopiedChannels, AChannelThatMovesByItselfRepeatsNone) {
   EXPECT_TRUE(structure_search::repeated_loosely(scene.recording.log, {0}, {1, 2}).empty());
 }
 
-// The first where they fit alike, the better one where not.
+// The measured one where they fit alike (the first where names do not tell), the better one where
+// not.
 TEST(CopiedChannels, TheColumnThatTheMarkersFollowIsUsed) {
   RecordingOptions o;
   o.sigma_m = 3e-5;
   o.sigma_rad = 0.01 * kDegree;
   const Scene scene = make_scene("Goals", {.joints = 4, .prismatic_share = 0.0}, o);
   const JointLog alike = with_commands(scene.recording.log, 0.0, 1e-6, true);
-  expect_one_of_each(find_structure(scene.recording.tracks, alike), alike, true);
+  expect_one_of_each(find_structure(scene.recording.tracks, alike), alike, false);
+  JointLog unnamed = alike;
+  for (std::size_t c = 0; c < 4; ++c) unnamed.channels[c] = "other" + std::to_string(c);
+  for (const StructureJoint& joint : find_structure(scene.recording.tracks, unnamed).joints) {
+    ASSERT_TRUE(joint.channel);
+    EXPECT_LT(joint.channel->channel, 4);
+  }
   const JointLog worse = with_commands(scene.recording.log, 0.0, 3e-3, true);
   expect_one_of_each(find_structure(scene.recording.tracks, worse), worse, false);
 }
