@@ -532,8 +532,10 @@ void require_time_overlap(const JointLog& log, const std::vector<double>& times_
       log_name,
       fmt::format("runs from {:.3f} to {:.3f} s and {} from {:.3f} to {:.3f} s: no common time",
                   log.times_s.front(), log.times_s.back(), source, first, last),
-      "use one clock for both; of a video, video_start in recording.yaml is the log's time at its "
-      "first frame");
+      fmt::format(
+          "use one clock for both; if both began together, add {:.3f} s to the times of {}: of a "
+          "video by video_start in recording.yaml, the log's time at its first frame",
+          log.times_s.front() - first, source));
 }
 
 void require_time_overlap(const PoseLog& log, const std::vector<double>& times_s,

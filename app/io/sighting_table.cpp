@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "kinematics/log/header_units.h"
+#include "kinematics/log/tool_table.h"
 
 namespace kinescope {
 
@@ -13,6 +14,7 @@ CsvTable read_sighting_table(const std::filesystem::path& path) {
   CsvTable table = read_csv(path, RaggedRows::kSetAside);
   for (const std::string& column : table.header) table.factors.push_back(header_factor(column));
   strip_units(table);
+  if (const auto time = table.column("t")) dates_to_seconds(table, *time);
   return table;
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -49,9 +51,14 @@ class SqliteFile final : public Reader {
     sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+    const bool whole = is_readable();
+    if (!whole) read_what_is_there();
     read_topics();
-    messages_ =
-        prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, messages.id");
+    // Sorting reads everything before it gives anything, and the index may be what is missing.
+    messages_ = prepare(
+        whole ? "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, messages.id"
+              : "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY messages.id");
+    warn_of_lost_changes(file.path);
   }
 
   const std::vector<Topic>& topics() const override { return table_.topics(); }
@@ -95,10 +102,48 @@ class SqliteFile final : public Reader {
   using Statement = std::unique_ptr<sqlite3_stmt, CloseSqlite>;
 
   [[noreturn]] void refuse() const {
-    throw bad_input(name_,
-                    fmt::format("is no bag of ROS 2 in sqlite3 ({})",
-                                database_ ? sqlite3_errmsg(database_.get()) : "no memory"),
-                    "check what it is, or copy it again");
+    throw bad_input(
+        name_,
+        fmt::format("is no bag of ROS 2 in sqlite3 ({})",
+                    database_ ? sqlite3_errmsg(database_.get()) : "no memory"),
+        "check what it is, or copy it again; a file NAME.db3-wal beside it belongs to it");
+  }
+
+  /// False for a file that is shorter than it says.
+  [[nodiscard]] bool is_readable() const {
+    sqlite3_stmt* made = nullptr;
+    const int status =
+        sqlite3_prepare_v2(database_.get(), "SELECT id FROM topics", -1, &made, nullptr);
+    sqlite3_finalize(made);
+    return status != SQLITE_CORRUPT;
+  }
+
+  /// sqlite3 refuses a file that is cut off unless its schema may be repaired; this one is opened
+  /// for reading only.
+  void read_what_is_there() {
+    sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+    sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
+    warnings_.push_back(fmt::format(
+        "{}: the file is cut off (the copy, or the recording, was broken off): what is there is "
+        "read",
+        name_));
+  }
+
+  /// A recorder that writes changes beside the file brings them into it when it ends, and then
+  /// writes metadata.yaml.
+  void warn_of_lost_changes(const std::filesystem::path& file) {
+    constexpr std::size_t kVersionAt = 18;  // of the header: 2 is a log of changes (WAL)
+    std::ifstream stream(file, std::ios::binary);
+    std::string header(kVersionAt + 1, '\0');
+    stream.read(header.data(), static_cast<std::streamsize>(header.size()));
+    std::error_code error;
+    const bool closed = std::filesystem::exists(file.parent_path() / "metadata.yaml", error);
+    const bool changes = std::filesystem::exists(file.string() + "-wal", error);
+    if (!stream || header[kVersionAt] != 2 || closed || changes) return;
+    warnings_.push_back(
+        fmt::format("{}: its recorder kept the last messages in {}-wal, which is not there: if it "
+                    "was broken off (no metadata.yaml), they are missing; copy that file, too",
+                    name_, std::filesystem::path(name_).filename().string()));
   }
 
   Statement prepare(const char* query) {

@@ -60,11 +60,25 @@ class Lines {
   Comment last_comment_;
 };
 
+/// Words between blanks, of which several are one.
+std::vector<std::string> split_words(std::string_view line) {
+  std::vector<std::string> words;
+  line = trim(line);
+  while (!line.empty()) {
+    const std::string_view word = line.substr(0, line.find_first_of(" \t"));
+    words.emplace_back(trim(word));
+    line = trim(line.substr(word.size()));
+  }
+  return words;
+}
+
 std::size_t count_cells(std::string_view line, char delimiter) {
+  if (delimiter == ' ') return split_words(line).size();
   return static_cast<std::size_t>(std::ranges::count(line, delimiter)) + 1;
 }
 
 std::vector<std::string> split(std::string_view line, char delimiter) {
+  if (delimiter == ' ') return split_words(line);
   std::vector<std::string> cells;
   cells.reserve(count_cells(line, delimiter));
   std::size_t begin = 0;
@@ -126,6 +140,8 @@ class TableParser {
           "is this the right file?");
     }
     table_.header = split(*line, delimiter_);
+    if (table_.header.size() > 1 && table_.header.front().empty())
+      table_.header.front() = kUnnamedColumn;
     unnamed_end_ = table_.header.size() > 1 && table_.header.back().empty();
     if (unnamed_end_) table_.header.pop_back();
     check_header(*line);
@@ -182,7 +198,16 @@ class TableParser {
       refuse("columns are separated by ';' or by tabs: both stand in the header",
              "use one of them, or commas");
     }
-    return semicolon ? ';' : tab ? '\t' : ',';
+    if (semicolon || tab) return semicolon ? ';' : '\t';
+    return is_in_words(header) ? ' ' : ',';
+  }
+
+  /// Blanks separate columns where the line below has as many words; a title has others.
+  [[nodiscard]] bool is_in_words(std::string_view header) const {
+    const std::size_t words = split_words(header).size();
+    Lines below = lines_;
+    const auto next = first_row_ ? first_row_ : below.next_content();
+    return words > 1 && next && split_words(*next).size() == words;
   }
 
   /// EuRoC's tables: "#timestamp [ns],filename" above rows that begin with a number.

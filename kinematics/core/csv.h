@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reading tables: values separated by commas, semicolons or tabs, with one header line. Numbers
-// only, except in the columns the caller reads as text. Every complaint names file, line and
-// column.
+// Reading tables: values separated by commas, semicolons, tabs or blanks, with one header line.
+// Numbers only, except in the columns the caller reads as text. Every complaint names file, line
+// and column.
 #pragma once
 
 #include <cstddef>
@@ -57,12 +57,16 @@ enum class RaggedRows { kRefuse, kSetAside };
 inline constexpr std::size_t kMostColumns = 10'000;
 inline constexpr std::size_t kMostCells = 100'000'000;
 
-/// Parses text. A header without a comma may separate its columns by semicolons or by tabs; then
-/// the numbers may have decimal commas, all of them or none. Lines end in LF, CR LF or CR. A
-/// delimiter at the end of a line opens no column.
+/// The name of a first column without one: pandas writes its index so, and reads it back so.
+inline constexpr std::string_view kUnnamedColumn = "Unnamed: 0";
+
+/// Parses text. A header without a comma may separate its columns by semicolons, by tabs or (where
+/// the next line has as many words) by blanks; then the numbers may have decimal commas, all of
+/// them or none. Lines end in LF, CR LF or CR. A delimiter at the end of a line opens no column.
 /// Throws bad_input for: nothing in it, columns separated otherwise, decimal commas beside decimal
-/// points, two columns of one name, an unnamed column, more than kMostColumns or kMostCells, a NUL
-/// byte, and, unless they are set aside, for rows shorter or longer than the header.
+/// points, two columns of one name, an unnamed column but the first, more than kMostColumns or
+/// kMostCells, a NUL byte, and, unless they are set aside, for rows shorter or longer than the
+/// header.
 [[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source,
                                  RaggedRows ragged = RaggedRows::kRefuse);
 /// The same from a file, also from one packed with gzip.

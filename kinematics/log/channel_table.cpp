@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/header_units.h"
+#include "kinematics/log/tool_table.h"
 
 namespace kinescope {
 namespace {
@@ -45,13 +47,15 @@ bool is_label_column(const ColumnOfNumbers& column) {
   return 2 * column.words > static_cast<std::size_t>(column.values.size());
 }
 
-ChannelTable from_csv(const CsvTable& csv) {
+ChannelTable from_csv(CsvTable csv) {
+  std::vector<std::string> said = make_time_plain(csv);
   ChannelTable table{.source = csv.source,
                      .names = {},
                      .values = {},
                      .labels = {},
                      .header_line = csv.header_line,
-                     .lines = csv.lines};
+                     .lines = csv.lines,
+                     .warnings = std::move(said)};
   const auto rows = static_cast<Eigen::Index>(csv.rows.size());
   table.values.resize(rows, static_cast<Eigen::Index>(csv.header.size()));
   Eigen::Index used = 0;

@@ -3,8 +3,9 @@
 // Takes   a wide table, CSV or CSV packed with gzip: one column a channel, one row a sample.
 // Gives   ChannelTable: every column as it stands in the file, faults included, with its lines.
 // Units   the file's; nothing is converted.
-// Method  empty cells and "nan" become NaN, infinities stay; columns of words become labels.
-// Not here: what a column means (dynamics/data), the strict joint log (joint_log.h).
+// Method  times as other tools write them become plain (tool_table.h); empty cells and "nan" become
+// NaN, infinities stay; columns of words become labels. Not here: what a column means
+// (dynamics/data), the strict joint log (joint_log.h).
 #pragma once
 
 #include <filesystem>

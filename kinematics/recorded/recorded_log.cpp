@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/recorded/recorded_log.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "kinematics/bags/bag_log.h"
 #include "kinematics/datasets/dataset_log.h"
 #include "kinematics/log/joint_log_table.h"
+#include "kinematics/log/tool_table.h"
 #include "kinematics/mat/mat_log.h"
 
 namespace kinescope::recorded {
@@ -24,7 +26,9 @@ LogTable read_log_table(const std::filesystem::path& path) {
     mat::LogTable read = mat::joint_table(path);
     return {std::move(read.table), std::move(read.warnings), {}};
   }
-  return {read_csv(path, RaggedRows::kSetAside), {}, {}};
+  CsvTable table = read_csv(path, RaggedRows::kSetAside);
+  std::vector<std::string> said = make_time_plain(table);
+  return {with_log_names(std::move(table)), std::move(said), {}};
 }
 
 JointLog read_joint_log(const std::filesystem::path& path,
@@ -60,7 +64,16 @@ TorqueColumns torque_columns(const std::filesystem::path& log, const std::string
     const auto [position, effort] = datasets::torque_names(*dataset, channel, torque);
     return {position, effort};
   }
-  return {channel, torque};
+  if (mat::is_mat(log)) return {channel, torque};
+  // As another tool named them.
+  const CsvTable table = read_csv(log, RaggedRows::kSetAside);
+  const std::vector<std::string> names = log_names(table);
+  const auto in_file = [&](const std::string& name) {
+    const auto found = std::ranges::find(names, name);
+    return found == names.end() ? name
+                                : table.header[static_cast<std::size_t>(found - names.begin())];
+  };
+  return {in_file(channel), in_file(torque)};
 }
 
 }  // namespace kinescope::recorded

@@ -92,7 +92,7 @@ TEST(Inspect, NamesEveryProblemAndEndsWithThree) {
   const RecordingFolder folder;
   folder.write("video.mp4", "no video")
       .write("tags.yaml", "family: tag99\n")
-      .write("joints.csv", "t a\n0 1\n");
+      .write("joints.csv", "t a b\n0 1\n");
   const Inspection inspection = inspect_recording(folder.paths());
   EXPECT_FALSE(inspection.ready());
   EXPECT_TRUE(says(inspection.findings, "'tag99' is not known")) << all(inspection.findings);

@@ -146,7 +146,7 @@ TEST_F(ReadRecording, JointLogsRefused) {
             std::string::npos);
   EXPECT_NE(with("joints.csv", "t,a\n0,1\n1,nan\n").find("joints.csv:3: column 'a' holds 'nan'"),
             std::string::npos);
-  EXPECT_NE(with("joints.csv", "t a\n0 1\n").find("joints.csv:1: columns are separated by ' '"),
+  EXPECT_NE(with("joints.csv", "t a b\n0 1\n").find("joints.csv:1: columns are separated by ' '"),
             std::string::npos);
   EXPECT_NE(with("joints.csv", "t,a,a\n0,1,1\n").find("joints.csv:1: two columns are named 'a'"),
             std::string::npos);

@@ -212,6 +212,40 @@ TEST(Bag, NothingIsLeftBesideADatabase) {
   EXPECT_EQ(count(), before);
 }
 
+// The first database of the folder, `kept` of its pages, by itself.
+fs::path cut_database(const std::string& name, std::size_t kept, bool of_changes = false) {
+  constexpr std::size_t kPage = 1024;
+  std::ifstream stream(kData / "joints_sqlite3" / "joints_sqlite3_0.db3", std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (of_changes) bytes[18] = bytes[19] = 2;
+  const fs::path folder = truth::temporary_path(name);
+  fs::create_directories(folder);
+  std::ofstream(folder / "r.db3", std::ios::binary)
+      << bytes.substr(0, std::min(bytes.size(), kept * kPage));
+  return folder / "r.db3";
+}
+
+TEST(Bag, ADatabaseThatIsCutOffIsReadUpToThere) {
+  const Contents whole = read_contents(cut_database("whole_db", 1000));
+  EXPECT_TRUE(whole.warnings.empty());
+  const Contents cut = read_contents(cut_database("cut_db", 8));
+  ASSERT_FALSE(cut.joints.empty());
+  EXPECT_FALSE(cut.joints.front().times_s.empty());
+  EXPECT_LT(cut.joints.front().times_s.size(), whole.joints.front().times_s.size());
+  ASSERT_FALSE(cut.warnings.empty());
+  EXPECT_NE(cut.warnings.front().find("the file is cut off"), std::string::npos);
+}
+
+TEST(Bag, ChangesThatWereNotCopiedAreMissed) {
+  const fs::path file = cut_database("changes_db", 1000, true);
+  const Contents contents = read_contents(file);
+  ASSERT_EQ(contents.warnings.size(), 1U);
+  EXPECT_NE(contents.warnings[0].find("r.db3-wal, which is not there"), std::string::npos)
+      << contents.warnings[0];
+  std::ofstream(file.parent_path() / "metadata.yaml") << "ended: well\n";
+  EXPECT_TRUE(read_contents(file).warnings.empty());
+}
+
 TEST(Bag, SourceNamesATopic) {
   const fs::path file = truth::temporary_path("named.mcap");
   truth::BagWriter(file).finish();

@@ -63,7 +63,7 @@ TEST(JointLog, RefusesWithLineAndRemedy) {
   EXPECT_NE(refusal("t,tau1\n0,1\n").find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,x\n0,1\n", {"x"}).find("no joint channel"), std::string::npos);
   EXPECT_NE(refusal("t,a,a\n0,1,2\n").find("two columns"), std::string::npos);
-  EXPECT_NE(refusal("t a\n0 1\n").find("separated by ' '"), std::string::npos);
+  EXPECT_NE(refusal("t a b\n0 1\n").find("separated by ' '"), std::string::npos);
   EXPECT_NE(refusal("").find("is empty"), std::string::npos);
 }
 
