@@ -150,11 +150,12 @@ TEST_F(ReadRecording, JointLogsRefused) {
             std::string::npos);
   EXPECT_NE(with("joints.csv", "t,a,a\n0,1,1\n").find("joints.csv:1: two columns are named 'a'"),
             std::string::npos);
-  EXPECT_EQ(with("joints.csv", "t,a\n10,1\n12,1\n"),
-            "joints.csv: runs from 10.000 to 12.000 s and poses.csv from 0.000 to 2.000 s: no "
-            "common time (use one "
-            "clock for both; of a video, video_start in recording.yaml is the log's time at its "
-            "first frame)");
+  EXPECT_EQ(
+      with("joints.csv", "t,a\n10,1\n12,1\n"),
+      "joints.csv: runs from 10.000 to 12.000 s and poses.csv from 0.000 to 2.000 s: no "
+      "common time (use one clock for both; if both began together, add 10.000 s to the times "
+      "of poses.csv: of a video by video_start in recording.yaml, the log's time at its first "
+      "frame)");
 }
 
 TEST_F(ReadRecording, WhatIsNamedLikeAFileAndIsNone) {
