@@ -255,7 +255,7 @@ std::vector<LyingInput> lying_logs() {
                 }),
        kRun,
        3,
-       {"joints.csv:2: column 't' holds '2024-01-01T00:00:00.000'", "write times in s"},
+       {"joints.csv: runs from 1704067200.000", "no common time", "add 1704067200.000 s"},
        {"remove the line"}},
       {"LogWithoutTimes",
        poses,
