@@ -104,10 +104,10 @@ FittedTorque TorqueFitter::fitted() const {
 
 Eigen::MatrixXd TorqueFitter::own_prior() const {
   const Eigen::Index n = own_parameters() + effect_parameters_;
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
-  out.diagonal().head(base_values_.size()).setConstant(kBasePrior);
-  out.diagonal().segment(base_values_.size(), free_widths()).setConstant(kWidthPrior);
-  return out;
+  Eigen::VectorXd of_each = Eigen::VectorXd::Zero(n);
+  of_each.head(base_values_.size()).setConstant(kBasePrior);
+  of_each.segment(base_values_.size(), free_widths()).setConstant(kWidthPrior);
+  return of_each.asDiagonal();
 }
 
 /// A width that would leave its range stays at its end.
