@@ -2,15 +2,14 @@
 #include "app/explain/explainer.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "app/explain/doubted_sight.h"
+#include "app/explain/fit_nominal.h"
 #include "app/explain/moving_camera.h"
 #include "app/explain/see_cameras.h"
 #include "app/explain/see_recordings.h"
@@ -173,7 +172,18 @@ class Explainer {
     lap("structure");
     out.nominal_faults = std::move(checked.faults);
     out.start = std::move(checked.start);
-    fit_levels(out);
+    NominalFit fitted = fit_nominal(
+        evidence_.observed.measurements, options_.free,
+        [&](FreeGeometry free) {
+          Calibration plain = calibrated(out.start, free);
+          lap("calibrate");
+          return plain;
+        },
+        [&](FreeGeometry free, const Calibration& plain) {
+          return closed_loop(out.start, free, plain, {});
+        });
+    out.fitted = std::move(fitted.best);
+    out.levels = std::move(fitted.levels);
     return out;
   }
 
@@ -182,41 +192,6 @@ class Explainer {
     options.free = free;
     return calibrate(evidence_.observed.measurements, recording().markers, recording().log, start,
                      options, options_.progress);
-  }
-
-  // How much of a nominal robot is free: all levels are rivals. Effects are looked for beside the
-  // freest, and beside the one that predicts best without any.
-  void fit_levels(Explanation& out) const {
-    using enum FreeGeometry;
-    const Measurements& measurements = evidence_.observed.measurements;
-    constexpr std::array kLevels{kPlacement, kOffsets, kGeometry};
-    std::vector<Calibration> plain;
-    std::vector<LevelFit> fits;
-    for (const FreeGeometry free : kLevels) plain.push_back(calibrated(out.start, free));
-    for (std::size_t k = 0; k < plain.size(); ++k) fits.push_back({kLevels[k], 0, &plain[k]});
-    lap("calibrate");
-    std::set<std::size_t> levels = {static_cast<std::size_t>(options_.free.value_or(kGeometry))};
-    if (!options_.free) levels.insert(best_level(fits, measurements));
-    struct TracedLevel {
-      std::size_t row;  // of `fits`
-      TracedCalibration whole;
-    };
-    std::vector<TracedLevel> traced;
-    traced.reserve(levels.size());
-    std::vector<LevelFit> rivals;
-    for (const std::size_t level : levels) {
-      traced.push_back({level, closed_loop(out.start, kLevels[level], plain[level], {})});
-      auto& [row, whole] = traced.back();
-      if (!whole.effects.empty()) {
-        row = fits.size();
-        fits.push_back(
-            {kLevels[level], static_cast<int>(whole.effects.size()), &whole.calibration});
-      }
-      rivals.push_back(fits[row]);
-    }
-    TracedLevel& best = traced[best_level(rivals, measurements)];
-    out.levels = compare_levels(fits, best.row, measurements);
-    out.fitted = std::move(best.whole);
   }
 
   [[nodiscard]] TracedCalibration closed_loop(const CalibrationStart& start, FreeGeometry free,
