@@ -216,6 +216,15 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
     }
     out.push_back(std::move(place));
   }
+  // One that sways, or creeps as no drift does; a shift of it looks like a turn.
+  const bool alone = world.cameras.size() <= 1 && !world.is_carried;
+  for (int axis = 0; alone && axis < 3; ++axis) {
+    Correction turn;
+    turn.part = CorrectedPart::kCamera;
+    turn.direction = Vector6d::Unit(axis);
+    out.push_back({fmt::format("camera-to-base pose about {}", "xyz"[axis]), "rad",
+                   carriers.add(turn), 0.0, 0.0});
+  }
   for (const int marker : world.seen) {
     const Marker& m = world.tree.markers[static_cast<std::size_t>(marker)];
     for (int axis = 0; axis < 2; ++axis) {

@@ -88,7 +88,8 @@ TracedFit TorqueFitter::read_back(bool converged) const {
   for (const Eigen::Index row : parts_.motion->kept()) {
     linear.fold.push_back(parts_.fold[static_cast<std::size_t>(row)]);
   }
-  linear.noise = noise_at_most(*parts_.motion, residual(), parts_.base.sigma).replicate(instants_, 1);
+  linear.noise =
+      noise_at_most(*parts_.motion, residual(), parts_.base.sigma).replicate(instants_, 1);
   linear.unit = parts_.base.sigma.replicate(instants_, 1);
   linear.unit_name = parts_.context.torque_unit == "Nm" ? "N m" : parts_.context.torque_unit;
   const Eigen::VectorXi trajectory = parts_.motion->samples().trajectory(parts_.motion->kept());

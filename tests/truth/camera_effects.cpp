@@ -43,6 +43,16 @@ struct Slip {
   Pose T_before_after;
 };
 
+struct Sway {
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rad, amplitude
+  double omega = 1.0;                                  ///< rad/s
+  [[nodiscard]] Pose at(double t_s) const {
+    Pose T;
+    T.rotation = exp_rotation(rotation * std::sin(omega * t_s));
+    return T;
+  }
+};
+
 // Creeps towards another place.
 struct Drift {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rad, at the last frame
@@ -98,6 +108,7 @@ struct Undeclared {
   double reference_row = 0.0;
   std::optional<Bump> bump;
   std::optional<Drift> drift;
+  std::optional<Sway> sway;
   Growth growth;
   std::optional<Chequer> chequer;
   std::optional<Ripple> ripple;
@@ -134,6 +145,11 @@ Bump bump_of(const InjectedEffect& effect, double time_s, Rng& rng) {
 Drift drift_of(const InjectedEffect& effect, double time_constant_s, double last_s, Rng& rng) {
   const Eigen::Vector3d axis = axis_across(rng);
   return {axis * effect.size, rng.unit3() * kBumpLever, time_constant_s, last_s};
+}
+
+Sway sway_of(const InjectedEffect& effect, Rng& rng) {
+  const Eigen::Vector3d axis = axis_across(rng);
+  return {axis * effect.size, kTwoPi * effect.detail};
 }
 
 Ripple ripple_of(const InjectedEffect& effect, Rng& rng) {
@@ -203,6 +219,8 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out
     out.bump = bump_of(effect, time_s, rng);
   } else if (effect.effect == "camera_drift") {
     out.drift = drift_of(effect, time_s, robot.last_frame_s, rng);
+  } else if (effect.effect == "own_sway") {
+    out.sway = sway_of(effect, rng);
   } else if (effect.effect == "thermal_growth") {
     out.growth = {effect.size, time_s, robot.last_frame_s};
   } else if (effect.effect == "own_chequer") {
@@ -267,6 +285,7 @@ class Eye {
     Pose T = robot_.T_camera_base * T_base_marker;
     if (un_.bump && t_s >= un_.bump->time_s) T = un_.bump->T_new_old * T;
     if (un_.drift) T = un_.drift->at(t_s) * T;
+    if (un_.sway) T = un_.sway->at(t_s) * T;
     const auto slip = un_.slips.find(marker.id);
     if (slip != un_.slips.end() && t_s >= slip->second.time_s) T = T * slip->second.T_before_after;
     return T;

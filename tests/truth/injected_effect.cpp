@@ -60,9 +60,9 @@ constexpr std::array<Strength, 33> kWeakest{{
 }};
 
 constexpr std::array<std::string_view, 19> kOnJoints{
-    "encoder_scale", "eccentricity", "gear_error",  "backlash",      "compliance",
-    "coupling",      "helical",      "axis_wobble", "curved_slider", "zero_jump",
-    "zero_drift",    "own_tanh",     "own_speed",   "own_product",   "own_acceleration",
+    "encoder_scale", "eccentricity", "gear_error",   "backlash",      "compliance",
+    "coupling",      "helical",      "axis_wobble",  "curved_slider", "zero_jump",
+    "zero_drift",    "own_tanh",     "own_speed",    "own_product",   "own_acceleration",
     "own_vibration", "own_creep",    "quantisation", "own_cubic"};
 constexpr std::array<std::string_view, 4> kAtATime{"tag_slip", "camera_bump", "zero_jump",
                                                    "clock_jump"};

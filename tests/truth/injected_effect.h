@@ -61,6 +61,7 @@ namespace kinescope::truth {
 ///                    size x (its value / reach) x (value of `with` / reach)
 ///   own_acceleration true value of `place` += size x acceleration of `with` / its largest
 ///   own_vibration    rad (m) amplitude; detail: Hz
+///   own_sway         rad, amplitude of the camera's turn; detail: Hz; not drawn at random
 ///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
 ///                    and before, fading - its value) / reach
 struct InjectedEffect {

@@ -75,6 +75,20 @@ TEST(TraceCalibration, ACubicIsAMapAndNoEffectsThatCancel) {
             kWithoutAfterOverClean * clean_trace().trace.held_out_after.value);
 }
 
+// A tripod on a floor that shakes: no joint vibrates.
+TEST(TraceCalibration, ACameraThatSwaysIsNoJoint) {
+  constexpr double kSize = 1e-3;  // rad
+  const World world = make_effect_world(filmed({{"own_sway", "camera", kSize, 1.7}}, 400));
+  const Trace trace = trace_of(world).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  ASSERT_FALSE(trace.rest.empty());
+  for (const Rest& rest : trace.rest) {
+    EXPECT_TRUE(rest.place.starts_with("camera-to-base pose about ")) << rest.place;
+    EXPECT_EQ(rest.covariate, "phase of a vibration of 1.7 Hz");
+  }
+}
+
 TEST(TraceCalibration, GravityIsToldBesideACurve) {
   const World world = make_effect_world(filmed({strong("compliance", "q2")}));
   CalibrationTraceOptions options;

@@ -42,7 +42,8 @@ TEST(Csv, RefusesWithPlaceAndRemedy) {
   EXPECT_EQ(parse_refusal(""), "a.csv: is empty (record it again)");
   EXPECT_EQ(parse_refusal("\n# only this\n"), "a.csv: is empty (record it again)");
   EXPECT_EQ(parse_refusal("t,x\n"), "a.csv: has a header but no rows (record it again)");
-  EXPECT_EQ(parse_refusal("t x\n1 2\n"),
+  EXPECT_EQ(parse_refusal("t x\n1 2\n"), "accepted");
+  EXPECT_EQ(parse_refusal("t x\n1 2 3\n"),
             "a.csv:1: columns are separated by ' ' (separate them by commas, with a point in "
             "decimal numbers)");
   EXPECT_NE(parse_refusal("t;x\ty\n1;2\t3\n").find("by ';' or by tabs"), std::string::npos);
