@@ -341,6 +341,16 @@ std::vector<double> residual_components(MeasurementKind kind, const SightingResi
   return components;
 }
 
+namespace {
+
+// Axes that are held as drawn are not known the better for it.
+bool is_geometry_free(const RunSummary& run) {
+  const auto level = std::ranges::find_if(run.levels, &FreedomLevel::exported);
+  return level == run.levels.end() || level->free == FreeGeometry::kGeometry;
+}
+
+}  // namespace
+
 Analysis analyse(const RunSummary& run) {
   Analysis analysis;
   std::set<TagId> seen;
@@ -352,6 +362,8 @@ Analysis analyse(const RunSummary& run) {
   add_time_dependence(run, analysis);
   std::ranges::stable_sort(analysis.dependence, std::greater{}, &Dependence::explained);
   analysis.image_coverage = image_coverage(analysis, run.calibration.camera);
+  if (run.calibration.status == CalibrationStatus::kConverged && is_geometry_free(run))
+    analysis.tip = tip_uncertainty(run.calibration);
   std::set<int> frames;
   for (const SightingResidual& sighting : run.calibration.residuals) frames.insert(sighting.frame);
   analysis.independent_frames = static_cast<int>(

@@ -20,6 +20,7 @@
 #include <Eigen/Core>
 
 #include "app/report/run_summary.h"
+#include "app/report/tip_uncertainty.h"
 
 namespace kinescope::report {
 
@@ -68,6 +69,8 @@ struct Analysis {
   double outside_two_sigma = 0.0;  ///< fraction of the components beyond two of their rms
   double image_coverage = 0.0;     ///< fraction of an 8 x 6 grid over the image that holds a corner
   int independent_frames = 0;      ///< frames over the correlation time
+  /// Nothing where there is none, the fit did not converge, or a nominal robot's axes are held.
+  std::optional<TipUncertainty> tip;
 };
 
 /// Bins of (variable, value) pairs with equal counts. Fewer bins where the data are few.

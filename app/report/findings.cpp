@@ -84,7 +84,7 @@ void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
   const double ratio = held_out_ratio(run.calibration);
   if (ratio == 0.0) {
     findings.push_back({kNoCheck, "The error on unseen data is not known: nothing was held out.",
-                        "Record more postures, so that some can be held out."});
+                        "Record more postures, so that some can be held out.", true});
   } else if (const auto alone =
                  ratio > kRatioLimit ? lone_posture(run.calibration) : std::nullopt) {
     findings.push_back({kUnseen, words_of(*alone, run),
@@ -105,7 +105,8 @@ void add_held_out(const RunSummary& run, std::vector<Finding>& findings) {
                      "postures, not the measuring noise, limit the accuracy.",
                      ratio),
          "Record postures spread over the whole range of every joint, several of them moving at "
-         "once."});
+         "once.",
+         true});
   }
 }
 
@@ -176,7 +177,7 @@ void add_noise(const RunSummary& run, const Analysis& analysis, std::vector<Find
                           text_with_unit(calibration.correlation_time_s, Quantity::kTime));
     }
     findings.push_back(
-        {kModelError * 0.25, what + ".", "Record longer, with more different postures."});
+        {kModelError * 0.25, what + ".", "Record longer, with more different postures.", true});
   }
 }
 
@@ -229,7 +230,7 @@ void add_small_travel(const RunSummary& run, const Analysis& analysis,
         "number of independent frames ({} now).",
         analysis.independent_frames);
   }
-  findings.push_back({small ? kModelError * 0.5 : kAdvice, what, remedy});
+  findings.push_back({small ? kModelError * 0.5 : kAdvice, what, remedy, true});
 }
 
 void add_poor_markers(const RunSummary& run, std::vector<Finding>& findings) {

@@ -12,9 +12,10 @@
 namespace kinescope::report {
 
 struct Finding {
-  double weight = 0.0;  ///< orders the findings; no other meaning
-  std::string what;     ///< one sentence with its number
-  std::string remedy;   ///< one sentence; may be empty
+  double weight = 0.0;         ///< orders the findings; no other meaning
+  std::string what;            ///< one sentence with its number
+  std::string remedy;          ///< one sentence; may be empty
+  bool asks_postures = false;  ///< the remedy is other postures, which `plan` can choose
 };
 
 /// At least one: where nothing limits the model, the noise of the measurement does.

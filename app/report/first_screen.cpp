@@ -20,7 +20,7 @@ std::string names_of(const std::vector<TracedEffect>& effects) {
   std::vector<std::string> names;
   for (const TracedEffect& effect : effects) {
     names.push_back(effect.is_curve() ? "what repeats with the value of " + effect.id.place
-                                      : fmt::format("{} at {}", effect.id.effect, effect.id.place));
+                                      : plain_name(effect.id));
   }
   return joined(names);
 }
@@ -95,7 +95,9 @@ std::string interval_words(const Facts& facts, const Figure& figure) {
                      text_with_unit(value * of.interval.high, figure.quantity));
 }
 
-std::string merit(const Facts& facts) {
+// The error that the fit made of what it has not seen; `css_class`: "merit" where it is the page's
+// own figure, "check" beside one that says more.
+std::string check(const Facts& facts, std::string_view css_class) {
   const std::optional<Figure> figure = figure_of_merit(facts);
   if (!figure) return "";
   const MeasurementKind kind = facts.run.calibration.kind;
@@ -104,9 +106,73 @@ std::string merit(const Facts& facts) {
   of += figure->held_out ? " that the fit has not seen" : " in the data of the fit itself";
   if (figure->quantity == Quantity::kLength && kind == MeasurementKind::kCorners)
     of += ", across the line of sight";
-  return fmt::format("<p class=\"merit\"><b>{}</b><span>rms error of {}{}</span></p>\n",
+  return fmt::format("<p class=\"{}\"><b>{}</b><span>rms error of {}{}</span></p>\n", css_class,
                      inline_number(facts.result, figure->pointer, figure->quantity), of,
                      escaped(interval_words(facts, *figure)));
+}
+
+// "2.9 mm, 0.19°" of the result's tip; `prefix`: "" or "among_".
+std::string tip_numbers(const Facts& facts, std::string_view prefix) {
+  const std::string rotation = fmt::format("/tip/{}rotation_expanded_rad", prefix);
+  std::string text = inline_uncertainty(
+      facts.result, fmt::format("/tip/{}translation_expanded_m", prefix), Quantity::kLength);
+  if (number_at(facts.result, rotation))
+    text += ", " + inline_uncertainty(facts.result, rotation, Quantity::kAngle);
+  return text;
+}
+
+// The answer to "how exactly does the URDF say where the last link is".
+std::string tip_merit(const Facts& facts, const TipUncertainty& tip) {
+  const KinematicTree& tree = facts.run.calibration.tree;
+  const std::string base = base_words(tree);
+  std::string out = fmt::format(
+      "<p class=\"merit\"><b>{}</b><span>how exactly the URDF says where the last link is: {} on "
+      "{} "
+      "in the frame of {}, expanded uncertainty (k = 2) over the postures of the "
+      "recording{}</span></p>\n",
+      tip_numbers(facts, ""), escaped(marker_name(tip.marker)),
+      escaped(tree.links[tip.link.index()].name), escaped(base),
+      is_model_short(facts.run) ? "; what the model lacks comes on top" : "");
+  if (!is_base_apart(tip)) return out;
+  return out + fmt::format(
+                   "<p class=\"check\"><b>{}</b><span>the same with the base placed anew: most of "
+                   "the above is how {} is turned and placed</span></p>\n",
+                   tip_numbers(facts, "among_"), escaped(base));
+}
+
+std::string merit(const Facts& facts) {
+  const std::optional<TipUncertainty>& tip = facts.analysis.tip;
+  if (!tip) return check(facts, "merit");
+  return tip_merit(facts, *tip) + check(facts, "check");
+}
+
+// What the answer does not rest on, and what the readers of the files said.
+std::string rejections(const Facts& facts) {
+  const nlohmann::json& calibration = facts.result.at("calibration");
+  const int rejected = calibration.at("sightings_rejected").get<int>();
+  std::vector<std::string> parts;
+  if (rejected > 0) {
+    const int seen = rejected + calibration.at("sightings_used").get<int>();
+    parts.push_back(fmt::format("{} of {} sightings as outliers of the fit", rejected, seen));
+  }
+  for (const auto& [reason, count] : facts.run.rejected)
+    parts.push_back(fmt::format("{} detection{}: {}", count, count == 1 ? "" : "s", reason));
+  std::string out;
+  if (!parts.empty()) {
+    std::string words;
+    for (const std::string& part : parts) words += (words.empty() ? "" : "; ") + part;
+    out += "<p class=\"next\"><b>Rejected</b> " + escaped(words) + ".</p>\n";
+  }
+  if (facts.run.warnings.empty()) return out;
+  constexpr std::size_t kMostWarnings = 3;  // the others stand under data quality
+  const std::vector<std::string>& warnings = facts.run.warnings;
+  out += "<ul class=\"warned\">\n";
+  for (std::size_t k = 0; k < std::min(kMostWarnings, warnings.size()); ++k)
+    out += "<li>" + escaped(warnings[k]) + "</li>\n";
+  if (warnings.size() > kMostWarnings)
+    out +=
+        fmt::format("<li>and {} more under data quality</li>\n", warnings.size() - kMostWarnings);
+  return out + "</ul>\n";
 }
 
 // What was found, with the error on unseen data without and with it.
@@ -167,11 +233,12 @@ std::string first_screen(const Facts& facts, std::string_view lights) {
   // Of what is no answer, no figure stands out and nothing is ticked.
   const bool answer = is_answer(facts);
   return fmt::format(
-      "<p class=\"headline\">{}</p>\n<div class=\"first\">\n<div class=\"said\">\n{}{}{}"
+      "<p class=\"headline\">{}</p>\n<div class=\"first\">\n<div class=\"said\">\n{}{}{}{}"
       "<p class=\"next\"><b>What to record next</b> {}</p>\n</div>\n<div class=\"shown\">\n{}"
       "<div id=\"viewer-still\">{}</div>\n{}</div>\n</div>\n",
       escaped(headline(facts)), answer ? merit(facts) : "", answer ? lights : "", gains(facts),
-      escaped(facts.verdict.next), viewer_panel(), robot_still(facts), film(facts));
+      rejections(facts), with_code(facts.verdict.next), viewer_panel(), robot_still(facts),
+      film(facts));
 }
 
 }  // namespace kinescope::report

@@ -41,6 +41,39 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
+std::string with_code(std::string_view text) {
+  std::string out;
+  bool in_code = false;
+  for (std::size_t from = 0;;) {
+    const std::size_t tick = text.find('`', from);
+    out += escaped(text.substr(from, tick - from));
+    if (tick == std::string_view::npos) break;
+    in_code = !in_code;
+    out += in_code ? "<code>" : "</code>";
+    from = tick + 1;
+  }
+  return in_code ? out + "</code>" : out;
+}
+
+std::string folded(std::string section) {
+  static constexpr std::string_view kTitleEnd = "</h2>", kEnd = "</section>";
+  const std::size_t title = section.find("<h2>");
+  const std::size_t title_end = section.find(kTitleEnd, title);
+  const std::size_t end = section.rfind(kEnd);
+  if (title == std::string::npos || title_end == std::string::npos || end == std::string::npos)
+    return section;
+  section.insert(end, "</details>");
+  section.insert(title_end + kTitleEnd.size(), "</summary>");
+  section.insert(title, "<details class=\"fold tests\"><summary>");
+  return section;
+}
+
+std::string folded_part(std::string_view summary, std::string_view content) {
+  if (content.empty()) return "";
+  return fmt::format("<details class=\"tests\"><summary>{}</summary>{}</details>\n",
+                     escaped(summary), content);
+}
+
 std::string paragraph(std::string_view text, std::string_view css_class) {
   if (css_class.empty()) return fmt::format("<p>{}</p>\n", escaped(text));
   return fmt::format("<p class=\"{}\">{}</p>\n", css_class, escaped(text));
@@ -65,6 +98,14 @@ std::string inline_number(const nlohmann::json& result, const std::string& point
   if (!found) return "not known";
   return fmt::format("<span{}>{}</span>", key_attributes(pointer, quantity),
                      text_with_unit(*found, quantity));
+}
+
+std::string inline_uncertainty(const nlohmann::json& result, const std::string& pointer,
+                               Quantity quantity) {
+  const std::string_view unit = display_unit(quantity).text;
+  return fmt::format("<span{}>{}{}{}</span>", key_attributes(pointer, quantity),
+                     uncertainty_text(number_at(result, pointer), quantity),
+                     quantity == Quantity::kAngle ? "" : " ", unit);
 }
 
 Table::Table(std::string_view id, std::string_view caption, const nlohmann::json& result)

@@ -16,6 +16,13 @@ namespace kinescope::report {
 
 /// clean_text() with & < > " ' escaped: safe as content and inside a quoted attribute.
 [[nodiscard]] std::string escaped(std::string_view text);
+/// escaped(), with what stands between backticks as <code>.
+[[nodiscard]] std::string with_code(std::string_view text);
+/// A section (<section ..><h2>..</h2>..</section>) that opens at its title, without a script;
+/// printed in full. Empty stays empty.
+[[nodiscard]] std::string folded(std::string section);
+/// The content behind one line; nothing where it is empty.
+[[nodiscard]] std::string folded_part(std::string_view summary, std::string_view content);
 /// <p class="..">text</p>, the text escaped.
 [[nodiscard]] std::string paragraph(std::string_view text, std::string_view css_class = "");
 /// <figure> with its caption; the drawing is HTML already, the caption is text.
@@ -58,5 +65,8 @@ class Table {
 /// A number in running text: <span data-key=..>value unit</span>.
 [[nodiscard]] std::string inline_number(const nlohmann::json& result, const std::string& pointer,
                                         Quantity quantity);
+/// The same of an expanded uncertainty, two digits.
+[[nodiscard]] std::string inline_uncertainty(const nlohmann::json& result,
+                                             const std::string& pointer, Quantity quantity);
 
 }  // namespace kinescope::report

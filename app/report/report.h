@@ -71,6 +71,10 @@ struct Verdict {
 ///                  intrinsics {model, width, height, estimated, values [name, unit, value,
 ///                  expanded]}}, parameters [name, block, unit, value, sigma, sigma_white,
 ///                  expanded] (a pose: translation_m, quaternion_wxyz, rpy_rad as in URDF)
+///   tip            null, or where the last link is: marker, link, joints (that move it),
+///                  translation_expanded_m, rotation_expanded_rad in the base's frame, rms over the
+///                  recorded postures, worst_translation_expanded_m of them; the first two as
+///                  among_* with the base placed anew
 ///   errors         all, links [], markers []: name and {before, training, held_out}_{px, m, rad},
 ///   each
 ///                  count, rms, median, p95, max of the error's length (count 0: nothing else)

@@ -256,6 +256,21 @@ json error_json(const TypicalError& error) {
   return {{"px", number(error.px)}, {"m", number(error.m)}, {"rad", number(error.rad)}};
 }
 
+json tip_json(const RunSummary& run, const std::optional<TipUncertainty>& tip) {
+  if (!tip) return nullptr;
+  const auto& links = run.calibration.tree.links;
+  return {{"marker", tip->marker.value},
+          {"link", text(links[tip->link.index()].name)},
+          {"joints", tip->joints},
+          {"translation_expanded_m", expanded(tip->in_base.translation_m)},
+          {"rotation_expanded_rad", expanded(tip->in_base.rotation_rad)},
+          {"worst_translation_expanded_m", expanded(tip->worst_m)},
+          {"among_translation_expanded_m",
+           tip->among ? expanded(tip->among->translation_m) : json(nullptr)},
+          {"among_rotation_expanded_rad",
+           tip->among ? expanded(tip->among->rotation_rad) : json(nullptr)}};
+}
+
 json nominal_faults_json(const RunSummary& run) {
   json list = json::array();
   for (const NominalFault& fault : run.nominal_faults) {
@@ -310,6 +325,7 @@ json make_result(const RunSummary& run, const Analysis& analysis, const Verdict&
            {"nominal_faults", nominal_faults_json(run)},
            {"nominal_levels", nominal_levels_json(run)},
            {"calibration", calibration_json(run)},
+           {"tip", tip_json(run, analysis.tip)},
            {"errors", errors_json(run.errors)},
            {"trace", run.trace ? trace_json(*run.trace) : json(nullptr)},
            {"residuals", residuals_json(analysis, run.calibration.kind)},

@@ -106,7 +106,7 @@ std::string residual_light(const Trace& trace, double sigma_scale) {
 }
 
 std::string verdict_line(std::string_view label, std::string_view words) {
-  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", label, escaped(words));
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", label, with_code(words));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "app/report/findings.h"
 #include "app/report/html.h"
 #include "app/report/sections.h"
 #include "app/report/torque_sections.h"
@@ -29,14 +30,37 @@ std::string findings_table(const TorqueFacts& facts) {
 
 }  // namespace
 
+namespace {
+
+std::string torque_line(std::string_view label, std::string_view words) {
+  if (words.empty()) return "";
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", label, with_code(words));
+}
+
+// What of the log was not used, and what is wrong with it.
+std::string log_words(const TorqueSummary& summary) {
+  std::string out =
+      fmt::format("{} of {} rows used", summary.data.rows_used, summary.data.rows_read);
+  for (const LogFinding& finding : summary.data.findings)
+    out +=
+        fmt::format("; {}{}", finding.channel.empty() ? "" : finding.channel + ": ", finding.what);
+  out += ".";
+  for (const std::string& warning : summary.warnings) out += " " + sentence(warning);
+  return out;
+}
+
+}  // namespace
+
 std::string torque_verdict_section(const TorqueFacts& facts) {
   const TorqueVerdict verdict = torque_verdict(facts.summary);
   const std::string traced = facts.summary.trace ? trace_paragraph(*facts.summary.trace) : "";
-  return section_head("verdict", "Verdict") + paragraph(verdict.found) +
-         paragraph(verdict.accurate) + paragraph(verdict.limits) +
-         (traced.empty() ? "" : paragraph(traced)) +
-         (verdict.payload.empty() ? "" : paragraph(verdict.payload)) +
-         (verdict.gravity.empty() ? "" : paragraph(verdict.gravity)) + "</section>\n";
+  return section_head("verdict", "Verdict") +
+         (verdict.accurate.empty() ? "" : paragraph(verdict.accurate, "headline")) +
+         "<dl class=\"verdict\">\n" + torque_line("Found", verdict.found) +
+         torque_line("Log", log_words(facts.summary)) + torque_line("Beyond rigid bodies", traced) +
+         torque_line("What limits it", verdict.limits) +
+         torque_line("Forward in time", verdict.rollout) + torque_line("Payload", verdict.payload) +
+         torque_line("Gravity", verdict.gravity) + "</dl></section>\n";
 }
 
 std::string torque_data_section(const TorqueFacts& facts) {

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <numeric>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -161,6 +165,64 @@ std::string prediction_plot(const TorqueSummary& summary, Eigen::Index joint) {
                 "wide");
 }
 
+// Joints by what the model leaves of their torque's variance; those without variance last.
+std::vector<Eigen::Index> worst_first(const TorqueSummary& summary) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(summary.test.joints()));
+  std::iota(out.begin(), out.end(), Eigen::Index{0});
+  const Eigen::VectorXd& nmse = summary.scores[static_cast<std::size_t>(summary.best)].nmse_percent;
+  std::ranges::stable_sort(out, std::greater{}, [&](Eigen::Index j) {
+    return j < nmse.size() && std::isfinite(nmse[j]) ? nmse[j] : -1.0;
+  });
+  return out;
+}
+
+std::string further_scores(const TorqueFacts& facts, const std::string& by_lot) {
+  return score_table(facts, "left-out-table", "nMSE on motion left out of the training, %",
+                     "left_out_nmse_percent", Quantity::kPlain) +
+         score_table(
+             facts, "rms-table",
+             fmt::format("Rms error, {}{}",
+                         common_unit(facts.summary.train.torque_unit, facts.summary.types), by_lot),
+             "rms", Quantity::kPlain) +
+         score_table(facts, "coverage90-table", "Coverage of the 90 % band, %" + by_lot,
+                     "coverage_90", Quantity::kPercent) +
+         score_table(facts, "coverage95-table", "Coverage of the 95 % band, %" + by_lot,
+                     "coverage_95", Quantity::kPercent);
+}
+
+std::string notes(const TorqueSummary& summary) {
+  std::string out;
+  for (const std::string& note : model_notes(summary)) out += paragraph(note, "note");
+  for (const TorqueScore& score : summary.scores) {
+    const std::string limits = band_limits(score, summary.joints);
+    if (limits.empty()) continue;
+    out += paragraph(fmt::format("Bands of {}:{}", name_of(score), limits), "note");
+  }
+  return out;
+}
+
+// What the names of the table's models stand for, those that are in it.
+std::string model_names_words(const TorqueSummary& summary) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kWords = {
+      {{"parametric", "rigid bodies with viscous and Coulomb friction"},
+       {"rbf", "Gaussian process with a squared-exponential kernel, no physics"},
+       {"gip", "Gaussian process whose kernel has the structure of rigid bodies, no masses"},
+       {"model_based", "Gaussian process on the rigid bodies' regressor"},
+       {"semi_parametric", "parametric, and a Gaussian process for what that leaves"},
+       {"lip", "Gaussian processes for the energies, torques by the Lagrange equations"},
+       {"svr", "support vectors, no physics"},
+       {"network", "two-layer network, no physics"},
+       {"traced", "parametric, with the effects that tracing found"}}};
+  std::string out;
+  for (const auto& [name, words] : kWords) {
+    const bool fitted = std::ranges::any_of(summary.scores, [&](const TorqueScore& score) {
+      return score.failure.empty() && name_of(score) == name;
+    });
+    if (fitted) out += fmt::format("{}{}: {}", out.empty() ? "" : "; ", name, words);
+  }
+  return out.empty() ? out : out + ".";
+}
+
 }  // namespace
 
 std::string torque_models_section(const TorqueFacts& facts) {
@@ -172,28 +234,15 @@ std::string torque_models_section(const TorqueFacts& facts) {
   const std::string by_lot =
       facts.summary.split_at_random ? " (samples held out by lot, which flatters)" : "";
   out += score_table(facts, "nmse-table", "nMSE, %" + by_lot, "nmse_percent", Quantity::kPlain);
-  out += score_table(facts, "left-out-table", "nMSE on motion left out of the training, %",
-                     "left_out_nmse_percent", Quantity::kPlain);
-  out += score_table(
-      facts, "rms-table",
-      fmt::format("Rms error, {}{}",
-                  common_unit(facts.summary.train.torque_unit, facts.summary.types), by_lot),
-      "rms", Quantity::kPlain);
-  out += score_table(facts, "coverage90-table", "Coverage of the 90 % band, %" + by_lot,
-                     "coverage_90", Quantity::kPercent);
-  out += score_table(facts, "coverage95-table", "Coverage of the 95 % band, %" + by_lot,
-                     "coverage_95", Quantity::kPercent);
+  out += paragraph(model_names_words(facts.summary), "note");
+  out += folded_part("Motion left out of the training, rms errors and coverage",
+                     further_scores(facts, by_lot));
   for (const TorqueScore& score : facts.summary.scores) {
     if (!score.failure.empty()) {
       out += paragraph(fmt::format("{} was not fitted: {}", name_of(score), score.failure), "note");
     }
   }
-  for (const std::string& note : model_notes(facts.summary)) out += paragraph(note, "note");
-  for (const TorqueScore& score : facts.summary.scores) {
-    const std::string limits = band_limits(score, facts.summary.joints);
-    if (limits.empty()) continue;
-    out += paragraph(fmt::format("Bands of {}:{}", name_of(score), limits), "note");
-  }
+  out += folded_part("Notes on the models and their bands", notes(facts.summary));
   return out + learning_plot(facts.summary) + "</section>\n";
 }
 
@@ -203,9 +252,14 @@ std::string torque_prediction_section(const TorqueFacts& facts) {
   out += paragraph(
       fmt::format("Predicted by the {} model.",
                   name_of(facts.summary.scores[static_cast<std::size_t>(facts.summary.best)])));
-  for (Eigen::Index j = 0; j < facts.summary.test.joints(); ++j) {
-    out += prediction_plot(facts.summary, j);
-  }
+  constexpr std::size_t kOpen = 3;  // plots that a screen holds
+  const std::vector<Eigen::Index> joints = worst_first(facts.summary);
+  std::string rest;
+  for (std::size_t k = 0; k < joints.size(); ++k)
+    (k < kOpen ? out : rest) += prediction_plot(facts.summary, joints[k]);
+  if (joints.size() > kOpen)
+    out += folded_part(
+        fmt::format("The other {} joints, which it explains better", joints.size() - kOpen), rest);
   return out + "</section>\n";
 }
 

@@ -15,6 +15,10 @@ namespace {
 
 constexpr int kVelocityBins = 24;
 constexpr std::size_t kMostListed = 120;
+constexpr std::string_view kParameterNames =
+    "m: mass; mcx, mcy, mcz: mass times the place of its centre; Ixx .. Izz: moments of inertia "
+    "about "
+    "the link's frame; motor_inertia: of rotor and gear, at the joint's side.";
 
 // Of the parametric model, which the plots show; what tracing found beside it has its own.
 double drive_value(const TorqueSummary& summary, std::string_view term, const std::string& joint) {
@@ -165,7 +169,10 @@ std::string torque_parameters_section(const TorqueFacts& facts) {
           .mean;
   out += "<div class=\"columns\">";
   for (Eigen::Index j = 0; j < summary.train.joints(); ++j) out += friction_plot(summary, j, rest);
-  return out + "</div>\n" + drive_table(facts) + parameter_table(facts) + "</section>\n";
+  return out + "</div>\n" + drive_table(facts) +
+         folded_part("Base parameters: the combinations of masses that the torques tell apart",
+                     parameter_table(facts) + paragraph(kParameterNames, "note")) +
+         "</section>\n";
 }
 
 }  // namespace kinescope::report

@@ -240,6 +240,22 @@ std::string steps_list(const Trace& trace) {
 
 }  // namespace
 
+namespace {
+
+// The first ones open: the search finds what explains most first.
+std::string effect_figures(const std::vector<TracedEffect>& effects) {
+  constexpr std::size_t kOpen = 3;  // figures that a screen holds
+  std::string open, rest;
+  for (std::size_t k = 0; k < effects.size(); ++k)
+    (k < kOpen ? open : rest) += effect_figure(effects[k]);
+  if (rest.empty()) return open;
+  return open +
+         folded_part(fmt::format("The other {} effects, before and after", effects.size() - kOpen),
+                     rest);
+}
+
+}  // namespace
+
 std::string trace_section(const Trace& trace, const std::string& further) {
   std::string out = section_head("trace", "Closing the loop");
   const std::vector<std::string> lines = trace_lines(trace);
@@ -248,7 +264,7 @@ std::string trace_section(const Trace& trace, const std::string& further) {
   if (trace.verdict == TraceVerdict::kNothingToSay) return out + "</section>\n";
   if (!further.empty()) out += paragraph(further);
   if (!trace.accepted.empty()) out += effects_table(trace);
-  for (const TracedEffect& effect : trace.accepted) out += effect_figure(effect);
+  out += effect_figures(trace.accepted);
   for (const Ambiguity& ambiguity : trace.ambiguities) out += paragraph(ambiguity_words(ambiguity));
   for (const Rest& rest : trace.rest) {
     out += paragraph(rest_words(rest));

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -148,6 +151,27 @@ std::string mass_words(const TorqueSummary& summary) {
       "The masses that these torques ask for add up to {:.3g} kg on a reach of {:.3g} m: check the "
       "unit of the torques (N m is taken; torque_unit, torque_factor) and of the lengths. ",
       mass, reach);
+}
+
+// "mcx(link2) + .." in words: what a combination is named after.
+std::string plain_parameter(const std::string& combination) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kWords = {
+      {{"m", "the mass"},
+       {"mcx", "the centre of mass along x"},
+       {"mcy", "the centre of mass along y"},
+       {"mcz", "the centre of mass along z"},
+       {"motor_inertia", "the motor inertia"},
+       {"viscous", "the viscous friction"},
+       {"coulomb", "the Coulomb friction"},
+       {"offset", "the torque offset"}}};
+  const std::size_t open = combination.find('(');
+  if (open == std::string::npos) return combination;
+  const std::string name = combination.substr(0, open);
+  const std::string place = combination.substr(open + 1, combination.find(')') - open - 1);
+  const auto found =
+      std::ranges::find(kWords, name, &std::pair<std::string_view, std::string_view>::first);
+  if (found != kWords.end()) return fmt::format("{} of {}", found->second, place);
+  return name.starts_with("I") ? fmt::format("the inertia {} of {}", name, place) : combination;
 }
 
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -309,8 +333,9 @@ TorqueVerdict torque_verdict(const TorqueSummary& summary) {
   }
   if (!found.undetermined.empty()) {
     out.limits += fmt::format(
-        "{} parameters are not moved by this motion ({}, ..): record a richer one. ",
-        found.undetermined.size(), found.names[static_cast<std::size_t>(found.undetermined[0])]);
+        "{} parameters are not moved by this motion, the first being {}: record a richer one. ",
+        found.undetermined.size(),
+        plain_parameter(found.names[static_cast<std::size_t>(found.undetermined[0])]));
   }
   if (out.limits.empty()) out.limits = "No joint stands out.";
   return out;

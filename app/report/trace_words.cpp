@@ -103,6 +103,12 @@ std::string effect_name(const TracedEffect& effect) {
   return fmt::format("{} ({} {})", name, effect.scan_name, at);
 }
 
+std::string plain_name(const EffectId& id) {
+  std::string effect = id.effect;
+  std::ranges::replace(effect, '_', ' ');
+  return fmt::format("{} at {}", effect, id.place);
+}
+
 std::string size_words(const TracedEffect& effect) {
   const AmountUnit unit = is_share(effect.id, effect.unit) ? kPercent : amount_unit(effect.unit);
   const double half = 0.5 * (effect.interval.high - effect.interval.low);

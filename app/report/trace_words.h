@@ -23,6 +23,8 @@ struct AmountUnit {
 [[nodiscard]] std::string other_sizes_words(const TracedEffect& effect);
 /// "eccentricity at ch0"; with the value of its scan: ", 1 per turn".
 [[nodiscard]] std::string effect_name(const TracedEffect& effect);
+/// "time offset at clock": the identifier as words.
+[[nodiscard]] std::string plain_name(const EffectId& id);
 /// "0.598° (0.596° to 0.600°)".
 [[nodiscard]] std::string size_words(const TracedEffect& effect);
 [[nodiscard]] std::string error_change_words(const HeldOutError& before, const HeldOutError& after);

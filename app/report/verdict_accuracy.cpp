@@ -144,7 +144,6 @@ std::string anew_words(const RunSummary& run) {
 std::string prediction_words(const RunSummary& run) {
   const ErrorRow& all = run.errors.all;
   const std::string held_out = error_words(all.held_out_px, all.held_out_m, all.held_out_rad);
-  const std::string training = error_words(all.training_px, all.training_m, all.training_rad);
   // Depth is seen far worse, and is in no figure in mm.
   const std::string_view direction =
       run.calibration.kind == MeasurementKind::kCorners ? " across the line of sight" : "";
@@ -155,8 +154,9 @@ std::string prediction_words(const RunSummary& run) {
     text = fmt::format("{} {} that the fit has not seen are predicted to {}{} (rms)", what,
                        run.log.empty() ? "in stretches of the recording" : "at postures", held_out,
                        direction);
-    if (!training.empty()) text += fmt::format("; those it has seen to {}", training);
-  } else if (!training.empty()) {
+  } else if (const std::string training =
+                 error_words(all.training_px, all.training_m, all.training_rad);
+             !training.empty()) {
     text = fmt::format("{} are reproduced to {}{} (rms), on the data of the fit itself", what,
                        training, direction);
   } else {
@@ -164,6 +164,26 @@ std::string prediction_words(const RunSummary& run) {
   }
   return text + "." + camera_words(run.calibration) + unseen_recording_words(run) +
          anew_words(run) + level_words(run);
+}
+
+// Standard uncertainties in the base, over those among the rest, from which the base is spoken of.
+constexpr double kFarLess = 2.0;
+
+/// "The URDF says where the last link is (tag_9 on link6) to 2.9 mm and 0.19° (..)."
+std::string tip_words(const RunSummary& run, const TipUncertainty& tip) {
+  const KinematicTree& tree = run.calibration.tree;
+  std::string text = fmt::format(
+      "The URDF{} says where the last link is ({} on {}) to {} in the frame of {} (expanded "
+      "uncertainty, k = 2, over the postures of the recording; {} mm at the worst).",
+      run.shown_by_log.empty() ? "" : ", with corrected joint values,", marker_name(tip.marker),
+      tree.links[tip.link.index()].name, tip_figures_words(tip.in_base), base_words(tree),
+      uncertainty_text(kCoverageFactor * tip.worst_m, Quantity::kLength));
+  if (is_base_apart(tip))
+    text += fmt::format(
+        " Most of that is how {} is turned and placed; with the base placed anew it is {}.",
+        base_words(tree), tip_figures_words(*tip.among));
+  if (is_model_short(run)) text += " What the model lacks comes on top.";
+  return text + " ";
 }
 
 double median(std::vector<double> values) {
@@ -224,7 +244,6 @@ struct Axes {
 
   /// Where the base is far less certain than the axes, it is told apart from them.
   [[nodiscard]] bool is_base_apart() const {
-    constexpr double kFarLess = 2.0;
     return in_base.directions.size() > 1 && among.directions.size() == in_base.directions.size() &&
            median(in_base.directions) > kFarLess * median(among.directions);
   }
@@ -299,9 +318,33 @@ std::string nominal_words(const RunSummary& run) {
                      after);
 }
 
-std::string accuracy_words(const RunSummary& run) {
-  return prediction_words(run) + axis_words(run) + declared_words(run.calibration) +
-         clock_words(run);
+bool is_base_apart(const TipUncertainty& tip) {
+  return tip.among && tip.in_base.translation_m > kFarLess * tip.among->translation_m;
+}
+
+std::string base_words(const KinematicTree& tree) {
+  const auto marker =
+      std::ranges::find_if(tree.markers, [](const Marker& one) { return one.link.value == 0; });
+  return marker == tree.markers.end() ? "the base" : marker_name(marker->id);
+}
+
+std::string tip_figures_words(const TipFigures& figures) {
+  std::string text =
+      uncertainty_text(kCoverageFactor * figures.translation_m, Quantity::kLength) + " mm";
+  if (figures.rotation_rad)
+    text += fmt::format(
+        " and {}°", uncertainty_text(kCoverageFactor * *figures.rotation_rad, Quantity::kAngle));
+  return text;
+}
+
+bool is_model_short(const RunSummary& run) {
+  return held_out_ratio(run.calibration) > kRatioLimit ||
+         (run.trace && run.trace->verdict == TraceVerdict::kUnknown);
+}
+
+std::string accuracy_words(const RunSummary& run, const std::optional<TipUncertainty>& tip) {
+  return (tip ? tip_words(run, *tip) : "") + prediction_words(run) + axis_words(run) +
+         declared_words(run.calibration) + clock_words(run);
 }
 
 }  // namespace kinescope::report

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/report/analysis.h"
 #include "app/report/run_summary.h"
 
 namespace kinescope::report {
@@ -31,8 +32,21 @@ namespace kinescope::report {
 /// another where the base is far less certain than the axes. -1: none has one.
 [[nodiscard]] int least_certain_axis(const Calibration& calibration);
 
-/// Errors on data that the fit has not seen, uncertainties of the axes, what all figures take for
-/// granted, the clock.
-[[nodiscard]] std::string accuracy_words(const RunSummary& run);
+/// The base is far less certain than what stands on it.
+[[nodiscard]] bool is_base_apart(const TipUncertainty& tip);
+
+/// "tag_44", what holds the base's frame: its first marker; "the base" where it has none.
+[[nodiscard]] std::string base_words(const KinematicTree& tree);
+
+/// "2.9 mm and 0.19°", expanded.
+[[nodiscard]] std::string tip_figures_words(const TipFigures& figures);
+
+/// Something that the model lacks shows, beside what its uncertainties hold.
+[[nodiscard]] bool is_model_short(const RunSummary& run);
+
+/// Where the last link is, errors on data that the fit has not seen, uncertainties of the axes,
+/// what all figures take for granted, the clock.
+[[nodiscard]] std::string accuracy_words(const RunSummary& run,
+                                         const std::optional<TipUncertainty>& tip);
 
 }  // namespace kinescope::report

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "app/report/report.h"
+#include "tests/app/report/count_of.h"
 #include "tests/app/report/synthetic_run.h"
 
 namespace kinescope {
@@ -81,11 +82,52 @@ TEST(FirstScreen, WithoutAnAnswerSaysSo) {
                   "<p class=\"headline\">No answer: the axis of arm2 is not determined.</p>"));
 }
 
-TEST(FirstScreen, ItsOneNumberIsThatOfTheResultWithItsInterval) {
-  const std::string page = first_screen_of(traced_run(TraceVerdict::kClean));
-  EXPECT_TRUE(has(page, "<p class=\"merit\"><b><span data-key=\"/errors/all/held_out_m/rms\""));
+TEST(FirstScreen, ItsNumberIsHowExactlyTheLastLinkIsKnown) {
+  const RunSummary run = traced_run(TraceVerdict::kClean);
+  const std::string page = first_screen_of(run);
+  EXPECT_EQ(count_of(page, "class=\"merit\""), 1);
+  EXPECT_TRUE(has(page, "<p class=\"merit\"><b><span data-key=\"/tip/translation_expanded_m\""))
+      << page;
+  EXPECT_TRUE(has(page, "data-key=\"/tip/rotation_expanded_rad\"")) << page;
+  EXPECT_TRUE(has(page, "how exactly the URDF says where the last link is: tag_7 on ")) << page;
+  EXPECT_TRUE(has(page, "<p class=\"check\"><b><span data-key=\"/errors/all/held_out_m/rms\""));
   EXPECT_TRUE(has(page, "at postures that the fit has not seen, across the line of sight (95 %: "));
+  EXPECT_FALSE(has(page, "what the model lacks comes on top"));
+  EXPECT_TRUE(has(first_screen_of(traced_run(TraceVerdict::kUnknown)),
+                  "what the model lacks comes on top"));
   EXPECT_FALSE(has(first_screen_of(synthetic_run()), "(95 %: ")) << "nothing measured it";
+}
+
+TEST(FirstScreen, WithoutATipItsNumberIsTheErrorOnUnseenPostures) {
+  RunSummary run = synthetic_run();
+  run.calibration.covariance.resize(0, 0);
+  EXPECT_TRUE(has(first_screen_of(run),
+                  "<p class=\"merit\"><b><span data-key=\"/errors/all/held_out_m/rms\""));
+}
+
+TEST(FirstScreen, SaysWhatWasRejectedAndWarnedOf) {
+  RunSummary run = synthetic_run();
+  run.rejected = {{"something covers a part of it", 4}, {"too small", 1}};
+  run.warnings = {"joints.csv: 3 rows repeat their time"};
+  const std::string page = first_screen_of(run);
+  EXPECT_TRUE(has(page,
+                  " sightings as outliers of the fit; 4 detections: something covers a part of "
+                  "it; 1 detection: too small"))
+      << page;
+  EXPECT_TRUE(has(page, "<li>joints.csv: 3 rows repeat their time</li>")) << page;
+  run.rejected.clear();
+  run.warnings.clear();
+  for (SightingResidual& sighting : run.calibration.residuals) sighting.used = true;
+  EXPECT_FALSE(has(first_screen_of(run), "<b>Rejected</b>"));
+}
+
+TEST(FirstScreen, EffectsAreWordsAndCommandsAreCode) {
+  RunSummary run = traced_run(TraceVerdict::kEffects);
+  run.trace->accepted = {backlash("clock", 0.5, 0.2)};
+  run.trace->accepted.front().id.effect = "time_offset";
+  const std::string page = first_screen_of(run);
+  EXPECT_TRUE(has(page, "corrected for time offset at clock.</p>")) << page;
+  EXPECT_TRUE(has(page, "<code>kinescope plan</code>")) << page;
 }
 
 TEST(FirstScreen, BarsAreAsLongAsTheErrorsTheyStandFor) {

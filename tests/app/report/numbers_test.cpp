@@ -53,6 +53,22 @@ TEST(Html, EscapesAndRepairs) {
   EXPECT_EQ(clean_text(std::string_view("nul\0!", 5)), "nul !");
 }
 
+TEST(Html, WhatStandsBetweenBackticksIsCode) {
+  EXPECT_EQ(with_code("say `a <b>` and `c`."), "say <code>a &lt;b&gt;</code> and <code>c</code>.");
+  EXPECT_EQ(with_code("`open"), "<code>open</code>") << "no element stays open";
+  EXPECT_EQ(with_code(""), "");
+}
+
+TEST(Html, ASectionFoldsAtItsTitleWithoutAScript) {
+  EXPECT_EQ(folded("<section id=\"a\"><h2>A</h2>\n<p>x</p></section>\n"),
+            "<section id=\"a\"><details class=\"fold tests\"><summary><h2>A</h2></summary>\n"
+            "<p>x</p></details></section>\n");
+  EXPECT_EQ(folded(""), "");
+  EXPECT_EQ(folded_part("more", ""), "");
+  EXPECT_EQ(folded_part("a < b", "<p>x</p>"),
+            "<details class=\"tests\"><summary>a &lt; b</summary><p>x</p></details>\n");
+}
+
 TEST(Plot, TicksAreRound) {
   EXPECT_EQ(nice_ticks(0.0, 10.0, 5), (std::vector<double>{0, 2, 4, 6, 8, 10}));
   EXPECT_EQ(nice_ticks(1.0, 1.0, 5), std::vector<double>{});

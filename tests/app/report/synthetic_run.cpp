@@ -126,11 +126,11 @@ void add_parameters(Calibration& calibration) {
   };
   for (const Joint& joint : calibration.tree.joints) {
     const bool turns = joint.type == JointType::kRevolute;
-    add(joint.name + " axis tilt x", joint.name, "rad", rng.normal(0.01), 6e-5);
-    add(joint.name + " axis tilt y", joint.name, "rad", rng.normal(0.01), 8e-5);
+    add(joint.name + " turn x", joint.name, "rad", rng.normal(0.01), 6e-5);
+    add(joint.name + " turn y", joint.name, "rad", rng.normal(0.01), 8e-5);
     if (!turns) continue;
-    add(joint.name + " axis shift x", joint.name, "m", rng.normal(0.001), 2e-5);
-    add(joint.name + " axis shift y", joint.name, "m", rng.normal(0.001), 3e-5);
+    add(joint.name + " shift x", joint.name, "m", rng.normal(0.001), 2e-5);
+    add(joint.name + " shift y", joint.name, "m", rng.normal(0.001), 3e-5);
   }
   for (const Marker& marker : calibration.tree.markers) {
     const std::string name = "tag_" + std::to_string(marker.id.value);

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "app/report/contact_summary.h"
+#include "app/report/torque_summary.h"
 #include "app/report/torque_unit.h"
+#include "tests/app/report/synthetic_run.h"
 
 namespace kinescope::report {
 namespace {
@@ -14,6 +16,24 @@ TEST(TorqueWords, AContactVerdictGivesTheEstimatedRateOfFalseAlarms) {
   summary.check.extrapolated_per_hour = 3.24;
   EXPECT_EQ(contact_verdict(summary),
             "No contact in 20.0 s (false alarms: 1 an hour asked for, 3.2 estimated).");
+}
+
+TEST(TorqueWords, ParametersThatDoNotMoveAreNamedInWords) {
+  TorqueSummary summary;
+  summary.joints = {"j1"};
+  summary.types = {JointType::kRevolute};
+  TorqueScore& score = summary.scores.emplace_back();
+  score.nmse_percent = score.rms = Eigen::VectorXd::Ones(1);
+  score.coverage_95 = Eigen::VectorXd::Constant(1, 0.95);
+  summary.identification.names = {"mcx(link2) + 0.15 m(link3)"};
+  summary.identification.undetermined = {0};
+  const auto limits = [&] { return torque_verdict(summary).limits; };
+  EXPECT_TRUE(has(limits(), "the first being the centre of mass along x of link2: record"))
+      << limits();
+  summary.identification.names = {"Ixz(link2)"};
+  EXPECT_TRUE(has(limits(), "the first being the inertia Ixz of link2: record")) << limits();
+  summary.identification.names = {"motor_inertia(j1)"};
+  EXPECT_TRUE(has(limits(), "the first being the motor inertia of j1: record")) << limits();
 }
 
 TEST(TorqueWords, UnitsAreSpelledOneWay) {

@@ -57,6 +57,28 @@ TEST(TraceSection, AFieldIsDrawnAsArrowsOverTheImage) {
             1U);
 }
 
+TEST(TraceSection, PicturesBeyondThoseOfAScreenAreFolded) {
+  TracedEffect effect;
+  effect.id = {"backlash", "j1"};
+  effect.unit = "rad";
+  effect.picture.covariate = "value of j1";
+  effect.picture.covariate_unit = "rad";
+  effect.picture.unit = "px";
+  effect.picture.at = Eigen::VectorXd::LinSpaced(400, 0.0, 1.0);
+  effect.picture.before = effect.picture.at;
+  effect.picture.after = effect.picture.effect = Eigen::VectorXd::Zero(400);
+  Trace trace;
+  trace.verdict = TraceVerdict::kEffects;
+  trace.accepted.assign(3, effect);
+  EXPECT_EQ(count(trace_section(trace), "The other "), 0U);
+  trace.accepted.assign(5, effect);
+  const std::string html = trace_section(trace);
+  const std::size_t fold = html.find("<summary>The other 2 effects, before and after</summary>");
+  ASSERT_NE(fold, std::string::npos);
+  EXPECT_EQ(count(html.substr(0, fold), "<div class=\"figures pair\">"), 3U);
+  EXPECT_EQ(count(html.substr(fold), "<div class=\"figures pair\">"), 2U);
+}
+
 // Curves and fields are drawn in the report and are in no other product.
 TEST(TraceSection, TheHeadOfAnUnknownRestNamesTheEffectsAndTheModelThatIsExported) {
   Trace trace = trace_with_a_field();

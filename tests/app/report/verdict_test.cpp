@@ -25,6 +25,27 @@ TEST(Verdict, OfAVideoWithALog) {
   EXPECT_TRUE(has(verdict.limits, "within 4 %")) << verdict.limits;
 }
 
+TEST(Verdict, BeginsItsAccuracyWithTheLastLink) {
+  RunSummary run = synthetic_run();
+  const std::string accurate = make_verdict(run).accurate;
+  EXPECT_TRUE(accurate.starts_with("The URDF says where the last link is (tag_7 on ")) << accurate;
+  EXPECT_TRUE(has(accurate, "in the frame of tag_0 (expanded uncertainty, k = 2")) << accurate;
+  run.shown_by_log = {{"backlash", "q2"}};
+  EXPECT_TRUE(has(make_verdict(run).accurate, "The URDF, with corrected joint values, says"));
+  run.calibration.status = CalibrationStatus::kNotConverged;
+  EXPECT_FALSE(has(make_verdict(run).accurate, "last link"));
+}
+
+TEST(Verdict, NamesTheCommandThatChoosesOtherPostures) {
+  constexpr const char* kPlan = "`kinescope plan` with the folder of this run chooses them.";
+  RunSummary run = synthetic_run();
+  EXPECT_TRUE(make_verdict(run).next.ends_with(kPlan)) << make_verdict(run).next;
+  EXPECT_FALSE(has(make_verdict(synthetic_run({.log = false})).next, "plan"));
+  run.calibration.status = CalibrationStatus::kUndetermined;
+  run.calibration.status_reason = "the axis of q2 is not determined";
+  EXPECT_FALSE(has(make_verdict(run).next, "plan"));
+}
+
 TEST(Verdict, NamesThePostureThatStandsAlone) {
   RunSummary run = synthetic_run({.kind = MeasurementKind::kPoint});
   EXPECT_FALSE(has(make_verdict(run).limits, "bent to it"));
