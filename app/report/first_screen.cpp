@@ -129,7 +129,7 @@ std::string tip_merit(const Facts& facts, const TipUncertainty& tip) {
       "<p class=\"merit\"><b>{}</b><span>how exactly the URDF says where the last link is: {} on "
       "{} "
       "in the frame of {}, expanded uncertainty (k = 2) over the postures of the "
-      "recording{}</span></p>\n",
+      "recording at exact joint values{}</span></p>\n",
       tip_numbers(facts, ""), escaped(marker_name(tip.marker)),
       escaped(tree.links[tip.link.index()].name), escaped(base),
       is_model_short(facts.run) ? "; what the model lacks comes on top" : "");

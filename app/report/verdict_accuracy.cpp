@@ -174,10 +174,11 @@ std::string tip_words(const RunSummary& run, const TipUncertainty& tip) {
   const KinematicTree& tree = run.calibration.tree;
   std::string text = fmt::format(
       "The URDF{} says where the last link is ({} on {}) to {} in the frame of {} (expanded "
-      "uncertainty, k = 2, over the postures of the recording; {} mm at the worst).",
-      run.shown_by_log.empty() ? "" : ", with corrected joint values,", marker_name(tip.marker),
-      tree.links[tip.link.index()].name, tip_figures_words(tip.in_base), base_words(tree),
-      uncertainty_text(kCoverageFactor * tip.worst_m, Quantity::kLength));
+      "uncertainty, k = 2, over the postures of the recording at exact joint values; {} mm at the "
+      "worst).",
+      beside_urdf_words(run).empty() ? "" : ", with corrected joint values,",
+      marker_name(tip.marker), tree.links[tip.link.index()].name, tip_figures_words(tip.in_base),
+      base_words(tree), uncertainty_text(kCoverageFactor * tip.worst_m, Quantity::kLength));
   if (is_base_apart(tip))
     text += fmt::format(
         " Most of that is how {} is turned and placed; with the base placed anew it is {}.",
