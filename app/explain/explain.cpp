@@ -112,9 +112,11 @@ Explanation with_parts_followed(Explanation now, const Evidence& evidence,
     other.log = *mended;
     ExplainOptions alike = options;
     alike.calibrate.fold_of_frame = folds_of(calibration);
+    std::vector<std::string> said;
     Explanation with =
-        explained({other, evidence.observed, evidence.tracks, evidence.camera}, alike, warnings);
+        explained({other, evidence.observed, evidence.tracks, evidence.camera}, alike, said);
     if (is_better(with, now, evidence.observed.measurements)) {
+      warnings.insert(warnings.end(), said.begin(), said.end());
       for (std::string& line : words) line += "; taken so";
       now = std::move(with);
     }

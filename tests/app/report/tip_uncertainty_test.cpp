@@ -8,6 +8,7 @@
 
 #include "kinematics/core/rng.h"
 #include "tests/truth/camera_world.h"
+#include "tests/truth/coverage.h"
 
 namespace kinescope::report {
 namespace {
@@ -83,25 +84,13 @@ TipErrors tip_errors(const truth::World& world, const Calibration& found, TagId 
   return out;
 }
 
-struct TipCoverage {
-  int count = 0, held = 0;
-  double square = 0.0;
-
-  void add(double error, const Sigma& sigma) {
-    ASSERT_TRUE(sigma);
-    ++count;
-    held += error < 2.0 * *sigma ? 1 : 0;
-    square += std::pow(error / *sigma, 2);
-  }
-};
-
 // Twice the claim holds 95 of 100 errors. The mean square of a length is 1.04 claims' squares where
 // it has one direction and 1.54 where it has three alike. A claim half as large holds about 60 of
 // 100, one twice as large has a quarter of the mean square.
 TEST(TipUncertainty, ClaimsHoldAgainstTheScatterOfCalibrations) {
   constexpr std::uint64_t kWorlds = 80;
   constexpr int kLeastHeld = 70;  // three standard deviations below 76
-  TipCoverage place, turn, place_among, turn_among;
+  truth::Coverage place, turn, place_among, turn_among;
   for (std::uint64_t seed = 0; seed < kWorlds; ++seed) {
     const truth::World world = tip_world(seed);
     const Calibration found = calibrated(world);
@@ -116,7 +105,7 @@ TEST(TipUncertainty, ClaimsHoldAgainstTheScatterOfCalibrations) {
     place_among.add(errors.place_among, tip->among->translation_m);
     turn_among.add(errors.turn_among, tip->among->rotation_rad);
   }
-  for (const TipCoverage* one : {&place, &turn, &place_among, &turn_among}) {
+  for (const truth::Coverage* one : {&place, &turn, &place_among, &turn_among}) {
     EXPECT_GE(one->held, kLeastHeld);
     EXPECT_GT(one->square / one->count, 0.7);
     EXPECT_LT(one->square / one->count, 1.9);

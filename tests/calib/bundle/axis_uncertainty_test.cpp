@@ -7,30 +7,15 @@
 #include "kinematics/core/rng.h"
 #include "tests/truth/axis_errors.h"
 #include "tests/truth/camera_world.h"
+#include "tests/truth/coverage.h"
 
 namespace kinescope {
 namespace {
 
+using truth::Coverage;
 using truth::World;
 
 constexpr double kNoise_px = 0.1;
-
-/// Errors over claims, squared, and how many are within twice the claim.
-struct Coverage {
-  int count = 0;
-  int held = 0;
-  double square = 0.0;
-
-  void add(double error, const Sigma& sigma) {
-    ASSERT_TRUE(sigma);
-    ++count;
-    held += error < 2.0 * *sigma ? 1 : 0;
-    square += std::pow(error / *sigma, 2);
-  }
-
-  [[nodiscard]] double share() const { return static_cast<double>(held) / count; }
-  [[nodiscard]] double rms() const { return std::sqrt(square / count); }
-};
 
 struct Coverages {
   Coverage in_base, among;
