@@ -355,9 +355,9 @@ std::vector<LeftOver> Tracer::left_by_place() const {
                                      level_);
 }
 
-// Of what explains more than it leaves the verdict says that it is not all; a fifth of the error of
-// a measured log (`trace_torque_real lwr4`) went back into it where that was taken out, too. What
-// every joint has stays: it is there, whatever else is.
+// Of what explains more than it leaves the verdict says that it is not all; the error of a measured
+// log rose by a third where that was taken out, too (`trace_torque_real lwr4`). What every joint
+// has stays: it is there, whatever else is.
 bool Tracer::drop_beside_what_lasts() {
   for (const LeftOver& left : left_by_place()) {
     if (!left.lasts) continue;
