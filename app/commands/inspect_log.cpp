@@ -10,6 +10,7 @@
 #include "app/commands/inspection.h"
 #include "app/explain/log_doubts.h"
 #include "kinematics/core/median.h"
+#include "kinematics/log/exchanged_readings.h"
 #include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
@@ -110,6 +111,13 @@ void note_readings_apart(const JointLog& log, const std::vector<ReadingApart>& a
   }
 }
 
+void note_exchanged(const JointLog& log, std::vector<Finding>& findings) {
+  for (const ExchangedReadings& exchanged : exchanged_readings(log)) {
+    findings.push_back({false, fmt::format("{}: `run` takes it so unless the markers say otherwise",
+                                           words_of(log, exchanged))});
+  }
+}
+
 }  // namespace
 
 LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
@@ -126,6 +134,7 @@ LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
   const std::vector<ReadingApart> apart = readings_apart(log);
   const JointLog calm = without_readings(log, apart);
   note_readings_apart(log, apart, findings);
+  note_exchanged(log, findings);
   for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
     facts.channels.push_back(look_at_channel(calm, c, settings, findings));
   }

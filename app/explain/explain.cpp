@@ -10,6 +10,7 @@
 #include "app/explain/explainer.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/partly_followed.h"
+#include "kinematics/log/exchanged_readings.h"
 #include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
@@ -97,6 +98,33 @@ Explanation with_odd_readings_apart(const Evidence& evidence, const ExplainOptio
   return without_them;
 }
 
+// With columns back in their places, unless the markers speak for the log as it is.
+Explanation with_exchanged_back(const Evidence& evidence, const ExplainOptions& options,
+                                std::vector<std::string>& warnings) {
+  const JointLog& log = evidence.recording.log;
+  const std::vector<ExchangedReadings> exchanged = exchanged_readings(log);
+  if (exchanged.empty()) return with_odd_readings_apart(evidence, options, warnings);
+  Recording mended = evidence.recording;
+  mended.log = with_exchanged_back(log, exchanged);
+  std::vector<std::string> said;
+  Explanation back = with_odd_readings_apart(
+      {mended, evidence.observed, evidence.tracks, evidence.camera}, options, said);
+  if (!is_settled(back)) {
+    ExplainOptions alike = options;
+    if (back.fitted) alike.calibrate.fold_of_frame = folds_of(back.fitted->calibration);
+    std::vector<std::string> said_as_logged;
+    Explanation as_logged = with_odd_readings_apart(evidence, alike, said_as_logged);
+    if (!is_better(back, as_logged, evidence.observed.measurements)) {
+      warnings.insert(warnings.end(), said_as_logged.begin(), said_as_logged.end());
+      return as_logged;
+    }
+  }
+  warnings.insert(warnings.end(), said.begin(), said.end());
+  for (const ExchangedReadings& one : exchanged)
+    warnings.push_back(words_of(log, one) + "; taken so");
+  return back;
+}
+
 // A channel that is a joint's for a part of the recording.
 Explanation with_parts_followed(Explanation now, const Evidence& evidence,
                                 const ExplainOptions& options, std::vector<std::string>& warnings) {
@@ -129,8 +157,8 @@ Explanation with_parts_followed(Explanation now, const Evidence& evidence,
 
 Explanation explain(const Evidence& evidence, const ExplainOptions& options,
                     std::vector<std::string>& warnings) {
-  return with_parts_followed(with_odd_readings_apart(evidence, options, warnings), evidence,
-                             options, warnings);
+  return with_parts_followed(with_exchanged_back(evidence, options, warnings), evidence, options,
+                             warnings);
 }
 
 }  // namespace kinescope
