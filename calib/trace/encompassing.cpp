@@ -25,13 +25,17 @@ double added_beside(const NormalSystem& system, const std::vector<EffectColumn>&
 
 }  // namespace
 
-Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
-                           const Rivalling& second) {
+double odds_of_second(const NormalSystem& system, const Rivalling& first, const Rivalling& second) {
   const double stretches = std::max(2, system.partition().stretches);
   const double clear = std::min(first.statistic, second.statistic);
   const double price = (second.freedom - first.freedom) * std::log(std::max(stretches, clear));
-  const double odds = added_beside(system, second.columns, first.columns) -
-                      added_beside(system, first.columns, second.columns) - price;
+  return added_beside(system, second.columns, first.columns) -
+         added_beside(system, first.columns, second.columns) - price;
+}
+
+Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
+                           const Rivalling& second) {
+  const double odds = odds_of_second(system, first, second);
   if (odds <= -kClearly) return Comparison::kFirst;
   return odds >= kClearly ? Comparison::kSecond : Comparison::kInterchangeable;
 }

@@ -24,7 +24,11 @@ struct Rivalling {
   double statistic = 0.0;  ///< F
 };
 
-/// `system` has neither in it.
+/// Twice the logarithm of the odds of the second. `system` has neither in it.
+[[nodiscard]] double odds_of_second(const NormalSystem& system, const Rivalling& first,
+                                    const Rivalling& second);
+
+/// By odds of 88 to 100. `system` has neither in it.
 [[nodiscard]] Comparison compare_effects(const NormalSystem& system, const Rivalling& first,
                                          const Rivalling& second);
 

@@ -152,6 +152,8 @@ void Tracer::compare_without(const Stage& without, TracedEffect& detail) const {
 
 std::vector<ScanAlternative> Tracer::as_likely(const Stage& without, const Candidate& candidate,
                                                const TestedMember& own) const {
+  // The interval that covers them holds the truth in 19 of 20.
+  const double least_odds = -2.0 * std::log(19.0);
   std::vector<ScanAlternative> out;
   if (!candidate.scan_listed) return out;
   for (const double scan : candidate.scan) {
@@ -160,7 +162,7 @@ std::vector<ScanAlternative> Tracer::as_likely(const Stage& without, const Candi
     if (score_test(without.system, columns).gain < kRivalShare * own.score.gain) continue;
     const Score score = jackknife_test(without.system, columns);
     if (score.hidden() || !is_possible(candidate, score.theta) ||
-        compare_effects(without.system, {own.columns}, {columns}) == Comparison::kFirst) {
+        odds_of_second(without.system, {own.columns}, {columns}) < least_odds) {
       continue;
     }
     const double size = size_of(candidate, score.theta);
