@@ -133,6 +133,44 @@ bool is_visible(const Floor& floor, const InjectedEffect& injected) {
   return true;
 }
 
+// A marker in the frame of the first one of the base, at joint values in the order of `names`.
+Pose seen_from_base(const KinematicTree& tree, TagId marker, const std::vector<Joint>& names,
+                    const Eigen::VectorXd& values) {
+  Eigen::VectorXd own(values.size());
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const auto same = std::ranges::find(names, tree.joints[j].name, &Joint::name);
+    own[static_cast<Eigen::Index>(j)] = values[same - names.begin()];
+  }
+  const std::vector<Pose> links = forward_kinematics(tree, own);
+  const auto base = std::ranges::find(tree.markers, LinkId{0}, &Marker::link);
+  const Marker& last = *tree.marker(marker);
+  return (links[0] * base->T_link_marker).inverse() * links[last.link.index()] * last.T_link_marker;
+}
+
+// How far the robot's tip is off in the base's frame, root mean square over the recording, and what
+// the run says of it (k = 2).
+std::string tip_words(const truth::World& world, const KinematicTree& learned,
+                      const fs::path& run) {
+  const json result = json::parse(read_text_file(run / "result.json"));
+  if (!result.contains("tip") || result.at("tip").is_null()) return "no tip";
+  const json& tip = result.at("tip");
+  const TagId marker{tip.at("marker").get<int>()};
+  double shift = 0.0;
+  double turn = 0.0;
+  for (Eigen::Index f = 0; f < world.joint_values.rows(); ++f) {
+    const Eigen::VectorXd values = world.joint_values.row(f).transpose();
+    const Pose is = seen_from_base(world.tree, marker, world.tree.joints, values);
+    const Pose said = seen_from_base(learned, marker, world.tree.joints, values);
+    shift += (said.translation - is.translation).squaredNorm();
+    turn += log_rotation(is.rotation.inverse() * said.rotation).squaredNorm();
+  }
+  const auto count = static_cast<double>(world.joint_values.rows());
+  return fmt::format("tip off {:.3f} mm {:.4f} deg, said {:.3f} mm {:.4f} deg",
+                     1e3 * std::sqrt(shift / count), std::sqrt(turn / count) / kDegree,
+                     1e3 * tip.at("translation_expanded_m").get<double>(),
+                     tip.at("rotation_expanded_rad").get<double>() / kDegree);
+}
+
 Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& injected,
               const fs::path& folder, const std::string& name, Floor& floor) {
   RunOptions options;
@@ -168,8 +206,9 @@ Outcome judge(const truth::World& world, const std::optional<InjectedEffect>& in
     return out;
   }
   const auto error = acceptance::compare_with_truth(truth, learned);
-  fmt::print("{:.3f} mm {:+.3f} % {:.4f} deg; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
+  fmt::print("{:.3f} mm {:+.3f} % {:.4f} deg; {}; {:.4f} -> {:.4f} px; {}{}; {:.1f} s\n",
              1e3 * error.marker_rms_m, 100.0 * error.scale, error.worst_direction_rad / kDegree,
+             tip_words(world, learned, folder / "run"),
              trace.at("held_out_before").at("value").get<double>(),
              trace.at("held_out_after").at("value").get<double>(),
              out.named     ? ""
