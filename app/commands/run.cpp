@@ -43,6 +43,7 @@
 #include "calib/vision/repeated_frames.h"
 #include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
+#include "kinematics/urdf/calibrated_urdf.h"
 #include "kinematics/urdf/camera_links.h"
 #include "kinematics/urdf/urdf.h"
 
@@ -52,6 +53,7 @@ namespace {
 constexpr std::string_view kReport = "report.html";
 // Of a run without an answer, beside the products of an earlier one that has one.
 constexpr std::string_view kFailedReport = "failed_report.html";
+constexpr std::string_view kNominalCalibrated = "nominal_calibrated.urdf";
 
 /// Joints of one channel follow one another in a URDF; one of them that an effect moves beside its
 /// channel does not.
@@ -124,8 +126,11 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
   if (report == kReport) {
     if (const std::string words = report::beside_urdf_words(run); !words.empty())
       fmt::print("{}\n", report::sentence(words));
-    fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(),
-               judge(run).given ? "" : " (no answer: see above)");
+    const std::string_view caveat = judge(run).given ? "" : " (no answer: see above)";
+    fmt::print("urdf    {}{}\n", folder.file("robot.urdf").string(), caveat);
+    if (run.nominal)
+      fmt::print("nominal {} (the nominal file with calibrated joints, all else as it was){}\n",
+                 folder.file(kNominalCalibrated).string(), caveat);
   }
   fmt::print("report  {}\n", folder.file(report).string());
 }
@@ -156,6 +161,16 @@ void write_products(const RunSummary& run, const std::string& urdf, RunFolder& f
   folder.write("residuals.csv", residuals_csv(run.calibration));
   if (run.trace) folder.write("trace.json", json_text(trace_json(*run.trace)));
   folder.write("result.json", json_text(result_json(run), 2));
+}
+
+/// What can stand for the nominal file on a robot: robot.urdf has none of its masses, shapes and
+/// drives, but the markers.
+void write_calibrated_nominal(const RunSummary& run, const Recording& recording,
+                              RunFolder& folder) {
+  if (!run.nominal) return;
+  folder.write(kNominalCalibrated,
+               with_calibrated_joints(read_text_file(recording.nominal_file),
+                                      recording.nominal_file.string(), run.calibration.tree));
 }
 
 /// A recording shows a part of what a robot may do; where it goes beyond the limits, so do they.
@@ -410,6 +425,7 @@ ExitCode run_command(const RunOptions& options, const Console& console) {
   }
   if (answered) keep_observations(given, seen, folder);
   write_products(run, urdf, folder);
+  write_calibrated_nominal(run, recording, folder);
   clock.lap("write", run.times);
   const TorqueStages torque =
       torque_stages(recording, options, run.calibration, folder.file(""), console.progress);

@@ -142,6 +142,7 @@ std::vector<std::string> run_products(bool torques) {
       "calibration.json", "trace.json",    "observations.csv", "observations.json",
       "tracks.csv",       "residuals.csv", "run.json",         "failed_report.html",
       "hand_eye.json",    "hand_eye.urdf", "camera_path.csv",  "joint_values.csv"};
+  out.emplace_back("nominal_calibrated.urdf");
   if (!torques) return out;
   append(out, dynamics_products("dynamics_trace.json"));
   append(out, contact_products());

@@ -12,6 +12,7 @@
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
 #include "kinematics/urdf/dynamic_urdf.h"
+#include "kinematics/urdf/origin_text.h"
 #include "kinematics/urdf/urdf.h"
 #include "kinematics/urdf/urdf_document.h"
 #include "kinematics/urdf/urdf_inertia.h"
@@ -25,6 +26,7 @@ using urdf_document::add;
 using urdf_document::kAnyEffort;
 using urdf_document::kAnyVelocity;
 using urdf_document::number_text;
+using urdf_document::roll_pitch_yaw;
 
 std::string first_comment(const KinematicTree& tree, LimitSource source) {
   const auto moves = [](const Joint& joint) { return joint.type != JointType::kFixed; };
@@ -62,18 +64,6 @@ constexpr Material kRevoluteColour{"revolute_orange", "0.90 0.45 0.10 1"};
 constexpr Material kPrismaticColour{"prismatic_blue", "0.15 0.45 0.80 1"};
 constexpr Material kTagBlack{"tag_black", "0.05 0.05 0.05 1"};
 constexpr Material kTagWhite{"tag_white", "0.97 0.97 0.97 1"};
-
-/// Fixed-axis angles about x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll). Roll is taken from the rotation
-/// that is left after the yaw, so that the product is exact also where pitch is 90 degrees.
-Eigen::Vector3d roll_pitch_yaw(const Eigen::Quaterniond& rotation) {
-  const Eigen::Matrix3d R = rotation.normalized().toRotationMatrix();
-  const double yaw = std::atan2(R(1, 0), R(0, 0));
-  const double c = std::cos(yaw);
-  const double s = std::sin(yaw);
-  const double pitch = std::atan2(-R(2, 0), c * R(0, 0) + s * R(1, 0));
-  const double roll = std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1));
-  return {roll, pitch, yaw};
-}
 
 bool is_name_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||

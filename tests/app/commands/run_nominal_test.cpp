@@ -124,6 +124,52 @@ TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
   }
 }
 
+// What a robot runs with has masses, shapes and drives; robot.urdf has none of them.
+TEST(RunNominal, TheNominalFileIsWrittenWithCalibratedJointsAndAllElseAsItWas) {
+  const RecordingFolder folder;
+  write_poses(arm("nominal with masses and meshes", {}).recording, folder);
+  KinematicTree drawing = learned_from(folder);
+  drawing.markers.clear();
+  std::size_t turned = 0;
+  while (drawing.joints.at(turned).type == JointType::kFixed) ++turned;
+  drawing.joints[turned].T_parent_joint.translation.x() += 0.01;
+  const std::string more =
+      R"(<link name="tool0"><inertial><mass value="1.50"/><inertia ixx=".01" ixy="0" ixz="0" )"
+      R"(iyy=".01" iyz="0" izz=".01"/></inertial><visual><geometry><mesh filename="a.stl"/>)"
+      R"(</geometry></visual></link><joint name="tool" type="fixed"><parent link=")" +
+      drawing.links.back().name +
+      R"("/><child link="tool0"/><origin xyz="0 0 .10"/></joint><transmission name="t"/>)";
+  std::string text = write_urdf(drawing);
+  text.insert(text.find("</robot>"), more);
+  folder.write("drawing.urdf", text);
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", out.string(), "--quiet", "--no-trace",
+           "--nominal", (folder.path() / "drawing.urdf").string(), "--free", "geometry"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("\nnominal " + (out / "nominal_calibrated.urdf").string()),
+            std::string::npos)
+      << outcome.out;
+  const std::string written = read_text_file(out / "nominal_calibrated.urdf");
+  EXPECT_NE(written.find(more), std::string::npos) << written;
+  const KinematicTree calibrated = read_urdf(out / "robot.urdf");
+  const KinematicTree back = parse_urdf(written, "nominal_calibrated.urdf");
+  ASSERT_EQ(back.joints.size(), calibrated.joints.size());
+  Rng rng = Rng::from_name("nominal with masses and meshes, postures");
+  const Eigen::VectorXd values =
+      Eigen::VectorXd::NullaryExpr(static_cast<Eigen::Index>(back.joints.size()),
+                                   [&](Eigen::Index) { return rng.uniform(-2.0, 2.0); });
+  for (std::size_t link = 0; link < back.links.size(); ++link) {
+    ASSERT_EQ(back.links[link].name, calibrated.links[link].name);
+    const Pose apart = forward_kinematics(calibrated, values)[link].inverse() *
+                       forward_kinematics(back, values)[link];
+    EXPECT_LT(log_pose(apart).norm(), 1e-7) << back.links[link].name;  // arc cosine near one
+  }
+  for (std::size_t j = 0; j < back.joints.size(); ++j)
+    EXPECT_EQ(back.joints[j].limits, parse_urdf(text, "drawing").joints[j].limits);
+}
+
 // A drawing without a fault needs nothing freed: what is freed costs certainty, and is not
 // exported.
 TEST(RunNominal, TheFreedomThatPredictsBestIsExported) {

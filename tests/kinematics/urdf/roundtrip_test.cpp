@@ -5,29 +5,10 @@
 
 #include "kinematics/urdf/urdf.h"
 #include "tests/kinematics/model/random_tree.h"
+#include "tests/kinematics/urdf/tree_difference.h"
 
 namespace kinescope {
 namespace {
-
-// Exact algebra: about 10 products of numbers up to 10, a few epsilon (2e-16) each.
-constexpr double kExact = 1e-12;
-
-/// Largest difference of forward kinematics over links and markers, m or rad, by name.
-double worst_difference(const KinematicTree& a, const KinematicTree& b,
-                        const Eigen::VectorXd& values) {
-  const std::vector<Pose> fk_a = forward_kinematics(a, values);
-  const std::vector<Pose> fk_b = forward_kinematics(b, values);
-  double worst = 0.0;
-  for (std::size_t i = 0; i < a.links.size(); ++i) {
-    worst = std::max(worst, pose_distance(fk_a[i], fk_b[b.link(a.links[i].name)->index()]));
-  }
-  for (const Marker& marker : a.markers) {
-    const Marker& other = *b.marker(marker.id);
-    worst = std::max(worst, pose_distance(fk_a[marker.link.index()] * marker.T_link_marker,
-                                          fk_b[other.link.index()] * other.T_link_marker));
-  }
-  return worst;
-}
 
 TEST(UrdfRoundTrip, ThousandPosturesOnRandomTrees) {
   Rng rng = Rng::from_name("UrdfRoundTrip.ThousandPosturesOnRandomTrees");
