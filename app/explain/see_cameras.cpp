@@ -2,6 +2,7 @@
 #include "app/explain/see_cameras.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -42,17 +43,89 @@ std::vector<LoneCamera> look_alone(const Recording& recording,
   return out;
 }
 
-// Where the motion of common markers does not tie two clocks, each one's own motion against the
-// log may: what a search on that camera alone finds.
-double ahead_of_log(const LoneCamera& camera, const SightOptions& options) {
+// What a search on one camera alone finds of the robot; nothing where it finds no joint that the
+// log drives.
+struct AloneWithLog {
+  double ahead_s = 0.0;  // log time = own time + ahead
+  std::size_t driven = 0;
+};
+
+AloneWithLog alone_with_log(const LoneCamera& camera, const SightOptions& options) {
   StructureOptions structure;
   structure.scan_time_offset = options.calibrate.estimate_time_offset;
   structure.units = declared_units(camera.recording);
-  return find_structure(camera.tracks, camera.recording.log, structure).time_offset_s;
+  try {
+    const Structure found = find_structure(camera.tracks, camera.recording.log, structure);
+    const auto driven = std::ranges::count_if(
+        found.joints, [](const StructureJoint& joint) { return joint.channel.has_value(); });
+    return {found.time_offset_s, static_cast<std::size_t>(driven)};
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kUndetermined) throw;
+    return {};
+  }
+}
+
+// The cameras' clocks may be farther apart than the log's from theirs is looked for: common time is
+// then that of the camera on whose clock the log drives most joints.
+void take_clock_of_log(const std::vector<LoneCamera>& cameras, const SightOptions& options,
+                       PlacedCameras& placed) {
+  std::size_t best = placed.reference;
+  std::size_t most = alone_with_log(cameras[best], options).driven;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (c == placed.reference || !placed.places[c]) continue;
+    const std::size_t driven = alone_with_log(cameras[c], options).driven;
+    if (driven <= most) continue;
+    most = driven;
+    best = c;
+  }
+  const double ahead_s = placed.places[best]->ahead_s;
+  for (std::optional<CameraPlace>& place : placed.places)
+    if (place) place->ahead_s -= ahead_s;
+}
+
+bool far_apart(const PlacedCameras& placed, double by_s) {
+  return std::ranges::any_of(placed.places, [&](const std::optional<CameraPlace>& place) {
+    return place && std::abs(place->ahead_s) > by_s;
+  });
+}
+
+// Where the motion of common markers does not tie two clocks, each one's own motion against the
+// log may.
+PlacedCameras tied_by_log(const std::vector<LoneCamera>& cameras,
+                          const std::vector<PoseTracks>& tracks, const Recording& recording,
+                          const SightOptions& options, PlaceCamerasOptions place_options,
+                          std::vector<std::string>& warnings) {
+  for (const LoneCamera& camera : cameras) {
+    const AloneWithLog alone = alone_with_log(camera, options);
+    place_options.ahead_s.push_back(alone.ahead_s);
+    if (alone.driven > 0 || std::ranges::none_of(camera.tracks.tracks, marker_moves)) continue;
+    warnings.push_back(fmt::format(
+        "camera {}: neither a moving marker that another camera sees nor the joint log shows how "
+        "its clock runs; taken to be the log's (let both see a marker on a link)",
+        camera.recording.camera_name));
+  }
+  return place_cameras(tracks, recording.markers, place_options);
+}
+
+// What nobody would expect of clocks, in words.
+void say_far_clocks(const std::vector<LoneCamera>& cameras, const PlacedCameras& placed,
+                    std::vector<std::string>& warnings) {
+  const auto common = std::ranges::find_if(
+      placed.places, [](const auto& place) { return place && place->ahead_s == 0.0; });
+  const auto of = static_cast<std::size_t>(common - placed.places.begin());
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const std::optional<CameraPlace>& place = placed.places[c];
+    if (!place || std::abs(place->ahead_s) <= PlaceCamerasOptions{}.max_offset_s) continue;
+    warnings.push_back(fmt::format(
+        "camera {}: its stamps are {:.3f} s {} than camera {}'s, as markers that move show; taken "
+        "so (use one clock for all cameras and the log)",
+        cameras[c].recording.camera_name, std::abs(place->ahead_s),
+        place->ahead_s < 0.0 ? "later" : "earlier", cameras[of].recording.camera_name));
+  }
 }
 
 PlacedCameras place(const std::vector<LoneCamera>& cameras, const Recording& recording,
-                    const SightOptions& options) {
+                    const SightOptions& options, std::vector<std::string>& warnings) {
   std::vector<PoseTracks> tracks;
   std::vector<double> all_times_s;
   for (const LoneCamera& camera : cameras) {
@@ -68,10 +141,12 @@ PlacedCameras place(const std::vector<LoneCamera>& cameras, const Recording& rec
   PlacedCameras out = place_cameras(tracks, recording.markers, place_options);
   const bool unknown = std::ranges::any_of(
       out.places, [](const auto& place) { return place && !place->clock_known; });
-  if (!unknown) return out;
-  for (const LoneCamera& camera : cameras)
-    place_options.ahead_s.push_back(ahead_of_log(camera, options));
-  return place_cameras(tracks, recording.markers, place_options);
+  if (unknown)
+    return tied_by_log(cameras, tracks, recording, options, std::move(place_options), warnings);
+  if (far_apart(out, StructureOptions{}.max_time_offset_s))
+    take_clock_of_log(cameras, options, out);
+  say_far_clocks(cameras, out, warnings);
+  return out;
 }
 
 // The reference camera first, then by name, as the recording lists them.
@@ -198,7 +273,7 @@ SeenTogether see_cameras(const Recording& recording, const SightOptions& options
                          const std::function<SeenAlone(const Recording&)>& see_alone) {
   SeenTogether out;
   std::vector<LoneCamera> alone = look_alone(recording, see_alone, out.observed.warnings);
-  const PlacedCameras placed = place(alone, recording, options);
+  const PlacedCameras placed = place(alone, recording, options, out.observed.warnings);
   for (std::size_t c = 0; c < alone.size(); ++c) {
     if (placed.places[c]) continue;
     out.observed.warnings.push_back(
@@ -210,6 +285,7 @@ SeenTogether see_cameras(const Recording& recording, const SightOptions& options
   out = join_views(std::move(alone), placed, options);
   out.observed.warnings = std::move(warnings);
   turn_gravity(recording, out.observed.cameras, out.recording);
+  out.recording.settings.video_start_s += placed.places[placed.reference]->ahead_s;
   return out;
 }
 

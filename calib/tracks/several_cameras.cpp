@@ -22,6 +22,8 @@ using tracks::InterpolatedTrack;
 constexpr double kUnknownSize = 0.05;
 // Instants that a fit is made from; more of them change a start by nothing.
 constexpr std::size_t kMostPairs = 1500;
+// The same of a first scan over offsets of many seconds.
+constexpr std::size_t kMostCoarsePairs = 250;
 // The fewest common sightings that a camera is placed by.
 constexpr std::size_t kFewestPairs = 4;
 
@@ -113,7 +115,7 @@ class CommonMarkers {
     for (const PoseTrack& track : second.tracks) {
       const auto same = std::ranges::find(first.tracks, track.id, &PoseTrack::id);
       if (same == first.tracks.end() || same->samples.empty()) continue;
-      common_.push_back({&track, interpolated(first, *same, bridge), moves(*same)});
+      common_.push_back({&track, interpolated(first, *same, bridge), marker_moves(*same)});
       count_ += track.samples.size();
     }
   }
@@ -121,8 +123,9 @@ class CommonMarkers {
   [[nodiscard]] bool any_moves() const { return std::ranges::any_of(common_, &Common::moves); }
 
   // With the second camera's clock so far behind the first's.
-  [[nodiscard]] std::vector<PointPair> pairs(double ahead_s, bool moving_only) const {
-    const std::size_t step = 1 + count_ / kMostPairs;
+  [[nodiscard]] std::vector<PointPair> pairs(double ahead_s, bool moving_only,
+                                             std::size_t most = kMostPairs) const {
+    const std::size_t step = 1 + count_ / most;
     std::vector<PointPair> out;
     for (const Common& common : common_) {
       if (moving_only && !common.moves) continue;
@@ -146,62 +149,76 @@ class CommonMarkers {
     bool moves;
   };
 
-  // Its origin goes farther than its noise.
-  static bool moves(const PoseTrack& track) {
-    constexpr double kBeyondNoise = 10.0;
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const PoseSample& sample : track.samples)
-      mean += sample.T_camera_marker.translation / static_cast<double>(track.samples.size());
-    std::vector<double> away, noise;
-    for (const PoseSample& sample : track.samples) {
-      away.push_back((sample.T_camera_marker.translation - mean).norm());
-      noise.push_back(std::sqrt(sample.covariance.bottomRightCorner<3, 3>().trace()));
-    }
-    return median_of(std::move(away)) > kBeyondNoise * median_of(std::move(noise));
-  }
-
   const PoseTracks& second_;
   const MarkerSet& markers_;
   std::vector<Common> common_;
   std::size_t count_ = 0;
 };
 
-// The offset at which moving markers meet best; nothing where none stands out.
-std::optional<double> clock_by_motion(const CommonMarkers& common, double step_s, double about_s,
-                                      double half_width_s) {
-  // A clock that is right makes points meet several times as well as others do.
-  constexpr double kStandsOut = 0.5;
-  if (!common.any_moves() || !(step_s > 0.0)) return std::nullopt;
-  const auto misfit = [&](double ahead_s) {
-    const std::vector<PointPair> pairs = common.pairs(ahead_s, true);
-    if (pairs.size() < 4 * kFewestPairs) return std::numeric_limits<double>::infinity();
-    return meet(pairs).misfit_m;
-  };
+// A clock that is right makes points meet several times as well as others do.
+constexpr double kStandsOut = 0.5;
+
+struct ClockScan {
+  double best_s = 0.0;
+  double least_m = std::numeric_limits<double>::infinity();
+  double usual_m = std::numeric_limits<double>::infinity();
+};
+
+// Offsets at which fewer than half as many points meet as at others are not looked at: a short end
+// of a motion meets anywhere.
+ClockScan scan_clock(const CommonMarkers& common, double step_s, double about_s,
+                     double half_width_s, std::size_t most_pairs) {
   const int steps = static_cast<int>(std::ceil(half_width_s / step_s));
-  std::vector<double> all;
-  double best = about_s;
-  double least = std::numeric_limits<double>::infinity();
+  std::vector<std::vector<PointPair>> pairs;
+  std::size_t most = 0;
   for (int k = -steps; k <= steps; ++k) {
-    const double m = misfit(about_s + k * step_s);
-    if (std::isfinite(m)) all.push_back(m);
-    if (m < least) {
-      least = m;
-      best = about_s + k * step_s;
-    }
+    pairs.push_back(common.pairs(about_s + k * step_s, true, most_pairs));
+    most = std::max(most, pairs.back().size());
   }
-  if (all.empty() || least > kStandsOut * median_of(all)) return std::nullopt;
-  // The misfit is V-shaped about its least: halved intervals, to a hundredth of a step.
+  ClockScan out;
+  std::vector<double> all;
+  for (int k = -steps; k <= steps; ++k) {
+    const std::vector<PointPair>& at = pairs[static_cast<std::size_t>(k + steps)];
+    if (at.size() < std::max(4 * kFewestPairs, most / 2)) continue;
+    const double misfit_m = meet(at).misfit_m;
+    all.push_back(misfit_m);
+    if (misfit_m >= out.least_m) continue;
+    out.least_m = misfit_m;
+    out.best_s = about_s + k * step_s;
+  }
+  if (!all.empty()) out.usual_m = median_of(std::move(all));
+  return out;
+}
+
+// The misfit is V-shaped about its least: halved intervals, to a hundredth of a step.
+double refined_clock(const CommonMarkers& common, double step_s, const ClockScan& scan) {
   constexpr double kFine = 0.01;
+  double best_s = scan.best_s;
+  double least_m = meet(common.pairs(best_s, true)).misfit_m;
   for (double h = 0.5 * step_s; h > kFine * step_s; h *= 0.5) {
-    for (const double other : {best - h, best + h}) {
-      const double m = misfit(other);
-      if (m < least) {
-        least = m;
-        best = other;
-      }
+    for (const double other : {best_s - h, best_s + h}) {
+      const std::vector<PointPair> pairs = common.pairs(other, true);
+      if (pairs.size() < 4 * kFewestPairs) continue;
+      const double misfit_m = meet(pairs).misfit_m;
+      if (misfit_m >= least_m) continue;
+      least_m = misfit_m;
+      best_s = other;
     }
   }
-  return best;
+  return best_s;
+}
+
+// The offset at which moving markers meet best; nothing where none stands out. One far off is taken
+// where points meet there several times as well as at any near one.
+std::optional<double> clock_by_motion(const CommonMarkers& common, double step_s, double about_s,
+                                      const PlaceCamerasOptions& options) {
+  if (!common.any_moves() || !(step_s > 0.0)) return std::nullopt;
+  ClockScan best = scan_clock(common, step_s, about_s, options.max_offset_s, kMostPairs);
+  const ClockScan far =
+      scan_clock(common, step_s, about_s, options.max_far_offset_s, kMostCoarsePairs);
+  if (far.least_m < kStandsOut * best.least_m) best = far;
+  if (!(best.least_m <= kStandsOut * best.usual_m)) return std::nullopt;
+  return refined_clock(common, step_s, best);
 }
 
 std::optional<CameraPlace> placed_by(const PoseTracks& placed, const PoseTracks& own,
@@ -213,7 +230,7 @@ std::optional<CameraPlace> placed_by(const PoseTracks& placed, const PoseTracks&
   if (options.scan_clocks) {
     const double step_s =
         0.5 * std::max(tracks::median_step(own.times_s), tracks::median_step(placed.times_s));
-    if (const auto ahead_s = clock_by_motion(common, step_s, about_s, options.max_offset_s)) {
+    if (const auto ahead_s = clock_by_motion(common, step_s, about_s, options)) {
       out.ahead_s = *ahead_s;
       out.clock_known = true;
     }
@@ -237,6 +254,20 @@ std::size_t common_sightings(const PoseTracks& a, const PoseTracks& b) {
 }
 
 }  // namespace
+
+bool marker_moves(const PoseTrack& track) {
+  constexpr double kBeyondNoise = 10.0;
+  if (track.samples.empty()) return false;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const PoseSample& sample : track.samples)
+    mean += sample.T_camera_marker.translation / static_cast<double>(track.samples.size());
+  std::vector<double> away, noise;
+  for (const PoseSample& sample : track.samples) {
+    away.push_back((sample.T_camera_marker.translation - mean).norm());
+    noise.push_back(std::sqrt(sample.covariance.bottomRightCorner<3, 3>().trace()));
+  }
+  return median_of(std::move(away)) > kBeyondNoise * median_of(std::move(noise));
+}
 
 PlacedCameras place_cameras(const std::vector<PoseTracks>& tracks, const MarkerSet& markers,
                             const PlaceCamerasOptions& options) {

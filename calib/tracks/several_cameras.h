@@ -26,8 +26,11 @@ struct CameraPlace {
 };
 
 struct PlaceCamerasOptions {
-  bool scan_clocks = true;        ///< false: the clocks agree
-  double max_offset_s = 2.0;      ///< half width of the scan, about `ahead_s`
+  bool scan_clocks = true;    ///< false: the clocks agree
+  double max_offset_s = 2.0;  ///< half width of the scan, about `ahead_s`
+  /// Of offsets that are believed only where points meet several times as well as at any within
+  /// `max_offset_s`; at most half of what both saw is given up.
+  double max_far_offset_s = 30.0;
   std::vector<double> ahead_s{};  ///< per camera, own time to a common clock; empty: 0
 };
 
@@ -41,6 +44,9 @@ struct PlacedCameras {
 [[nodiscard]] PlacedCameras place_cameras(const std::vector<PoseTracks>& tracks,
                                           const MarkerSet& markers,
                                           const PlaceCamerasOptions& options = {});
+
+/// The marker's origin goes farther than its noise.
+[[nodiscard]] bool marker_moves(const PoseTrack& track);
 
 /// The frames of several cameras as one sequence in the order of time, then of the camera.
 struct CommonFrames {

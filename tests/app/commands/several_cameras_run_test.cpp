@@ -97,6 +97,22 @@ TEST(RunSeveralCameras, GivesTheRobotAndEachCamera) {
   EXPECT_NE(read_text_file(run.folder / "report.html").find("cameras-table"), std::string::npos);
 }
 
+// Whichever camera the log goes with; the one that is off is named.
+TEST(RunSeveralCameras, AClockThatIsSecondsOffIsNamedAndTaken) {
+  for (const std::size_t off : {0U, 1U}) {
+    std::vector<RigCamera> cameras = front_and_left();
+    cameras[off].clock_s += 3.0;
+    const Ran run = run_on(
+        written(fmt::format("rig_clock_{}", cameras[off].name), scara_before(cameras)), false);
+    ASSERT_EQ(run.code, 0) << run.error;
+    const json result = run.read("result.json");
+    EXPECT_NE(result.dump().find(fmt::format("camera {}: its stamps are ", cameras[off].name)),
+              std::string::npos);
+    for (const json& camera : result.at("calibration").at("cameras"))
+      EXPECT_NEAR(camera.at("held_out_px").get<double>(), 0.141, 0.03);
+  }
+}
+
 TEST(RunSeveralCameras, ABumpIsOfTheCameraThatWasBumped) {
   std::vector<RigCamera> cameras = front_and_left();
   cameras[1].bumped_s = 6.0;

@@ -58,6 +58,17 @@ TEST(PlaceCameras, FindsPosesAndClocksByMovingMarkers) {
   }
 }
 
+// Beyond the scan for clocks that nearly agree some wrong offset meets better than most.
+TEST(PlaceCameras, FindsAClockThatIsSecondsOff) {
+  const auto worlds = truth::make_rig_worlds(
+      rig({{.name = "a"}, {.name = "b", .azimuth_rad = 0.5, .clock_s = 3.2}}));
+  const PlacedCameras placed = place_cameras(tracks_of(worlds), worlds.front().markers);
+  const std::size_t other = 1 - placed.reference;
+  ASSERT_TRUE(placed.places[other].has_value());
+  EXPECT_TRUE(placed.places[other]->clock_known);
+  EXPECT_NEAR(placed.places[other]->ahead_s, other == 1 ? 3.2 : -3.2, 5e-3);
+}
+
 TEST(PlaceCameras, LeavesOutACameraWithoutACommonMarker) {
   auto worlds = truth::make_rig_worlds(rig({{.name = "a"}, {.name = "b", .azimuth_rad = 0.5}}));
   for (TagObservation& tag : worlds[1].measurements.corners) tag.id.value += 100;
