@@ -240,7 +240,11 @@ VideoFacts look_at_video(const Recording& recording, const Progress& progress,
     ++facts.frames_searched;
   }
   report_progress(progress, "inspect", expected, expected);
-  for (const std::string& warning : video->warnings()) findings.push_back({false, warning});
+  for (const std::string& warning : video->warnings()) {
+    // A bag's log was read from the same file.
+    if (std::ranges::find(findings, warning, &Finding::text) == findings.end())
+      findings.push_back({false, warning});
+  }
   facts.markers = summarise(seen, recording.markers);
   judge_doubled(seen, findings);
   if (recording.camera) {

@@ -13,6 +13,7 @@
 #include "app/io/sha256.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/core/file.h"
+#include "kinematics/core/text.h"
 #include "kinematics/datasets/dataset.h"
 #include "kinematics/recorded/container.h"
 
@@ -345,7 +346,7 @@ void describe_input(const Recording& recording, const Observed& observed, const 
   run.frames = static_cast<int>(observed.measurements.times_s.size());
   run.markers = summarise_markers(observed, recording.markers);
   run.warnings = recording.warnings;
-  run.warnings.insert(run.warnings.end(), observed.warnings.begin(), observed.warnings.end());
+  append_unsaid(run.warnings, observed.warnings);
 }
 
 RunAgain read_run_again(const fs::path& folder) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/core/text.h"
 
-#include <cstddef>
 
+#include <algorithm>
+#include <cstddef>
 namespace kinescope {
 namespace {
 
@@ -47,6 +48,11 @@ std::string clean_text(std::string_view text) {
     i += length;
   }
   return clean;
+}
+
+void append_unsaid(std::vector<std::string>& said, const std::vector<std::string>& more) {
+  for (const std::string& words : more)
+    if (std::ranges::find(said, words) == said.end()) said.push_back(words);
 }
 
 }  // namespace kinescope

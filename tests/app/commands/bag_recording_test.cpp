@@ -175,6 +175,20 @@ TEST(BagRecording, OfImagesIsARecordingOfAVideo) {
                 .code,
             0);
   EXPECT_EQ(calibration_of(from_bag), before);
+
+  // Log and images are read from one file: what is wrong with it is said once.
+  const fs::path file = folder.path() / "robot/recording.mcap";
+  fs::resize_file(file, fs::file_size(file) * 3 / 4);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"inspect", (folder.path() / "robot").string(), "--quiet"},
+        {"run", (folder.path() / "robot").string(), "--output", from_bag + "_cut", "--quiet",
+         "--no-trace"}}) {
+    const Outcome cut = run(command);
+    const std::string said = cut.out + cut.err;
+    const std::size_t first_at = said.find("the file ends early, inside of");
+    ASSERT_NE(first_at, std::string::npos) << said;
+    EXPECT_EQ(said.find("the file ends early, inside of", first_at + 1), std::string::npos) << said;
+  }
 }
 
 // Images that are named, or a film beside the bag, take nothing of what else the bag holds.
