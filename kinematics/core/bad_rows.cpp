@@ -27,6 +27,7 @@ BadRows::BadRows(std::string source, std::size_t count, std::string unit)
 
 BadRows::BadRows(const CsvTable& table)
     : BadRows(table.source, table.rows.size() + table.ragged.size(), "rows") {
+  titles_ = title_words(table);
   for (const RaggedRow& row : table.ragged) add(row.line, table.ragged_error(row));
 }
 
@@ -46,10 +47,13 @@ const Error& BadRows::first() const {
 }
 
 std::vector<std::string> BadRows::warnings() const {
-  if (errors_.empty()) return {};
-  if (errors_.size() == 1) return {fmt::format("{}: left out", complaint_of(first()))};
-  return {fmt::format("{}: {} of {} {} are left out, the first: {}", source_, errors_.size(),
-                      count_, unit_, complaint_of(first()))};
+  std::vector<std::string> out = titles_;
+  if (errors_.size() == 1) out.push_back(fmt::format("{}: left out", complaint_of(first())));
+  if (errors_.size() > 1) {
+    out.push_back(fmt::format("{}: {} of {} {} are left out, the first: {}", source_,
+                              errors_.size(), count_, unit_, complaint_of(first())));
+  }
+  return out;
 }
 
 }  // namespace kinescope

@@ -27,7 +27,8 @@ class BadRows {
   void add(std::size_t line, const Error& error);
   [[nodiscard]] bool too_many(std::size_t bad) const;
   [[nodiscard]] std::size_t size() const { return errors_.size(); }
-  /// One line that names the first and says how many there are; nothing where there is none.
+  /// One line that names the first and says how many there are; nothing where there is none. Before
+  /// it what was passed over above the table's header.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:
@@ -36,6 +37,7 @@ class BadRows {
   std::string source_;
   std::string unit_;
   std::size_t count_;
+  std::vector<std::string> titles_;
   std::vector<std::pair<std::size_t, Error>> errors_;  ///< line, what is wrong
 };
 

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/gzip.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope {
 namespace {
@@ -125,6 +126,7 @@ class TableParser {
       : table_(table), lines_(text), binary_(looks_binary(text)) {}
 
   void read_header() {
+    pass_titles();
     auto line = lines_.next_content();
     if (!line) throw bad_input(table_.source, "is empty", "record it again");
     table_.header_line = lines_.number();
@@ -179,6 +181,47 @@ class TableParser {
   }
 
  private:
+  /// Titles have no fixed form; the header shows by the row below it, which has as many cells.
+  void pass_titles() {
+    constexpr std::size_t kMostTitles = 50;  // a report's cover sheet; beyond it is another table
+    std::vector<std::string_view> above;
+    Lines next = lines_;
+    for (Lines from = lines_; above.size() <= kMostTitles; from = next) {
+      const auto line = next.next_content();
+      if (!line) return;
+      if (heads_numbers(*line, next, above)) {
+        for (const std::string_view title : above) table_.titles.emplace_back(trim(title));
+        lines_ = from;
+        return;
+      }
+      above.push_back(*line);
+    }
+  }
+
+  /// Names, with rows of as many cells below, the first with a number, and other lines above. Of
+  /// two lines a cover sheet may look so ("Robot,UR5" above "Rate,100").
+  [[nodiscard]] static bool heads_numbers(std::string_view line, Lines below,
+                                          const std::vector<std::string_view>& above) {
+    const auto row = below.next_content();
+    if (!row) return false;
+    const auto another = below.next_content();
+    const auto is_number = [](const std::string& cell) {
+      return parse_number(cell).has_value() || with_decimal_point(cell).has_value();
+    };
+    for (const char delimiter : {',', ';', '\t', ' '}) {
+      const std::vector<std::string> names = split(line, delimiter);
+      const std::vector<std::string> cells = split(*row, delimiter);
+      if (names.size() < 2 || names.size() != cells.size()) continue;
+      if (another && count_cells(*another, delimiter) != names.size()) continue;
+      if (std::ranges::any_of(names, is_number)) continue;
+      if (std::ranges::none_of(cells, is_number)) continue;
+      return std::ranges::none_of(above, [&](std::string_view title) {
+        return count_cells(title, delimiter) == names.size();
+      });
+    }
+    return false;
+  }
+
   [[noreturn]] void refuse(std::string_view what, std::string_view remedy) const {
     refuse_binary();
     throw bad_input(fmt::format("{}:{}", table_.source, table_.header_line), what, remedy);
@@ -323,6 +366,15 @@ double CsvTable::number(std::size_t row, std::size_t column) const {
                       : "correct or remove the line");
   }
   return factors.empty() ? *value : *value * factors[column];
+}
+
+std::vector<std::string> title_words(const CsvTable& table) {
+  if (table.titles.empty()) return {};
+  return {fmt::format(
+      "{}: {} above the header in line {} passed over: '{}'{}", table.source,
+      table.titles.size() == 1 ? "a line" : fmt::format("{} lines", table.titles.size()),
+      fmt::format("{} {}", table.header_line, table.titles.size() == 1 ? "is" : "are"),
+      clean_text(table.titles.front()), table.titles.size() == 1 ? "" : ", ..")};
 }
 
 std::optional<double> CsvTable::optional_number(std::size_t row, std::size_t column) const {

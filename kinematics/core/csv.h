@@ -29,6 +29,7 @@ struct CsvTable {
   std::string source;                          ///< file name, for messages
   std::vector<std::string> header;             ///< column names, trimmed, no two alike
   std::size_t header_line = 1;                 ///< line in the file of the header, from 1
+  std::vector<std::string> titles;             ///< lines above the header that are no part of it
   std::vector<std::vector<std::string>> rows;  ///< trimmed cells
   std::vector<std::size_t> lines;              ///< line in the file of each row, from 1
   std::vector<RaggedRow> ragged;               ///< rows set aside (RaggedRows::kSetAside)
@@ -53,6 +54,9 @@ struct CsvTable {
 /// What becomes of rows of another length than the header.
 enum class RaggedRows { kRefuse, kSetAside };
 
+/// What was passed over above the header, in words: one line, or none.
+[[nodiscard]] std::vector<std::string> title_words(const CsvTable& table);
+
 /// The most that is read of one table: more is another file than a log, and would fill the memory.
 inline constexpr std::size_t kMostColumns = 10'000;
 inline constexpr std::size_t kMostCells = 100'000'000;
@@ -62,11 +66,12 @@ inline constexpr std::string_view kUnnamedColumn = "Unnamed: 0";
 
 /// Parses text. A header without a comma may separate its columns by semicolons, by tabs or (where
 /// the next line has as many words) by blanks; then the numbers may have decimal commas, all of
-/// them or none. Lines end in LF, CR LF or CR. A delimiter at the end of a line opens no column.
-/// Throws bad_input for: nothing in it, columns separated otherwise, decimal commas beside decimal
-/// points, two columns of one name, an unnamed column but the first, more than kMostColumns or
-/// kMostCells, a NUL byte, and, unless they are set aside, for rows shorter or longer than the
-/// header.
+/// them or none. Lines above the header (a title, a date) are passed over where they have other
+/// numbers of cells than it and than the row of numbers below it. Lines end in LF, CR LF or CR. A
+/// delimiter at the end of a line opens no column. Throws bad_input for: nothing in it, columns
+/// separated otherwise, decimal commas beside decimal points, two columns of one name, an unnamed
+/// column but the first, more than kMostColumns or kMostCells, a NUL byte, and, unless they are set
+/// aside, for rows shorter or longer than the header.
 [[nodiscard]] CsvTable parse_csv(std::string_view text, std::string source,
                                  RaggedRows ragged = RaggedRows::kRefuse);
 /// The same from a file, also from one packed with gzip.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/core/text.h"
 
-
 #include <algorithm>
 #include <cstddef>
+
 namespace kinescope {
 namespace {
 

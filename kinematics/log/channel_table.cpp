@@ -10,6 +10,7 @@
 
 #include "kinematics/core/csv.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/text.h"
 #include "kinematics/log/header_units.h"
 #include "kinematics/log/tool_table.h"
 
@@ -48,7 +49,8 @@ bool is_label_column(const ColumnOfNumbers& column) {
 }
 
 ChannelTable from_csv(CsvTable csv) {
-  std::vector<std::string> said = make_time_plain(csv);
+  std::vector<std::string> said = title_words(csv);
+  append_unsaid(said, make_time_plain(csv));
   ChannelTable table{.source = csv.source,
                      .names = {},
                      .values = {},

@@ -197,6 +197,36 @@ bool is_of_header(const std::string& name) {
          name == "header.seq" || name == "header.frame_id";
 }
 
+// "actual_q_0" of Universal Robots' real-time data exchange: a joint's measured position.
+bool is_rtde_position(std::string_view name) {
+  constexpr std::string_view kPosition = "actual_q_";
+  return name.size() > kPosition.size() && name.starts_with(kPosition) &&
+         std::ranges::all_of(name.substr(kPosition.size()),
+                             [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// Its other fields (RTDE guide, "Data fields"): velocities, currents, targets, poses of the tool,
+// states of the controller.
+bool is_other_rtde_field(std::string_view name) {
+  constexpr std::array<std::string_view, 14> kFields{"actual_",
+                                                     "target_",
+                                                     "joint_control_output",
+                                                     "joint_temperatures",
+                                                     "joint_mode",
+                                                     "robot_mode",
+                                                     "robot_status",
+                                                     "safety_",
+                                                     "runtime_state",
+                                                     "speed_scaling",
+                                                     "tool_",
+                                                     "tcp_force",
+                                                     "ft_raw_wrench",
+                                                     "payload"};
+  return !is_rtde_position(name) && std::ranges::any_of(kFields, [&](std::string_view field) {
+    return name.starts_with(field);
+  });
+}
+
 }  // namespace
 
 bool dates_to_seconds(CsvTable& table, std::size_t column) {
@@ -227,10 +257,11 @@ std::vector<std::string> log_names(const CsvTable& table) {
     const auto joint = joint_of(table, name);
     return joint && joint->quantity == "position";
   });
+  const bool of_rtde = std::ranges::any_of(table.header, is_rtde_position);
   std::vector<std::string> out = table.header;
   std::map<std::string, int> uses;
   for (std::string& name : out) {
-    if (is_of_header(name)) {
+    if (is_of_header(name) || (of_rtde && is_other_rtde_field(name))) {
       name.clear();
     } else if (has_positions) {
       name = log_name(table, name);
@@ -243,9 +274,10 @@ std::vector<std::string> log_names(const CsvTable& table) {
   return out;
 }
 
-CsvTable with_log_names(CsvTable table) {
+CsvTable with_log_names(CsvTable table, const std::vector<std::string>& keep) {
   const std::vector<std::string> names = log_names(table);
   for (std::size_t c = names.size(); c-- > 0;) {
+    if (names[c].empty() && std::ranges::find(keep, table.header[c]) != keep.end()) continue;
     table.header[c] = names[c];
     if (names[c].empty()) remove_column(table, c);
   }

@@ -24,10 +24,11 @@ namespace kinescope {
 bool dates_to_seconds(CsvTable& table, std::size_t column);
 
 /// The name of each column as a joint log has it: "shoulder" of "/joint_states/shoulder/position",
-/// "tau_shoulder" of its effort; empty for what is no joint value there (velocities, counters).
+/// "tau_shoulder" of its effort; empty for what is no joint value there (velocities, counters; of
+/// RTDE's fields all but `actual_q_N`, where that is there).
 [[nodiscard]] std::vector<std::string> log_names(const CsvTable& table);
 
-/// The table with those names, without the columns that have none.
-[[nodiscard]] CsvTable with_log_names(CsvTable table);
+/// The table with those names, without the columns that have none but for those in `keep`.
+[[nodiscard]] CsvTable with_log_names(CsvTable table, const std::vector<std::string>& keep = {});
 
 }  // namespace kinescope

@@ -12,7 +12,7 @@
 
 namespace kinescope::recorded {
 
-LogTable read_log_table(const std::filesystem::path& path) {
+LogTable read_log_table(const std::filesystem::path& path, const std::vector<std::string>& keep) {
   if (const auto bag = bags::bag_source(path)) {
     bags::LogTable read = bags::joint_table(*bag);
     return {std::move(read.table), std::move(read.warnings), {}};
@@ -28,12 +28,12 @@ LogTable read_log_table(const std::filesystem::path& path) {
   }
   CsvTable table = read_csv(path, RaggedRows::kSetAside);
   std::vector<std::string> said = make_time_plain(table);
-  return {with_log_names(std::move(table)), std::move(said), {}};
+  return {with_log_names(std::move(table), keep), std::move(said), {}};
 }
 
 JointLog read_joint_log(const std::filesystem::path& path,
                         const std::vector<std::string>& torque_channels) {
-  LogTable read = recorded::read_log_table(path);
+  LogTable read = recorded::read_log_table(path, torque_channels);
   JointLog log = joint_log_of(std::move(read.table), torque_channels).log;
   log.warnings.insert(log.warnings.begin(), read.warnings.begin(), read.warnings.end());
   log.joined_at_s = std::move(read.joined_at_s);

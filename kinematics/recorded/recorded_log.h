@@ -22,8 +22,10 @@ struct LogTable {
   std::vector<double> joined_at_s;  ///< as JointLog's
 };
 
-/// Throws as read_csv(), mat::joint_table(), bags::joint_table() and datasets::read_signals().
-[[nodiscard]] LogTable read_log_table(const std::filesystem::path& path);
+/// `keep`: columns that stay though no joint's position (torques that were declared). Throws as
+/// read_csv(), mat::joint_table(), bags::joint_table() and datasets::read_signals().
+[[nodiscard]] LogTable read_log_table(const std::filesystem::path& path,
+                                      const std::vector<std::string>& keep = {});
 /// As kinescope::read_joint_log(), also from a bag or dataset.
 [[nodiscard]] JointLog read_joint_log(const std::filesystem::path& path,
                                       const std::vector<std::string>& torque_channels = {});

@@ -141,6 +141,25 @@ TEST(Csv, ACommentMayBeTheHeader) {
             (std::vector<std::string>{"t", "x"}));
 }
 
+TEST(Csv, TitlesAboveTheHeaderArePassedOverAndSaid) {
+  const CsvTable table = parse_csv(
+      "Recorded by ControllerTool "
+      "v3\nDate;2026-01-02\nRobot,UR5\nRate,100\n\nt,a,b\n0,1,2\n1,2,3\n",
+      "log.csv");
+  EXPECT_EQ(table.header, (std::vector<std::string>{"t", "a", "b"}));
+  EXPECT_EQ(table.header_line, 6U);
+  EXPECT_EQ(table.lines, (std::vector<std::size_t>{7, 8}));
+  EXPECT_EQ(title_words(table), (std::vector<std::string>{
+                                    "log.csv: 4 lines above the header in line 6 are passed over: "
+                                    "'Recorded by ControllerTool v3', .."}));
+  EXPECT_EQ(title_words(parse_csv("Export from X\nt a\n0 1\n", "log.csv")),
+            (std::vector<std::string>{
+                "log.csv: a line above the header in line 2 is passed over: 'Export from X'"}));
+  // A header with its units below is none of them, nor is one above a damaged row.
+  EXPECT_TRUE(parse_csv("t,a\ns,rad\n0,1\n1,2\n", "log.csv").titles.empty());
+  EXPECT_TRUE(parse_csv("t,a\n0,1,5\n1,2\n", "log.csv", RaggedRows::kSetAside).titles.empty());
+}
+
 TEST(Csv, NamesTheLineOfAHeaderBelowComments) {
   EXPECT_EQ(parse_refusal("# made by a logger\n\nt,x,x\n1,2,3\n"),
             "a.csv:3: two columns are named 'x' (give every column its own name)");

@@ -87,6 +87,21 @@ TEST(ToolTable, BlanksBetweenColumns) {
   EXPECT_TRUE(rtde.said.empty());
 }
 
+// Velocities and currents of Universal Robots' exchange move with joints, and are none.
+TEST(ToolTable, OfRtdeOnlyMeasuredPositionsAreChannels) {
+  const std::string text =
+      "timestamp,actual_q_0,actual_q_1,target_q_0,actual_qd_0,actual_current_0,speed_scaling,rail\n"
+      "0,1,2,3,4,5,1,7\n1,2,3,4,5,6,1,8\n";
+  EXPECT_EQ(read_tool(text).log.channels,
+            (std::vector<std::string>{"actual_q_0", "actual_q_1", "rail"}));
+  const CsvTable kept = with_log_names(parse_csv(text, "joints.csv"), {"actual_current_0"});
+  EXPECT_TRUE(kept.column("actual_current_0"));
+  EXPECT_FALSE(kept.column("actual_qd_0"));
+  // Without them a target is all that is known of a joint.
+  EXPECT_EQ(read_tool("t,target_q_0,actual_qd_0\n0,1,2\n1,2,3\n").log.channels,
+            (std::vector<std::string>{"target_q_0", "actual_qd_0"}));
+}
+
 TEST(ToolTable, Dates) {
   const ToolLog dates =
       read_tool("timestamp,a\n2024-06-10 06:13:20.25,1\n2024-06-10 06:13:20.5,2\n");
