@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 
 #include "app/io/flange_convention.h"
+#include "app/io/flange_matrix.h"
 #include "app/io/recording.h"
 #include "app/io/sighting_table.h"
 #include "kinematics/log/header_units.h"
@@ -26,10 +27,12 @@ struct FlangeAngles {
   const char* words;
   std::string_view convention;
 };
-constexpr std::array<FlangeAngles, 5> kFlangeAngles{{
+constexpr const char* kKawasakiT = "t of o, a, t";
+constexpr std::array<FlangeAngles, 6> kFlangeAngles{{
     {{"roll", "pitch", "yaw"}, "roll, pitch, yaw about fixed x, y, z", "fixed_xyz"},
     {{"w", "p", "r"}, "W, P, R about fixed x, y, z", "fixed_xyz"},
     {{"a", "b", "c"}, "A, B, C about z, then y, then x", "zyx"},
+    {{"o", "a", kKawasakiT}, "O, A, T about z, then the turned y, then the turned z", "zyz"},
     {{"rx", "ry", "rz"}, "rx, ry, rz as a rotation vector", "rotation_vector"},
     {{"rx", "ry", "rz"}, "rx, ry, rz as angles about fixed x, y, z", "fixed_xyz"},
 }};
@@ -70,9 +73,18 @@ void name_numbered_quaternion(std::vector<std::string>& header) {
   for (std::size_t k = 0; k < at.size(); ++k) header[at[k]] = kParts[k];
 }
 
+// Kawasaki's third angle is named as the time is: it stands behind the second.
+void name_kawasaki_t(std::vector<std::string>& header) {
+  for (std::size_t c = 2; c < header.size(); ++c) {
+    const bool third = header[c].starts_with('t') || header[c].starts_with('T');
+    if (third && header[c - 2] == "o" && header[c - 1] == "a") header[c] = kKawasakiT;
+  }
+}
+
 struct FlangeTable {
   CsvTable table;
   std::vector<bool> has_unit;  ///< of each column: its name in the file says it
+  std::string of_matrix = {};  ///< the reading in words, where the pose is one
 };
 
 // Names as makers write them: X, Y, Z, A, B, C.
@@ -90,8 +102,11 @@ FlangeTable read_flange_table(const std::filesystem::path& path) {
     const bool twice = std::ranges::find(names, name) != names.end();
     names.push_back(twice ? column : std::move(name));
   }
-  if (!has_quaternion(table)) name_numbered_quaternion(names);
-  table.header = std::move(names);
+  name_kawasaki_t(names);
+  table.header = names;
+  out.of_matrix = matrix_to_quaternion(table).value_or("");
+  out.has_unit.resize(table.header.size(), false);
+  if (!has_quaternion(table)) name_numbered_quaternion(table.header);
   return out;
 }
 
@@ -125,7 +140,7 @@ void require_rotation(const CsvTable& table, const std::vector<FlangeAngles>& an
                     fmt::format("has no rotation that is known, but the columns {}",
                                 fmt::join(table.header, ", ")),
                     "name them qx, qy, qz, qw, or roll, pitch, yaw, or a, b, c, or w, p, r, or "
-                    "rx, ry, rz; degrees as \"roll [deg]\"");
+                    "o, a, t, or rx, ry, rz, or T00 to T33; degrees as \"roll [deg]\"");
   }
 }
 
@@ -306,6 +321,14 @@ std::vector<ColumnReading> quaternions(const CsvTable& table) {
   return out;
 }
 
+// The numbers themselves say how a matrix is to be read.
+ColumnReading matrix(const FlangeTable& file) {
+  ColumnReading out{&rotation_convention("quaternion_xyzw"),
+                    columns_of(file.table, kQuaternion).columns};
+  out.words = file.of_matrix;
+  return out;
+}
+
 // Angles as their names say, and as other makers read three of them.
 std::vector<ColumnReading> triples(const std::vector<FlangeAngles>& named,
                                    const RotationColumns& of) {
@@ -327,6 +350,7 @@ std::vector<ColumnReading> triples(const std::vector<FlangeAngles>& named,
 }
 
 std::vector<ColumnReading> candidates_of(const FlangeTable& file) {
+  if (!file.of_matrix.empty()) return with_conjugates({matrix(file)});
   if (has_quaternion(file.table)) return with_conjugates(quaternions(file.table));
   const std::vector<FlangeAngles> named = angles_in(file.table);
   require_rotation(file.table, named);
