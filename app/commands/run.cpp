@@ -117,7 +117,8 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
     return;
   }
   const Verdict verdict = make_verdict(run);
-  fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
+  fmt::print("{}\n{}\n{}\nNext: {}\n", verdict.found, verdict.accurate, verdict.limits,
+             verdict.next);
   if (run.trace) {
     for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
   }

@@ -90,8 +90,9 @@ void print_hand_eye(const HandEyeSummary& summary, const RunFolder& folder,
     return;
   }
   const Verdict verdict = hand_eye_verdict(summary);
-  for (const std::string& words : {verdict.found, verdict.accurate, verdict.limits, verdict.next})
+  for (const std::string& words : {verdict.found, verdict.accurate, verdict.limits})
     if (!words.empty()) fmt::print("{}\n", words);
+  if (!verdict.next.empty()) fmt::print("Next: {}\n", verdict.next);
   if (summary.hand_eye.trace)
     for (const std::string& line : trace_lines(*summary.hand_eye.trace)) fmt::print("{}\n", line);
   for (const std::string& line : odd_row_lines(summary)) fmt::print("{}\n", line);

@@ -70,8 +70,7 @@ class Detecting {
     const std::unique_ptr<VideoReader> reader = open_video(video);
     const VideoInfo& info = reader->info();
     lossy_ = is_lossy(info.codec);
-    // Pictures that were taken one by one need not follow from one another.
-    one_by_one_ = info.codec == "images";
+    one_by_one_ = is_one_by_one(info);
     const std::size_t run_length = one_by_one_ ? 1 : static_cast<std::size_t>(every_);
     Detection out;
     TagObservations& found = out.observations;
@@ -122,6 +121,14 @@ class Detecting {
   }
 
  private:
+  // Pictures that were taken one by one need not follow from one another. A film kept as images is
+  // followed as a film: its frames are nearer to each other than a marker is looked for behind its
+  // last sighting.
+  static bool is_one_by_one(const VideoInfo& info) {
+    return info.codec == "images" &&
+           !(info.duration_s < kGapOneSide_s * static_cast<double>(info.frame_count - 1));
+  }
+
   static bool is_lossy(const std::string& codec) {
     static const std::set<std::string> kLossless = {"images",  "rawvideo", "ffv1",   "huffyuv",
                                                     "ffvhuff", "png",      "utvideo"};

@@ -192,6 +192,8 @@ TEST(RunNominal, TheFreedomThatPredictsBestIsExported) {
   EXPECT_LT(held_out(0), held_out(2)) << levels.dump(2);
   EXPECT_TRUE(levels[0].at("exported").get<bool>()) << levels.dump(2);
   EXPECT_NE(outcome.out.find("held as drawn"), std::string::npos) << outcome.out;
+  const std::string next = result.at("verdict").at("next").get<std::string>();
+  EXPECT_NE(outcome.out.find("\nNext: " + next + "\n"), std::string::npos) << outcome.out;
 }
 
 }  // namespace
