@@ -10,6 +10,7 @@
 #include "app/io/output_folder.h"
 #include "app/io/same_place.h"
 #include "app/io/torque_effects_file.h"
+#include "dynamics/data/column_names.h"
 #include "dynamics/data/log_checks.h"
 #include "dynamics/simulation/plant.h"
 #include "dynamics/simulation/robot_effects.h"
@@ -48,6 +49,44 @@ std::vector<int> channels_of(const JointLog& log, const TorqueRobot& robot) {
                   fmt::format("name the columns t, {}", fmt::join(robot.joints, ", ")));
 }
 
+bool is_joint_position(const std::string& column) {
+  const auto meaning = read_column_name(column);
+  return !meaning || (meaning->quantity == LoggedQuantity::kPosition &&
+                      meaning->origin == LoggedOrigin::kPlain);
+}
+
+/// What another robot's trajectory shows by: columns of no joint of this one, or of other names.
+std::vector<std::string> assignment_words(const JointLog& log, const std::vector<int>& channels,
+                                          const TorqueRobot& robot) {
+  std::vector<std::string> in_order;
+  std::vector<std::string> others;
+  for (std::size_t c = 0; c < log.channels.size(); ++c) {
+    const auto used = std::ranges::find(channels, static_cast<int>(c));
+    if (used == channels.end()) {
+      if (is_joint_position(log.channels[c]))
+        others.push_back(fmt::format("'{}'", log.channels[c]));
+      continue;
+    }
+    const std::string& joint = robot.joints[static_cast<std::size_t>(used - channels.begin())];
+    if (log.channels[c].find(joint) == std::string::npos)
+      in_order.push_back(fmt::format("{} = {}", joint, log.channels[c]));
+  }
+  std::vector<std::string> out;
+  if (!in_order.empty()) {
+    out.push_back(fmt::format(
+        "{}: no column is named like a joint: taken in their order: {} (check that the log is this "
+        "robot's)",
+        log.source, fmt::join(in_order, ", ")));
+  }
+  if (!others.empty()) {
+    out.push_back(fmt::format(
+        "{}: {} joints are wanted, the log has {}: {} left out (check that the log is this "
+        "robot's)",
+        log.source, channels.size(), channels.size() + others.size(), fmt::join(others, ", ")));
+  }
+  return out;
+}
+
 /// Values that are too large to be rad or m.
 void require_plausible_units(const JointLog& log, const Eigen::MatrixXd& values,
                              const std::vector<int>& channels, const TorqueRobot& robot) {
@@ -84,6 +123,7 @@ TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& ro
                     fmt::format("give at least {}", kFewest));
   }
   const std::vector<int> channels = channels_of(log, robot);
+  for (const std::string& words : assignment_words(log, channels, robot)) console.warn(words);
   Eigen::MatrixXd values(std::ssize(log.times_s), std::ssize(channels));
   for (std::size_t j = 0; j < channels.size(); ++j) {
     values.col(static_cast<Eigen::Index>(j)) = log.values.col(channels[j]);

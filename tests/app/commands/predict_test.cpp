@@ -90,6 +90,19 @@ TEST_F(PredictCommand, SaysWhereTheMotionIsNew) {
   ASSERT_EQ(fast.code, 0) << fast.err;
   EXPECT_NE(fast.out.find("times as fast here as in what was learned"), std::string::npos)
       << fast.out;
+
+  // Another robot's log is refused by the names of its joints.
+  std::string other = read_text_file(path("next.csv"));
+  const std::size_t line = other.find('\n');
+  std::string header;
+  for (const char c : other.substr(0, line))
+    header += c == '1' ? "_arm" : c == '2' ? "_hand" : std::string(1, c);
+  folder_.write("other.csv", header + other.substr(line));
+  const Outcome renamed = run(words("other.csv"));
+  EXPECT_EQ(renamed.code, 3);
+  EXPECT_NE(renamed.err.find("the log's joints (arm, hand) are not the tree's (joint1, joint2)"),
+            std::string::npos)
+      << renamed.err;
 }
 
 TEST_F(PredictCommand, ParametricModelsAreSavedWithWhatTracingFound) {

@@ -196,6 +196,26 @@ TEST_F(Simulate, TheSameSeedGivesTheSameBytes) {
   EXPECT_NE(read_text_file(path("log.csv")), first);
 }
 
+TEST_F(Simulate, WhatPointsToAnotherRobotsTrajectoryIsSaidByNames) {
+  EXPECT_EQ(run(words({})).err, "");
+  folder_.write("other.csv", trajectory_csv({"base", "arm", "hand"}, 2.0));
+  const Outcome named_otherwise = run(words({}, "other.csv"));
+  EXPECT_EQ(named_otherwise.code, 0);
+  EXPECT_NE(named_otherwise.err.find("taken in their order: " + joints_[0] + " = base, " +
+                                     joints_[1] + " = arm"),
+            std::string::npos)
+      << named_otherwise.err;
+  std::vector<std::string> more = joints_;
+  more.emplace_back("gripper");
+  more.push_back("dq_" + joints_[0]);
+  folder_.write("more.csv", trajectory_csv(more, 2.0));
+  const Outcome longer = run(words({}, "more.csv"));
+  EXPECT_EQ(longer.code, 0);
+  EXPECT_NE(longer.err.find("3 joints are wanted, the log has 4: 'gripper' left out"),
+            std::string::npos)
+      << longer.err;
+}
+
 TEST_F(Simulate, ATrajectoryInDegreesIsRefused) {
   std::string degrees = "t";
   for (const std::string& joint : joints_) degrees += "," + joint;
