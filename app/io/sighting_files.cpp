@@ -189,8 +189,14 @@ void ask_for_unit(double span, const std::string& source, std::vector<std::strin
 }
 
 /// No camera or tracker sees a robot over 100 m; one of half a metre spans more than that in mm.
+constexpr double kNoHall = 100.0;
+
+std::string taken_as_mm(const std::string& source, double span) {
+  return fmt::format("{}: the positions span {:.0f} m: they are taken as mm (write x, y, z in m)",
+                     source, span);
+}
+
 void read_as_metres(ReadSightings<PoseTracks>& poses, const std::string& source) {
-  constexpr double kNoHall = 100.0;
   std::vector<Eigen::Vector3d> positions;
   for (const PoseTrack& track : poses.found.tracks)
     for (const PoseSample& sample : track.samples)
@@ -200,8 +206,22 @@ void read_as_metres(ReadSightings<PoseTracks>& poses, const std::string& source)
   for (PoseTrack& track : poses.found.tracks) {
     for (PoseSample& sample : track.samples) sample.T_camera_marker.translation *= 1e-3;
   }
-  poses.warnings.push_back(fmt::format(
-      "{}: the positions span {:.0f} m: they are taken as mm (write x, y, z in m)", source, span));
+  poses.warnings.push_back(taken_as_mm(source, span));
+}
+
+/// Sigmas that the table declares are in the positions' unit.
+void read_as_metres(ReadSightings<PointObservations>& points, const std::string& source) {
+  std::vector<Eigen::Vector3d> positions;
+  for (const PointObservation& point : points.found.observations)
+    if (point.position_m) positions.push_back(*point.position_m);
+  const double span = span_m(positions);
+  if (span <= kNoHall) return ask_for_unit(span, source, points.warnings);
+  for (PointObservation& point : points.found.observations) {
+    if (!point.position_m) continue;
+    *point.position_m *= kMetrePerMillimetre;
+    if (point.sigma_m != kPointSigmaM) point.sigma_m *= kMetrePerMillimetre;
+  }
+  points.warnings.push_back(taken_as_mm(source, span));
 }
 
 PointObservation read_point(const CsvTable& table, std::size_t row) {
@@ -330,10 +350,7 @@ ReadSightings<PointObservations> read_points(const std::filesystem::path& path) 
               out.found.observations.push_back(std::move(point));
             });
   append(out.warnings, bad);
-  std::vector<Eigen::Vector3d> positions;
-  for (const PointObservation& point : out.found.observations)
-    if (point.position_m) positions.push_back(*point.position_m);
-  ask_for_unit(span_m(positions), table.source, out.warnings);
+  read_as_metres(out, table.source);
   return out;
 }
 

@@ -195,6 +195,18 @@ TEST_F(SightingFiles, PositionsThatSpanAHallAreMillimetres) {
       << "one position far off changes no unit";
 }
 
+TEST_F(SightingFiles, PointsOfATrackerInMillimetresAreTakenSo) {
+  folder_.write("points.csv",
+                "t,point,x,y,z,sigma\n0,1,1500,0,20,0.02\n1,1,1800,0,20,\n2,1,2250,0,30,0.02\n");
+  const ReadSightings<PointObservations> read = read_points(folder_.path() / "points.csv");
+  ASSERT_EQ(read.found.observations.size(), 3U);
+  EXPECT_NEAR(read.found.observations[0].position_m->x(), 1.5, 1e-12);
+  EXPECT_NEAR(read.found.observations[0].sigma_m, 2e-5, 1e-12);
+  EXPECT_NEAR(read.found.observations[1].sigma_m, 1e-4, 1e-12) << "the default is in m";
+  ASSERT_EQ(read.warnings.size(), 1U);
+  EXPECT_NE(read.warnings[0].find("span 750 m: they are taken as mm"), std::string::npos);
+}
+
 TEST_F(SightingFiles, PositionsThatSpanMoreThanACellAreAskedFor) {
   const ReadSightings<PoseTracks> read = read_poses_of(forty_poses("41,1,0,0,0,0,0,0,1", 1e2));
   EXPECT_NEAR(read.found.tracks[0].samples[10].T_camera_marker.translation.x(), 10.0, 1e-9);
