@@ -2,6 +2,7 @@
 #include "kinematics/urdf/calibrated_urdf.h"
 
 #include <gtest/gtest.h>
+#include <urdf_parser/urdf_parser.h>
 
 #include "kinematics/urdf/urdf.h"
 #include "tests/kinematics/model/random_tree.h"
@@ -79,7 +80,12 @@ TEST(CalibratedUrdf, OnlyTagsOfJointsThatMovedChange) {
                R"(<axis xyz="0 1 0"/>)");
   expected = replaced(expected, R"(<child link="tag_4"/><origin xyz="0 0 .05"/>)",
                       R"(<child link="tag_4"/><origin xyz="0 0.002 0.05" rpy="0 0 0"/>)");
-  EXPECT_EQ(with_calibrated_joints(kDrawing, "memory", tree), expected);
+  const std::string written = with_calibrated_joints(kDrawing, "memory", tree);
+  EXPECT_EQ(written, expected);
+  const auto whole = urdf::parseURDF(written);  // all of it, not the kinematic part alone
+  ASSERT_NE(whole, nullptr);
+  EXPECT_EQ(whole->getLink("upper")->inertial->mass, 2.5);
+  EXPECT_EQ(whole->getJoint("shoulder")->limits->upper, 2.8973);
 }
 
 TEST(CalibratedUrdf, ATreeThatIsTheDrawingChangesNoByte) {
