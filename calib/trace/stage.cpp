@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/trace/distribution.h"
+
 namespace kinescope::trace {
 
 Stage::Stage(std::vector<AddedEffect> effects, TracedFit fitted)
@@ -117,6 +119,14 @@ Eigen::MatrixXd rows_of(const Linearisation& linear, const std::vector<EffectCol
 Linearisation extend(const Linearisation& linear, const std::vector<EffectColumn>& columns,
                      const Eigen::MatrixXd& prior) {
   return extend(linear, rows_of(linear, columns), prior);
+}
+
+double lost_p_value(const Stage& less, const Stage& with, double parameters) {
+  if (with.fit.linear.independent_instants) return 1.0;
+  const double freedom = with.system.partition().stretches - 1.0;
+  const double left = std::max(1e-300, with.system.total().rr);
+  const double lost = std::max(0.0, less.system.total().rr - left) / left;
+  return freedom < 1.0 ? 1.0 : f_survival(lost * freedom / parameters, parameters, freedom);
 }
 
 }  // namespace kinescope::trace

@@ -62,4 +62,10 @@ using StagePtr = std::shared_ptr<const Stage>;
 [[nodiscard]] Linearisation extend(const Linearisation& linear, const Eigen::MatrixXd& columns,
                                    const Eigen::MatrixXd& prior);
 
+/// p-value of the squares that `less` leaves beyond those of `with`, which has so many parameters
+/// more or others, each stretch counted as one measurement only. A few large differences of squares
+/// say little about their mean, and much beside what is left with it. Of single postures, which are
+/// many and may be outliers, their mean says enough: 1.
+[[nodiscard]] double lost_p_value(const Stage& less, const Stage& with, double parameters);
+
 }  // namespace kinescope::trace

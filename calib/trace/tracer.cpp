@@ -19,17 +19,6 @@ namespace {
 constexpr double kLargeShare = 0.05;
 constexpr int kLongestChain = 5;
 
-// What the fit lost without an effect, each stretch counted as one measurement only. A few large
-// differences of squares say little about their mean, and much beside what is left with it. Of
-// single postures, which are many and may be outliers, their mean says enough.
-double lost_p_value(const Stage& less, const Stage& with, double parameters) {
-  if (with.fit.linear.independent_instants) return 1.0;
-  const double freedom = with.system.partition().stretches - 1.0;
-  const double left = std::max(1e-300, with.system.total().rr);
-  const double lost = std::max(0.0, less.system.total().rr - left) / left;
-  return freedom < 1.0 ? 1.0 : f_survival(lost * freedom / parameters, parameters, freedom);
-}
-
 }  // namespace
 
 Tracer::Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress)

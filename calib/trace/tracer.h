@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "calib/trace/common_motion.h"
+#include "calib/trace/encompassing.h"
 #include "calib/trace/family.h"
 #include "calib/trace/lasting.h"
 #include "calib/trace/rest.h"
@@ -108,6 +109,7 @@ class Tracer {
   [[nodiscard]] bool check(std::size_t index);
   [[nodiscard]] bool swap(std::size_t index, const AddedEffect& other, bool likelier, bool plainer);
   [[nodiscard]] bool is_ruled_out(std::size_t index, const AddedEffect& rival);
+  [[nodiscard]] Comparison compare_fits(std::size_t index, const AddedEffect& rival);
   [[nodiscard]] bool settle_rivals(std::size_t index, const Stage& without,
                                    const TestedMember& own);
   [[nodiscard]] std::vector<AddedEffect> curves_for_rests() const;

@@ -22,6 +22,7 @@ namespace {
 // A rival is looked at if it explains at least this share of what the chosen effect explains.
 constexpr double kRivalShare = 0.5;
 constexpr std::size_t kMostRivals = 6;
+constexpr double kSameGain = 1e-9;  // of two columns that are one: rounding
 // What is less than this share of the squares that were there at first may be the imperfection of
 // the other effects: with all of them in it must be beyond doubt.
 constexpr double kImperfection = 1e-5;
@@ -255,6 +256,21 @@ bool Tracer::is_ruled_out(std::size_t index, const AddedEffect& rival) {
          predicts_clearly_worse(refitted->held_out.whitened, now_->held_out.whitened);
 }
 
+// Of two effects that are the same to first order (a delay and a low-pass): only their fits differ.
+Comparison Tracer::compare_fits(std::size_t index, const AddedEffect& rival) {
+  std::vector<AddedEffect> effects = now_->added;
+  effects[index] = rival;
+  const StagePtr other = stage_of(std::move(effects));
+  if (!other->fit.converged) return Comparison::kFirst;
+  const auto parameters = static_cast<double>(now_->fit.values[index].size());
+  const auto is_worse = [&](const Stage& one, const Stage& beside) {
+    return predicts_clearly_worse(one.held_out.whitened, beside.held_out.whitened) ||
+           lost_p_value(one, beside, parameters) <= level_;
+  };
+  if (is_worse(*other, *now_)) return Comparison::kFirst;
+  return is_worse(*now_, *other) ? Comparison::kSecond : Comparison::kInterchangeable;
+}
+
 bool Tracer::settle_rivals(std::size_t index, const Stage& without, const TestedMember& own) {
   const AddedEffect effect = now_->added[index];
   std::vector<TestedMember> rivals;
@@ -278,9 +294,11 @@ bool Tracer::settle_rivals(std::size_t index, const Stage& without, const Tested
   for (const TestedMember& rival : rivals) {
     const Candidate& candidate = without.fit.candidates[rival.index];
     const double freedom = freedom_of(candidate, rival.score);
+    const bool same = std::abs(rival.score.gain - own.score.gain) < kSameGain * own.score.gain;
     const Comparison comparison =
-        compare_effects(without.system, {own.columns, own_freedom, own.score.statistic},
-                        {rival.columns, freedom, rival.score.statistic});
+        same ? compare_fits(index, {candidate.id, rival.scan})
+             : compare_effects(without.system, {own.columns, own_freedom, own.score.statistic},
+                               {rival.columns, freedom, rival.score.statistic});
     if (comparison == Comparison::kFirst) continue;
     // Of two that say the same the plainer one comes first.
     const bool plainer = freedom < own_freedom && !needed_.contains(effect.id);

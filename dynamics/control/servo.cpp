@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/control/velocity_estimator.h"
+#include "dynamics/effects/first_order_lag.h"
 #include "dynamics/rigid/mass_matrix.h"
 #include "dynamics/simulation/simulation.h"
 #include "kinematics/core/error.h"
@@ -50,6 +51,16 @@ Eigen::MatrixXd delayed(const Eigen::MatrixXd& rows, const Eigen::VectorXd& dela
     }
   }
   return out;
+}
+
+/// Each column behind the low-pass of its drive.
+Eigen::MatrixXd lagged(Eigen::MatrixXd rows, const Eigen::VectorXd& lag_s,
+                       const TorqueSamples& samples) {
+  for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+    if (lag_s[j] == 0.0) continue;
+    rows.col(j) = first_order_lag(rows.col(j), samples.t_s, samples.trajectory, lag_s[j]);
+  }
+  return rows;
 }
 
 /// Where the robot was at every stamp, and what the controller and its motors did about it.
@@ -114,8 +125,8 @@ ServoLog log_of(const Run& run, const Plant& plant, const TorqueSamples& referen
   out.samples.q = run.q;
   out.samples.dq = run.dq;
   out.samples.ddq = run.ddq;
-  out.samples.torque =
-      delayed(run.applied * plant.gain.transpose(), plant.delay_s, options.rate_hz);
+  out.samples.torque = delayed(lagged(run.applied * plant.gain.transpose(), plant.lag_s, reference),
+                               plant.delay_s, options.rate_hz);
   if (options.torque_noise > 0.0) {
     for (double& torque : out.samples.torque.reshaped()) torque += rng.normal(options.torque_noise);
   }

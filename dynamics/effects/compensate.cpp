@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// measured(t + delay) = sensor * (rigid bodies + effects)(t), forwards and backwards.
+// measured(t + delay) = lag (sensor * (rigid bodies + effects))(t), forwards and backwards.
 #include <algorithm>
 #include <cmath>
 
@@ -15,10 +15,11 @@ namespace kinescope {
 namespace {
 
 /// An effect's part in the equation above.
-enum class Part { kPhysical, kDelay, kGain, kCross, kGravity };
+enum class Part { kPhysical, kDelay, kLag, kGain, kCross, kGravity };
 
 Part part_of(const TorqueEffect& effect) {
   if (effect.id.effect == "torque_delay") return Part::kDelay;
+  if (effect.id.effect == "torque_lag") return Part::kLag;
   if (effect.id.effect == "torque_gain") return Part::kGain;
   if (effect.id.effect == "gravity_direction") return Part::kGravity;
   if (effect.id.effect == "cross_talk" && effect.values.size() == 1) return Part::kCross;
@@ -111,12 +112,30 @@ struct Applied {
     return out;
   }
 
-  /// `later`: 1 takes the delay out of a measured torque, -1 puts it into a predicted one.
-  [[nodiscard]] Eigen::MatrixXd shifted(Eigen::MatrixXd torque, double later) const {
-    for (const TorqueEffect& effect : corrected.effects) {
-      if (part_of(effect) != Part::kDelay) continue;
-      const Eigen::Index j = joint_of(effect);
-      torque.col(j) = context.motion->shifted(torque.col(j), later * effect.values[0]);
+  /// What the sensors make of torques in time: behind each joint's low-pass, and late.
+  [[nodiscard]] Eigen::MatrixXd late(Eigen::MatrixXd torque) const {
+    const EffectMotion& motion = *context.motion;
+    for (const Part part : {Part::kLag, Part::kDelay}) {
+      for (const TorqueEffect& effect : corrected.effects) {
+        if (part_of(effect) != part) continue;
+        auto column = torque.col(joint_of(effect));
+        column = part == Part::kLag ? motion.lagged(column, effect.values[0])
+                                    : motion.shifted(column, -effect.values[0]);
+      }
+    }
+    return torque;
+  }
+
+  /// The other way round.
+  [[nodiscard]] Eigen::MatrixXd in_time(Eigen::MatrixXd torque) const {
+    const EffectMotion& motion = *context.motion;
+    for (const Part part : {Part::kDelay, Part::kLag}) {
+      for (const TorqueEffect& effect : corrected.effects) {
+        if (part_of(effect) != part) continue;
+        auto column = torque.col(joint_of(effect));
+        column = part == Part::kLag ? motion.before_lag(column, effect.values[0])
+                                    : motion.shifted(column, effect.values[0]);
+      }
     }
     return torque;
   }
@@ -128,14 +147,14 @@ Eigen::MatrixXd predict_torque(const CorrectedTorqueModel& corrected, const Torq
                                const TorqueFilter& filter) {
   const Applied applied(corrected, samples, filter);
   const Eigen::MatrixXd physical = applied.base() + applied.effects();
-  return applied.shifted(physical * applied.sensor().transpose(), -1.0);
+  return applied.late(physical * applied.sensor().transpose());
 }
 
 TorqueSamples compensate(const CorrectedTorqueModel& corrected, const TorqueSamples& samples,
                          const TorqueFilter& filter) {
   const Applied applied(corrected, samples, filter);
   TorqueSamples out = samples;
-  const Eigen::MatrixXd in_time = applied.shifted(samples.torque, 1.0);
+  const Eigen::MatrixXd in_time = applied.in_time(samples.torque);
   out.torque =
       applied.sensor().fullPivLu().solve(in_time.transpose()).transpose() - applied.effects();
   return out;

@@ -2,7 +2,7 @@
 //
 // The effects that a model of rigid bodies lacks, as candidates for calib/trace: what each one adds
 // to the torque that the actuators must give (friction, springs, a payload) or to what their
-// sensors say (offset, gain, delay), per unit of its parameters.
+// sensors say (offset, gain, delay, lag), per unit of its parameters.
 #pragma once
 
 #include <functional>

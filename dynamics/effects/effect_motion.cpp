@@ -8,6 +8,7 @@
 
 #include "dynamics/data/statistics.h"
 #include "dynamics/data/zero_phase_filter.h"
+#include "dynamics/effects/first_order_lag.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -191,6 +192,20 @@ Eigen::VectorXd EffectMotion::shifted(const Eigen::VectorXd& samples, double lat
     }
   }
   return out;
+}
+
+Eigen::VectorXd EffectMotion::lagged(const Eigen::VectorXd& samples, double constant_s) const {
+  return first_order_lag(samples, time_s(), samples_.trajectory, constant_s);
+}
+
+Eigen::VectorXd EffectMotion::before_lag(const Eigen::VectorXd& samples, double constant_s) const {
+  if (constant_s == 0.0) return samples;
+  return samples + constant_s * rate(samples);
+}
+
+Eigen::MatrixXd EffectMotion::lagged_at_instants(const Eigen::MatrixXd& signals,
+                                                 double constant_s) const {
+  return first_order_lag(signals, at_instants(time_s()), samples_.trajectory(kept_), constant_s);
 }
 
 void EffectMotion::leave_out(const std::vector<char>& wanted) {

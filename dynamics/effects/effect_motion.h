@@ -79,6 +79,13 @@ class EffectMotion {
   /// The signal as it is `later_s` after each sample (cubic between samples; the ends are held).
   [[nodiscard]] Eigen::VectorXd shifted(const Eigen::VectorXd& samples, double later_s) const;
 
+  /// Signals of every sample behind a first-order low-pass (first_order_lag.h), and before it.
+  [[nodiscard]] Eigen::VectorXd lagged(const Eigen::VectorXd& samples, double constant_s) const;
+  [[nodiscard]] Eigen::VectorXd before_lag(const Eigen::VectorXd& samples, double constant_s) const;
+  /// The same of signals at the instants kept (instants x signals).
+  [[nodiscard]] Eigen::MatrixXd lagged_at_instants(const Eigen::MatrixXd& signals,
+                                                   double constant_s) const;
+
   /// Instants kept are those for which `wanted` (a sample each) is not 0.
   void leave_out(const std::vector<char>& wanted);
 

@@ -68,11 +68,28 @@ Candidate torque_delay(const SharedContext& c, std::size_t j) {
   return out;
 }
 
+/// To first order the same as a delay: only fits with one or the other in tell them apart.
+Candidate torque_lag(const SharedContext& c, std::size_t j) {
+  Candidate out;
+  out.id = {"torque_lag", c->joints[j]};
+  out.words = fmt::format("the torque of {} lags behind a low-pass of the drive", c->joints[j]);
+  out.check = "low-pass of the torque or current in the drive of the joint, and its corner";
+  out.record = "reverse the joint quickly and often, at several speeds";
+  out.size_unit = "s";
+  out.parameters = {{"time_constant", "s"}};
+  out.possible = [](const Eigen::VectorXd& theta) { return theta[0] >= 0.0; };
+  out.columns = [c, j](double) {
+    return std::vector<EffectColumn>{
+        {static_cast<int>(j), -c->measured_rate.col(static_cast<Eigen::Index>(j))}};
+  };
+  return out;
+}
+
 }  // namespace
 
 void add_sensors(const SharedContext& context, std::vector<Candidate>& out) {
   for (std::size_t j = 0; j < context->joints.size(); ++j) {
-    for (const auto& make : {torque_offset, torque_gain, torque_delay}) {
+    for (const auto& make : {torque_offset, torque_gain, torque_delay, torque_lag}) {
       out.push_back(make(context, j));
     }
     for (std::size_t from = 0; from < context->joints.size(); ++from) {

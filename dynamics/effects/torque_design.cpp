@@ -21,20 +21,6 @@ void add(JointTorques& sum, const JointTorques& torques, double factor) {
   }
 }
 
-/// What the sensors show of a torque.
-JointTorques seen(const JointTorques& torques, const Eigen::MatrixXd& sensor) {
-  JointTorques out(torques.size());
-  for (std::size_t j = 0; j < torques.size(); ++j) {
-    for (std::size_t from = 0; from < torques.size(); ++from) {
-      const double share = sensor(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(from));
-      JointTorques part(torques.size());
-      part[j] = torques[from];
-      add(out, part, share);
-    }
-  }
-  return out;
-}
-
 /// Torque of an effect, a unit of each parameter.
 std::vector<JointTorques> torques_of(const GravityCase& gravity, const Candidate& candidate,
                                      double scan) {
@@ -70,6 +56,50 @@ Eigen::MatrixXd TorqueFitter::sensor() const {
     if (added.kind == Kind::kCross) out(added.joint, added.from) += added.values[0];
   }
   return out;
+}
+
+/// Time constant of a joint's low-pass.
+double TorqueFitter::lag_s(Eigen::Index joint) const {
+  double out = 0.0;
+  for (const Added& added : added_) {
+    if (added.kind == Kind::kLag && added.joint == joint) out += added.values[0];
+  }
+  return out;
+}
+
+/// Torques of the joints, instants x joints, behind their low-passes.
+Eigen::MatrixXd TorqueFitter::lagged(Eigen::MatrixXd torque) const {
+  for (Eigen::Index j = 0; j < joints_; ++j) {
+    const double constant_s = lag_s(j);
+    if (constant_s > 0.0)
+      torque.col(j) = parts_.motion->lagged_at_instants(torque.col(j), constant_s);
+  }
+  return torque;
+}
+
+/// What the sensors show of a torque.
+JointTorques TorqueFitter::seen(const JointTorques& torques, const Eigen::MatrixXd& sensor) const {
+  JointTorques out(torques.size());
+  for (std::size_t j = 0; j < torques.size(); ++j) {
+    for (std::size_t from = 0; from < torques.size(); ++from) {
+      const double share = sensor(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(from));
+      JointTorques part(torques.size());
+      part[j] = torques[from];
+      add(out, part, share);
+    }
+    const double constant_s = lag_s(static_cast<Eigen::Index>(j));
+    if (constant_s > 0.0 && out[j].size() > 0)
+      out[j] = parts_.motion->lagged_at_instants(out[j], constant_s);
+  }
+  return out;
+}
+
+/// d lagged / d constant: with L = 1 / (1 + constant s), -s L^2 = (L^2 - L) / constant.
+Eigen::VectorXd TorqueFitter::lag_column(const Eigen::VectorXd& torque, double constant_s) const {
+  constexpr double kNearlyNone_s = 1e-6;  // the same formula where there is none yet
+  const double constant = std::max(constant_s, kNearlyNone_s);
+  const Eigen::VectorXd once = parts_.motion->lagged_at_instants(torque, constant);
+  return (parts_.motion->lagged_at_instants(once, constant) - once) / constant;
 }
 
 /// Of the effects that are no matter of the sensors, at the present state.
@@ -115,9 +145,14 @@ std::vector<JointTorques> TorqueFitter::measured_columns(const Eigen::MatrixXd& 
         out.push_back(std::move(own));
         break;
       }
+      case Kind::kLag:
+        at_joint = lag_column(physical * S.row(added.joint).transpose(), lag_s(added.joint));
+        out.push_back(std::move(own));
+        break;
       case Kind::kGain:
       case Kind::kCross:
-        at_joint = physical.col(added.kind == Kind::kGain ? added.joint : added.from);
+        at_joint = parts_.motion->lagged_at_instants(
+            physical.col(added.kind == Kind::kGain ? added.joint : added.from), lag_s(added.joint));
         out.push_back(std::move(own));
         break;
       default:
@@ -169,7 +204,8 @@ void TorqueFitter::put_base(Eigen::Index joint, const Eigen::MatrixXd& sensor) {
   Eigen::RowVectorXd others = sensor.row(joint);
   others[joint] = 0.0;
   const double inverse = 1.0 / parts_.base.sigma[joint];
-  if (others.isZero(0.0)) {
+  const double constant_s = lag_s(joint);
+  if (others.isZero(0.0) && constant_s == 0.0) {
     rows.base = &case_->base[j];
     rows.base_squares = &case_->base_squares[j];
     rows.base_gain = sensor(joint, joint) * inverse;
@@ -180,6 +216,7 @@ void TorqueFitter::put_base(Eigen::Index joint, const Eigen::MatrixXd& sensor) {
     if (sensor(joint, from) == 0.0) continue;
     rows.mixed += sensor(joint, from) * case_->base[static_cast<std::size_t>(from)];
   }
+  rows.mixed = parts_.motion->lagged_at_instants(rows.mixed, constant_s);
   rows.mixed_squares = rows.mixed.transpose() * rows.mixed;
   rows.base = &rows.mixed;
   rows.base_squares = &rows.mixed_squares;
@@ -190,7 +227,7 @@ void TorqueFitter::make_design() {
   make_torques();
   const Eigen::MatrixXd torque = physical();
   const Eigen::MatrixXd S = sensor();
-  const Eigen::MatrixXd residual = observed() - torque * S.transpose();
+  const Eigen::MatrixXd residual = observed() - lagged(torque * S.transpose());
   std::vector<JointTorques> columns;
   const Eigen::MatrixXd widths = width_columns();
   for (Eigen::Index k = 0; k < free_widths(); ++k) {

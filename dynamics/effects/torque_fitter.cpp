@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// measured(t + delay) = sensor * (rigid bodies + effects)(t) + noise: linear in nearly everything.
+// measured(t + delay) = lag (sensor * (rigid bodies + effects))(t) + noise: linear in nearly
+// everything.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -64,6 +65,7 @@ void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
     effect_parameters_ += added.values.size();
     const std::string& name = effect.id.effect;
     if (name == "torque_delay") added.kind = Kind::kDelay;
+    if (name == "torque_lag") added.kind = Kind::kLag;
     if (name == "torque_gain") added.kind = Kind::kGain;
     if (name == "gravity_direction") added.kind = Kind::kGravity;
     if (name == "cross_talk" && !is_coupling(candidate)) added.kind = Kind::kCross;
@@ -213,6 +215,8 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
     } else {
       added.values += own;
     }
+    // A drive that leads its torque is none; the search asks whether its lag may be nothing.
+    if (added.kind == Kind::kLag) added.values = added.values.cwiseMax(0.0).eval();
   }
   if (tilt != case_->tilt_deg) {
     const RigidModel now = fitted().rigid;

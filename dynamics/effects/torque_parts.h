@@ -74,11 +74,11 @@ class TorqueFitter {
   [[nodiscard]] FittedTorque fitted() const;
 
  private:
-  enum class Kind { kLinear, kDelay, kGain, kCross, kGravity };
+  enum class Kind { kLinear, kDelay, kLag, kGain, kCross, kGravity };
   struct Added {
     AddedEffect effect;
     Kind kind = Kind::kLinear;
-    Eigen::Index joint = 0;  ///< of delay, gain, cross-talk, friction
+    Eigen::Index joint = 0;  ///< of delay, lag, gain, cross-talk, friction
     Eigen::Index from = 0;   ///< of cross-talk
     Eigen::Index first = 0;  ///< of its parameters, among those of all effects
     Eigen::VectorXd values;
@@ -90,7 +90,7 @@ class TorqueFitter {
     const Eigen::MatrixXd* base = nullptr;
     const Eigen::MatrixXd* base_squares = nullptr;
     double base_gain = 1.0;
-    Eigen::MatrixXd mixed, mixed_squares;  ///< base where the sensor sees other joints, too
+    Eigen::MatrixXd mixed, mixed_squares;  ///< base where the sensor lags or sees others, too
     Eigen::MatrixXd columns;
     std::vector<Eigen::Index> parameters;  ///< of the columns
     Eigen::VectorXd residual;
@@ -116,6 +116,10 @@ class TorqueFitter {
   [[nodiscard]] bool at_a_bound(Eigen::Index turning, double change) const;
   [[nodiscard]] Eigen::MatrixXd observed() const;
   [[nodiscard]] Eigen::MatrixXd sensor() const;
+  [[nodiscard]] double lag_s(Eigen::Index joint) const;
+  [[nodiscard]] Eigen::MatrixXd lagged(Eigen::MatrixXd torque) const;
+  [[nodiscard]] JointTorques seen(const JointTorques& torques, const Eigen::MatrixXd& sensor) const;
+  [[nodiscard]] Eigen::VectorXd lag_column(const Eigen::VectorXd& torque, double constant_s) const;
   void make_torques();
   [[nodiscard]] std::vector<JointTorques> measured_columns(const Eigen::MatrixXd& physical) const;
   [[nodiscard]] Eigen::MatrixXd width_columns() const;

@@ -28,6 +28,7 @@ class Assembly {
     plant_.viscous = model.base.viscous.asDiagonal();
     plant_.gain = Eigen::MatrixXd::Identity(n, n);
     plant_.delay_s = Eigen::VectorXd::Zero(n);
+    plant_.lag_s = plant_.delay_s;
     plant_.drives.resize(static_cast<std::size_t>(n));
     for (Eigen::Index j = 0; j < n; ++j) {
       JointDrive& drive = plant_.drives[static_cast<std::size_t>(j)];
@@ -49,7 +50,7 @@ class Assembly {
     std::string_view name;
     void (Assembly::*add)(const TorqueEffect&);
   };
-  static const std::array<Law, 18> kLaws;
+  static const std::array<Law, 19> kLaws;
 
   [[nodiscard]] std::size_t joint_named(const TorqueEffect& effect, std::string_view name) const {
     const auto& bodies = plant_.rigid.bodies;
@@ -134,6 +135,11 @@ class Assembly {
   void torque_delay(const TorqueEffect& e) {
     plant_.delay_s[static_cast<Eigen::Index>(joint(e))] += value(e, 0, 1);
   }
+  void torque_lag(const TorqueEffect& e) {
+    const double constant_s = value(e, 0, 1);
+    if (constant_s < 0.0) throw foreign(e, "has a time constant below 0");
+    plant_.lag_s[static_cast<Eigen::Index>(joint(e))] += constant_s;
+  }
 
   /// "a from b": what the sensor shows of another's torque. "a + b", "a - b": a coupled drive.
   void cross_talk(const TorqueEffect& e) {
@@ -175,7 +181,7 @@ class Assembly {
   Plant plant_;
 };
 
-const std::array<Assembly::Law, 18> Assembly::kLaws = {
+const std::array<Assembly::Law, 19> Assembly::kLaws = {
     {{"viscous", &Assembly::viscous},
      {"coulomb", &Assembly::coulomb},
      {"asymmetric", &Assembly::asymmetric},
@@ -191,6 +197,7 @@ const std::array<Assembly::Law, 18> Assembly::kLaws = {
      {"torque_offset", &Assembly::torque_offset},
      {"torque_gain", &Assembly::torque_gain},
      {"torque_delay", &Assembly::torque_delay},
+     {"torque_lag", &Assembly::torque_lag},
      {"cross_talk", &Assembly::cross_talk},
      {"payload", &Assembly::payload},
      {"gravity_direction", &Assembly::gravity_direction}}};

@@ -4,8 +4,8 @@
 // Gives   Plant: the robot as a simulator moves it, by the laws that tracing knows
 //         (dynamics/effects/drive_laws.h).
 // Units   SI; vectors hold one entry a moving joint, in the tree's order. Torques in N m or N.
-// Method  torque = M(q) ddq + C(q, dq) dq + g(q) + drives; measured = gain * torque, delayed.
-// Not here: integration (simulation.h), servo (servo.h), contacts, temperature.
+// Method  torque = M(q) ddq + C(q, dq) dq + g(q) + drives; measured = gain * torque, low-passed and
+// delayed. Not here: integration (simulation.h), servo (servo.h), contacts, temperature.
 #pragma once
 
 #include <string>
@@ -71,6 +71,7 @@ struct Plant {
   std::vector<CoupledDrive> coupled;  ///< with dry friction
   Eigen::MatrixXd gain;               ///< measured torques from true ones
   Eigen::VectorXd delay_s;            ///< by which each torque is measured late
+  Eigen::VectorXd lag_s;              ///< time constant of the low-pass before that; 0: none
   std::vector<std::string> left_out;  ///< effects that are not simulated, in words
 
   [[nodiscard]] Eigen::Index size() const { return rigid.size(); }

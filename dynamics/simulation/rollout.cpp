@@ -68,12 +68,13 @@ std::vector<Window> windows_of(const TorqueSamples& samples, double horizon_s, i
   return out;
 }
 
-/// True torques of the actuators at the samples: the sensors' gains and delays undone.
+/// True torques of the actuators at the samples: what the sensors do undone.
 Eigen::MatrixXd true_torques(const Plant& plant, const TorqueSamples& samples) {
   const EffectMotion motion(samples, {.every_sample = true});
   Eigen::MatrixXd in_time = samples.torque;
   for (Eigen::Index j = 0; j < in_time.cols(); ++j) {
     if (plant.delay_s[j] != 0.0) in_time.col(j) = motion.shifted(in_time.col(j), plant.delay_s[j]);
+    in_time.col(j) = motion.before_lag(in_time.col(j), plant.lag_s[j]);
   }
   return plant.gain.fullPivLu().solve(in_time.transpose()).transpose();
 }

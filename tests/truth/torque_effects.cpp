@@ -193,7 +193,8 @@ class World {
       if (e.effect == "drift") know(e, torque * (1.0 - std::exp(-1.0 / kSettling)));
       if (e.effect == "asymmetric") know(e, torque / scales_.speed[e.joint]);
       if (e.effect == "cubic_viscous") know(e, 0.0);
-      if (e.effect == "load_friction" || e.effect == "torque_gain" || e.effect == "torque_delay") {
+      if (e.effect == "load_friction" || e.effect == "torque_gain" || e.effect == "torque_delay" ||
+          e.effect == "torque_lag") {
         know(e, e.strength);
       }
       if (e.effect == "motor_inertia") know(e, torque / scales_.acceleration[e.joint]);
@@ -287,6 +288,17 @@ class World {
     return 0.0;
   }
 
+  /// The mean of what was, weighted by e^(-age / constant): at the middles of equal weights.
+  double lagged(const TrueEffect& effect, double t_s) {
+    constexpr int kParts = 200;
+    double sum = 0.0;
+    for (int k = 0; k < kParts; ++k) {
+      const double age = -effect.strength * std::log((k + 0.5) / kParts);
+      sum += physical(t_s - age)[effect.joint];
+    }
+    return sum / kParts;
+  }
+
   /// What the sensors say at a time.
   Eigen::VectorXd measured(double t_s) {
     const Eigen::VectorXd now = physical(t_s);
@@ -295,6 +307,7 @@ class World {
     for (const TrueEffect& effect : effects_) {
       if (effect.effect == "torque_delay")
         out[effect.joint] = physical(t_s - effect.strength)[effect.joint];
+      if (effect.effect == "torque_lag") out[effect.joint] = lagged(effect, t_s);
     }
     for (const TrueEffect& effect : effects_) {
       const Eigen::Index j = effect.joint;
@@ -335,25 +348,13 @@ class World {
 }  // namespace
 
 std::vector<std::string> known_torque_effects() {
-  return {"viscous",
-          "coulomb",
-          "asymmetric",
-          "stribeck",
-          "cubic_viscous",
-          "load_friction",
-          "position_friction",
-          "hysteresis",
-          "motor_inertia",
-          "payload",
-          "spring",
-          "ripple",
-          "torque_offset",
-          "torque_gain",
-          "cross_talk",
-          "torque_delay",
-          "drift",
-          "gravity_direction",
-          "contact"};
+  return {"viscous",           "coulomb",       "asymmetric",
+          "stribeck",          "cubic_viscous", "load_friction",
+          "position_friction", "hysteresis",    "motor_inertia",
+          "payload",           "spring",        "ripple",
+          "torque_offset",     "torque_gain",   "cross_talk",
+          "torque_delay",      "torque_lag",    "drift",
+          "gravity_direction", "contact"};
 }
 
 EffectWorld effect_world(const std::vector<TrueEffect>& effects, const EffectWorldOptions& options,

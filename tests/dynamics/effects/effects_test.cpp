@@ -80,6 +80,7 @@ TEST_P(EveryEffect, ExplainsTheTorqueThatTheGeneratorMadeAndHasItsSize) {
   Rng rng = Rng::from_name("effects", 7);
   const double strength = GetParam() == "gravity_direction" ? 5.0
                           : GetParam() == "torque_delay"    ? 0.01
+                          : GetParam() == "torque_lag"      ? 0.03
                                                             : 0.2;
   const EffectWorld world = effect_world({{GetParam(), 1, 2, strength}}, quiet_world(), rng);
   const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
@@ -107,7 +108,8 @@ INSTANTIATE_TEST_SUITE_P(library, EveryEffect,
                                          "cubic_viscous", "load_friction", "position_friction",
                                          "hysteresis", "motor_inertia", "payload", "spring",
                                          "ripple", "torque_offset", "torque_gain", "cross_talk",
-                                         "torque_delay", "drift", "gravity_direction"),
+                                         "torque_delay", "torque_lag", "drift",
+                                         "gravity_direction"),
                          [](const auto& tested) { return tested.param; });
 
 // From a floor to a ceiling, where tilts of all directions are the same.
@@ -158,6 +160,52 @@ TEST(TorqueEffects, ColumnsAreTheDerivativesOfTheFitsPrediction) {
       EXPECT_TRUE(column.share.allFinite()) << c.id.effect;
     }
   }
+}
+
+TorqueTrace trace_of_lag(double constant_s, double noise, double cutoff_hz) {
+  Rng rng = Rng::from_name("effects", 4);
+  EffectWorldOptions options = quiet_world();
+  options.noise = noise;
+  const EffectWorld world = effect_world({{"torque_lag", 1, 2, constant_s}}, options, rng);
+  TorqueTraceOptions trace;
+  trace.model = declared_options(cutoff_hz);
+  return trace_torque(world.model, exact_samples(world, cutoff_hz), trace);
+}
+
+TEST(TorqueEffects, ALowPassOfTheDriveIsNoDelay) {
+  const TorqueTrace out = trace_of_lag(0.04, 1e-2, 25.0);
+  ASSERT_EQ(out.trace.accepted.size(), 1U) << out.trace.reason;
+  const TracedEffect& lag = out.trace.accepted.front();
+  EXPECT_EQ(lag.id, (EffectId{"torque_lag", "joint2"}));
+  EXPECT_NEAR(lag.size, 0.04, 0.001);
+  EXPECT_TRUE(lag.interval.low < 0.04 && lag.interval.high > 0.04);
+  EXPECT_TRUE(out.trace.ambiguities.empty()) << out.trace.reason;
+}
+
+TEST(TorqueEffects, ALowPassFarAboveTheMotionMayBeADelay) {
+  const TorqueTrace out = trace_of_lag(0.01, 0.02, 6.0);
+  ASSERT_EQ(out.trace.verdict, TraceVerdict::kAmbiguous) << out.trace.reason;
+  ASSERT_EQ(out.trace.ambiguities.size(), 1U);
+  std::vector<EffectId> named = out.trace.ambiguities.front().effects;
+  std::ranges::sort(named);
+  EXPECT_EQ(named, (std::vector<EffectId>{{"torque_delay", "joint2"}, {"torque_lag", "joint2"}}));
+}
+
+TEST(TorqueEffects, ALowPassIsPredictedAndTakenOutAgain) {
+  Rng rng = Rng::from_name("effects", 5);
+  const EffectWorld world = effect_world({{"torque_lag", 0, 1, 0.04}}, quiet_world(), rng);
+  const TorqueSamples samples = exact_samples(world);
+  const TorqueTrace out = trace_torque(world.model, samples, {.model = declared_options()});
+  const TorqueFilter filter = declared_options().filter;
+  const Eigen::MatrixXd predicted = predict_torque(out.corrected, samples, filter);
+  const TorqueSamples clean = compensate(out.corrected, samples, filter);
+  CorrectedTorqueModel without = out.corrected;
+  without.effects.clear();
+  const Eigen::MatrixXd bodies = predict_torque(without, samples, filter);
+  const Eigen::VectorXd lagged = samples.torque.col(0);
+  const double before = rms(bodies.col(0) - lagged);
+  EXPECT_LT(rms(predicted.col(0) - lagged), 0.1 * before);
+  EXPECT_LT(rms(clean.torque.col(0) - bodies.col(0)), 0.2 * before);
 }
 
 TEST(TorqueEffects, ACleanLogOfADeclaredRobotIsClean) {

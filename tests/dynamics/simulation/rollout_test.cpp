@@ -57,7 +57,8 @@ TEST(Rollout, UndoesWhatTheSensorsDo) {
   const DynamicModel model = arm();
   std::vector<TorqueEffect> effects = friction(model);
   const std::string joint = model.tree.joints[moving_joints(model.tree)[1].index()].name;
-  for (const auto& [name, value] : {std::pair{"torque_gain", 0.2}, {"torque_delay", 0.02}}) {
+  for (const auto& [name, value] :
+       {std::pair{"torque_gain", 0.2}, {"torque_delay", 0.02}, {"torque_lag", 0.03}}) {
     TorqueEffect sensor;
     sensor.id = {name, joint};
     sensor.values = Eigen::VectorXd::Constant(1, value);
