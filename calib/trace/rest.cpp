@@ -285,6 +285,23 @@ bool earns_its_place(const NormalSystem& system, FoundRest& found, double& gain)
   return found.rest.held_out_after.value < found.rest.held_out_before.value;
 }
 
+// The curve over what was shown, where it is one for sure.
+std::optional<FoundRest> curve_of(const NormalSystem& system, const Driven& driven,
+                                  const TraceOptions& options) {
+  const std::vector<double> knots = equal_knots(driven.over.value);
+  FoundRest out;
+  out.columns = hats(driven.place.carrier, driven.over.value, knots);
+  const Posterior curve = best_posterior(gather(system, out.columns, driven.score), knots);
+  if (curve.mean.size() == 0) return std::nullopt;  // beside the others it says nothing of its own
+  out.prior = curve.prior_information;
+  out.rest = describe(system, driven.place, driven.over, knots, curve);
+  out.rest.p_value = std::min(1.0, driven.p_value);
+  double gain = 0.0;
+  if (!earns_its_place(system, out, gain)) return std::nullopt;
+  if (!moves_enough(system, gain, out.columns, options)) return std::nullopt;
+  return out;
+}
+
 std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector<RestPlace>& places,
                                    const std::vector<Covariate>& covariates,
                                    const std::vector<FoundRest>& known, double level,
@@ -294,28 +311,18 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
     return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
   };
-  std::optional<Driven> best =
+  const std::optional<Driven> best =
       first_shown(system, by_gain(system, places, covariates, known, columns_of, options),
                   columns_of, tests, level, options);
-  if (!best) {
-    auto vibration = find_vibration(system, places, level, options);
-    if (!vibration) return std::nullopt;
-    best = {places[vibration->place], std::move(vibration->phase), std::move(vibration->score),
-            vibration->p_value};
+  if (best) {
+    if (auto found = curve_of(system, *best, options)) return found;
   }
-
-  const std::vector<double> knots = equal_knots(best->over.value);
-  FoundRest out;
-  out.columns = hats(best->place.carrier, best->over.value, knots);
-  const Posterior curve = best_posterior(gather(system, out.columns, best->score), knots);
-  if (curve.mean.size() == 0) return std::nullopt;  // beside the others it says nothing of its own
-  out.prior = curve.prior_information;
-  out.rest = describe(system, best->place, best->over, knots, curve);
-  out.rest.p_value = std::min(1.0, best->p_value);
-  double gain = 0.0;
-  if (!earns_its_place(system, out, gain)) return std::nullopt;
-  if (!moves_enough(system, gain, out.columns, options)) return std::nullopt;
-  return out;
+  auto vibration = find_vibration(system, places, level, options);
+  if (!vibration) return std::nullopt;
+  return curve_of(system,
+                  {places[vibration->place], std::move(vibration->phase),
+                   std::move(vibration->score), vibration->p_value},
+                  options);
 }
 
 std::pair<const Covariate*, double> most_telling(const NormalSystem& system, const RestPlace& place,

@@ -402,10 +402,14 @@ std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,
 StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round) {
   StagePtr best;
   int refits = 0;
+  const Contender* last = nullptr;
   for (const Contender& contender : contenders) {
-    if (refits >= options_.refits) break;
+    // The same columns under two names (a delay, a low-pass): only refits tell, of one direction.
+    const bool same = last != nullptr && last->held_out == contender.held_out;
+    if (refits >= options_.refits && !same) break;
+    last = &contender;
     if (best && predicts_clearly_worse(contender.held_out, contenders.front().held_out)) break;
-    ++refits;
+    if (!same) ++refits;
     std::vector<AddedEffect> effects = now_->added;
     effects.push_back({contender.id, contender.member.scan});
     StagePtr stage = with_sizes_for_scans(stage_of(std::move(effects)));

@@ -119,7 +119,8 @@ std::optional<Vibration> find_vibration(const NormalSystem& system,
                                         const std::vector<RestPlace>& places, double level,
                                         const TraceOptions& options) {
   const Linearisation& linear = system.linear();
-  if (linear.independent_instants || linear.body.empty() || places.empty()) return std::nullopt;
+  const bool noise_is_known = !linear.body.empty() || linear.noise.size() > 0;
+  if (linear.independent_instants || !noise_is_known || places.empty()) return std::nullopt;
   const std::optional<Grid> grid = grid_of(linear.time_s);
   if (!grid) return std::nullopt;
   const double duration = static_cast<double>(grid->cells) * grid->step_s;

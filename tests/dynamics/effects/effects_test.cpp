@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -206,6 +207,41 @@ TEST(TorqueEffects, ALowPassIsPredictedAndTakenOutAgain) {
   const double before = rms(bodies.col(0) - lagged);
   EXPECT_LT(rms(predicted.col(0) - lagged), 0.1 * before);
   EXPECT_LT(rms(clean.torque.col(0) - bodies.col(0)), 0.2 * before);
+}
+
+bool is_of_a_vibration(const Rest& rest) {
+  return rest.covariate.starts_with("phase of a vibration");
+}
+
+TEST(TorqueEffects, ALineInTheTorqueIsAVibrationOfItsFrequency) {
+  Rng rng = Rng::from_name("effects", 6);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  EffectWorld world = effect_world({}, options, rng);
+  const Eigen::ArrayXd turns = 2.0 * std::numbers::pi * 6.0 * world.log.t_s.array();
+  world.log.torque.col(1).array() += 0.02 * rms(world.log.torque.col(1)) * turns.sin();
+  const TorqueTrace out =
+      trace_torque(world.model, exact_samples(world, 12.0), {.model = declared_options(12.0)});
+  EXPECT_EQ(out.trace.verdict, TraceVerdict::kUnknown) << out.trace.reason;
+  ASSERT_EQ(out.trace.rest.size(), 1U);
+  EXPECT_EQ(out.trace.rest.front().place, "joint2");
+  EXPECT_EQ(out.trace.rest.front().covariate, "phase of a vibration of 6 Hz");
+}
+
+TEST(TorqueEffects, NoiseOfAnyColourIsNoVibration) {
+  for (const double memory : {0.0, 0.5, 0.9, 0.97}) {
+    for (std::uint64_t seed = 0; seed < 5; ++seed) {
+      SCOPED_TRACE(testing::Message() << memory << ", " << seed);
+      Rng rng = Rng::from_name("colours", seed);
+      EffectWorldOptions options = quiet_world();
+      options.noise = 0.01;
+      options.noise_memory = memory;
+      const EffectWorld world = effect_world({}, options, rng);
+      const TorqueTrace out =
+          trace_torque(world.model, exact_samples(world, 12.0), {.model = declared_options(12.0)});
+      EXPECT_FALSE(std::ranges::any_of(out.trace.rest, is_of_a_vibration)) << out.trace.reason;
+    }
+  }
 }
 
 TEST(TorqueEffects, ACleanLogOfADeclaredRobotIsClean) {
