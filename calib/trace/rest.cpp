@@ -317,7 +317,7 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
   if (best) {
     if (auto found = curve_of(system, *best, options)) return found;
   }
-  auto vibration = find_vibration(system, places, level, options);
+  auto vibration = find_vibration(system, places, covariates, level, options);
   if (!vibration) return std::nullopt;
   return curve_of(system,
                   {places[vibration->place], std::move(vibration->phase),

@@ -6,9 +6,11 @@
 #include <complex>
 #include <numbers>
 
+#include <Eigen/LU>
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
+#include "calib/trace/distribution.h"
 #include "kinematics/core/golden_section.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/parallel_for.h"
@@ -104,6 +106,56 @@ double refined_frequency(const NormalSystem& system, int carrier, double frequen
   return golden_section(gain, frequency_hz - step_hz, frequency_hz + step_hz, kFrequencySteps).at;
 }
 
+// A signal without the straight line of every stretch, which would look alike in all of them.
+Eigen::VectorXd without_trends(const Eigen::VectorXd& value, const Eigen::VectorXd& time_s,
+                               const Partition& partition) {
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(partition.stretches, 5);  // 1, t, x, tt, tx
+  const auto of = [&](Eigen::Index i) { return partition.stretch[static_cast<std::size_t>(i)]; };
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const double t = time_s[i] - time_s[0];
+    sums.row(of(i)) += Eigen::RowVectorXd{{1.0, t, value[i], t * t, t * value[i]}};
+  }
+  Eigen::VectorXd out(value.size());
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const Eigen::RowVectorXd mean = sums.row(of(i)) / sums(of(i), 0);
+    const double spread = mean[3] - mean[1] * mean[1];
+    const double slope = spread > 0.0 ? (mean[4] - mean[1] * mean[2]) / spread : 0.0;
+    out[i] = value[i] - mean[2] - slope * (time_s[i] - time_s[0] - mean[1]);
+  }
+  return out;
+}
+
+// p-value of a line in a covariate: the mean of what each stretch says of its cosine and sine
+// (Hotelling 1931).
+double line_p_value(const Covariate& covariate, const Eigen::VectorXd& time_s, double frequency_hz,
+                    const Partition& partition) {
+  const int n = partition.stretches;
+  const Eigen::VectorXd value = without_trends(covariate.value, time_s, partition);
+  Eigen::MatrixX2d swings = Eigen::MatrixX2d::Zero(n, 2);
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const double phase = 2.0 * std::numbers::pi * frequency_hz * time_s[i];
+    swings.row(partition.stretch[static_cast<std::size_t>(i)]) +=
+        value[i] * Eigen::RowVector2d(std::cos(phase), std::sin(phase));
+  }
+  const Eigen::RowVector2d mean = swings.colwise().mean();
+  const Eigen::MatrixX2d about = swings.rowwise() - mean;
+  const Eigen::Matrix2d scatter = about.transpose() * about / (n - 1.0);
+  if (n < 4 || !(scatter.determinant() > 0.0)) return 1.0;
+  const double squared = n * mean.dot((scatter.inverse() * mean.transpose()).transpose());
+  return f_survival(squared * (n - 2.0) / (2.0 * (n - 1.0)), 2.0, n - 2.0);
+}
+
+// True where a joint's motion swings so, too: what is left then follows it.
+bool is_of_the_motion(const NormalSystem& system, const std::vector<Covariate>& covariates,
+                      double frequency_hz, double level) {
+  return std::ranges::any_of(covariates, [&](const Covariate& covariate) {
+    if (covariate.name == "time") return false;  // a straight line: rounding is left of it
+    const double p_value =
+        line_p_value(covariate, system.linear().time_s, frequency_hz, system.partition());
+    return p_value * static_cast<double>(covariates.size()) <= level;
+  });
+}
+
 Covariate phase_of(const Eigen::VectorXd& time_s, double frequency_hz) {
   Covariate out;
   out.name = fmt::format("phase of a vibration of {:.3g} Hz", frequency_hz);
@@ -116,7 +168,8 @@ Covariate phase_of(const Eigen::VectorXd& time_s, double frequency_hz) {
 }  // namespace
 
 std::optional<Vibration> find_vibration(const NormalSystem& system,
-                                        const std::vector<RestPlace>& places, double level,
+                                        const std::vector<RestPlace>& places,
+                                        const std::vector<Covariate>& covariates, double level,
                                         const TraceOptions& options) {
   const Linearisation& linear = system.linear();
   const bool noise_is_known = !linear.body.empty() || linear.noise.size() > 0;
@@ -143,6 +196,8 @@ std::optional<Vibration> find_vibration(const NormalSystem& system,
   if (out.score.hidden() || !is_large(out.score, options)) return std::nullopt;
   out.p_value = tests * std::max(out.score.p_value, jackknife_test(system, columns).p_value);
   if (out.p_value > level) return std::nullopt;
+  if (linear.body.empty() && is_of_the_motion(system, covariates, frequency_hz, level))
+    return std::nullopt;
   return out;
 }
 

@@ -64,7 +64,7 @@ TEST(Vibration, IsFoundWithItsFrequency) {
   for (const double frequency_hz : {1.7, 3.56, 11.3}) {
     const Linearisation linear = film({.size = 0.5, .frequency_hz = frequency_hz}, 3);
     const NormalSystem system(linear, make_partition(linear));
-    const auto found = find_vibration(system, kPlaces, kLevel, {});
+    const auto found = find_vibration(system, kPlaces, {}, kLevel, {});
     ASSERT_TRUE(found.has_value()) << frequency_hz;
     EXPECT_EQ(found->place, 0U);
     const double phase = 2.0 * std::numbers::pi * frequency_hz * linear.time_s[kFrames - 1];
@@ -97,7 +97,7 @@ TEST(Vibration, NoiseHoldsNone) {
       // Integral time of an AR(1).
       linear.correlation_time_s = (0.5 + memory / (1.0 - memory)) / kFramesASecond;
       const NormalSystem system(linear, make_partition(linear));
-      if (find_vibration(system, kPlaces, kLevel, {})) ++invented;
+      if (find_vibration(system, kPlaces, {}, kLevel, {})) ++invented;
     }
     EXPECT_LE(invented, 4) << "memory " << memory;
   }
@@ -107,7 +107,7 @@ TEST(Vibration, PosturesHaveNoFrequency) {
   Linearisation linear = film({.size = 1.0, .frequency_hz = 3.56}, 5);
   linear.independent_instants = true;
   const NormalSystem system(linear, make_partition(linear));
-  EXPECT_FALSE(find_vibration(system, kPlaces, kLevel, {}).has_value());
+  EXPECT_FALSE(find_vibration(system, kPlaces, {}, kLevel, {}).has_value());
 }
 
 }  // namespace

@@ -228,6 +228,19 @@ TEST(TorqueEffects, ALineInTheTorqueIsAVibrationOfItsFrequency) {
   EXPECT_EQ(out.trace.rest.front().covariate, "phase of a vibration of 6 Hz");
 }
 
+TEST(TorqueEffects, WhatSwingsWithAJointIsNoVibration) {
+  Rng rng = Rng::from_name("effects", 6);
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  EffectWorld world = effect_world({}, options, rng);
+  const Eigen::ArrayXd turns = 2.0 * std::numbers::pi * 6.0 * world.log.t_s.array();
+  world.log.torque.col(1).array() += 0.02 * rms(world.log.torque.col(1)) * turns.sin();
+  TorqueSamples samples = exact_samples(world, 12.0);
+  samples.ddq.col(2).array() += 0.5 * rms(samples.ddq.col(2)) * turns.cos();
+  const TorqueTrace out = trace_torque(world.model, samples, {.model = declared_options(12.0)});
+  EXPECT_FALSE(std::ranges::any_of(out.trace.rest, is_of_a_vibration)) << out.trace.reason;
+}
+
 TEST(TorqueEffects, NoiseOfAnyColourIsNoVibration) {
   for (const double memory : {0.0, 0.5, 0.9, 0.97}) {
     for (std::uint64_t seed = 0; seed < 5; ++seed) {
