@@ -83,7 +83,18 @@ void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
 }
 
 void TorqueFitter::set_gravity(const Eigen::Vector2d& tilt_deg) {
-  case_ = tilt_deg.isZero(0.0) ? parts_.upright : make_gravity_case(parts_, tilt_deg);
+  set_gravity(tilt_deg.isZero(0.0) ? parts_.upright : make_gravity_case(parts_, tilt_deg));
+}
+
+void TorqueFitter::set_gravity_start(int start) {
+  const Eigen::Vector2d tilt_deg = gravity_starts()[static_cast<std::size_t>(start)];
+  set_gravity(tilt_deg.isZero(0.0) ? parts_.upright : parts_.starts.get(start, [&] {
+    return make_gravity_case(parts_, tilt_deg);
+  }));
+}
+
+void TorqueFitter::set_gravity(std::shared_ptr<const GravityCase> gravity) {
+  case_ = std::move(gravity);
   const Eigen::VectorXd widths = context_.widths;
   context_ = case_->context;
   if (widths.size() > 0) context_.widths = widths;
@@ -237,10 +248,10 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
 void TorqueFitter::choose_gravity_start(Added& gravity) {
   const auto starts = gravity_starts();
   double best = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d chosen = starts[0];
-  for (const Eigen::Vector2d& start : starts) {
-    gravity.values = start;
-    set_gravity(start);
+  int chosen = 0;
+  for (int start = 0; start < kGravityStarts; ++start) {
+    gravity.values = starts[static_cast<std::size_t>(start)];
+    set_gravity_start(start);
     make_design();
     // What is left when all that is linear is fitted and the tilt stays.
     Normal linear = normal();
@@ -254,8 +265,8 @@ void TorqueFitter::choose_gravity_start(Added& gravity) {
       chosen = start;
     }
   }
-  gravity.values = chosen;
-  set_gravity(chosen);
+  gravity.values = starts[static_cast<std::size_t>(chosen)];
+  set_gravity_start(chosen);
 }
 
 TracedFit TorqueFitter::run() {

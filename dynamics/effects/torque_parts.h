@@ -9,6 +9,7 @@
 #include "dynamics/effects/base_choice.h"
 #include "dynamics/effects/effect_library.h"
 #include "dynamics/effects/traced_torque.h"
+#include "kinematics/core/memo.h"
 
 namespace kinescope {
 
@@ -52,6 +53,8 @@ struct TorqueTracedModel::Parts {
   Eigen::MatrixXd widest;  ///< whitened, see widest_residual()
 
   std::shared_ptr<const effects::GravityCase> upright;  ///< gravity as declared
+  /// From a base that stands as gravity_starts() says: every fit that seeks gravity begins there.
+  Memo<int, std::shared_ptr<const effects::GravityCase>> starts;
 
   /// All that follows from the instants that are kept.
   void refresh();
@@ -104,6 +107,8 @@ class TorqueFitter {
   void read(const std::vector<AddedEffect>& effects);
   [[nodiscard]] bool is_open(const EffectId& id) const;
   void set_gravity(const Eigen::Vector2d& tilt_deg);
+  void set_gravity(std::shared_ptr<const GravityCase> gravity);
+  void set_gravity_start(int start);
   void set_widths(const Eigen::VectorXd& widths);
   void choose_gravity_start(Added& gravity);
   [[nodiscard]] double step();

@@ -240,6 +240,7 @@ void TorqueTracedModel::Parts::refresh() {
     }
   }
   upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
+  starts = {};
 }
 
 void TorqueTracedModel::Parts::choose_base(const effects::BaseData& data, bool masses) {
