@@ -18,7 +18,6 @@ constexpr Eigen::Index kMostRows = 2000;
 constexpr double kMostShift_s = 1.0;
 constexpr double kShiftOfLog = 0.05;  // of a short log, at either end
 constexpr double kBend_s = 0.025;  // between the samples of an acceleration: at 1 Hz it loses 1 %
-constexpr double kMad = 1.4826;    // standard deviations of normal noise in a median deviation
 const double kRoundedSigma = 1.0 / std::sqrt(12.0);  // of a grid rounded to its steps
 // Of the difference's rms: less is rounding, whatever neighbours differ by.
 constexpr double kRounding = 1e-4;
@@ -69,7 +68,7 @@ double median_magnitude(const Eigen::VectorXd& values) {
 double noise_between_neighbours(const Eigen::VectorXd& r) {
   const Eigen::Index n = r.size() - 2;
   const double kOfSecondDifference = std::sqrt(6.0);  // squares of 1 -2 1
-  return kMad * median_magnitude(r.head(n) - 2.0 * r.segment(1, n) + r.tail(n)) /
+  return kSigmaOverMedian * median_magnitude(r.head(n) - 2.0 * r.segment(1, n) + r.tail(n)) /
          kOfSecondDifference;
 }
 
@@ -274,9 +273,10 @@ void TracedColumns::fit_widest() {
 double TracedColumns::noise_of(const Eigen::VectorXd& residual) const {
   const Eigen::VectorXd used = used_.values.col(0);
   const double step = std::max(step_of(used).value_or(0.0), step_of(pair_->other).value_or(0.0));
-  return std::max(
-      {pair_->postures ? kMad * median_magnitude(residual) : noise_between_neighbours(residual),
-       kRoundedSigma * step, kRounding * rms_about_mean(at_rows(pair_->other - used)), kNothing});
+  return std::max({pair_->postures ? kSigmaOverMedian * median_magnitude(residual)
+                                   : noise_between_neighbours(residual),
+                   kRoundedSigma * step, kRounding * rms_about_mean(at_rows(pair_->other - used)),
+                   kNothing});
 }
 
 TracedColumns::Shares TracedColumns::shares_at(const State& state) const {

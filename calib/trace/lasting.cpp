@@ -14,8 +14,6 @@
 namespace kinescope::trace {
 namespace {
 
-// Standard deviations in a median of absolute values.
-constexpr double kNormal = 1.4826;
 // Noise is known from neighbours: what it is itself lasts two instants or so.
 constexpr double kInstantsAlike = 2.0;
 // Variance of the logarithm of a scale from medians, times samples (Rousseeuw and Croux 1993).
@@ -37,7 +35,7 @@ Scale scale_at(const Linearisation& linear, const RestPlace& place) {
       ratios.push_back(std::abs(linear.residual[row]) / linear.noise[row]);
   }
   const auto rows = static_cast<double>(ratios.size());
-  return {kNormal * median_of(std::move(ratios)), rows};
+  return {kSigmaOverMedian * median_of(std::move(ratios)), rows};
 }
 
 // Two scales are compared, that of the residual and that of the noise.

@@ -140,9 +140,8 @@ class AprilGridFinder final : public BoardFinder {
     const double measured = median_of(spacings);
     const double off = std::abs(measured - board_.spacing);
     for (double& spacing : spacings) spacing = std::abs(spacing - measured);
-    constexpr double kSigmaOfMedian = 1.4826;  // of normal noise, from the median deviation
-    constexpr double kSigmas = 3.0;            // of one pair of tags, many though there are
-    if (off <= kSigmas * kSigmaOfMedian * median_of(spacings)) return {};
+    constexpr double kSigmas = 3.0;  // of one pair of tags, many though there are
+    if (off <= kSigmas * kSigmaOverMedian * median_of(spacings)) return {};
     // The distance takes up the pitch; tags are then too large or small by off / (1 + s), and
     // their corners lie half a diagonal from the middle.
     const double edge_px = median_of(edges_px);

@@ -154,7 +154,7 @@ double robust_noise(const std::vector<Sample>& samples,
     if (samples[i].weight > 0.5) size.push_back(std::abs(samples[i].grey - predictions[i].grey));
   }
   if (size.empty()) return 0.0;
-  return std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
+  return std::max(kMinNoise, kSigmaOverMedian * median_of(std::move(size)));
 }
 
 std::optional<std::array<double, 2>> guess_levels(const std::vector<Sample>& samples) {

@@ -101,7 +101,7 @@ std::optional<Pooled> pool(const std::vector<Shift>& shifts) {
     for (const Shift& marker : markers)
       off.push_back(marker.bloom - x(0) - marker.ink_per_m * x(1));
     scatter = std::max(
-        kLikelyScatter, 1.4826 * [&] {
+        kLikelyScatter, kSigmaOverMedian * [&] {
           if (round == 0) return 1.0;  // not yet known: all count alike
           std::vector<double> size;
           for (const double r : off) size.push_back(std::abs(r));

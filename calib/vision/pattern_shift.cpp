@@ -13,6 +13,7 @@
 
 #include "calib/vision/marker_cells.h"
 #include "calib/vision/marker_edges.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -151,7 +152,7 @@ std::optional<Numbers<N>> fit(const std::vector<CellEdge>& steps) {
     // As many of them as there are numbers could be made nothing.
     const auto middle = size.begin() + static_cast<std::ptrdiff_t>((size.size() + N) / 2);
     std::ranges::nth_element(size, middle);
-    scale = std::max(1.4826 * *middle, kLeastScale);
+    scale = std::max(kSigmaOverMedian * *middle, kLeastScale);
   }
   return out;
 }

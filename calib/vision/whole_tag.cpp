@@ -341,7 +341,7 @@ class WholeTagFit {
     std::vector<double> size;
     size.reserve(coarse_);
     for (std::size_t i = 0; i < coarse_; ++i) size.push_back(std::abs(residuals_[i]));
-    noise_ = std::max(kMinNoise, 1.4826 * median_of(std::move(size)));
+    noise_ = std::max(kMinNoise, kSigmaOverMedian * median_of(std::move(size)));
     if (!weigh()) return std::nullopt;
     Row pull = Row::Zero();
     for (const Row& block : pulls_) pull += block;

@@ -38,10 +38,9 @@ struct Normal {
 };
 
 double robust_sigma(const Eigen::VectorXd& residual, Eigen::Index parameters) {
-  constexpr double kNormal = 1.4826;  // standard deviations in a median of absolute deviations
   const auto rows = static_cast<double>(residual.size());
   const double freedom = std::max(1.0, rows - static_cast<double>(parameters));
-  return kNormal * median_of(to_vector(residual.cwiseAbs())) * std::sqrt(rows / freedom);
+  return kSigmaOverMedian * median_of(to_vector(residual.cwiseAbs())) * std::sqrt(rows / freedom);
 }
 
 Eigen::MatrixXd columns_that_act(const Eigen::MatrixXd& all) {

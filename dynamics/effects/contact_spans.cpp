@@ -30,14 +30,13 @@ std::vector<ContactSpan> find_contact_spans(const EffectMotion& motion,
                                             const Eigen::MatrixXd& whitened,
                                             const Eigen::VectorXd& sigma,
                                             const ContactSpanOptions& options) {
-  constexpr double kNormal = 1.4826;  // standard deviations in a median of absolute deviations
   const Eigen::VectorXd time_s = motion.at_instants(motion.time_s());
   const Eigen::ArrayXd level =
       windowed_power(time_s, whitened.rowwise().squaredNorm().array(), options.window_s)
           .max(1e-12)
           .log();
   const double median = median_of(to_vector(level.matrix()));
-  const double spread = kNormal * median_of(to_vector((level - median).abs().matrix()));
+  const double spread = kSigmaOverMedian * median_of(to_vector((level - median).abs().matrix()));
   std::vector<ContactSpan> out;
   if (!(spread > 0.0)) return out;
   const Eigen::ArrayXd height = (level - median) / spread;

@@ -12,7 +12,6 @@
 namespace kinescope::effects {
 namespace {
 
-constexpr double kNormal = 1.4826;  // standard deviations in a median of absolute values
 constexpr std::size_t kFewest = 30;
 
 /// Instants whose neighbours are one usual step away.
@@ -75,7 +74,8 @@ Eigen::VectorXd noise_at_most(const EffectMotion& motion, const Eigen::MatrixXd&
       sizes.push_back(std::abs(residual(i - 1, j) - 2.0 * residual(i, j) + residual(i + 1, j)));
     const double rounding =
         motion.samples().torque_step.size() > j ? motion.samples().torque_step[j] / sigma[j] : 0.0;
-    out[j] = std::hypot(factor * kNormal * median_of(std::move(sizes)), rounding / std::sqrt(12.0));
+    out[j] = std::hypot(factor * kSigmaOverMedian * median_of(std::move(sizes)),
+                        rounding / std::sqrt(12.0));
   }
   return out;
 }

@@ -171,8 +171,7 @@ Judged judge(const JointModel& joint, const Search& search, const RobustTorque& 
     out.score -=
         0.5 * (kFreedom + 1.0) * std::log1p(z * z / kFreedom) + 0.5 * std::log(left.variance(i, 0));
   }
-  constexpr double kMedianToSigma = 1.4826;
-  out.unseen_rms = kMedianToSigma * median_of(to_vector(left.residual.col(0).cwiseAbs()));
+  out.unseen_rms = kSigmaOverMedian * median_of(to_vector(left.residual.col(0).cwiseAbs()));
   const double noise_square = std::pow(joint.scale() * std::exp(search[4]), 2);
   const double function = median_of(to_vector(left.variance.col(0))) - noise_square;
   const double unseen_square = out.unseen_rms * out.unseen_rms;

@@ -15,7 +15,6 @@ namespace {
 constexpr double kHuber = 1.345;
 constexpr double kTukey = 4.685;
 constexpr double kStudentFreedom = 4.0;
-constexpr double kMadToSigma = 1.4826;
 
 /// Rows are scaled a stretch at a time, so that the copy stays in the cache.
 constexpr Eigen::Index kStretch = 512;
@@ -65,7 +64,7 @@ double median_sigma(const Eigen::VectorXd& whitened, const Eigen::VectorXd& weig
   for (Eigen::Index t = 0; t < whitened.size(); ++t) {
     if (weights[t] > 0.0) sizes.push_back(std::abs(whitened[t]));
   }
-  return kMadToSigma * median_of(std::move(sizes));
+  return kSigmaOverMedian * median_of(std::move(sizes));
 }
 
 class Fitter {

@@ -15,4 +15,7 @@ namespace kinescope {
   return *middle;
 }
 
+/// Standard deviation of normal noise over the median of its absolute values.
+inline constexpr double kSigmaOverMedian = 1.4826;
+
 }  // namespace kinescope

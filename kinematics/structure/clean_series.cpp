@@ -221,7 +221,7 @@ std::optional<double> noise_from_differences(const Body& body, const Steps& step
     for (int c = 0; c < 6; ++c) absolute.push_back(std::abs(white(c)));
   }
   if (absolute.size() < 120) return std::nullopt;
-  return 1.4826 * median_of(std::move(absolute));
+  return kSigmaOverMedian * median_of(std::move(absolute));
 }
 
 void scale_branch(Branch& branch, double scale) {
