@@ -117,13 +117,13 @@ void print_result(const RunSummary& run, const RunFolder& folder, std::string_vi
     return;
   }
   const Verdict verdict = make_verdict(run);
-  fmt::print("{}\n{}\n{}\nNext: {}\n", verdict.found, verdict.accurate, verdict.limits,
-             verdict.next);
+  fmt::print("{}\n{}\n{}\n", verdict.found, verdict.accurate, verdict.limits);
   if (run.trace) {
     for (const std::string& line : trace_lines(*run.trace)) fmt::print("{}\n", line);
   }
   for (const std::string& line : second_column_lines(run.second_columns)) fmt::print("{}\n", line);
   for (const std::string& line : run.torque) fmt::print("{}\n", line);
+  if (!verdict.next.empty()) fmt::print("Next: {}\n", verdict.next);
   if (report == kReport) {
     if (const std::string words = report::beside_urdf_words(run); !words.empty())
       fmt::print("{}\n", report::sentence(words));

@@ -92,10 +92,10 @@ void print_hand_eye(const HandEyeSummary& summary, const RunFolder& folder,
   const Verdict verdict = hand_eye_verdict(summary);
   for (const std::string& words : {verdict.found, verdict.accurate, verdict.limits})
     if (!words.empty()) fmt::print("{}\n", words);
-  if (!verdict.next.empty()) fmt::print("Next: {}\n", verdict.next);
   if (summary.hand_eye.trace)
     for (const std::string& line : trace_lines(*summary.hand_eye.trace)) fmt::print("{}\n", line);
   for (const std::string& line : odd_row_lines(summary)) fmt::print("{}\n", line);
+  if (!verdict.next.empty()) fmt::print("Next: {}\n", verdict.next);
   fmt::print("poses   {}\nurdf    {}\nreport  {}\n", folder.file("hand_eye.json").string(),
              folder.file("hand_eye.urdf").string(), folder.file("report.html").string());
 }
