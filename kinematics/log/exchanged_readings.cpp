@@ -18,7 +18,7 @@ namespace {
 
 // More of them are another kind of log.
 constexpr std::size_t kMost = 4;
-// Of the sharpest turn of the motion. Chosen; jumps of exchanged columns made 10 to 100.
+// Of the sharpest turn of the motion. Chosen.
 constexpr double kJump = 2.0;
 // Of a channel's range: postures in a row cross half of it in one step. Chosen.
 constexpr double kFastestOfAMotion = 0.1;
