@@ -155,6 +155,9 @@ CameraEffect tag_slip(const EffectWorld& world, int marker) {
   CameraEffect out =
       effect("tag_slip", name, fmt::format("{} moved on its link", name), kTwist, "m");
   out.candidate.size_weights.head<3>().setZero();
+  out.candidate.size = [](const Eigen::VectorXd& twist) {
+    return exp_pose(Vector6d(twist)).translation.norm();
+  };
   out.candidate.check = "glue or screws of the marker's plate";
   out.candidate.record = "more frames with this marker in view, before and after";
   out.candidate.possible = is_a_slip(world, marker);
