@@ -11,6 +11,7 @@
 
 #include "dynamics/data/statistics.h"
 #include "dynamics/effects/candidates.h"
+#include "dynamics/effects/carrier_torques.h"
 #include "dynamics/effects/drive_laws.h"
 #include "dynamics/rigid/inverse_dynamics.h"
 #include "dynamics/rigid/regressor.h"
@@ -19,70 +20,7 @@
 namespace kinescope {
 namespace {
 
-using effects::Carriers;
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
 constexpr double kDegree = std::numbers::pi / 180.0;
-
-void put(Triplets& triplets, int carrier, Eigen::Index joint, Eigen::Index joints,
-         const Eigen::VectorXd& values) {
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (values[i] != 0.0) {
-      triplets.emplace_back(static_cast<int>(i * joints + joint), carrier, values[i]);
-    }
-  }
-}
-
-void put_joints(const EffectContext& context, const Carriers& carriers, Triplets& triplets) {
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(context.instants());
-  for (Eigen::Index j = 0; j < carriers.joints; ++j) {
-    const auto joint = static_cast<std::size_t>(j);
-    put(triplets, carriers.joint(joint), j, carriers.joints, ones);
-    if (j + 1 == carriers.joints) continue;
-    for (const bool sum : {true, false}) {
-      put(triplets, carriers.pair(joint, sum), j, carriers.joints, ones);
-      put(triplets, carriers.pair(joint, sum), j + 1, carriers.joints, sum ? ones : -ones);
-    }
-  }
-}
-
-/// Torque a degree of tilt: d torque / d gravity times the way gravity moves.
-void put_gravity(const EffectContext& context, const Eigen::MatrixXd& q, const Carriers& carriers,
-                 Triplets& triplets) {
-  const Eigen::Vector3d& gravity = context.rigid.gravity_m_s2;
-  if (!(gravity.norm() > 0.0)) return;
-  Eigen::Matrix<double, 3, 2 + effects::kGravityStarts> moves;
-  moves.leftCols<2>() = context.gravity_moves;
-  const auto starts = effects::gravity_starts();
-  for (int k = 0; k < effects::kGravityStarts; ++k) {
-    const Eigen::Vector2d& start = starts[static_cast<std::size_t>(k)];
-    moves.col(2 + k) = (tilted(gravity, start) - gravity) / std::max(1.0, start.norm());
-  }
-  for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Eigen::MatrixXd torque = gravity_jacobian(context.rigid, q.row(i).transpose()) * moves;
-    for (int a = 0; a < moves.cols(); ++a) {
-      for (Eigen::Index j = 0; j < carriers.joints; ++j) {
-        triplets.emplace_back(static_cast<int>(i * carriers.joints + j), carriers.gravity(a),
-                              torque(j, a));
-      }
-    }
-  }
-}
-
-void put_bodies(const EffectContext& context, const TorqueSamples& rows, const Carriers& carriers,
-                Triplets& triplets) {
-  const std::vector<Eigen::MatrixXd> Y =
-      regressors_of_samples(context.rigid, rows.q, rows.dq, rows.ddq);
-  const std::vector<int> bodies = effects::tips(context.rigid);
-  for (std::size_t t = 0; t < bodies.size(); ++t) {
-    for (int k = 0; k < 10; ++k) {
-      for (Eigen::Index j = 0; j < carriers.joints; ++j) {
-        put(triplets, carriers.body(static_cast<int>(t), k), j, carriers.joints,
-            Y[static_cast<std::size_t>(j)].col(10 * bodies[t] + k));
-      }
-    }
-  }
-}
 
 }  // namespace
 
@@ -221,20 +159,14 @@ std::vector<Candidate> make_candidates(const EffectContext& context) {
 }
 
 Eigen::SparseMatrix<double> make_carriers(const EffectContext& context) {
-  const Carriers carriers{static_cast<Eigen::Index>(context.joints.size())};
-  TorqueSamples rows;
-  rows.q = context.motion->rows_at_instants(context.motion->samples().q);
-  rows.dq = context.motion->rows_at_instants(context.motion->samples().dq);
-  rows.ddq = context.motion->rows_at_instants(context.motion->samples().ddq);
-  Triplets triplets;
-  put_joints(context, carriers, triplets);
-  put_gravity(context, rows.q, carriers, triplets);
-  put_bodies(context, rows, carriers, triplets);
-  Eigen::SparseMatrix<double> out(
-      context.instants() * carriers.joints,
-      carriers.count(static_cast<int>(effects::tips(context.rigid).size())));
-  out.setFromTriplets(triplets.begin(), triplets.end());
-  return out;
+  const TorqueSamples& samples = context.motion->samples();
+  const Eigen::MatrixXd q = context.motion->rows_at_instants(samples.q);
+  const Eigen::MatrixXd dq = context.motion->rows_at_instants(samples.dq);
+  const Eigen::MatrixXd ddq = context.motion->rows_at_instants(samples.ddq);
+  return effects::sparse_carriers(
+      effects::carrier_torques(context, gravity_slopes_of_samples(context.rigid, q),
+                               regressors_of_samples(context.rigid, q, dq, ddq)),
+      context.instants());
 }
 
 Eigen::MatrixXd effect_torque(const Eigen::SparseMatrix<double>& carriers,

@@ -2,20 +2,19 @@
 #include <cmath>
 
 #include "dynamics/effects/torque_parts.h"
-#include "dynamics/rigid/inverse_dynamics.h"
-#include "dynamics/rigid/regressor.h"
 #include "kinematics/core/dense_algebra.h"
 
 namespace kinescope::effects {
 namespace {
 
 /// Combinations of the bodies' parameters that the log shows, each of unit effect on the whitened
-/// torque: 10 bodies x base parameters.
-Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen::VectorXd& sigma) {
-  const Eigen::Index n = Y.front().cols();
+/// torque: 10 bodies x base parameters. `normals`: Y' Y of each joint.
+Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& normals,
+                             const Eigen::VectorXd& sigma) {
+  const Eigen::Index n = normals.front().cols();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  for (std::size_t j = 0; j < Y.size(); ++j) {
-    H.noalias() += Y[j].transpose() * Y[j] / std::pow(sigma[static_cast<Eigen::Index>(j)], 2);
+  for (std::size_t j = 0; j < normals.size(); ++j) {
+    H += normals[j] / std::pow(sigma[static_cast<Eigen::Index>(j)], 2);
   }
   const Eigen::VectorXd scale = unit_scale(H);
   const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
@@ -26,53 +25,61 @@ Eigen::MatrixXd shown_bodies(const std::vector<Eigen::MatrixXd>& Y, const Eigen:
          values.tail(n - first).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-}  // namespace
-
-void GravityCase::set_carriers(const Eigen::SparseMatrix<double>& all) {
-  carriers = all;
-  const Eigen::Index joints = fixed.cols();
-  carrier_torques.assign(static_cast<std::size_t>(carriers.cols()),
-                         JointTorques(static_cast<std::size_t>(joints)));
-  for (int c = 0; c < carriers.outerSize(); ++c) {
-    for (Eigen::SparseMatrix<double>::InnerIterator entry(carriers, c); entry; ++entry) {
-      Eigen::VectorXd& torque = carrier_torques[static_cast<std::size_t>(c)]
-                                               [static_cast<std::size_t>(entry.row() % joints)];
-      if (torque.size() == 0) torque.setZero(fixed.rows());
-      torque[entry.row() / joints] = entry.value();
-    }
+/// The base where all masses are free.
+void free_bodies(const TorqueTracedModel::Parts& parts, const std::vector<Eigen::MatrixXd>& Y,
+                 GravityCase& out) {
+  std::vector<Eigen::MatrixXd> normals;
+  for (std::size_t j = 0; j < Y.size(); ++j)
+    normals.push_back(parts.regressors.normal(j, out.rigid.gravity_m_s2));
+  out.bodies = shown_bodies(normals, parts.base.sigma);
+  for (std::size_t j = 0; j < Y.size(); ++j) {
+    // Bodies stand behind those that carry them: what stands before the joint's own does nothing.
+    const Eigen::Index moved = Y[j].cols() - 10 * static_cast<Eigen::Index>(j);
+    out.base.emplace_back(Y[j].rightCols(moved) * out.bodies.bottomRows(moved));
+    out.base_squares.emplace_back(out.bodies.transpose() * normals[j] * out.bodies);
   }
 }
 
+/// The same where they are declared.
+void fix_bodies(const TorqueTracedModel::Parts& parts, GravityCase& out) {
+  const Eigen::Index joints = parts.q.cols();
+  out.fixed = out.context.load + parts.dq * parts.viscous.asDiagonal();
+  out.base.assign(static_cast<std::size_t>(joints), Eigen::MatrixXd(parts.q.rows(), 0));
+  out.base_squares.assign(static_cast<std::size_t>(joints), Eigen::MatrixXd(0, 0));
+}
+
+}  // namespace
+
 std::shared_ptr<const GravityCase> make_gravity_case(const TorqueTracedModel::Parts& parts,
-                                                     const Eigen::Vector2d& tilt_deg) {
+                                                     const Eigen::Vector2d& tilt_deg,
+                                                     const RigidModel& weighed) {
   auto out = std::make_shared<GravityCase>();
   out->tilt_deg = tilt_deg;
   out->rigid = parts.base.rigid;
-  out->rigid.gravity_m_s2 = tilted(parts.base.rigid.gravity_m_s2, tilt_deg);
+  const Eigen::Vector3d& declared = parts.base.rigid.gravity_m_s2;
+  const Eigen::Vector3d gravity = tilted(declared, tilt_deg);
+  out->rigid.gravity_m_s2 = gravity;
   out->context = parts.context;
-  out->context.rigid.gravity_m_s2 = out->rigid.gravity_m_s2;
-  out->context.gravity_moves = tilt_moves(out->rigid.gravity_m_s2);
+  out->context.rigid.gravity_m_s2 = gravity;
+  out->context.gravity_moves = tilt_moves(gravity);
   if (!tilt_deg.isZero(0.0)) {
-    out->context.load =
-        inverse_dynamics_of_samples(out->context.rigid, parts.q, parts.dq, parts.ddq);
+    const auto slopes = parts.regressors.slopes(out->context.rigid);
+    out->context.load = parts.declared_load;
+    for (std::size_t a = 0; a < slopes.size(); ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      out->context.load += (gravity[axis] - declared[axis]) * slopes[a];
+    }
   }
-  const Eigen::Index joints = parts.q.cols();
-  const bool declared = parts.base.kind == TorqueBaseKind::kDeclared;
-  out->fixed = Eigen::MatrixXd::Zero(parts.q.rows(), joints);
-  if (declared) {
-    out->fixed = inverse_dynamics_of_samples(out->rigid, parts.q, parts.dq, parts.ddq) +
-                 parts.dq * parts.viscous.asDiagonal();
-    out->base.assign(static_cast<std::size_t>(joints), Eigen::MatrixXd(parts.q.rows(), 0));
+  std::vector<Eigen::MatrixXd> Y;
+  for (std::size_t j = 0; j < parts.regressors.declared.size(); ++j)
+    Y.push_back(parts.regressors.regressor(j, gravity));
+  out->fixed = Eigen::MatrixXd::Zero(parts.q.rows(), parts.q.cols());
+  if (parts.base.kind == TorqueBaseKind::kDeclared) {
+    fix_bodies(parts, *out);
   } else {
-    const std::vector<Eigen::MatrixXd> Y =
-        regressors_of_samples(out->rigid, parts.q, parts.dq, parts.ddq);
-    out->bodies = shown_bodies(Y, parts.base.sigma);
-    for (const Eigen::MatrixXd& joint : Y) out->base.emplace_back(joint * out->bodies);
+    free_bodies(parts, Y, *out);
   }
-  for (const Eigen::MatrixXd& base : out->base) {
-    out->base_squares.emplace_back(base.transpose() * base);
-  }
-  out->set_carriers(make_carriers(out->context));
+  out->carrier_torques = carrier_torques(out->context, parts.regressors.slopes(weighed), Y);
   return out;
 }
 

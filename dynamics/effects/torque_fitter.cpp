@@ -83,13 +83,24 @@ void TorqueFitter::read(const std::vector<AddedEffect>& effects) {
 }
 
 void TorqueFitter::set_gravity(const Eigen::Vector2d& tilt_deg) {
-  set_gravity(tilt_deg.isZero(0.0) ? parts_.upright : make_gravity_case(parts_, tilt_deg));
+  set_gravity(tilt_deg.isZero(0.0) ? parts_.upright
+                                   : make_gravity_case(parts_, tilt_deg, parts_.context.rigid));
+}
+
+/// From where it points by now, the masses as they are found.
+void TorqueFitter::tilt_base(const Eigen::Vector2d& tilt_deg) {
+  if (parts_.base.kind == TorqueBaseKind::kIdentified) {
+    // The tilt's columns at the masses found; what the log does not show of them stays unknown.
+    set_gravity(make_gravity_case(parts_, tilt_deg, fitted().rigid));
+  } else {
+    set_gravity(tilt_deg);
+  }
 }
 
 void TorqueFitter::set_gravity_start(int start) {
   const Eigen::Vector2d tilt_deg = gravity_starts()[static_cast<std::size_t>(start)];
   set_gravity(tilt_deg.isZero(0.0) ? parts_.upright : parts_.starts.get(start, [&] {
-    return make_gravity_case(parts_, tilt_deg);
+    return make_gravity_case(parts_, tilt_deg, parts_.context.rigid);
   }));
 }
 
@@ -229,18 +240,7 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
     // A drive that leads its torque is none; the search asks whether its lag may be nothing.
     if (added.kind == Kind::kLag) added.values = added.values.cwiseMax(0.0).eval();
   }
-  if (tilt != case_->tilt_deg) {
-    const RigidModel now = fitted().rigid;
-    set_gravity(tilt);
-    // The tilt's columns at the masses found; what the log does not show of them stays unknown.
-    if (parts_.base.kind == TorqueBaseKind::kIdentified) {
-      auto found = std::make_shared<GravityCase>(*case_);
-      found->context.rigid = now;
-      found->context.rigid.gravity_m_s2 = case_->rigid.gravity_m_s2;
-      found->set_carriers(make_carriers(found->context));
-      case_ = found;
-    }
-  }
+  if (tilt != case_->tilt_deg) tilt_base(tilt);
   if (free_widths() > 0) move_widths(change.segment(p, free_widths()));
 }
 

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "dynamics/effects/base_choice.h"
+#include "dynamics/effects/carrier_torques.h"
 #include "dynamics/effects/effect_library.h"
+#include "dynamics/effects/gravity_regressors.h"
 #include "dynamics/effects/traced_torque.h"
 #include "kinematics/core/memo.h"
 
@@ -15,16 +17,12 @@ namespace kinescope {
 
 namespace effects {
 
-/// Torque joint by joint, instants each; empty where a joint has none.
-using JointTorques = std::vector<Eigen::VectorXd>;
-
 /// The base under one direction of gravity.
 struct GravityCase {
   Eigen::Vector2d tilt_deg;
   RigidModel rigid;  ///< bodies of the base; of the reference where they are free
   EffectContext context;
-  Eigen::SparseMatrix<double> carriers;
-  std::vector<JointTorques> carrier_torques;  ///< the same, by carrier
+  std::vector<JointTorques> carrier_torques;  ///< by carrier
   Eigen::MatrixXd fixed;                      ///< torque that is not free, instants x joints
   std::vector<Eigen::MatrixXd> base;          ///< of each joint: torque a base parameter, instants
                                               ///< x parameters
@@ -32,11 +30,12 @@ struct GravityCase {
   Eigen::MatrixXd bodies;                     ///< the bodies' parameters from the base parameters
 
   [[nodiscard]] Eigen::Index parameters() const { return base.front().cols(); }
-  void set_carriers(const Eigen::SparseMatrix<double>& all);
 };
 
+/// `weighed`: the bodies by whose weight a tilt shows in the torque.
 [[nodiscard]] std::shared_ptr<const GravityCase> make_gravity_case(
-    const TorqueTracedModel::Parts& parts, const Eigen::Vector2d& tilt_deg);
+    const TorqueTracedModel::Parts& parts, const Eigen::Vector2d& tilt_deg,
+    const RigidModel& weighed);
 
 }  // namespace effects
 
@@ -52,6 +51,8 @@ struct TorqueTracedModel::Parts {
       coulomb;             ///< that the model declares, of each joint; 0 where masses are free
   Eigen::MatrixXd widest;  ///< whitened, see widest_residual()
 
+  effects::GravityRegressors regressors;  ///< of the geometry, at the instants
+  Eigen::MatrixXd declared_load;  ///< of the bodies of context.rigid in the declared gravity
   std::shared_ptr<const effects::GravityCase> upright;  ///< gravity as declared
   /// From a base that stands as gravity_starts() says: every fit that seeks gravity begins there.
   Memo<int, std::shared_ptr<const effects::GravityCase>> starts;
@@ -107,6 +108,7 @@ class TorqueFitter {
   void read(const std::vector<AddedEffect>& effects);
   [[nodiscard]] bool is_open(const EffectId& id) const;
   void set_gravity(const Eigen::Vector2d& tilt_deg);
+  void tilt_base(const Eigen::Vector2d& tilt_deg);
   void set_gravity(std::shared_ptr<const GravityCase> gravity);
   void set_gravity_start(int start);
   void set_widths(const Eigen::VectorXd& widths);

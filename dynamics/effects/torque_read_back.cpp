@@ -77,7 +77,7 @@ TracedFit TorqueFitter::read_back(bool converged) const {
     columns = (columns * turn_of_tilt(added.values)).eval();
   }
   linear.prior = own_prior();
-  linear.carriers = case_->carriers;
+  linear.carriers = sparse_carriers(case_->carrier_torques, instants_);
   for (int c = 0; c < linear.carriers.outerSize(); ++c) {
     for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, c); entry; ++entry) {
       entry.valueRef() /= parts_.base.sigma[entry.row() % joints_];

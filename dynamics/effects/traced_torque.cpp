@@ -2,6 +2,7 @@
 #include "dynamics/effects/traced_torque.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -115,10 +116,11 @@ BaseData base_data(const EffectContext& context, const RigidModel& rigid) {
     }
     data.common.push_back(std::move(common));
   }
-  for (Eigen::Index i = 0; i < data.q.rows(); ++i) {
-    const Eigen::MatrixXd gravity = gravity_jacobian(rigid, data.q.row(i).transpose());
+  const std::array<Eigen::MatrixXd, 3> slopes = gravity_slopes_of_samples(rigid, data.q);
+  for (std::size_t axis = 0; axis < slopes.size(); ++axis) {
     for (Eigen::Index j = 0; j < data.q.cols(); ++j) {
-      data.common[static_cast<std::size_t>(j)].row(i).head<3>() = gravity.row(j);
+      data.common[static_cast<std::size_t>(j)].col(static_cast<Eigen::Index>(axis)) =
+          slopes[axis].col(j);
     }
   }
   return data;
@@ -239,7 +241,9 @@ void TorqueTracedModel::Parts::refresh() {
           -base.rigid.bodies[b].motor_inertia;
     }
   }
-  upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero());
+  regressors = effects::make_gravity_regressors(context.rigid, q, dq, ddq);
+  declared_load = inverse_dynamics_of_samples(context.rigid, q, dq, ddq);
+  upright = effects::make_gravity_case(*this, Eigen::Vector2d::Zero(), context.rigid);
   starts = {};
 }
 

@@ -54,6 +54,17 @@ Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_jacobian(const RigidModel& mode
   return out;
 }
 
+std::array<Eigen::MatrixXd, 3> gravity_slopes_of_samples(const RigidModel& model,
+                                                         const Eigen::MatrixXd& q) {
+  const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(q.rows(), q.cols());
+  std::array<Eigen::MatrixXd, 3> out;
+  for (std::size_t axis = 0; axis < out.size(); ++axis) {
+    const auto unit = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(axis));
+    out[axis] = inverse_dynamics_of_samples(in_gravity(model, unit), q, still, still);
+  }
+  return out;
+}
+
 Eigen::VectorXd coriolis_torque(const RigidModel& model, const Eigen::VectorXd& q,
                                 const Eigen::VectorXd& dq) {
   return inverse_dynamics(in_gravity(model, Eigen::Vector3d::Zero()), q, dq,

@@ -4,6 +4,8 @@
 // matrix); friction is not.
 #pragma once
 
+#include <array>
+
 #include "dynamics/rigid/rigid_model.h"
 
 namespace kinescope {
@@ -27,6 +29,9 @@ namespace kinescope {
 /// times the gravity vector is gravity_torque(), and the rest of the torque does not depend on it.
 [[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_jacobian(const RigidModel& model,
                                                                         const Eigen::VectorXd& q);
+/// The same of a whole log: one matrix an axis of the base, samples x joints.
+[[nodiscard]] std::array<Eigen::MatrixXd, 3> gravity_slopes_of_samples(const RigidModel& model,
+                                                                       const Eigen::MatrixXd& q);
 
 /// C(q, dq) dq: centrifugal and Coriolis torque.
 [[nodiscard]] Eigen::VectorXd coriolis_torque(const RigidModel& model, const Eigen::VectorXd& q,
