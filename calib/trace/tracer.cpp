@@ -415,6 +415,9 @@ StagePtr Tracer::refit_best(const std::vector<Contender>& contenders, int round)
     StagePtr stage = with_sizes_for_scans(stage_of(std::move(effects)));
     mark(round, contender.id, CandidateState::kRefitted, stage->error.value);
     const double bar = best ? best->held_out_sum() : now_->held_out_sum();
+    // What the residual asks for in a straight line may end where no such effect is.
+    const Candidate* candidate = find_candidate(now_->fit, contender.id);
+    if (candidate == nullptr || !is_possible(*candidate, stage->fit.values.back())) continue;
     if (stage->fit.converged && stage->held_out_sum() < bar) best = std::move(stage);
   }
   return best;

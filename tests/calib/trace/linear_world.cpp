@@ -206,6 +206,7 @@ TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
       if (candidate.id != effect.id) continue;
       for (EffectColumn& column : candidate.columns(effect.scan)) {
         if (effect.id.effect == "bend") column.share = share({0, "tanh_other"});
+        if (effect.id.effect == "scale" && options_.scale_turns) column.share *= -1.0;
         columns.push_back(column);
       }
     }

@@ -22,6 +22,7 @@ struct LinearWorldOptions {
   int folds = 5;
   bool together = false;     ///< the second joint moves as the first one does
   bool scale_grows = false;  ///< a scale below zero cannot be
+  bool scale_turns = false;  ///< fitted, a scale has the other sign than the residual asks for
   /// Candidate "bend" at joint1: at nothing it does what the joint's zero does, in the fit it is
   /// "tanh_other" (as friction frees the width of its turn).
   bool bends = false;

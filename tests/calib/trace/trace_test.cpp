@@ -277,6 +277,20 @@ TEST(TraceTest, ParametersThatCannotBeAreNotFound) {
   EXPECT_EQ(std::ranges::find(trace.accepted, scale, &TracedEffect::id), trace.accepted.end());
 }
 
+// In a straight line the residual asks for a scale that can be; the fit ends where none is.
+TEST(TraceTest, WhatCannotBeOnceItIsFittedIsNotAdded) {
+  LinearWorldOptions options;
+  options.scale_grows = true;
+  for (const bool turns : {false, true}) {
+    options.scale_turns = turns;
+    const Trace trace = trace_effects(LinearWorld(options, {{0, "scale", 0.5, 0.0}}));
+    const bool added = std::ranges::any_of(trace.steps, [](const TraceStep& step) {
+      return step.words.starts_with("scale at joint1 added");
+    });
+    EXPECT_EQ(added, !turns) << trace.reason;
+  }
+}
+
 // Of an effect that is not there the direction is an accident, and what its size must be to rise
 // above a floor is not.
 TEST(TraceTest, TheSmallestSizeAboveAFloorDoesNotDependOnTheNoise) {
