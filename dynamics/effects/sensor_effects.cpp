@@ -8,6 +8,11 @@
 namespace kinescope::effects {
 namespace {
 
+// The slowest low-pass that a drive would have on its torque: a corner of 1.6 Hz. Measured drives
+// came out at 8 to 25 ms; the 180 ms of a joint that creeps were friction (`trace_torque_real`,
+// franka_joint7).
+constexpr double kSlowestLag_s = 0.1;
+
 Candidate torque_offset(const SharedContext& c, std::size_t j) {
   Candidate out;
   out.id = {"torque_offset", c->joints[j]};
@@ -77,7 +82,9 @@ Candidate torque_lag(const SharedContext& c, std::size_t j) {
   out.record = "reverse the joint quickly and often, at several speeds";
   out.size_unit = "s";
   out.parameters = {{"time_constant", "s"}};
-  out.possible = [](const Eigen::VectorXd& theta) { return theta[0] >= 0.0; };
+  out.possible = [](const Eigen::VectorXd& theta) {
+    return theta[0] >= 0.0 && theta[0] <= kSlowestLag_s;
+  };
   out.columns = [c, j](double) {
     return std::vector<EffectColumn>{
         {static_cast<int>(j), -c->measured_rate.col(static_cast<Eigen::Index>(j))}};

@@ -11,10 +11,18 @@
 
 namespace kinescope::effects {
 
-/// Only waves may come several times: of all else a second one would mend the first one's shape.
+/// Only waves may come several times: of all else a second one would mend the first one's shape. So
+/// would a low-pass beside a delay, the same to first order: each is in the other's place or not at
+/// all.
 bool TorqueFitter::is_open(const EffectId& id) const {
   if (id.effect == "ripple") return true;
-  return std::ranges::none_of(added_, [&](const Added& a) { return a.effect.id == id; });
+  const auto is_late = [](const std::string& effect) {
+    return effect == "torque_delay" || effect == "torque_lag";
+  };
+  return std::ranges::none_of(added_, [&](const Added& a) {
+    const EffectId& other = a.effect.id;
+    return other == id || (other.place == id.place && is_late(other.effect) && is_late(id.effect));
+  });
 }
 
 /// Whitened, instants x joints.

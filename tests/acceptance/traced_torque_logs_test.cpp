@@ -36,8 +36,8 @@ INSTANTIATE_TEST_SUITE_P(table, TracedTorqueLogs,
                          testing::Values(Figure{"scara4_stribeck_ripple", 0.0105},
                                          Figure{"wam7_payload", 0.0151},
                                          Figure{"ur6_contact", 0.0181},
-                                         Figure{"franka_joint7", 0.0275},
-                                         Figure{"kinova_joint7", 0.119}, Figure{"feetech", 0.246}),
+                                         Figure{"franka_joint7", 0.0385},
+                                         Figure{"kinova_joint7", 0.110}, Figure{"feetech", 0.246}),
                          [](const auto& tested) { return tested.param.set; });
 
 }  // namespace

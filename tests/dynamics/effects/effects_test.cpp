@@ -192,6 +192,28 @@ TEST(TorqueEffects, ALowPassFarAboveTheMotionMayBeADelay) {
   EXPECT_EQ(named, (std::vector<EffectId>{{"torque_delay", "joint2"}, {"torque_lag", "joint2"}}));
 }
 
+TEST(TorqueEffects, ADriveHasNoLowPassSlowerThanItsMotion) {
+  const TorqueTrace out = trace_of_lag(0.3, 1e-2, 25.0);
+  EXPECT_FALSE(std::ranges::any_of(out.trace.accepted, [](const TracedEffect& effect) {
+    return effect.id.effect == "torque_lag";
+  })) << out.trace.reason;
+  EXPECT_NE(out.trace.verdict, TraceVerdict::kClean);
+}
+
+TEST(TorqueEffects, ALowPassAndADelayStandInOneAnothersPlaceOnly) {
+  Rng rng = Rng::from_name("effects", 4);
+  const EffectWorld world = effect_world({{"torque_lag", 1, 2, 0.04}}, quiet_world(), rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  for (const char* in : {"torque_delay", "torque_lag"}) {
+    const TracedFit fit = model.fit({{{in, "joint2"}, 0.0}});
+    for (const char* other : {"torque_delay", "torque_lag"}) {
+      EXPECT_EQ(std::ranges::count(fit.candidates, EffectId{other, "joint2"}, &Candidate::id), 0)
+          << other << " beside " << in;
+      EXPECT_EQ(std::ranges::count(fit.candidates, EffectId{other, "joint1"}, &Candidate::id), 1);
+    }
+  }
+}
+
 TEST(TorqueEffects, ALowPassIsPredictedAndTakenOutAgain) {
   Rng rng = Rng::from_name("effects", 5);
   const EffectWorld world = effect_world({{"torque_lag", 0, 1, 0.04}}, quiet_world(), rng);
