@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/median.h"
+#include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
 namespace {
@@ -78,12 +79,20 @@ class UsualMotion {
   std::vector<bool> is_motion_;
 };
 
+bool jumps(const JointLog& log, const UsualMotion& usual, Eigen::Index row, int channel) {
+  return usual.turn(log, channel, row, log.values(row, channel)) >
+         kJump * usual.sharpest_turn(channel);
+}
+
+// None where they come from a jump: a single wrong reading leads anywhere (one of 0 to the other
+// side of zero).
 std::vector<int> channels_that_jump(const JointLog& log, const UsualMotion& usual,
                                     Eigen::Index row) {
   std::vector<int> out;
   for (int c = 0; c < log.values.cols(); ++c) {
-    const double turn = usual.turn(log, c, row, log.values(row, c));
-    if (usual.is_motion(c) && turn > kJump * usual.sharpest_turn(c)) out.push_back(c);
+    if (!usual.is_motion(c) || !jumps(log, usual, row, c)) continue;
+    if (jumps(log, usual, row - 1, c)) return {};
+    out.push_back(c);
   }
   return out;
 }
@@ -145,10 +154,10 @@ std::vector<ExchangedReadings> exchanged_readings(const JointLog& log) {
   // Most rows are the motion's.
   constexpr std::size_t kFewestRows = 20 * kMost;
   if (log.size() < kFewestRows) return out;
-  const UsualMotion usual(log);
-  JointLog mended = log;
-  for (std::size_t row = 2; row < log.size(); ++row) {
-    if (log.is_joined_between(log.times_s[row - 2], log.times_s[row])) continue;
+  JointLog mended = without_readings(log, readings_apart(log));
+  const UsualMotion usual(mended);
+  for (std::size_t row = 3; row < log.size(); ++row) {
+    if (log.is_joined_between(log.times_s[row - 3], log.times_s[row])) continue;
     const auto found = exchanged_at(mended, usual, static_cast<Eigen::Index>(row));
     if (!found) continue;
     exchange_back(mended, *found);

@@ -89,6 +89,14 @@ TEST(ExchangedReadings, AreNoJumpElsewhere) {
   EXPECT_TRUE(exchanged_readings(gap).empty());
 }
 
+// Behind a reading of 0 the motion seems to come from the other side.
+TEST(ExchangedReadings, AreNoneBehindASingleWrongReading) {
+  JointLog log = waves();
+  for (const int row : {130, 301}) log.values(row, 0) = 0.0;
+  log.values.row(222).setZero();
+  EXPECT_TRUE(exchanged_readings(log).empty());
+}
+
 // Between episodes the robot was elsewhere.
 TEST(ExchangedReadings, AreNotLookedForBetweenEpisodes) {
   JointLog log = exchanged_from(waves(), 230, 0, 1);
