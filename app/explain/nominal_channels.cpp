@@ -36,24 +36,34 @@ std::vector<std::string> strangers(const JointLog& log, const KinematicTree& tre
   return out;
 }
 
+std::vector<Joint*> joints_without_column(KinematicTree& tree) {
+  std::vector<Joint*> out;
+  for (Joint& joint : tree.joints)
+    if (is_movable(joint) && joint.channel.empty()) out.push_back(&joint);
+  return out;
+}
+
+Error no_names(const JointLog& log, const std::vector<std::string>& names) {
+  return bad_input(log.source, "no column is named like a joint of the nominal robot",
+                   fmt::format("name the columns {}", fmt::join(names, ", ")));
+}
+
 void take_in_order(const JointLog& log, NominalChannels& out) {
-  std::vector<Joint*> own;
+  const std::vector<Joint*> own = joints_without_column(out.tree);
   std::vector<std::string> names;
-  for (Joint& joint : out.tree.joints) {
-    if (!is_movable(joint) || !joint.channel.empty()) continue;
-    own.push_back(&joint);
-    names.push_back(joint.name);
-  }
-  if (own.size() != log.channels.size()) {
-    throw bad_input(log.source, "no column is named like a joint of the nominal robot",
-                    fmt::format("name the columns {}", fmt::join(names, ", ")));
-  }
+  for (const Joint* joint : own) names.push_back(joint->name);
+  if (own.empty() || own.size() > log.channels.size()) throw no_names(log, names);
   for (std::size_t k = 0; k < own.size(); ++k) own[k]->channel = log.channels[k];
   out.in_order = true;
+  out.of_more = own.size() < log.channels.size();
   out.warnings.push_back(
-      fmt::format("no column of {} is named like a joint of the nominal robot: taken in order ({} "
-                  "drives {}, ..)",
-                  log.source, log.channels.front(), names.front()));
+      out.of_more
+          ? fmt::format("no column of {} is named like a joint of the nominal robot: `run` takes "
+                        "those that the markers show to drive them, where they do",
+                        log.source)
+          : fmt::format("no column of {} is named like a joint of the nominal robot: taken in "
+                        "order ({} drives {}, ..)",
+                        log.source, log.channels.front(), names.front()));
 }
 
 // A joint that mimics another one names that one as its channel; it takes that one's column, or
@@ -170,9 +180,17 @@ NominalChannels match_channels(const Recording& recording) {
   }
   if (!named) take_in_order(log, out);
   follow_others(log, out.tree);
-  list_copies(log, out.tree);
+  if (!out.of_more) list_copies(log, out.tree);
   hold_the_others(log, out);
   return out;
+}
+
+void require_columns_known(const NominalChannels& matched, const JointLog& log) {
+  if (!matched.of_more) return;
+  std::vector<std::string> names;
+  for (const Joint& joint : matched.tree.joints)
+    if (is_movable(joint)) names.push_back(joint.name);
+  throw no_names(log, names);
 }
 
 NominalChannels by_motion(NominalChannels matched, const Structure& structure,
@@ -197,6 +215,8 @@ NominalChannels by_motion(NominalChannels matched, const Structure& structure,
   for (std::size_t k = 0; k < chain.size(); ++k) {
     matched.tree.joints[chain[k]].channel = columns[k];
   }
+  if (matched.of_more) list_copies(log, matched.tree);
+  matched.of_more = false;
   matched.warnings = {
       fmt::format("no column of {} is named like a joint of the nominal robot: taken by what the "
                   "markers show ({})",

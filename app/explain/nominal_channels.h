@@ -19,10 +19,15 @@ struct NominalChannels {
   KinematicTree tree;
   std::vector<std::string> warnings;
   bool in_order = false;  ///< no column is named like a joint
+  /// There are more columns than joints, too: which ones drive the joints, only markers show.
+  bool of_more = false;
 };
 
 /// Throws bad_input, naming joints and columns, where a column is missing or belongs to no joint.
 [[nodiscard]] NominalChannels match_channels(const Recording& recording);
+
+/// Throws bad_input where nothing has shown which of more columns than joints drive the joints.
+void require_columns_known(const NominalChannels& matched, const JointLog& log);
 
 /// The same with the columns that the markers show to move the joints, first to last, of a robot
 /// that is one chain as the structure is, with joints of the same kinds; as it is otherwise.

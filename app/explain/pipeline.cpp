@@ -372,6 +372,7 @@ CheckedNominal start_from_nominal(const Recording& recording, const Observed& ob
     if (matched.in_order) matched = by_motion(std::move(matched), structure, recording.log);
     require_drawn_types(matched, structure, recording);
   }
+  require_columns_known(matched, recording.log);
   const KinematicTree& nominal = matched.tree;
   warnings.insert(warnings.end(), matched.warnings.begin(), matched.warnings.end());
   const auto place = [&](const KinematicTree& tree) {

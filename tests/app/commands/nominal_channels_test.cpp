@@ -147,6 +147,24 @@ TEST(NominalChannels, WithoutNamesTheMarkersSayWhichColumnDrivesWhat) {
   EXPECT_EQ(by_motion(ordered, two_turns({1, 1}), recording.log).tree.joints[0].channel, "a");
 }
 
+// A column of a gripper, or of a motor that drives nothing, beside those of the joints.
+TEST(NominalChannels, OfMoreColumnsThanJointsTheMarkersSayWhichDriveThem) {
+  Recording recording = with_columns({"a", "idle", "b"});
+  KinematicTree& arm = *recording.nominal;
+  arm.joints.resize(2);
+  arm.links.resize(3);
+  const NominalChannels ordered = match_channels(recording);
+  ASSERT_TRUE(ordered.of_more);
+  EXPECT_THROW(require_columns_known(ordered, recording.log), Error);
+  const NominalChannels moved = by_motion(ordered, two_turns({2, 0}), recording.log);
+  EXPECT_NO_THROW(require_columns_known(moved, recording.log));
+  EXPECT_EQ(moved.tree.joints[0].channel, "b");
+  EXPECT_EQ(moved.tree.joints[1].channel, "a");
+  EXPECT_THROW(
+      require_columns_known(by_motion(ordered, two_turns({2}), recording.log), recording.log),
+      Error);
+}
+
 TEST(NominalChannels, InspectSaysTheSame) {
   const RecordingFolder folder;
   folder.write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,1,0,0,1,0,0,0,1\n1,1,0,0,1,0,0,0,1\n")
