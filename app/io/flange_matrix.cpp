@@ -40,7 +40,8 @@ std::optional<std::pair<std::string, std::string>> name_and_number(const std::st
   return std::pair(std::string(column.begin(), first), digits);
 }
 
-std::optional<Numbered> numbered_columns(const CsvTable& table, std::set<std::size_t> counts) {
+std::optional<Numbered> numbered_columns(const CsvTable& table,
+                                         const std::set<std::size_t>& counts) {
   std::map<std::string, std::map<int, std::size_t>> all;
   for (std::size_t c = 0; c < table.header.size(); ++c)
     if (const auto is = name_and_number(table.header[c]))
@@ -147,8 +148,8 @@ std::optional<std::string> matrix_to_quaternion(CsvTable& table) {
       numbered_columns(table, has_place ? std::set<std::size_t>{9} : std::set<std::size_t>{12, 16});
   if (!of || table.column("qw")) return std::nullopt;
   const Layout layout = likelier_layout(table, *of);
-  const std::string words = fmt::format("matrix {} to {}, {}", table.header[of->columns.front()],
-                                        table.header[of->columns.back()], layout.words);
+  std::string words = fmt::format("matrix {} to {}, {}", table.header[of->columns.front()],
+                                  table.header[of->columns.back()], layout.words);
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const std::vector<std::string> cells = cells_of(read_matrix(table, r, *of, layout), !has_place);
     table.rows[r].insert(table.rows[r].end(), cells.begin(), cells.end());

@@ -76,11 +76,12 @@ struct RunSummary {
   std::vector<StageTime> times;
 
   int frames = 0;  ///< of the recording
+  bool camera_declared = true;
+  bool free_asked = false;  ///< how much of a nominal robot is free was the user's choice
   double duration_s = 0.0;
   std::vector<MarkerSummary> markers;
   std::vector<std::pair<std::string, int>> rejected;  ///< reason, count
   std::vector<std::string> warnings;                  ///< of reading and detection
-  bool camera_declared = true;
   std::string camera_motion;  ///< how it is known whether the camera moves; empty: it stands still
 
   JointLog log;
@@ -89,7 +90,6 @@ struct RunSummary {
   std::optional<KinematicTree> nominal;
   std::vector<NominalFault> nominal_faults;  ///< mended before the fit
   std::vector<FreedomLevel> levels;          ///< of the nominal robot; empty without one
-  bool free_asked = false;                   ///< how much is free was the user's choice
   Calibration calibration;
   std::optional<Trace> trace;                   ///< none where it was not asked for
   std::vector<FittedEffect> effects;            ///< that the calibration has in it
