@@ -13,6 +13,10 @@ namespace {
 
 GroupSums sums_of(const RowMatrix& J, const Eigen::VectorXd& r) {
   const Eigen::Index parameters = J.cols();
+  // Eigen's product refers to the first of no numbers.
+  if (J.size() == 0)
+    return {Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters),
+            r.squaredNorm()};
   GroupSums out{Eigen::MatrixXd::Zero(parameters, parameters), J.transpose() * r, r.squaredNorm()};
   out.H.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
   out.H = Eigen::MatrixXd(out.H.selfadjointView<Eigen::Lower>());
