@@ -36,7 +36,7 @@ struct ExchangedReadings {
 [[nodiscard]] JointLog with_exchanged_back(JointLog log,
                                            const std::vector<ExchangedReadings>& exchanged);
 
-/// "FILE: from t = 12.05 on 'j2' goes on in the column of 'j3', and 'j3' in that of 'j2'".
+/// "FILE: from t = 12.05 on 'j2' goes on as 'j3', 'j3' goes on as 'j2'".
 [[nodiscard]] std::string words_of(const JointLog& log, const ExchangedReadings& exchanged);
 
 }  // namespace kinescope
