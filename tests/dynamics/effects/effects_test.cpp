@@ -235,13 +235,23 @@ bool is_of_a_vibration(const Rest& rest) {
   return rest.covariate.starts_with("phase of a vibration");
 }
 
-TEST(TorqueEffects, ALineInTheTorqueIsAVibrationOfItsFrequency) {
+/// Phase of 6 Hz at each sample, rad.
+Eigen::ArrayXd six_hertz(const EffectWorld& world) {
+  return 2.0 * std::numbers::pi * 6.0 * world.log.t_s.array();
+}
+
+/// The torque of joint2 swings with 6 Hz.
+EffectWorld shaken_world() {
   Rng rng = Rng::from_name("effects", 6);
   EffectWorldOptions options = quiet_world();
   options.noise = 0.01;
   EffectWorld world = effect_world({}, options, rng);
-  const Eigen::ArrayXd turns = 2.0 * std::numbers::pi * 6.0 * world.log.t_s.array();
-  world.log.torque.col(1).array() += 0.02 * rms(world.log.torque.col(1)) * turns.sin();
+  world.log.torque.col(1).array() += 0.02 * rms(world.log.torque.col(1)) * six_hertz(world).sin();
+  return world;
+}
+
+TEST(TorqueEffects, ALineInTheTorqueIsAVibrationOfItsFrequency) {
+  const EffectWorld world = shaken_world();
   const TorqueTrace out =
       trace_torque(world.model, exact_samples(world, 12.0), {.model = declared_options(12.0)});
   EXPECT_EQ(out.trace.verdict, TraceVerdict::kUnknown) << out.trace.reason;
@@ -251,14 +261,9 @@ TEST(TorqueEffects, ALineInTheTorqueIsAVibrationOfItsFrequency) {
 }
 
 TEST(TorqueEffects, WhatSwingsWithAJointIsNoVibration) {
-  Rng rng = Rng::from_name("effects", 6);
-  EffectWorldOptions options = quiet_world();
-  options.noise = 0.01;
-  EffectWorld world = effect_world({}, options, rng);
-  const Eigen::ArrayXd turns = 2.0 * std::numbers::pi * 6.0 * world.log.t_s.array();
-  world.log.torque.col(1).array() += 0.02 * rms(world.log.torque.col(1)) * turns.sin();
+  const EffectWorld world = shaken_world();
   TorqueSamples samples = exact_samples(world, 12.0);
-  samples.ddq.col(2).array() += 0.5 * rms(samples.ddq.col(2)) * turns.cos();
+  samples.ddq.col(2).array() += 0.5 * rms(samples.ddq.col(2)) * six_hertz(world).cos();
   const TorqueTrace out = trace_torque(world.model, samples, {.model = declared_options(12.0)});
   EXPECT_FALSE(std::ranges::any_of(out.trace.rest, is_of_a_vibration)) << out.trace.reason;
 }
