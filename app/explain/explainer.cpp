@@ -428,11 +428,21 @@ class Explainer {
     alone.structure->status = StructureStatus::kDetermined;
     // Beside an account that leaves noise only, a rival can but be as good with more.
     const bool leaves_noise_only = is_settled(alone) && alone.fitted->effects.empty();
+    // A joint more explains of what is left here only what it shows by itself.
+    std::optional<Explanation> plain;
+    if (!is_explained(now)) plain = plainly_fitted(*now.structure);
     std::vector<double> odds;
-    for (const RivalStructure& rival : now.structure->rivals)
-      odds.push_back(log_odds_of(
-          alone, leaves_noise_only ? plainly_fitted(rival.structure)
-                                   : of_structure(rival.structure, {now.fitted->trace.added})));
+    for (const RivalStructure& rival : now.structure->rivals) {
+      Explanation other = plainly_fitted(rival.structure);
+      const bool has_more = rival.structure.joints.size() > now.structure->joints.size();
+      if (leaves_noise_only) {
+        odds.push_back(log_odds_of(alone, other));
+      } else if (plain && has_more && !is_better(other, *plain)) {
+        odds.push_back(log_odds_of(*plain, other));
+      } else {
+        odds.push_back(log_odds_of(alone, traced(std::move(other), {now.fitted->trace.added})));
+      }
+    }
     const auto best = std::ranges::min_element(odds);
     const bool is_exchanged = best != odds.end() && *best < 0.0;
     if (is_exchanged) {
@@ -450,13 +460,12 @@ class Explainer {
   [[nodiscard]] Explanation with_couplings_doubted(Explanation now) const {
     if (!now.fitted || !now.structure || !options_.trace) return now;
     if (now.fitted->trace.design_comes_first) return now;
+    // A ratio that no gear has is not in the fit.
+    if (std::ranges::all_of(now.start.tree.joints, &std::vector<ChannelShare>::empty,
+                            &Joint::couplings))
+      return now;
     Structure free = *now.structure;
-    bool any = false;
-    for (StructureJoint& joint : free.joints) {
-      any = any || !joint.couplings.empty();
-      joint.couplings.clear();
-    }
-    if (!any) return now;
+    for (StructureJoint& joint : free.joints) joint.couplings.clear();
     Explanation other = asked_again(of_structure(std::move(free), {}));
     return is_better(other, now) ? other : now;
   }

@@ -126,6 +126,7 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   upright.gravity_base = told_by->gravity.direction;
   trace_options.start = elsewhere(std::move(known), sag);
   trace_options.start.push_back({sag, 0.0});
+  if (!names(out.trace, sag)) trace_options.about = sag;
   CalibrationTrace again =
       traced(effects::TracedBundle(bundle, upright), bundle, upright, trace_options, progress);
   const bool says_all =

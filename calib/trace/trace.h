@@ -34,6 +34,8 @@ struct TraceOptions {
   double noise_floor = 0.0;
   /// Effects that the model has already: they stay if they earn their place.
   std::vector<AddedEffect> start = {};
+  /// Of `start`, what is asked about: where it is taken out, the search ends without an answer.
+  std::optional<EffectId> about = {};
   /// So many effects without a scan may together name what is left at one place, judged among
   /// themselves: that something is left there has been shown. 0: none.
   int plain_causes = 0;

@@ -53,6 +53,10 @@ void Tracer::search() {
   for (bool again = true; again;) {
     forward();
     again = backward();
+    if (options_.about && !is_added(*options_.about)) {
+      say_nothing(fmt::format("{} is not shown", name_of(*options_.about)));
+      return;
+    }
     if (!again && look_ahead_put_off_) {
       checked_ = now_;
       again = true;
@@ -108,6 +112,10 @@ bool Tracer::can_look(const Stage& stage) {
     return false;
   }
   return true;
+}
+
+bool Tracer::is_added(const EffectId& id) const {
+  return std::ranges::find(now_->added, id, &AddedEffect::id) != now_->added.end();
 }
 
 bool Tracer::may_go_on() const { return options_.most_fits == 0 || fits_ < options_.most_fits; }

@@ -55,6 +55,7 @@ class Tracer {
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_look(const Stage& stage);
+  [[nodiscard]] bool is_added(const EffectId& id) const;
   /// TraceOptions::most_fits.
   [[nodiscard]] bool may_go_on() const;
   void say_nothing(std::string reason);

@@ -65,7 +65,7 @@ std::vector<AddedEffect> Tracer::curves_for_rests() const {
       return c.is_curve() && c.id.place == found.rest.place && c.curve_over == found.rest.covariate;
     });
     if (candidate == now_->fit.candidates.end() || removed_.contains(candidate->id) ||
-        std::ranges::find(now_->added, candidate->id, &AddedEffect::id) != now_->added.end()) {
+        is_added(candidate->id)) {
       continue;
     }
     if (const auto curve = likeliest_curve(now_->system, *candidate)) out.push_back(*curve);
