@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -98,6 +99,58 @@ CalibrationTrace traced(const effects::TracedBundle& model, const EffectBundle& 
   return out;
 }
 
+// The effects of the bundle under the gravity that a sag would have, with that sag and what is
+// known elsewhere to begin with; `may_go`: an answer without the sag is one.
+CalibrationTrace traced_upright(const EffectBundle& bundle, CalibrationTraceOptions options,
+                                TraceOptions trace_options, const TellingSag& told_by,
+                                std::vector<AddedEffect> known, bool may_go,
+                                const Progress& progress) {
+  options.gravity_base = told_by.gravity.direction;
+  trace_options.start = elsewhere(std::move(known), told_by.id);
+  trace_options.start.push_back({told_by.id, 0.0});
+  if (!may_go) trace_options.about = told_by.id;
+  CalibrationTrace out =
+      traced(effects::TracedBundle(bundle, options), bundle, options, trace_options, progress);
+  if (out.trace.steps.empty()) return out;
+  out.trace.steps.front().words =
+      fmt::format("the model as it is; gravity points where the sag of {} says", told_by.id.place);
+  return out;
+}
+
+// A sag without gravity is a poor picture of what it does, for which others stand in: gravity is
+// asked for as soon as a sag was added, and where that leaves nothing, these are not looked for.
+class GravityBySagFirst {
+ public:
+  GravityBySagFirst(const EffectBundle& bundle, const CalibrationTraceOptions& options,
+                    const TraceOptions& trace_options, const Progress& progress)
+      : bundle_(&bundle), options_(&options), trace_options_(trace_options), progress_(&progress) {}
+
+  /// TraceOptions::until.
+  [[nodiscard]] bool leaves_nothing(const std::vector<AddedEffect>& added) {
+    for (const auto& [id, scan, spread] : added) {
+      if (!effects::is_sag(id) || !asked_.insert(id).second) continue;
+      const effects::TracedBundle model(*bundle_, *options_);
+      const TellingSag told{id, effects::gravity_by_sag(model, elsewhere(added, id), id)};
+      CalibrationTrace upright =
+          traced_upright(*bundle_, *options_, trace_options_, told, added, false, *progress_);
+      if (upright.trace.verdict != TraceVerdict::kEffects || !names(upright.trace, id)) continue;
+      found_ = std::move(upright);
+      return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] std::optional<CalibrationTrace>& found() { return found_; }
+
+ private:
+  const EffectBundle* bundle_;
+  const CalibrationTraceOptions* options_;
+  TraceOptions trace_options_;
+  const Progress* progress_;
+  std::set<EffectId> asked_;
+  std::optional<CalibrationTrace> found_;
+};
+
 CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
                                      const CalibrationTraceOptions& options,
                                      const Progress& progress) {
@@ -111,8 +164,13 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   if (options.calibrate.estimate_time_offset && !bundle.postures()) {
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
   }
-  CalibrationTrace out = traced(model, bundle, options, trace_options, progress);
-  if (options.gravity_base || is_told_by_one_other(out.trace)) return out;
+  if (options.gravity_base) return traced(model, bundle, options, trace_options, progress);
+  GravityBySagFirst by_sag(bundle, options, trace_options, progress);
+  TraceOptions until = trace_options;
+  until.until = [&](const std::vector<AddedEffect>& added) { return by_sag.leaves_nothing(added); };
+  CalibrationTrace out = traced(model, bundle, options, until, progress);
+  if (by_sag.found()) return *std::move(by_sag.found());
+  if (is_told_by_one_other(out.trace)) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects, or leaves nothing that no effect explains.
   std::vector<AddedEffect> known = trace_options.start;
@@ -122,13 +180,8 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   const std::optional<TellingSag> told_by = telling_sag(bundle, options, known, out.trace);
   if (!told_by) return out;
   const EffectId& sag = told_by->id;
-  CalibrationTraceOptions upright = options;
-  upright.gravity_base = told_by->gravity.direction;
-  trace_options.start = elsewhere(std::move(known), sag);
-  trace_options.start.push_back({sag, 0.0});
-  if (!names(out.trace, sag)) trace_options.about = sag;
-  CalibrationTrace again =
-      traced(effects::TracedBundle(bundle, upright), bundle, upright, trace_options, progress);
+  CalibrationTrace again = traced_upright(bundle, options, trace_options, *told_by, known,
+                                          names(out.trace, sag), progress);
   const bool says_all =
       out.trace.verdict == TraceVerdict::kUnknown && again.trace.verdict != TraceVerdict::kUnknown;
   // What predicts clearly better may need more.
@@ -149,8 +202,6 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
   if (again.trace.verdict == TraceVerdict::kNothingToSay || !told || !(better || plainer)) {
     return out;
   }
-  again.trace.steps.front().words =
-      fmt::format("the model as it is; gravity points where the sag of {} says", sag.place);
   return again;
 }
 

@@ -10,6 +10,7 @@
 // Not here: what the effects are (calib/effects, dynamics/effects), cameras, robots.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,9 @@ struct TraceOptions {
   std::vector<AddedEffect> start = {};
   /// Of `start`, what is asked about: where it is taken out, the search ends without an answer.
   std::optional<EffectId> about = {};
+  /// Asked with all that the model has then, whenever an effect was added: where it is true, the
+  /// search ends without an answer.
+  std::function<bool(const std::vector<AddedEffect>&)> until = {};
   /// So many effects without a scan may together name what is left at one place, judged among
   /// themselves: that something is left there has been shown. 0: none.
   int plain_causes = 0;

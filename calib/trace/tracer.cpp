@@ -52,11 +52,10 @@ void Tracer::search() {
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
   for (bool again = true; again;) {
     forward();
+    if (is_ended_) return say_nothing("the search was ended");
     again = backward();
-    if (options_.about && !is_added(*options_.about)) {
-      say_nothing(fmt::format("{} is not shown", name_of(*options_.about)));
-      return;
-    }
+    if (options_.about && !is_added(*options_.about))
+      return say_nothing(fmt::format("{} is not shown", name_of(*options_.about)));
     if (!again && look_ahead_put_off_) {
       checked_ = now_;
       again = true;
@@ -148,6 +147,8 @@ void Tracer::forward() {
       mark(round_, id, CandidateState::kAccepted, now_->error.value);
       add_step(round_, fmt::format("{} added", name_of(id)), *now_);
     }
+    is_ended_ = options_.until && options_.until(now_->added);
+    if (is_ended_) return;
     std::set<std::string> places;
     for (std::size_t i = before; i < now_->added.size(); ++i)
       places.insert(now_->added[i].id.place);

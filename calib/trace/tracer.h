@@ -197,6 +197,7 @@ class Tracer {
   std::vector<FoundRest> rests_;
   int round_ = 0;
   int fits_ = 0;
+  bool is_ended_ = false;            // by TraceOptions::until
   bool look_ahead_put_off_ = false;  // by the last forward()
   StagePtr checked_;  // the backward check left it as it is, after a look ahead was put off
   Trace trace_;
