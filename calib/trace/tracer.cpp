@@ -132,6 +132,7 @@ void Tracer::forward() {
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
     StagePtr next = refit_best(contenders(*now_, family), round_);
+    if (next) next = or_what_is_below_floors(std::move(next), family);
     // What hides behind others is looked for where all of these are beyond doubt: the backward
     // check takes out the others first.
     look_ahead_put_off_ = !next && now_ != checked_ && one_without_size();
@@ -210,9 +211,8 @@ bool Tracer::shows_another(const Stage& stage, const TestedMember& hint) const {
   return !contenders(system, candidates, test_family(system, candidates)).empty();
 }
 
-// What is below the floors is not looked for, but it is there: several effects together may stand
-// in for it.
-bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family) {
+// What is below the floors is not looked for, but it is there, and others may stand in for it.
+const TestedMember* Tracer::most_below_floors(const std::vector<TestedMember>& family) const {
   const TestedMember* below = nullptr;
   for (const TestedMember& member : family) {
     const Candidate& candidate = now_->fit.candidates[member.index];
@@ -221,11 +221,35 @@ bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember
                         !removed_.contains(candidate.id);
     if (counts && (below == nullptr || member.score.gain > below->score.gain)) below = &member;
   }
-  if (below == nullptr) return false;
+  return below;
+}
+
+StagePtr Tracer::with(const TestedMember& member) {
   std::vector<AddedEffect> effects = now_->added;
-  effects.push_back({now_->fit.candidates[below->index].id, below->scan});
-  const StagePtr stage = stage_of(std::move(effects));
+  effects.push_back({now_->fit.candidates[member.index].id, member.scan});
+  return stage_of(std::move(effects));
+}
+
+bool Tracer::is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family) {
+  const TestedMember* below = most_below_floors(family);
+  if (below == nullptr) return false;
+  const StagePtr stage = with(*below);
   return stage->fit.converged && stage->held_out_sum() <= found.held_out_sum();
+}
+
+// A name for what is small is better than another one for it.
+StagePtr Tracer::or_what_is_below_floors(StagePtr found, const std::vector<TestedMember>& family) {
+  const TestedMember* below = most_below_floors(family);
+  const double gain = now_->system.total().rr - found->system.total().rr;
+  if (below == nullptr || below->score.gain < gain) return found;
+  const Candidate& candidate = now_->fit.candidates[below->index];
+  if (std::isinf(candidate.floor)) return found;
+  StagePtr stage = with(*below);
+  if (!stage->fit.converged || stage->held_out_sum() >= found->held_out_sum() ||
+      !is_possible(candidate, stage->fit.values.back()))
+    return found;
+  small_.insert(candidate.id);
+  return stage;
 }
 
 StagePtr Tracer::without_idle(StagePtr stage, std::size_t known) {

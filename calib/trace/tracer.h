@@ -78,6 +78,13 @@ class Tracer {
   [[nodiscard]] bool shows_another(const Stage& stage, const TestedMember& hint) const;
   [[nodiscard]] StagePtr refit_best(const std::vector<Contender>& contenders, int round);
   [[nodiscard]] StagePtr look_ahead(const std::vector<TestedMember>& family);
+  /// Shown for certain, and explains most of those.
+  [[nodiscard]] const TestedMember* most_below_floors(
+      const std::vector<TestedMember>& family) const;
+  /// The effects that there are, and this one.
+  [[nodiscard]] StagePtr with(const TestedMember& member);
+  [[nodiscard]] StagePtr or_what_is_below_floors(StagePtr found,
+                                                 const std::vector<TestedMember>& family);
   [[nodiscard]] bool is_of_the_sensor(const Stage& found, const std::vector<TestedMember>& family);
   /// Of those that may be added, the one that explains most, significant or not.
   [[nodiscard]] const TestedMember* most_telling(const Stage& stage,

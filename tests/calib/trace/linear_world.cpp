@@ -161,6 +161,14 @@ std::vector<Candidate> LinearWorld::candidates() const {
     imitation.columns = [shape](double) { return std::vector<EffectColumn>{{0, shape}}; };
     out.push_back(std::move(imitation));
   }
+  if (options_.other_is_small) {
+    Candidate other = simple("tanh_other", 0, 1);
+    other.floor = 1e3;
+    other.columns = [shape = share({0, "tanh_other"})](double) {
+      return std::vector<EffectColumn>{{0, shape}};
+    };
+    out.push_back(std::move(other));
+  }
   if (options_.stands_in) {
     const Eigen::VectorXd weave = share({0, "weave"});
     const Eigen::VectorXd large = 2.0 * (2.1 * time_s_.array()).sin();

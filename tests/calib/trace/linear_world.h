@@ -28,6 +28,8 @@ struct LinearWorldOptions {
   bool bends = false;
   /// Candidate "imitation" at joint1: nearly what "tanh_other" does, and some of its own.
   bool imitates = false;
+  /// Candidate "tanh_other" at joint1, below a floor that nothing reaches.
+  bool other_is_small = false;
   /// Candidates "first_half" and "second_half" at joint1: far larger each than the "weave" that
   /// they are together, which candidate "weave" tells alone, below a floor that nothing reaches.
   bool stands_in = false;

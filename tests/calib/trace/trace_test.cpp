@@ -227,6 +227,50 @@ TEST(TraceTest, WhatIsBelowItsFloorHasNoOtherNames) {
   }
 }
 
+// What is too small to be looked for is named where another effect would be named in its place.
+TEST(TraceTest, WhatIsBelowItsFloorIsNamedBeforeWhatStandsInForIt) {
+  LinearWorldOptions options;
+  options.imitates = true;
+  const std::vector<Injected> small{{0, "tanh_other", 0.5, 0.0}};
+  const Trace imitated = trace_effects(LinearWorld(options, small));
+  EXPECT_TRUE(std::ranges::any_of(imitated.steps, [](const TraceStep& step) {
+    return step.words.starts_with("imitation at joint1 added");
+  })) << imitated.reason;
+  options.other_is_small = true;
+  const Trace named = trace_effects(LinearWorld(options, small));
+  ASSERT_EQ(named.accepted.size(), 1u) << named.reason;
+  EXPECT_EQ(named.accepted.front().id, (EffectId{"tanh_other", "joint1"}));
+  EXPECT_EQ(named.verdict, TraceVerdict::kEffects) << named.reason;
+}
+
+TEST(TraceTest, ASearchEndsWhereItsCallerHasTheAnswer) {
+  const LinearWorld world({}, {{0, "scale", 0.5, 0.0}});
+  TraceOptions options;
+  std::vector<AddedEffect> asked;
+  options.until = [&](const std::vector<AddedEffect>& added) {
+    asked = added;
+    return true;
+  };
+  const Trace trace = trace_effects(world, options);
+  EXPECT_EQ(trace.verdict, TraceVerdict::kNothingToSay);
+  ASSERT_EQ(asked.size(), 1u);
+  EXPECT_EQ(asked.front().id, (EffectId{"scale", "joint1"}));
+  EXPECT_TRUE(trace.accepted.empty());
+  options.until = [](const std::vector<AddedEffect>&) { return false; };
+  EXPECT_EQ(trace_effects(world, options).verdict, TraceVerdict::kEffects);
+}
+
+TEST(TraceTest, ASearchAboutAnEffectEndsWhereThatIsTakenOut) {
+  const LinearWorld world({}, {{0, "scale", 0.5, 0.0}});
+  TraceOptions options;
+  options.start = {{{"coupling", "joint2"}, 0.0}};
+  options.about = options.start.front().id;
+  EXPECT_EQ(trace_effects(world, options).verdict, TraceVerdict::kNothingToSay);
+  options.start = {{{"scale", "joint1"}, 0.0}};
+  options.about = options.start.front().id;
+  EXPECT_EQ(trace_effects(world, options).verdict, TraceVerdict::kEffects);
+}
+
 TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
   LinearWorldOptions options;
   options.seed = 4;
