@@ -15,7 +15,7 @@ packages=(
 )
 if [[ "${1:-}" == tests ]]; then
   packages+=(libgtest-dev librapidcheck-dev liborocos-kdl-dev liburdfdom-tools libbenchmark-dev
-             python3-jsonschema python3-matplotlib groff-base zsh dpkg-dev file)
+             python3-jsonschema python3-matplotlib groff-base zsh dpkg-dev file libscalapack-openmpi-dev openmpi-bin)
   # Not in every release; the tests that want them say so and skip.
   optional=(libmujoco-dev clang-format-19 chromium)
 else

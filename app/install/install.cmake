@@ -56,6 +56,10 @@ endforeach()
 # Also where the prefix is moved.
 file(RELATIVE_PATH KINESCOPE_PC_TO_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" KINESCOPE_PC_TO_PREFIX "${KINESCOPE_PC_TO_PREFIX}")
+set(kinescope_scalapack_library "")
+if(KINESCOPE_SCALAPACK)
+  set(kinescope_scalapack_library "-lscalapack-openmpi ")
+endif()
 foreach(package kinescope kinescope_torque)
   configure_file(app/install/${package}.pc.in ${package}.pc @ONLY)
   install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${package}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig

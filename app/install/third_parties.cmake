@@ -49,6 +49,9 @@ macro(kinescope_find_torque_third_parties)
   kinescope_find_libraries(kinescope_libsvm svm)
   # Debian's dlibConfig.cmake asks for libraries of its pictures and windows; the network needs none.
   kinescope_find_libraries(kinescope_dlib dlib)
+  if(KINESCOPE_SCALAPACK)
+    kinescope_find_libraries(kinescope_scalapack scalapack-openmpi)
+  endif()
 endmacro()
 
 # To be called when PkgConfig is found.

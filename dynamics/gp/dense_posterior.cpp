@@ -143,25 +143,14 @@ class DensePosterior : public Posterior {
   Eigen::VectorXd alpha_;
 };
 
-struct Factorised {
-  Eigen::MatrixXd factor;
-  double jitter = 0.0;
-};
+}  // namespace
 
-// Jitter grows tenfold from the rounding of the diagonal until the matrix has a factor.
-Factorised factorise(Workers& workers, const Covariance& covariance, const Prepared& training,
-                     const Eigen::VectorXd& noise, double max_jitter) {
-  const Index rows = noise.size();
-  Factorised out{Eigen::MatrixXd::Zero(rows, rows), 0.0};
+double with_jitter(const Covariance& covariance, Index samples, double max_jitter,
+                   const std::function<Attempt(double)>& attempt) {
   double relative = 0.0;
   while (true) {
-    covariance.lower(workers, training, out.factor);
-    out.factor.diagonal() += noise;
-    const double scale = out.factor.diagonal().mean();
-    out.jitter = relative * scale;
-    out.factor.diagonal().array() += out.jitter;
-    const Index failed = tiled_cholesky(workers, out.factor);
-    if (failed == 0) return out;
+    const Attempt now = attempt(relative);
+    if (now.failed == 0) return now.jitter;
     constexpr double kFirstJitter = 1e-14;
     relative = relative == 0.0 ? kFirstJitter : 10.0 * relative;
     if (relative > max_jitter) {
@@ -169,15 +158,12 @@ Factorised factorise(Workers& workers, const Covariance& covariance, const Prepa
           "kernel matrix",
           fmt::format("not positive definite at sample {} of {}, even with {:.1e} of its mean "
                       "diagonal added",
-                      (failed - 1) / covariance.outputs(), training.samples,
-                      std::max(0.0, max_jitter)),
+                      (now.failed - 1) / covariance.outputs(), samples, std::max(0.0, max_jitter)),
           "the same input twice without noise, or more samples than the kernel has features: raise "
           "the noise variance");
     }
   }
 }
-
-}  // namespace
 
 Fit fit_dense(Workers& workers, const Kernel& kernel, const Eigen::VectorXd& log_noise,
               Problem problem, const FitOptions& options) {
@@ -185,18 +171,24 @@ Fit fit_dense(Workers& workers, const Kernel& kernel, const Eigen::VectorXd& log
   Covariance covariance(kernel);
   Prepared training = covariance.prepare(problem.inputs);
   const Eigen::VectorXd noise = noise_of_rows(problem, log_noise);
-  Factorised factorised = factorise(workers, covariance, training, noise, options.max_jitter);
-  Eigen::VectorXd alpha = problem.targets;
-  solve_lower(factorised.factor, alpha);
+  // The one matrix of this size: kernel, then its factor.
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(noise.size(), noise.size());
   Fit out;
-  out.jitter = factorised.jitter;
-  out.log_likelihood = -0.5 * alpha.squaredNorm() -
-                       factorised.factor.diagonal().array().log().sum() -
+  out.jitter = with_jitter(covariance, problem.samples, options.max_jitter, [&](double relative) {
+    covariance.lower(workers, training, factor);
+    factor.diagonal() += noise;
+    const double jitter = relative * factor.diagonal().mean();
+    factor.diagonal().array() += jitter;
+    return Attempt{jitter, tiled_cholesky(workers, factor)};
+  });
+  Eigen::VectorXd alpha = problem.targets;
+  solve_lower(factor, alpha);
+  out.log_likelihood = -0.5 * alpha.squaredNorm() - factor.diagonal().array().log().sum() -
                        0.5 * static_cast<double>(alpha.size()) * std::log(2.0 * std::numbers::pi);
-  solve_lower_transposed(factorised.factor, alpha);
-  const Eigen::VectorXd total_noise = noise.array() + factorised.jitter;
+  solve_lower_transposed(factor, alpha);
+  const Eigen::VectorXd total_noise = noise.array() + out.jitter;
   out.posterior = std::make_shared<DensePosterior>(std::move(covariance), std::move(training),
-                                                   total_noise, std::move(factorised.factor),
+                                                   total_noise, std::move(factor),
                                                    std::move(problem.targets), std::move(alpha));
   return out;
 }

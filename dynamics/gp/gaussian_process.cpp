@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dynamics/gp/posterior.h"
+#include "dynamics/gp/process_group.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::gp {
@@ -24,15 +25,22 @@ GpModel make_model(Kernel kernel, double noise_variance, Normalisation normalisa
   return out;
 }
 
+bool keeps_kernel_matrix(const Kernel& kernel, Eigen::Index samples) {
+  Problem sized;
+  sized.samples = samples;
+  return choose_route(kernel, sized, Route::kAuto) == Route::kDense;
+}
+
 FittedGp fit(const GpModel& model, const Dataset& dataset, const FitOptions& options) {
   Problem problem = make_problem(model, dataset);
   FittedGp out{model, Route::kDense, 0.0, 0.0, problem.samples, 0, nullptr};
   out.route = choose_route(model.kernel, problem, options.route);
   Workers workers(options.threads);
   const Eigen::VectorXd log_noise = log_noise_values(model);
+  const auto dense = process_count() > 1 ? fit_distributed : fit_dense;
   Fit fitted = out.route == Route::kFeatures
                    ? fit_features(workers, model.kernel, log_noise, std::move(problem))
-                   : fit_dense(workers, model.kernel, log_noise, std::move(problem), options);
+                   : dense(workers, model.kernel, log_noise, std::move(problem), options);
   out.posterior = std::move(fitted.posterior);
   out.log_likelihood = fitted.log_likelihood;
   out.jitter = fitted.jitter;

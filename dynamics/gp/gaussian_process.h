@@ -67,6 +67,10 @@ struct FittedGp {
 [[nodiscard]] FittedGp fit(const GpModel& model, const Dataset& dataset,
                            const FitOptions& options = {});
 
+/// Whether fit() of so many samples keeps their kernel matrix (Route::kDense), rows * 8 bytes a row
+/// (memory.h): one of them, in which the factor is made.
+[[nodiscard]] bool keeps_kernel_matrix(const Kernel& kernel, Eigen::Index samples);
+
 struct PredictOptions {
   bool variance = true;
   int threads = 0;

@@ -3,6 +3,7 @@
 // What a fit leaves behind, for each route; internal. Everything in normalised units, sample-major.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "dynamics/gp/feature_system.h"
@@ -69,9 +70,26 @@ struct Fit {
   Eigen::Index features = 0;
 };
 
+/// One try at a Cholesky factor: what was added to the diagonal, and the 1-based row whose pivot is
+/// not positive; 0 where there is none.
+struct Attempt {
+  double jitter = 0.0;
+  Eigen::Index failed = 0;
+};
+
+/// Calls attempt(jitter relative to the mean diagonal) from 0 and then tenfold from the rounding of
+/// the diagonal until there is a factor; gives the jitter that it took. Throws undetermined beyond
+/// `max_jitter`.
+double with_jitter(const Covariance& covariance, Eigen::Index samples, double max_jitter,
+                   const std::function<Attempt(double)>& attempt);
+
 [[nodiscard]] Fit fit_dense(Workers& workers, const Kernel& kernel,
                             const Eigen::VectorXd& log_noise, Problem problem,
                             const FitOptions& options);
+/// The same over the processes of the present ProcessGroup (process_group.h).
+[[nodiscard]] Fit fit_distributed(Workers& workers, const Kernel& kernel,
+                                  const Eigen::VectorXd& log_noise, Problem problem,
+                                  const FitOptions& options);
 [[nodiscard]] Fit fit_features(Workers& workers, const Kernel& kernel,
                                const Eigen::VectorXd& log_noise, Problem problem);
 

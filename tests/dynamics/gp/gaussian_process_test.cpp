@@ -179,6 +179,31 @@ TEST(Fit, ThreadsDoNotShow) {
   }
 }
 
+// Many tiles, the last one smaller, beside the textbook's formulas on whole matrices.
+TEST(Fit, TheFactorInPlaceGivesMeanBandAndLikelihoodOfPlainAlgebra) {
+  constexpr double kSame = 1e-10;  // relative, of a condition number about 1e5
+  Rng rng = Rng::from_name("in place");
+  const Dataset data = smooth_data(rng, 1100, 3, 0.1);
+  const GpModel model = make_model(rbf(first_columns(3)), 1e-2);
+  const Eigen::MatrixXd at = random_matrix(rng, 300, 3);
+  const FittedGp fitted = fit(model, data, {.route = Route::kDense});
+  const Prediction predicted = predict(fitted, at);
+  Eigen::MatrixXd k = covariance(model.kernel, data.inputs);
+  k.diagonal().array() += 1e-2;
+  const Eigen::LLT<Eigen::MatrixXd> factor(k);
+  const Eigen::MatrixXd cross = covariance(model.kernel, data.inputs, at);
+  const Eigen::VectorXd alpha = factor.solve(data.targets.col(0));
+  const Eigen::VectorXd mean = cross.transpose() * alpha;
+  const Eigen::VectorXd band = covariance(model.kernel, at).diagonal() -
+                               factor.matrixL().solve(cross).colwise().squaredNorm().transpose();
+  const double likelihood = -0.5 * data.targets.col(0).dot(alpha) -
+                            factor.matrixLLT().diagonal().array().log().sum() -
+                            0.5 * 1100.0 * std::log(2.0 * std::numbers::pi);
+  EXPECT_LT((predicted.mean - mean).cwiseAbs().maxCoeff(), kSame * mean.cwiseAbs().maxCoeff());
+  EXPECT_LT((predicted.variance - band).cwiseAbs().maxCoeff(), kSame);
+  EXPECT_NEAR(fitted.log_likelihood / likelihood, 1.0, kSame);
+}
+
 TEST(Fit, OrderOfSamplesDoesNotMatter) {
   Rng rng = Rng::from_name("order");
   const Dataset data = smooth_data(rng, 300, 3, 0.1);
