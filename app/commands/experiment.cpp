@@ -3,6 +3,7 @@
 // `kinescope experiment`: choices checked, the experiment run, its products written.
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/torque/torque_inputs.h"
+#include "dynamics/gp/process_group.h"
 #include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
 
@@ -28,13 +30,14 @@ const Experiment& experiment_of(const std::string& name) {
 // An option that would do nothing is refused.
 void require_known(const Experiment& experiment, const ExperimentOptions& options) {
   const ExperimentChoice& choice = options.choice;
-  const std::array<std::pair<std::string_view, bool>, 11> given = {
+  const std::array<std::pair<std::string_view, bool>, 12> given = {
       {{"--runs", choice.runs.has_value()},
        {"--samples", choice.samples.has_value()},
        {"--seconds", choice.seconds.has_value()},
        {"--noise", choice.noise.has_value()},
        {"--tilt", choice.tilts_deg.has_value()},
        {"--shift", choice.shifts_m.has_value()},
+       {"--inducing", choice.inducing.has_value()},
        {"--models", choice.learners.has_value()},
        {"--joints", choice.joints.has_value()},
        {"--starts", choice.starts.has_value()},
@@ -76,11 +79,31 @@ ExperimentLog read_log(const ExperimentOptions& options, const Console& console)
   return {robot.model, std::move(data.samples), robot.joints};
 }
 
+void silence_output() {
+  for (std::FILE* stream : {stdout, stderr}) {
+    if (std::freopen("/dev/null", "w", stream) == nullptr) std::fclose(stream);
+  }
+}
+
+// Of several processes all do the work, and the first one alone prints and writes.
+bool one_of_the_others(const Experiment& experiment) {
+  if (gp::process_count() > 1 &&
+      std::ranges::find(experiment.options, "--models") == experiment.options.end()) {
+    throw bad_request("mpirun",
+                      fmt::format("the experiment {} is for one process", experiment.name),
+                      "leave mpirun out");
+  }
+  return gp::process_rank() > 0;
+}
+
 }  // namespace
 
 ExitCode experiment_command(const ExperimentOptions& options, const Console& console) {
   const Experiment& experiment = experiment_of(options.name);
+  const gp::ProcessGroup processes;
+  if (gp::process_rank() > 0) silence_output();
   require_known(experiment, options);
+  const bool only_learns = one_of_the_others(experiment);
   Writer writer{.command = "experiment", .products = {}, .inputs = {}, .force = options.force};
   writer.products = {"experiment.json", "experiment.html"};
   for (const std::string_view table : experiment.tables) {
@@ -92,6 +115,10 @@ ExitCode experiment_command(const ExperimentOptions& options, const Console& con
     writer.inputs = {options.log, options.robot};
     inputs = hashed_inputs({{options.log}, {options.robot}});
     choice.log = read_log(options, console);
+  }
+  if (only_learns) {
+    static_cast<void>(experiment.run(choice, {}));
+    return ExitCode::kDone;
   }
   const OutputFolder folder(options.output, writer);
   ExperimentSummary summary = experiment.run(choice, console.progress);

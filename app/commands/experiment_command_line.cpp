@@ -47,7 +47,9 @@ void add_list(CLI::App& command, const char* name, std::optional<std::vector<dou
 void add_choices(CLI::App& command, ExperimentChoice& choice) {
   add_count(command, "--runs", choice.runs, 1, 10000,
             "Random worlds; of a log, parts that are left out one after another");
-  add_count(command, "--samples", choice.samples, 50, 40000, "Samples to learn from");
+  add_count(command, "--samples", choice.samples, 50, 1e6, "Samples to learn from");
+  add_count(command, "--inducing", choice.inducing, 10, 10000,
+            "Inducing points of the models that have them");
   command
       .add_option_function<double>(
           "--seconds", [&choice](const double& seconds) { choice.seconds = seconds; },
@@ -72,7 +74,8 @@ void add_choices(CLI::App& command, ExperimentChoice& choice) {
             for (const std::string& word : words)
               choice.learners->push_back(*experiments::learner_of(word));
           },
-          "Some of gip, rbf, network, semi_parametric, model_based, parametric, lip (slow)")
+          "Some of gip, rbf, network, semi_parametric, model_based, parametric, lip (slow), "
+          "gip_inducing, rbf_inducing, semi_parametric_inducing")
       ->delimiter(',')
       ->check(one_of(learner_names()))
       ->type_name("LIST")
@@ -135,6 +138,7 @@ void add_experiment(CLI::App& app, CommandLine& line) {
   add_output_options(command, line.output);
   command.footer(fmt::format(
       "Examples:\n  kinescope experiment scara --runs 2 --samples 500 --tilt 2 --shift 0.01\n"
+      "  kinescope experiment ur10 --samples 40000\n"
       "  kinescope experiment efficiency --log log.csv --robot robot.urdf\n\n{}",
       kExitCodes));
 }

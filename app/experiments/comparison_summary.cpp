@@ -141,6 +141,26 @@ std::vector<ExperimentTable> comparison_tables(const ComparisonFacts& facts) {
   return {medians(facts), spread(facts), runs(facts)};
 }
 
+std::vector<ExperimentTable> comparison_tables(
+    const std::vector<std::pair<std::string, ComparisonFacts>>& tests) {
+  std::vector<ExperimentTable> out;
+  for (const auto& [name, facts] : tests) {
+    const std::vector<ExperimentTable> tables = comparison_tables(facts);
+    for (std::size_t k = 0; k < tables.size(); ++k) {
+      if (out.size() == k) {
+        out.push_back(tables[k]);
+        out[k].labels.emplace_back("Test");
+        out[k].rows.clear();
+      }
+      for (ExperimentTable::Row row : tables[k].rows) {
+        row.labels.push_back(name);
+        out[k].rows.push_back(std::move(row));
+      }
+    }
+  }
+  return out;
+}
+
 std::vector<ExperimentSection::Figure> box_figures(const ComparisonFacts& facts, int setting) {
   std::vector<ExperimentSection::Figure> out;
   for (int j = 0; std::cmp_less(j, facts.joints.size()); ++j) {

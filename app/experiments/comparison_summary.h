@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/report/experiment.h"
@@ -35,6 +36,10 @@ struct ComparisonFacts {
 /// "medians": a row a setting and learner, a column a joint; "spread": quartiles and the median
 /// with its 95 % interval; "runs": every trial.
 [[nodiscard]] std::vector<ExperimentTable> comparison_tables(const ComparisonFacts& facts);
+/// The same of tests that were judged apart, by their names: one table of each kind, with a column
+/// of words that names the test.
+[[nodiscard]] std::vector<ExperimentTable> comparison_tables(
+    const std::vector<std::pair<std::string, ComparisonFacts>>& tests);
 /// Box plots of one setting, one a joint.
 [[nodiscard]] std::vector<ExperimentSection::Figure> box_figures(const ComparisonFacts& facts,
                                                                  int setting);

@@ -31,6 +31,7 @@ struct ExperimentChoice {
   std::optional<std::vector<int>> joints;  ///< of the arm; several: one after another
   std::optional<int> starts;               ///< of every search of hyperparameters
   std::optional<int> search_samples;       ///< that the search sees
+  std::optional<int> inducing;             ///< points, of the learners that take them
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: all of the machine; never changes a result
   std::optional<ExperimentLog> log;

@@ -32,6 +32,8 @@ struct Experiment {
 
 [[nodiscard]] ExperimentSummary panda_experiment(const ExperimentChoice& choice,
                                                  const Progress& progress);
+[[nodiscard]] ExperimentSummary ur10_experiment(const ExperimentChoice& choice,
+                                                const Progress& progress);
 [[nodiscard]] ExperimentSummary barrett_experiment(const ExperimentChoice& choice,
                                                    const Progress& progress);
 [[nodiscard]] ExperimentSummary contact_experiment(const ExperimentChoice& choice,

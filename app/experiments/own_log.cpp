@@ -18,6 +18,7 @@ experiments::LearnOptions learn_options(const ExperimentChoice& choice) {
   out.search.starts = choice.starts.value_or(out.search.starts);
   out.search.samples = choice.search_samples.value_or(out.search.samples);
   out.search.seed = choice.seed;
+  out.inducing = choice.inducing.value_or(out.inducing);
   out.threads = choice.threads;
   return out;
 }

@@ -10,26 +10,52 @@
 namespace kinescope::experiments {
 namespace {
 
-void judge(const ComparisonCase& one, const Eigen::MatrixXd& predicted, Trial& trial) {
-  const Eigen::MatrixXd& torque = one.test.torque;
+// Rows of the test that are judged together.
+std::vector<std::vector<Eigen::Index>> parts_of(const TorqueSamples& test, bool by_trajectory) {
+  const int count = by_trajectory ? test.trajectory.maxCoeff() + 1 : 1;
+  std::vector<std::vector<Eigen::Index>> out(static_cast<std::size_t>(count));
+  for (Eigen::Index i = 0; i < test.size(); ++i) {
+    out[by_trajectory ? static_cast<std::size_t>(test.trajectory[i]) : 0].push_back(i);
+  }
+  return out;
+}
+
+void judge(const Eigen::MatrixXd& torque, const Eigen::MatrixXd& predicted, Trial& trial) {
   trial.nmse_percent = normalised_error_percent(torque, predicted);
   const Eigen::RowVectorXd mean = torque.colwise().mean();
   trial.global_nmse_percent =
       100.0 * (torque - predicted).squaredNorm() / (torque.rowwise() - mean).squaredNorm();
 }
 
-Trial trial_of(Learner learner, const ComparisonCase& one, const LearnOptions& options) {
-  Trial trial;
-  trial.learner = learner;
-  trial.inside_percent = inside_percent(one.train.q, one.test.q);
+Eigen::MatrixXd predicted_or_reason(Learner learner, const ComparisonCase& one,
+                                    const LearnOptions& options, std::string& reason) {
   try {
-    judge(one, predict_by(learner, one.believed, one.train, one.test, options), trial);
+    return predict_by(learner, one.believed, one.train, one.test, options);
   } catch (const Error& error) {
+    reason = error.what();
+    return {};
+  }
+}
+
+std::vector<Trial> trials_of(Learner learner, const ComparisonCase& one,
+                             const ComparisonPlan& plan) {
+  std::string failure;
+  const Eigen::MatrixXd predicted = predicted_or_reason(learner, one, plan.learn, failure);
+  std::vector<Trial> out;
+  for (const auto& rows : parts_of(one.test, plan.judge_trajectories)) {
+    Trial trial;
+    trial.learner = learner;
+    trial.trajectory = static_cast<int>(out.size());
+    trial.failure = failure;
+    trial.inside_percent = inside_percent(one.train.q, one.test.q(rows, Eigen::all));
     trial.nmse_percent = Eigen::VectorXd::Constant(one.test.joints(), kNotMeasured);
     trial.global_nmse_percent = kNotMeasured;
-    trial.failure = error.what();
+    if (failure.empty()) {
+      judge(one.test.torque(rows, Eigen::all), predicted(rows, Eigen::all), trial);
+    }
+    out.push_back(std::move(trial));
   }
-  return trial;
+  return out;
 }
 
 }  // namespace
@@ -38,16 +64,18 @@ std::vector<Trial> run_comparison(const ComparisonPlan& plan, const Progress& pr
   const int total = plan.settings * plan.runs * static_cast<int>(plan.learners.size());
   constexpr std::string_view kStage = "learning";
   std::vector<Trial> out;
-  report_progress(progress, kStage, 0, total);
+  int done = 0;
+  report_progress(progress, kStage, done, total);
   for (int setting = 0; setting < plan.settings; ++setting) {
     for (int run = 0; run < plan.runs; ++run) {
       const ComparisonCase one = plan.make(setting, run);
       for (const Learner learner : plan.learners) {
-        Trial trial = trial_of(learner, one, plan.learn);
-        trial.setting = setting;
-        trial.run = run;
-        out.push_back(std::move(trial));
-        report_progress(progress, kStage, static_cast<int>(out.size()), total);
+        for (Trial& trial : trials_of(learner, one, plan)) {
+          trial.setting = setting;
+          trial.run = run;
+          out.push_back(std::move(trial));
+        }
+        report_progress(progress, kStage, ++done, total);
       }
     }
   }

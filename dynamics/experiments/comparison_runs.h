@@ -27,11 +27,13 @@ struct ComparisonPlan {
   /// The same case for the same numbers, whenever it is asked for.
   std::function<ComparisonCase(int setting, int run)> make;
   LearnOptions learn;
+  bool judge_trajectories = false;  ///< each of the test's by itself, a trial of its own
 };
 
 struct Trial {
   int setting = 0;
   int run = 0;
+  int trajectory = 0;  ///< of the test, that it is judged on; 0 where all are judged together
   Learner learner = Learner::kGip;
   /// Mean squared error over the variance of the test's torque, one a joint, per cent.
   Eigen::VectorXd nmse_percent;
@@ -43,8 +45,8 @@ struct Trial {
   std::string failure = {};  ///< why there are no errors (they are NaN then); else empty
 };
 
-/// In the order of settings, runs, learners. What cannot be learned (too few samples) gets its
-/// reason.
+/// In the order of settings, runs, learners, trajectories. What cannot be learned (too few samples)
+/// gets its reason.
 [[nodiscard]] std::vector<Trial> run_comparison(const ComparisonPlan& plan,
                                                 const Progress& progress = {});
 

@@ -7,26 +7,45 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "dynamics/gp/lip_kernel.h"
+#include "dynamics/gp/memory.h"
+#include "dynamics/gp/process_group.h"
 #include "dynamics/gp/robot_kernels.h"
+#include "dynamics/gp/sparse.h"
 #include "dynamics/gp/workers.h"
 #include "dynamics/identify/model_features.h"
 #include "dynamics/models/neural_network.h"
 #include "dynamics/rigid/rigid_model.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::experiments {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-constexpr std::array<std::pair<std::string_view, Learner>, 7> kNames = {
+constexpr std::array<std::pair<std::string_view, Learner>, 10> kNames = {
     {{"gip", Learner::kGip},
      {"rbf", Learner::kRbf},
      {"network", Learner::kNetwork},
      {"semi_parametric", Learner::kSemiParametric},
      {"model_based", Learner::kModelBased},
      {"parametric", Learner::kParametric},
-     {"lip", Learner::kLip}}};
+     {"lip", Learner::kLip},
+     {"gip_inducing", Learner::kGipInducing},
+     {"rbf_inducing", Learner::kRbfInducing},
+     {"semi_parametric_inducing", Learner::kSemiParametricInducing}}};
+
+// The learner of all samples that one of inducing points stands for; else itself.
+Learner exact_of(Learner learner) {
+  if (learner == Learner::kGipInducing) return Learner::kGip;
+  if (learner == Learner::kRbfInducing) return Learner::kRbf;
+  if (learner == Learner::kSemiParametricInducing) return Learner::kSemiParametric;
+  return learner;
+}
+
+bool of_inducing_points(Learner learner) { return exact_of(learner) != learner; }
 
 // Variance of the noise to begin with, of normalised torques.
 constexpr double kNoiseStart = 1e-3;
@@ -70,21 +89,56 @@ gp::Kernel kernel_of(Learner learner, const DynamicModel& believed, const Torque
   return gp::semi_parametric(features.map, features.prior, gp::first_columns(3 * joints));
 }
 
+Matrix by_process(Learner learner, const DynamicModel& believed, const TorqueSamples& train,
+                  const Matrix& wanted, int joint, const LearnOptions& options) {
+  const Learner exact = exact_of(learner);
+  const gp::Dataset data{
+      motion_inputs(train.q, train.dq, train.ddq), train.torque.col(joint), {}, {}};
+  const gp::GpModel start = gp::make_model(
+      kernel_of(exact, believed, train, joint), kNoiseStart,
+      exact == Learner::kRbf ? gp::standardise(data) : gp::standardise_targets(data));
+  const gp::GpModel model = search(start, data, options.search, options.threads).model;
+  const gp::FitOptions fit{.threads = options.threads};
+  const gp::FittedGp fitted =
+      of_inducing_points(learner)
+          ? gp::fit_sparse(model, data,
+                           gp::choose_inducing(model, data, {.count = options.inducing}), fit)
+          : gp::fit(model, data, fit);
+  return gp::predict(fitted, wanted, {.variance = false, .threads = options.threads}).mean;
+}
+
+bool keeps_kernel_matrix(Learner learner, const DynamicModel& believed, const TorqueSamples& like,
+                         Eigen::Index samples) {
+  if (learner == Learner::kRbf || learner == Learner::kSemiParametric) return true;
+  return learner == Learner::kGip &&
+         gp::keeps_kernel_matrix(kernel_of(learner, believed, like, 0), samples);
+}
+
+// Whether the workers' kernel matrices fit beside each other, one of a joint each.
+bool fit_together(Learner learner, Eigen::Index samples, int at_once) {
+  if (of_inducing_points(learner)) return true;
+  return gp::process_count() == 1 && !gp::memory_shortage(samples, 1, at_once);
+}
+
+// Joints side by side, each on one thread; where the memory is for one kernel matrix alone, or
+// several processes share it, one after another on all threads. Neither changes a result.
 Matrix by_processes(Learner learner, const DynamicModel& believed, const TorqueSamples& train,
                     const TorqueSamples& test, const LearnOptions& options) {
-  const Matrix inputs = motion_inputs(train.q, train.dq, train.ddq);
   const Matrix wanted = motion_inputs(test.q, test.dq, test.ddq);
   Matrix out(test.size(), test.joints());
   gp::Workers workers(options.threads);
-  workers.run(train.joints(), [&](Eigen::Index j, gp::Scratch&) {
-    const gp::Dataset data{inputs, train.torque.col(j), {}, {}};
-    const gp::GpModel start = gp::make_model(
-        kernel_of(learner, believed, train, static_cast<int>(j)), kNoiseStart,
-        learner == Learner::kRbf ? gp::standardise(data) : gp::standardise_targets(data));
-    const gp::Estimate found = search(start, data, options.search, 1);
-    const gp::FittedGp fitted = gp::fit(found.model, data, {.threads = 1});
-    out.col(j) = gp::predict(fitted, wanted, {.variance = false, .threads = 1}).mean;
-  });
+  const auto joints = static_cast<int>(train.joints());
+  const bool together = fit_together(learner, train.size(), std::min(workers.count(), joints));
+  LearnOptions own = options;
+  if (together) own.threads = 1;
+  const auto learn = [&](Eigen::Index j) {
+    out.col(j) = by_process(learner, believed, train, wanted, static_cast<int>(j), own);
+  };
+  if (together) {
+    workers.run(joints, [&](Eigen::Index j, gp::Scratch&) { learn(j); });
+  } else {
+    for (Eigen::Index j = 0; j < joints; ++j) learn(j);
+  }
   return out;
 }
 
@@ -138,11 +192,30 @@ const std::vector<Learner>& usual_learners() {
   static const std::vector<Learner> learners = [] {
     std::vector<Learner> out;
     for (const auto& [name, learner] : kNames) {
-      if (learner != Learner::kLip) out.push_back(learner);
+      if (learner != Learner::kLip && !of_inducing_points(learner)) out.push_back(learner);
     }
     return out;
   }();
   return learners;
+}
+
+void require_memory(const std::vector<Learner>& learners, const DynamicModel& believed,
+                    const TorqueSamples& like, Eigen::Index samples, std::size_t limit_bytes) {
+  for (const Learner learner : learners) {
+    const bool together = learner == Learner::kLip;
+    if (!together && !keeps_kernel_matrix(learner, believed, like, samples)) continue;
+    const Eigen::Index joints = together ? like.joints() : 1;
+    const auto shortage = gp::memory_shortage(samples, joints, 1.0, limit_bytes);
+    if (!shortage) continue;
+    std::string remedy = fmt::format("take at most {} samples", shortage->fitting_samples);
+    if (!together) remedy += fmt::format(" (--samples), or {}_inducing", to_string(learner));
+    throw bad_request(
+        std::string(to_string(learner)),
+        fmt::format("the kernel matrix of {} samples{} needs {:.1f} GB, {:.1f} GB are available",
+                    samples, together ? fmt::format(" of {} joints", joints) : "",
+                    shortage->needed_gb, shortage->available_gb),
+        remedy);
+  }
 }
 
 gp::Estimate search(const gp::GpModel& start, const gp::Dataset& data, const SearchOptions& options,

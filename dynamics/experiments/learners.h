@@ -3,8 +3,9 @@
 // Takes   samples of a robot's motion and torque, and its kinematics as somebody believes them.
 // Gives   torques that the learners of the field predict for other motion.
 // Method  exact Gaussian processes of single joints, all with the same search of their
-//         hyperparameters; least squares; the network that papers compare with.
-// Not here: bands, memory of the noise, inducing points: dynamics/models, whose models are for use.
+//         hyperparameters, and the same through inducing points; least squares; the network that
+//         papers compare with.
+// Not here: bands, memory of the noise: dynamics/models, whose models are for use.
 #pragma once
 
 #include <cstdint>
@@ -26,15 +27,20 @@ enum class Learner {
   kSemiParametric,  ///< features of the believed model plus a squared exponential, zero mean
   kModelBased,      ///< features of the believed model alone
   kParametric,      ///< base parameters of the believed model by weighted least squares
-  kLip              ///< Lagrangian-inspired polynomial of all joints together, and no friction
+  kLip,             ///< Lagrangian-inspired polynomial of all joints together, and no friction
+  // The same kernels and hyperparameters through inducing points (dynamics/gp/sparse.h).
+  kGipInducing,
+  kRbfInducing,
+  kSemiParametricInducing
 };
 
-/// "gip", "rbf", "network", "semi_parametric", "model_based", "parametric", "lip".
+/// "gip", "rbf", "network", "semi_parametric", "model_based", "parametric", "lip", "gip_inducing",
+/// "rbf_inducing", "semi_parametric_inducing".
 [[nodiscard]] std::string_view to_string(Learner learner);
 /// Nothing for an unknown name.
 [[nodiscard]] std::optional<Learner> learner_of(std::string_view name);
 [[nodiscard]] std::vector<std::string_view> learner_names();
-/// All but LIP, which takes minutes.
+/// All but LIP, which takes minutes, and those of inducing points.
 [[nodiscard]] const std::vector<Learner>& usual_learners();
 
 struct SearchOptions {
@@ -52,8 +58,15 @@ struct SearchOptions {
 struct LearnOptions {
   SearchOptions search;
   NeuralNetworkOptions network;
-  int threads = 0;  ///< 0: all of the machine; never changes a result
+  int inducing = 500;  ///< points, of the learners that take them
+  int threads = 0;     ///< 0: all of the machine; never changes a result
 };
+
+/// Throws bad_request where the kernel matrix that a learner keeps of `samples`, one joint at a
+/// time, does not fit into memory; to be asked before the work begins. `like`: some samples of the
+/// robot. `limit_bytes` 0: what the machine has available.
+void require_memory(const std::vector<Learner>& learners, const DynamicModel& believed,
+                    const TorqueSamples& like, Eigen::Index samples, std::size_t limit_bytes = 0);
 
 /// Torques at the test's motion, samples x joints, in the unit of the training. Throws what the
 /// learners throw where there are too few samples.

@@ -20,12 +20,38 @@ struct PublishedBody {
   std::array<double, 6> inertia_kgm2;  ///< xx xy xz yy yz zz, about the centre
 };
 
-InertialParameters inertia_of(const PublishedBody& body) {
+CentralInertia central_of(const PublishedBody& body) {
   const auto& [xx, xy, xz, yy, yz, zz] = body.inertia_kgm2;
   CentralInertia central{body.mass_kg, Eigen::Vector3d::Map(body.centre_m.data()), {}};
   central.inertia_kgm2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return from_central(central);
+  return central;
 }
+
+InertialParameters inertia_of(const PublishedBody& body) { return from_central(central_of(body)); }
+
+// One row of the maker's table, distal convention: a link's frame stands at its far end.
+struct Ur10Link {
+  double a_m, d_m, alpha_rad;
+  PublishedBody body;
+};
+
+constexpr std::array<Ur10Link, 6> kUr10 = {
+    {{0.0,
+      0.1273,
+      kQuarter,
+      {7.1, {0.021, 0.0, 0.027}, {0.0341, 0.0, -0.0043, 0.0353, 0.0001, 0.0216}}},
+     {-0.612, 0.0, 0.0, {12.7, {0.38, 0.0, 0.158}, {0.0281, 0.0001, -0.0156, 0.7707, 0.0, 0.7694}}},
+     {-0.5723, 0.0, 0.0, {4.27, {0.24, 0.0, 0.068}, {0.0101, 0.0001, 0.0092, 0.3093, 0.0, 0.3065}}},
+     {0.0,
+      0.163941,
+      kQuarter,
+      {2.0, {0.0, 0.007, 0.018}, {0.0030, 0.0, 0.0, 0.0022, -0.0002, 0.0026}}},
+     {0.0,
+      0.1157,
+      -kQuarter,
+      {2.0, {0.0, 0.007, 0.018}, {0.0030, 0.0, 0.0, 0.0022, -0.0002, 0.0026}}},
+     // The page gives 0 for its xx, which no body has: taken as its yy.
+     {0.0, 0.0922, 0.0, {0.365, {0.0, 0.0, -0.026}, {0.0004, 0.0, 0.0, 0.0004, 0.0, 0.0003}}}}};
 
 // What a joint may do.
 struct Limits {
@@ -140,6 +166,32 @@ DynamicModel panda_arm() {
         {1.2516e-2, -4.28e-4, -1.196e-3, 1.0027e-2, -7.41e-4, 4.815e-3}}}};
   DynamicModel model = panda_kinematics();
   for (std::size_t j = 0; j < kBodies.size(); ++j) model.links[j + 1] = inertia_of(kBodies[j]);
+  return model;
+}
+
+DynamicModel ur10_kinematics() {
+  std::vector<std::array<double, 3>> rows;
+  for (std::size_t j = 0; j < kUr10.size(); ++j) {
+    const double a = j > 0 ? kUr10[j - 1].a_m : 0.0;
+    const double alpha = j > 0 ? kUr10[j - 1].alpha_rad : 0.0;
+    rows.push_back({a, alpha, kUr10[j].d_m});
+  }
+  DynamicModel model = dh_arm(rows);
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  for (Joint& joint : model.tree.joints) joint.limits = JointLimits{-kTurn, kTurn};
+  return model;
+}
+
+DynamicModel ur10_arm() {
+  DynamicModel model = ur10_kinematics();
+  for (std::size_t j = 0; j < kUr10.size(); ++j) {
+    const Eigen::Matrix3d turn =
+        exp_rotation(Eigen::Vector3d::UnitX() * kUr10[j].alpha_rad).toRotationMatrix();
+    CentralInertia body = central_of(kUr10[j].body);
+    body.centre_m = turn * body.centre_m + kUr10[j].a_m * Eigen::Vector3d::UnitX();
+    body.inertia_kgm2 = turn * body.inertia_kgm2 * turn.transpose();
+    model.links[j + 1] = from_central(body);
+  }
   return model;
 }
 

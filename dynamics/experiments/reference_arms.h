@@ -22,6 +22,12 @@ namespace kinescope {
 /// public description of the arm lists them.
 [[nodiscard]] DynamicModel panda_arm();
 
+/// The UR10 (CB3) as its maker publishes it ("DH parameters for calculations of kinematics and
+/// dynamics", universal-robots.com): geometry and position limits, without masses.
+[[nodiscard]] DynamicModel ur10_kinematics();
+/// The same with the masses, centres of mass and inertias of that page.
+[[nodiscard]] DynamicModel ur10_arm();
+
 /// R R P R with vertical axes; masses and lengths of a mid-size SCARA, made up.
 [[nodiscard]] DynamicModel scara_arm();
 

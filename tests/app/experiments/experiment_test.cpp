@@ -3,6 +3,7 @@
 // `kinescope experiment` in small: products, the page against its table,
 // refusals.
 #include <algorithm>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,9 @@ TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
        {std::vector<std::string>{"barrett", "--samples", "150"},
         std::vector<std::string>{"contact", "--runs", "1", "--seconds", "5", "--samples", "8000"},
         std::vector<std::string>{"control", "--runs", "1", "--seconds", "12", "--joints", "4"},
+        std::vector<std::string>{"ur10", "--samples", "200", "--models",
+                                 "rbf,rbf_inducing,parametric", "--inducing", "50", "--starts", "1",
+                                 "--search-samples", "60"},
         std::vector<std::string>{"panda", "--runs", "1", "--joints", "2,3", "--models",
                                  "rbf,parametric", "--starts", "1", "--search-samples", "60"}}) {
     std::vector<std::string> command{"experiment"};
@@ -95,13 +99,57 @@ TEST(Experiment, EveryTableOfTheOthersIsWrittenAndValid) {
   }
 }
 
+TEST(Experiment, OfTheUr10BothTestsAreInTableAndPage) {
+  const std::filesystem::path folder = truth::temporary_path("ur10_experiment");
+  const Outcome outcome = run({"experiment", "ur10", "--samples", "200", "--models",
+                               "parametric,rbf,rbf_inducing", "--inducing", "40", "--starts", "1",
+                               "--search-samples", "60", "-o", folder.string(), "--quiet"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string page = read_text_file(folder / "experiment.html");
+  const CsvRows rows = read_csv_rows(read_text_file(folder / "medians.csv"));
+  ASSERT_EQ(rows.size(), 2U * 3U);
+  for (const auto& row : rows) {
+    EXPECT_NE(page.find("Test: " + row.at("Test")), std::string::npos);
+    // Geometry is known, and the springs are stiff: what is left is below the noise.
+    if (row.at("Model") == "parametric") {
+      EXPECT_LT(std::stod(row.at("all joints")), 3.0) << row.at("Test");
+    }
+  }
+  EXPECT_NE(rows.front().at("all joints"), rows.back().at("all joints"));
+  EXPECT_NE(page.find("rbf from all samples errs by"), std::string::npos);
+}
+
+// The first of mpirun's processes writes what one process would.
+TEST(Experiment, OverSeveralProcesses) {
+  if (!KINESCOPE_WITH_SCALAPACK) GTEST_SKIP() << "built without ScaLAPACK (KINESCOPE_SCALAPACK)";
+  if (std::system("command -v mpirun > /dev/null") != 0) {
+    GTEST_SKIP() << "mpirun is not installed (openmpi-bin)";
+  }
+  const std::filesystem::path folder = truth::temporary_path("processes");
+  const auto table = [&](const std::string& before, const std::string& name) {
+    const std::string command = before + KINESCOPE_PROGRAM +
+                                " experiment ur10 --samples 600 --models rbf --starts 1 "
+                                "--search-samples 60 --threads 1 --quiet -o " +
+                                (folder / name).string();
+    EXPECT_EQ(std::system((command + " > /dev/null").c_str()), 0) << command;
+    return read_csv_rows(read_text_file(folder / name / "medians.csv"));
+  };
+  std::filesystem::create_directories(folder);
+  const CsvRows one = table("", "one");
+  const CsvRows two = table("mpirun --oversubscribe --allow-run-as-root -n 2 ", "two");
+  ASSERT_EQ(one.size(), two.size());
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    EXPECT_NEAR(std::stod(two[k].at("all joints")) / std::stod(one[k].at("all joints")), 1.0, 1e-7);
+  }
+}
+
 TEST(Experiment, OnALogOfOnesOwn) {
   const experiments::ComparisonCase one =
       experiments::scara_case({}, 0, {.samples = 1200, .test_samples = 10});
   const RecordingFolder folder;
   folder.write("robot.urdf", write_urdf(one.believed)).write("log.csv", torque_log_csv(one.train));
   const std::filesystem::path out = folder.path() / "out";
-  for (const char* name : {"scara", "efficiency"}) {
+  for (const char* name : {"scara", "efficiency", "ur10"}) {
     const Outcome outcome =
         run({"experiment", name, "--log", (folder.path() / "log.csv").string(), "--robot",
              (folder.path() / "robot.urdf").string(), "--runs", "2", "--models", "parametric,rbf",
@@ -125,6 +173,12 @@ TEST(Experiment, Refusals) {
   expect_refusal({"experiment", "efficiency", "--tilt", "2"}, code,
                  "--tilt: is no option of the experiment efficiency");
   expect_refusal({"experiment", "control", "--joints", "3"}, code, "give 4 to 7");
+  expect_refusal({"experiment", "ur10", "--samples", "1000000", "--models", "model_based,rbf"},
+                 code, "rbf: the kernel matrix of 1000000 samples needs 8000.0 GB");
+  expect_refusal({"experiment", "ur10", "--noise", "0.1"}, code,
+                 "--noise: is no option of the experiment ur10");
+  expect_refusal({"experiment", "panda", "--inducing", "50"}, code,
+                 "--inducing: is no option of the experiment panda");
   expect_refusal({"experiment", "scara", "--seconds", "20"}, code,
                  "--seconds: is no option of the experiment scara");
   expect_refusal({"experiment", "scara", "--tilt", "1,2", "--shift", "0.01"}, code,
