@@ -2,10 +2,9 @@
 //
 // All samples in one exact Gaussian process: time and memory, in one process beside LAPACK's bare
 // factor of the same size, and over the processes of mpirun.
-//   build/test/exact_gp --samples 40000                      # 13 GB, 21 inputs, all threads
-//   for n in 1 2 4; do mpirun --oversubscribe -n $n build/test/exact_gp --samples 10000 --threads 1
-//   --no-dpotrf; done mpirun --oversubscribe -n 4 build/test/exact_gp --samples 1500 --no-dpotrf
-//   --against-one
+//   build/test/exact_gp --samples 40000      # 13 GB; 21 inputs, one output, all threads
+//   mpirun --oversubscribe --bind-to none -n 2 build/test/exact_gp --threads 1 --no-dpotrf
+//   mpirun --oversubscribe -n 4 build/test/exact_gp --samples 1500 --no-dpotrf --against-one
 // The last one compares with one process's answers: exit code 1 where they differ by more than
 // 1e-8, relative.
 #include <chrono>
