@@ -205,7 +205,7 @@ void require_memory(const std::vector<Learner>& learners, const DynamicModel& be
     const bool together = learner == Learner::kLip;
     if (!together && !keeps_kernel_matrix(learner, believed, like, samples)) continue;
     const Eigen::Index joints = together ? like.joints() : 1;
-    const auto shortage = gp::memory_shortage(samples, joints, 1.0, limit_bytes);
+    const auto shortage = gp::memory_shortage(samples, joints, gp::machine_share(), limit_bytes);
     if (!shortage) continue;
     std::string remedy = fmt::format("take at most {} samples", shortage->fitting_samples);
     if (!together) remedy += fmt::format(" (--samples), or {}_inducing", to_string(learner));

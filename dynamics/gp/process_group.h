@@ -27,5 +27,7 @@ class ProcessGroup {
 [[nodiscard]] int process_count();
 /// From 0, which is the one that prints and writes.
 [[nodiscard]] int process_rank();
+/// What the processes of this machine hold together of a shared matrix, as a share of it.
+[[nodiscard]] double machine_share();
 
 }  // namespace kinescope::gp

@@ -325,11 +325,17 @@ ProcessGroup::~ProcessGroup() {
 int process_count() { return present_grid() ? present_grid()->count : 1; }
 int process_rank() { return present_grid() ? present_grid()->rank : 0; }
 
+// Open MPI says how many of the processes it started on this machine.
+double machine_share() {
+  const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
+  if (!present_grid() || here == nullptr) return 1.0;
+  return std::atof(here) / present_grid()->count;
+}
+
 Fit fit_distributed(Workers& workers, const Kernel& kernel, const VectorXd& log_noise,
                     Problem problem, const FitOptions& options) {
   const Grid& grid = *present_grid();
-  // Of one machine: what all processes need together.
-  check_memory(problem.samples, problem.outputs, 1.0, options.memory_limit_bytes);
+  check_memory(problem.samples, problem.outputs, machine_share(), options.memory_limit_bytes);
   Covariance covariance(kernel);
   Prepared training = covariance.prepare(problem.inputs);
   const VectorXd noise = noise_of_rows(problem, log_noise);

@@ -23,6 +23,7 @@ ProcessGroup::~ProcessGroup() = default;
 
 int process_count() { return 1; }
 int process_rank() { return 0; }
+double machine_share() { return 1.0; }
 
 Fit fit_distributed(Workers&, const Kernel&, const Eigen::VectorXd&, Problem, const FitOptions&) {
   KINESCOPE_CHECK(false, "there is one process");

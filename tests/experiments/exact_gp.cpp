@@ -18,6 +18,7 @@
 
 #include "dynamics/gp/gaussian_process.h"
 #include "dynamics/gp/process_group.h"
+#include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 
 extern "C" {
@@ -38,6 +39,7 @@ struct Options {
   int samples = 10000;
   int test_samples = 256;
   int threads = 0;
+  double most_mb = 0.0;
   bool without_dpotrf = false;
   bool against_one = false;
 };
@@ -105,7 +107,9 @@ Answers answers_of(const Options& options) {
   Answers out;
   const Stopwatch fit_watch;
   const FittedGp fitted =
-      fit(ard_model(), make_data(options.samples, "train"), {.threads = options.threads});
+      fit(ard_model(), make_data(options.samples, "train"),
+          {.threads = options.threads,
+           .memory_limit_bytes = static_cast<std::size_t>(1e6 * options.most_mb)});
   out.fit_s = fit_watch.seconds();
   out.log_likelihood = fitted.log_likelihood;
   const Stopwatch predict_watch;
@@ -154,8 +158,14 @@ int main(int argc, char** argv) {
   app.add_option("--samples", options.samples)->check(CLI::Range(10, 100000));
   app.add_option("--test-samples", options.test_samples)->check(CLI::Range(1, 100000));
   app.add_option("--threads", options.threads, "0: all of the machine")->check(CLI::Range(0, 256));
+  app.add_option("--most-mb", options.most_mb, "memory that the matrix may take; 0: what there is");
   app.add_flag("--no-dpotrf", options.without_dpotrf);
   app.add_flag("--against-one", options.against_one, "compare with one process's answers");
   CLI11_PARSE(app, argc, argv);
-  return kinescope::gp::run(options);
+  try {
+    return kinescope::gp::run(options);
+  } catch (const kinescope::Error& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
 }

@@ -31,6 +31,19 @@ TEST_P(Processes, GiveTheAnswersOfOne) {
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
 }
 
+// A matrix of 16 MB in 10: on one machine it does not fit, half of it on either of two does.
+TEST(ProcessGroup, EachMachineNeedsMemoryForItsShare) {
+  if (!KINESCOPE_WITH_SCALAPACK) GTEST_SKIP() << "built without ScaLAPACK (KINESCOPE_SCALAPACK)";
+  if (!installed("mpirun")) GTEST_SKIP() << "mpirun is not installed (openmpi-bin)";
+  const auto fits = [](const std::string& machine) {
+    return std::system(("mpirun --oversubscribe --allow-run-as-root -n 2 " + machine +
+                        KINESCOPE_EXACT_GP " --samples 1400 --no-dpotrf --threads 1 --most-mb 10")
+                           .c_str()) == 0;
+  };
+  EXPECT_FALSE(fits(""));
+  EXPECT_TRUE(fits("env OMPI_COMM_WORLD_LOCAL_SIZE=1 "));
+}
+
 INSTANTIATE_TEST_SUITE_P(TwoAndFour, Processes, testing::Values(2, 4));
 
 TEST(ProcessGroup, WithoutMpirunThereIsOne) {
