@@ -10,8 +10,10 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/command_line.h"
+#include "app/commands/command_options.h"
 #include "app/commands/progress_line.h"
 #include "app/commands/run_again.h"
+#include "app/commands/shell_line.h"
 #include "app/io/nearest_name.h"
 #include "app/torque/saved_model_log.h"
 #include "kinematics/core/single_threaded_blas.h"
@@ -19,17 +21,6 @@
 
 namespace kinescope {
 namespace {
-
-std::string join_arguments(int argc, const char* const* argv) {
-  std::string text = "kinescope";
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const bool plain =
-        !word.empty() && word.find_first_of(" \t\n'\"\\$`&|;<>()*?#!~") == std::string::npos;
-    text += plain ? fmt::format(" {}", word) : fmt::format(" '{}'", word);
-  }
-  return text;
-}
 
 /// One line, whatever the library wrote.
 std::string in_one_line(std::string text) {
@@ -71,7 +62,7 @@ std::string parse_error_words(const CLI::App& app, const CLI::ParseError& error,
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, trace, correct, compare, plan, dynamics, predict, simulate, control, export, "
+        "run, merge, trace, correct, compare, plan, dynamics, predict, simulate, control, export, "
         "contact, "
         "experiment, "
         "policy, inspect, camera or markers; see kinescope --help";
@@ -105,8 +96,18 @@ ExitCode run_again(const CommandLine& line, const Console& console) {
   return run_command(options, console);
 }
 
+// What all shards of a run have in common.
+std::vector<std::string> words_of_all_shards(const CLI::App& run) {
+  return words_of(run, {"--shard", "--output", "--threads", "--force", "--json", "--quiet"});
+}
+
 ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
-  if (app.got_subcommand("run")) return run_command(finished_options(line), console);
+  if (app.got_subcommand("run")) {
+    RunOptions options = finished_options(line);
+    if (options.shard) options.arguments = words_of_all_shards(*app.get_subcommand("run"));
+    return run_command(options, console);
+  }
+  if (app.got_subcommand("merge")) return run_command(options_of_merge(line.merge), console);
   if (app.got_subcommand("trace")) return run_again(line, console);
   if (app.got_subcommand("correct")) return correct_command(line.correct, console);
   if (app.got_subcommand("compare")) return compare_command(line.compare, console);
@@ -243,8 +244,8 @@ bool names_no_command(const CLI::App& app, int argc, const char* const* argv) {
 
 /// A command line with what reports say of it, and its options.
 void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* argv) {
-  line.run.command_line = join_arguments(argc, argv);
   line.run.arguments.assign(argv + 1, argv + argc);
+  line.run.command_line = shell_line(line.run.arguments);
   line.dynamics.command_line = line.run.command_line;
   line.contact.command_line = line.run.command_line;
   line.experiment.command_line = line.run.command_line;
@@ -252,6 +253,7 @@ void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* a
   line.control.command_line = line.run.command_line;
   line.compare.command_line = line.run.command_line;
   line.plan.command_line = line.run.command_line;
+  line.merge.command_line = line.run.command_line;
   add_commands(app, line);
 }
 

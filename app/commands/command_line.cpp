@@ -145,7 +145,9 @@ void add_run(CLI::App& app, CommandLine& line) {
            line.run.further.assign(folders.begin() + 1, folders.end());
          },
          "Folder with video.mp4, tags.yaml, joints.csv, camera.yaml; a bag of ROS; or a LeRobot "
-         "dataset. Several of one robot are calibrated together")
+         "dataset. Several of one robot are calibrated together; @FILE: those in a text file, one "
+         "a "
+         "line")
       ->check(refuse_empty)
       ->required()
       ->type_name("PATH");
@@ -156,6 +158,9 @@ void add_run(CLI::App& app, CommandLine& line) {
       ->type_name("FOLDER");
   add_estimation_options(run, line);
   add_detection_options(run, line.run.detect);
+  add_shard(run, line.run.shard,
+            "Of several recordings look for the markers in every N-th only, beginning with the "
+            "I-th, and leave them in the output folder as a part for kinescope merge");
   run.add_option("--fail-on", line.run.fail_on,
                  "Limit that turns the exit code to 5, such as \"held_out_px>0.2\" (in quotes: a "
                  "shell takes > for itself); may be given again")
@@ -183,6 +188,35 @@ void add_path_argument(CLI::App& command, const char* name, std::filesystem::pat
           name, [&path](const std::string& text) { path = text; }, help)
       ->required()
       ->type_name(type);
+}
+
+void add_merge(CLI::App& app, CommandLine& line) {
+  CLI::App& merge = *app.add_subcommand(
+      "merge", "One robot from the parts that the shards of a run left, as the run in one piece");
+  MergeOptions& options = line.merge;
+  merge
+      .add_option_function<std::vector<std::string>>(
+          "PART",
+          [&options](const std::vector<std::string>& folders) {
+            options.parts.assign(folders.begin(), folders.end());
+          },
+          "Folders of kinescope run --shard 1/N, 2/N, .. N/N, all of one run; its recordings must "
+          "still be where they were")
+      ->check(refuse_empty)
+      ->required()
+      ->type_name("FOLDER");
+  merge
+      .add_option_function<std::string>(
+          "-o,--output", [&options](const std::string& text) { options.output = text; },
+          "Folder for the results (default: as of the run in one piece)")
+      ->type_name("FOLDER");
+  add_force(merge, options.force, kReplaceOthers);
+  add_output_options(merge, line.output);
+  merge.footer(
+      fmt::format("Example:\n  kinescope run @recordings.txt --shard 1/2 --output part1\n"
+                  "  kinescope run @recordings.txt --shard 2/2 --output part2\n"
+                  "  kinescope merge part1 part2 --output robot_run\n\n{}",
+                  kExitCodes));
 }
 
 void add_trace(CLI::App& app, CommandLine& line) {
@@ -472,6 +506,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
                   "sample_videos/scara4_none\n\n{}",
                   kExitCodes));
   add_run(app, line);
+  add_merge(app, line);
   add_trace(app, line);
   add_correct(app, line);
   add_compare(app, line);

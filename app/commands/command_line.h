@@ -24,6 +24,7 @@ struct OutputOptions {
 /// Everything the command line can say.
 struct CommandLine {
   RunOptions run;
+  MergeOptions merge;
   DynamicsOptions dynamics;
   PredictOptions predict;
   SimulateOptions simulate;

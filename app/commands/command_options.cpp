@@ -47,6 +47,39 @@ void add_threads(CLI::App& command, int& threads) {
       ->type_name("N");
 }
 
+std::vector<std::string> words_of(const CLI::App& command,
+                                  const std::vector<std::string>& without) {
+  std::vector<std::string> out{command.get_name()};
+  std::vector<std::string> named;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0) continue;
+    if (option->get_positional()) {
+      out.insert(out.end(), option->results().begin(), option->results().end());
+      continue;
+    }
+    const std::string name = "--" + option->get_lnames().front();
+    if (std::ranges::find(without, name) != without.end()) continue;
+    const bool is_flag = option->get_type_size() == 0;
+    if (is_flag) named.push_back(name);
+    for (const std::string& value : option->results())
+      if (!is_flag) named.push_back(name + "=" + value);
+  }
+  out.insert(out.end(), named.begin(), named.end());
+  return out;
+}
+
+void add_shard(CLI::App& command, std::optional<Shard>& shard, const char* help) {
+  command
+      .add_option_function<std::string>(
+          "--shard", [&shard](const std::string& text) { shard = parse_shard(text); }, help)
+      ->check([](const std::string& text) -> std::string {
+        return parse_shard(text)
+                   ? ""
+                   : fmt::format("'{}' is no shard: i/n, i from 1 to n, such as 2/3", text);
+      })
+      ->type_name("I/N");
+}
+
 void add_output_options(CLI::App& command, OutputOptions& output) {
   command.add_flag("--json", output.json, "Print the result as JSON");
   command.add_flag("--quiet", output.quiet, "No progress on standard error (warnings stay)");

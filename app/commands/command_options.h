@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/commands/command_line.h"
+#include "app/io/shard.h"
 
 namespace kinescope {
 
@@ -37,6 +38,14 @@ void add_gravity(CLI::App& command, std::optional<Eigen::Vector3d>& gravity_m_s2
 
 /// --threads of a command whose result does not depend on it.
 void add_threads(CLI::App& command, int& threads);
+
+/// The words that say what was understood of a command line, in the order of the options' table:
+/// the command's name, its arguments, `--name=value`. Without options of these names.
+[[nodiscard]] std::vector<std::string> words_of(const CLI::App& command,
+                                                const std::vector<std::string>& without);
+
+/// --shard i/n.
+void add_shard(CLI::App& command, std::optional<Shard>& shard, const char* help);
 
 /// --json and --quiet.
 void add_output_options(CLI::App& command, OutputOptions& output);

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "app/commands/console.h"
+#include "app/commands/shard_parts.h"
 #include "app/experiments/experiment_choice.h"
 #include "app/explain/sight_options.h"
 #include "app/io/recording.h"
+#include "app/io/shard.h"
 #include "app/torque/torque_options.h"
 #include "calib/design/goal.h"
 #include "calib/vision/board.h"
@@ -36,10 +38,22 @@ struct RunOptions : SightOptions {
   std::vector<std::string>
       fail_on;               ///< limits such as "held_out_px>0.2" that turn the exit code to 5
   std::string command_line;  ///< for the report
-  std::vector<std::string> arguments;  ///< the same, for run.json; without the program's name
+  std::vector<std::string> arguments;    ///< the same, for run.json; without the program's name
+  std::filesystem::path working_folder;  ///< that they are seen from; empty: the current one
+  /// Look for the markers of this shard's recordings alone, and leave a part in `output`.
+  std::optional<Shard> shard = {};
+  std::vector<ShardPart> parts = {};  ///< detection that was done so; empty: none was
 };
 
 [[nodiscard]] ExitCode run_command(const RunOptions& options, const Console& console);
+
+/// Of `run --shard`, all shards of one run: the same run in one piece.
+struct MergeOptions {
+  std::vector<std::filesystem::path> parts;  ///< folders
+  std::filesystem::path output;              ///< as RunOptions
+  bool force = false;                        ///< replace what others wrote
+  std::string command_line;                  ///< for the report
+};
 
 /// On a finished run folder: the run's own command again, with detection taken from the folder.
 struct TraceCommandOptions {

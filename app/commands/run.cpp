@@ -11,6 +11,8 @@
 #include "app/commands/limits.h"
 #include "app/commands/run_folder.h"
 #include "app/commands/run_hand_eye.h"
+#include "app/commands/run_shard.h"
+#include "app/commands/shard_parts.h"
 #include "app/commands/torque_stages.h"
 #include "app/explain/across_recordings.h"
 #include "app/explain/explain.h"
@@ -19,6 +21,7 @@
 #include "app/explain/log_doubts.h"
 #include "app/explain/moving_camera.h"
 #include "app/explain/pipeline.h"
+#include "app/explain/see_alone.h"
 #include "app/explain/see_cameras.h"
 #include "app/explain/see_recordings.h"
 #include "app/explain/sighting_doubts.h"
@@ -197,40 +200,18 @@ KinematicTree with_camera(const Calibration& calibration) {
   return with_camera_links(calibration.tree, moving->link, moving->T_camera_link.inverse());
 }
 
-/// The markers, and the camera. One that nobody declared is found from the markers' borders; then
-/// it is known, and their cells can be used, too.
-SeenAlone see(const Recording& recording, const RunOptions& options,
-              const std::optional<TagObservations>& cached, const Progress& progress) {
-  SeenAlone out;
-  out.observed = observe(recording, options, recording.camera, cached, progress);
-  out.camera = choose_camera(recording, out.observed.tags);
-  if (recording.camera || recording.nominal || out.observed.tags.observations.empty()) return out;
-  const auto find_camera = [&] {
-    return camera_from_motion(recording, out.observed, out.camera, options.calibrate);
-  };
-  std::optional<CameraModel> found = find_camera();
-  if (found && recording.entry == RecordingEntry::kVideo && !out.observed.tags.lens_known) {
-    const Progress again = [&](std::string_view, int done, int total) {
-      report_progress(progress, "markers with this lens", done, total);
-    };
-    out.observed = observe(recording, options, found, std::nullopt, again);
-    out.camera = choose_camera(recording, out.observed.tags);
-    found = find_camera();
-  }
-  if (found) out.camera = *found;
-  return out;
-}
-
 /// Of one camera, or of all; of one recording, or of all.
 SeenTogether look(const std::vector<Recording>& given, const RunOptions& options,
                   const RunFolder& folder, const Progress& progress) {
-  const auto see_alone = [&](const Recording& one) {
-    return see(one, options, folder.cached_observations(one), progress);
+  const auto see = [&](const Recording& one) {
+    auto kept = observations_in(options.parts, one, options.detect);
+    if (!kept) kept = folder.cached_observations(one);
+    return see_alone(one, options, kept, progress);
   };
-  if (given.size() > 1) return see_recordings(given, options, see_alone);
+  if (given.size() > 1) return see_recordings(given, options, see);
   const Recording& recording = given.front();
-  if (!recording.cameras.empty()) return see_cameras(recording, options, see_alone);
-  SeenAlone alone = see_alone(recording);
+  if (!recording.cameras.empty()) return see_cameras(recording, options, see);
+  SeenAlone alone = see(recording);
   PoseTracks tracks =
       alone.observed.tags.observations.empty()
           ? alone.observed.measurements.poses
@@ -364,10 +345,12 @@ void require_nominal(const RunOptions& options, const Recording& recording) {
 }  // namespace
 
 ExitCode run_command(const RunOptions& options, const Console& console) {
+  if (options.shard) return run_shard(options, console);
   Stopwatch clock;
   RunSummary run;
   const std::vector<Limit> limits = parse_limits(options.fail_on);
   const std::vector<Recording> given = read_recordings(options.recording, options.further);
+  require_unchanged(options.parts, given);
   const Recording whole = described_together(given);
   require_nominal(options, whole);
   if (!whole.flange.empty()) return run_hand_eye(options, whole, console);

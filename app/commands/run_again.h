@@ -11,11 +11,18 @@ namespace kinescope {
 
 struct CommandLine;
 
-/// Options of `run` with what follows from others filled in.
-[[nodiscard]] RunOptions finished_options(const CommandLine& line);
+/// Options of `run` with what follows from others filled in, lists of recordings too; their words
+/// are seen from the folder (empty: the current one).
+[[nodiscard]] RunOptions finished_options(const CommandLine& line,
+                                          const std::filesystem::path& from = {});
 
 /// Of the run in the folder, its paths as seen from here, the folder its output. Throws bad_input
 /// where run.json does not say, or was written by something else.
 [[nodiscard]] RunOptions options_of_run(const std::filesystem::path& folder);
+
+/// Of the run whose parts these are, all of them, with what they hold. Throws bad_input where one
+/// cannot be read, is damaged or of another version; bad_request where they are not the parts of
+/// one run, each once, and says how a missing one is made.
+[[nodiscard]] RunOptions options_of_merge(const MergeOptions& merge);
 
 }  // namespace kinescope

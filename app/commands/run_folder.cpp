@@ -7,15 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/kept_observations.h"
 #include "app/io/json_text.h"
-#include "app/io/products.h"
 #include "app/io/same_place.h"
-#include "app/io/sha256.h"
-#include "kinematics/bags/bag.h"
 #include "kinematics/core/file.h"
 #include "kinematics/core/text.h"
-#include "kinematics/datasets/dataset.h"
-#include "kinematics/recorded/container.h"
 
 namespace kinescope {
 namespace {
@@ -23,18 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// What one camera saw: "observations.csv", "observations_left.csv".
-std::string observations_file(const std::string& camera, std::string_view ending) {
-  return camera.empty() ? fmt::format("observations.{}", ending)
-                        : fmt::format("observations_{}.{}", camera, ending);
-}
-
 std::vector<std::string> products_of(const Recording& recording) {
   std::vector<std::string> out = run_products(!recording.log.torque_columns.empty());
   std::vector<std::string> names = recording.joined;
   for (const RecordedCamera& camera : recording.cameras) names.push_back(camera.name);
   for (const std::string& name : names) {
-    for (const char* ending : {"csv", "json"}) out.push_back(observations_file(name, ending));
+    for (std::string& file : observations_files(name)) out.push_back(std::move(file));
   }
   return out;
 }
@@ -114,54 +104,6 @@ std::string describe_geometry(const std::optional<FreeGeometry>& free) {
   return "unknown";
 }
 
-// Of a file, or of the list of a folder's files with their hashes (as `sha256sum * | sha256sum`);
-// of a bag with its topic, of a dataset with its camera and episodes.
-std::string sha256_of_path(const fs::path& path) {
-  if (datasets::dataset_source(path)) {
-    std::string list = recorded::short_name(path) + "\n";
-    for (const fs::path& part : recorded::parts_of(path))
-      list += fmt::format("{}  {}\n", sha256_of_file(part), part.filename().string());
-    return sha256_of_text(list);
-  }
-  if (const auto bag = bags::bag_source(path); bag && !bag->topic.empty())
-    return sha256_of_text(sha256_of_path(bag->bag) + bag->topic);
-  if (!fs::is_directory(path)) return sha256_of_file(path);
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
-  std::ranges::sort(files);
-  std::string list;
-  for (const fs::path& file : files) {
-    list += fmt::format("{}  {}\n", sha256_of_file(file), file.filename().string());
-  }
-  return sha256_of_text(list);
-}
-
-// The table holds only frames with a marker; the times of all frames, what was rejected and the
-// detection's warnings stand in `kept`. Nothing where the two do not belong together; throws
-// json::exception where something is missing.
-std::optional<TagObservations> observations_of(const json& kept, TagObservations table) {
-  const auto times = kept.at("times_s").get<std::vector<double>>();
-  std::size_t next = 0;
-  for (TagObservation& seen : table.observations) {
-    const double t = table.times_s[static_cast<std::size_t>(seen.frame)];
-    while (next < times.size() && times[next] < t) ++next;
-    if (next == times.size()) return std::nullopt;
-    seen.frame = static_cast<int>(next);
-  }
-  table.times_s = times;
-  table.width = kept.at("width").get<int>();
-  table.height = kept.at("height").get<int>();
-  for (const json& tag : kept.at("rejected")) {
-    table.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
-                              tag.at("reason").get<std::string>()});
-  }
-  table.warnings = kept.at("warnings").get<std::vector<std::string>>();
-  table.lens_known = kept.at("lens_known").get<bool>();
-  return table;
-}
-
 }  // namespace
 
 RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
@@ -173,57 +115,14 @@ RunFolder::RunFolder(const RunOptions& options, const Recording& recording)
       detect_(options.detect),
       force_(options.force) {}
 
-std::string RunFolder::detection_key(const Recording& recording) const {
-  std::string key = fmt::format(
-      "kinescope {} corners by cells, pictures twice, video {} decimate {} blur {} refine {} "
-      "hamming {} margin {} "
-      "sightings {} start {}",
-      program_version(), sha256_of_path(recording.video), detect_.detector.decimate,
-      detect_.detector.blur_sigma, detect_.detector.refine_edges,
-      detect_.detector.max_hamming.value_or(-1), detect_.detector.min_margin, detect_.min_sightings,
-      recording.settings.video_start_s);
-  const MarkerSet& markers = recording.markers;
-  key += fmt::format(" family {} only_listed {} ids", markers.family, markers.only_listed);
-  for (const auto& [id, size] : markers.sizes_m) key += fmt::format(" {}", id.value);
-  if (const auto& camera = recording.camera) {
-    key += fmt::format(" lens {} {} {} {} {}", to_string(camera->model), camera->fx, camera->fy,
-                       camera->cx, camera->cy);
-    for (const double term : camera->distortion) key += fmt::format(" {}", term);
-  }
-  return key;
-}
-
 std::optional<TagObservations> RunFolder::cached_observations(const Recording& recording) const {
-  if (force_ || recording.entry != RecordingEntry::kVideo) return std::nullopt;
-  const fs::path table = file(observations_file(recording.camera_name, "csv"));
-  const fs::path key = file(observations_file(recording.camera_name, "json"));
-  if (!fs::exists(table) || !fs::exists(key)) return std::nullopt;
-  const json kept = json::parse(read_text_file(key), nullptr, false);
-  if (!kept.is_object() || kept.value("key", json()) != detection_key(recording) ||
-      kept.value("sha256", json()) != sha256_of_file(table)) {
-    return std::nullopt;
-  }
-  try {
-    return observations_of(kept, read_corners(table, recording.markers));
-  } catch (const json::exception&) {
-    return std::nullopt;  // damaged: the video is read once more
-  }
+  if (force_) return std::nullopt;
+  return read_kept_observations(file(""), recording, detect_);
 }
 
 void RunFolder::keep_observations(const Recording& recording, const TagObservations& observations) {
-  if (observations.observations.empty()) return;
-  const std::string table = observations_file(recording.camera_name, "csv");
-  write(table, observations_csv(observations));
-  if (recording.entry != RecordingEntry::kVideo) return;
-  json rejected = json::array();
-  for (const RejectedTag& tag : observations.rejected) {
-    rejected.push_back({{"frame", tag.frame}, {"id", tag.id.value}, {"reason", tag.reason}});
-  }
-  const json kept{{"key", detection_key(recording)},   {"sha256", sha256_of_file(file(table))},
-                  {"width", observations.width},       {"height", observations.height},
-                  {"times_s", observations.times_s},   {"rejected", std::move(rejected)},
-                  {"warnings", observations.warnings}, {"lens_known", observations.lens_known}};
-  write(observations_file(recording.camera_name, "json"), json_text(kept));
+  for (const auto& [name, content] : kept_observations(recording, observations, detect_))
+    write(name, content);
 }
 
 bool RunFolder::holds_answer() const {
@@ -254,16 +153,6 @@ void RunFolder::remove_stale_products() const {
   for (const std::string& name : own_products()) {
     if (!products_.contains(name) && std::ranges::find(known, name) != known.end()) remove(name);
   }
-}
-
-std::vector<InputFile> hash_inputs(const Recording& recording) {
-  std::vector<InputFile> inputs;
-  for (const fs::path& path : recording.files) {
-    const fs::path relative = path.lexically_relative(recording.folder);
-    const bool inside = !relative.empty() && *relative.begin() != "..";
-    inputs.push_back({inside ? relative.string() : path.filename().string(), sha256_of_path(path)});
-  }
-  return inputs;
 }
 
 std::vector<std::pair<std::string, std::string>> list_options(const RunOptions& options) {
@@ -301,7 +190,7 @@ json run_json(const RunSummary& run, const std::set<std::string>& products) {
           {"version", run.version},
           {"command", run.command},
           {"arguments", run.arguments},
-          {"working_folder", fs::current_path().string()},
+          {"working_folder", run.working_folder},
           {"recording", run.recording},
           {"entry", run.entry},
           {"inputs", inputs},
@@ -341,6 +230,8 @@ void describe_input(const Recording& recording, const Observed& observed, const 
   run.version = program_version();
   run.command = options.command_line;
   run.arguments = options.arguments;
+  run.working_folder =
+      (options.working_folder.empty() ? fs::current_path() : options.working_folder).string();
   run.inputs = hash_inputs(recording);
   run.options = list_options(options);
   run.frames = static_cast<int>(observed.measurements.times_s.size());

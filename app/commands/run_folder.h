@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.h"
+#include "app/commands/kept_observations.h"
 #include "app/explain/pipeline.h"
 #include "app/io/output_folder.h"
 #include "app/report/run_summary.h"
@@ -45,15 +46,11 @@ class RunFolder : public OutputFolder {
   void remove_stale_products() const;
 
  private:
-  [[nodiscard]] std::string detection_key(const Recording& recording) const;
-
   DetectOptions detect_;
   bool force_ = false;
   std::set<std::string> products_;  // of this run
 };
 
-/// Every file that was read, with its SHA-256.
-[[nodiscard]] std::vector<InputFile> hash_inputs(const Recording& recording);
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> list_options(
     const RunOptions& options);
 /// What every run says of its input: names, files, options, frames, markers, warnings of reading.

@@ -49,23 +49,39 @@ std::string in_a_name(std::string text) {
   return text;
 }
 
-void name_them(const std::vector<fs::path>& folders, std::vector<Recording>& recordings) {
+struct NamedFolder {
+  std::string name;
+  fs::path folder;
+};
+
+// By name, whichever way they were given.
+std::vector<NamedFolder> named_folders(const std::vector<fs::path>& folders) {
   std::map<std::string, int> count;
-  for (const Recording& recording : recordings) ++count[in_a_name(recording.name)];
+  for (const fs::path& folder : folders) ++count[in_a_name(recording_name(folder))];
   std::set<std::string> taken;
-  for (std::size_t k = 0; k < recordings.size(); ++k) {
-    std::string name = in_a_name(recordings[k].name);
+  std::vector<NamedFolder> out;
+  for (const fs::path& folder : folders) {
+    std::string name = in_a_name(recording_name(folder));
     if (count[name] > 1) {
-      const fs::path above = fs::absolute(folders[k]).lexically_normal().parent_path();
+      const fs::path above = fs::absolute(folder).lexically_normal().parent_path();
       name.insert(0, in_a_name(recording_name(above)) + "_");
     }
     if (!taken.insert(name).second) {
-      throw bad_request(folders[k].string(),
+      throw bad_request(folder.string(),
                         fmt::format("two of the recordings would be called {}", name),
                         "give their folders different names");
     }
-    recordings[k].camera_name = std::move(name);
+    out.push_back({std::move(name), folder});
   }
+  std::ranges::sort(out, {}, &NamedFolder::name);
+  return out;
+}
+
+std::vector<fs::path> all_folders(const RecordingPaths& paths,
+                                  const std::vector<fs::path>& further) {
+  std::vector<fs::path> out{paths.folder};
+  out.insert(out.end(), further.begin(), further.end());
+  return out;
 }
 
 Error not_alike(const Recording& of, const std::string& what, const std::string& remedy) {
@@ -153,25 +169,34 @@ void require_same_nominal(const std::vector<Recording>& recordings) {
 
 }  // namespace
 
+std::vector<std::string> recording_names(const RecordingPaths& paths,
+                                         const std::vector<fs::path>& further) {
+  std::vector<std::string> out;
+  for (NamedFolder& one : named_folders(all_folders(paths, further)))
+    out.push_back(std::move(one.name));
+  return out;
+}
+
 std::vector<Recording> read_recordings(const RecordingPaths& paths,
-                                       const std::vector<fs::path>& further) {
+                                       const std::vector<fs::path>& further, const Shard& shard) {
   std::vector<Recording> out;
   if (further.empty()) {
     out.push_back(read_recording(paths));
     return out;
   }
   require_no_single_files(paths);
-  std::vector<fs::path> folders{paths.folder};
-  folders.insert(folders.end(), further.begin(), further.end());
+  const std::vector<fs::path> folders = all_folders(paths, further);
   require_different(folders);
-  for (const fs::path& folder : folders) {
+  const std::vector<NamedFolder> named = named_folders(folders);
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (!shard.holds(k)) continue;
     RecordingPaths of_one = paths;
-    of_one.folder = folder;
+    of_one.folder = named[k].folder;
     out.push_back(read_recording(of_one));
     require_one_fixed_camera(out.back());
+    out.back().camera_name = named[k].name;
   }
-  name_them(folders, out);
-  std::ranges::sort(out, {}, &Recording::camera_name);
+  if (out.empty()) return out;
   for (const Recording& recording : out) require_same_robot(out.front(), recording);
   require_same_nominal(out);
   // Throws where the channels differ.

@@ -11,17 +11,25 @@
 #include <vector>
 
 #include "app/io/recording.h"
+#include "app/io/shard.h"
 
 namespace kinescope {
 
-/// The recording at `paths`; with those in `further` folders all, by name: that of the folder,
-/// where two are alike with the folder above it. Each of several has its name as `camera_name`.
+/// The names of the recordings in `paths.folder` and the `further` folders, in their order: that of
+/// the folder, where two are alike with the folder above it. Nothing is read. Throws bad_request
+/// where two have one name.
+[[nodiscard]] std::vector<std::string> recording_names(
+    const RecordingPaths& paths, const std::vector<std::filesystem::path>& further);
+
+/// The recording at `paths`; with those in `further` folders all, by name (recording_names()), or
+/// of them those of a shard. Each of several has its name as `camera_name`.
 /// Throws what reading throws, and bad_request or bad_input, in one line, where they cannot be
 /// combined: one recording twice, files named that are of one recording, several cameras, a
 /// flange.csv, no joints.csv, points held in targets, different entries, channels, units, markers
 /// or nominal robots.
 [[nodiscard]] std::vector<Recording> read_recordings(
-    const RecordingPaths& paths, const std::vector<std::filesystem::path>& further);
+    const RecordingPaths& paths, const std::vector<std::filesystem::path>& further,
+    const Shard& shard = {});
 
 /// All as one, before they were looked at: names, files, markers, nominal robot; the log is the
 /// first's. Of one recording, that.

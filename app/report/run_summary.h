@@ -71,6 +71,7 @@ struct RunSummary {
   std::string version;                 ///< of the program
   std::string command;                 ///< how to reproduce
   std::vector<std::string> arguments;  ///< the same, for a program
+  std::string working_folder;          ///< that they are seen from
   std::vector<InputFile> inputs;
   std::vector<std::pair<std::string, std::string>> options;  ///< name, value
   std::vector<StageTime> times;
