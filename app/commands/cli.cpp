@@ -62,7 +62,8 @@ std::string parse_error_words(const CLI::App& app, const CLI::ParseError& error,
   } else if (command == nullptr) {
     message = "name a command";
     remedy =
-        "run, merge, trace, correct, compare, plan, dynamics, predict, simulate, control, export, "
+        "run, merge, fleet, trace, correct, compare, plan, dynamics, predict, simulate, control, "
+        "export, "
         "contact, "
         "experiment, "
         "policy, inspect, camera or markers; see kinescope --help";
@@ -101,6 +102,14 @@ std::vector<std::string> words_of_all_shards(const CLI::App& run) {
   return words_of(run, {"--shard", "--output", "--threads", "--force", "--json", "--quiet"});
 }
 
+// Options of a fleet that are those of each of its runs.
+std::vector<std::string> words_of_all_robots(const CLI::App& fleet) {
+  std::vector<std::string> words =
+      words_of(fleet, {"--shard", "--output", "--force", "--json", "--quiet"});
+  words.erase(words.begin(), words.begin() + 2);  // its name, and the list of robots
+  return words;
+}
+
 ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& console) {
   if (app.got_subcommand("run")) {
     RunOptions options = finished_options(line);
@@ -108,6 +117,13 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     return run_command(options, console);
   }
   if (app.got_subcommand("merge")) return run_command(options_of_merge(line.merge), console);
+  if (app.got_subcommand("fleet")) {
+    FleetOptions& fleet = line.fleet;
+    if (fleet.output.empty()) fleet.output = log_name(fleet.table) + "_fleet";
+    fleet.run_words = words_of_all_robots(*app.get_subcommand("fleet"));
+    fleet.has_limits = !line.run.fail_on.empty();
+    return fleet_command(fleet, console);
+  }
   if (app.got_subcommand("trace")) return run_again(line, console);
   if (app.got_subcommand("correct")) return correct_command(line.correct, console);
   if (app.got_subcommand("compare")) return compare_command(line.compare, console);
@@ -254,6 +270,7 @@ void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* a
   line.compare.command_line = line.run.command_line;
   line.plan.command_line = line.run.command_line;
   line.merge.command_line = line.run.command_line;
+  line.fleet.command_line = line.run.command_line;
   add_commands(app, line);
 }
 

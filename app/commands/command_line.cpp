@@ -136,6 +136,17 @@ void add_detection_options(CLI::App& run, DetectOptions& detect) {
       ->group(group);
 }
 
+void add_judgement_options(CLI::App& run, RunOptions& options) {
+  run.add_option("--fail-on", options.fail_on,
+                 "Limit that turns the exit code to 5, such as \"held_out_px>0.2\" (in quotes: a "
+                 "shell takes > for itself); may be given again")
+      ->type_name("LIMIT")
+      ->allow_extra_args(false);
+  run.add_flag_callback(
+      "--no-trace", [&options] { options.trace = false; },
+      "Do not look for effects that the calibration lacks (trace.json)");
+}
+
 void add_run(CLI::App& app, CommandLine& line) {
   CLI::App& run = *app.add_subcommand("run", "From a recording to a URDF and a report");
   run.add_option_function<std::vector<std::string>>(
@@ -161,14 +172,7 @@ void add_run(CLI::App& app, CommandLine& line) {
   add_shard(run, line.run.shard,
             "Of several recordings look for the markers in every N-th only, beginning with the "
             "I-th, and leave them in the output folder as a part for kinescope merge");
-  run.add_option("--fail-on", line.run.fail_on,
-                 "Limit that turns the exit code to 5, such as \"held_out_px>0.2\" (in quotes: a "
-                 "shell takes > for itself); may be given again")
-      ->type_name("LIMIT")
-      ->allow_extra_args(false);
-  run.add_flag_callback(
-      "--no-trace", [&line] { line.run.trace = false; },
-      "Do not look for effects that the calibration lacks (trace.json)");
+  add_judgement_options(run, line.run);
   add_force(
       run, line.run.force,
       "Run every stage again, also where nothing changed, and replace what others wrote in the "
@@ -216,6 +220,38 @@ void add_merge(CLI::App& app, CommandLine& line) {
       fmt::format("Example:\n  kinescope run @recordings.txt --shard 1/2 --output part1\n"
                   "  kinescope run @recordings.txt --shard 2/2 --output part2\n"
                   "  kinescope merge part1 part2 --output robot_run\n\n{}",
+                  kExitCodes));
+}
+
+void add_fleet(CLI::App& app, CommandLine& line) {
+  CLI::App& fleet = *app.add_subcommand(
+      "fleet", "Many robots, each from its own recordings, and a table of them, worst first");
+  FleetOptions& options = line.fleet;
+  add_path_argument(fleet, "ROBOTS", options.table,
+                    "CSV file with the columns robot, recording; several rows of one robot are its "
+                    "several recordings",
+                    "FILE");
+  add_path(fleet, "--camera", line.run.recording.camera, "Intrinsics of all recordings");
+  add_path(fleet, "--tags", line.run.recording.tags, "Marker family and sizes of all");
+  add_path(fleet, "--nominal", line.run.recording.nominal, "Nominal robot (URDF) of all");
+  fleet
+      .add_option_function<std::string>(
+          "-o,--output", [&options](const std::string& text) { options.output = text; },
+          "Folder for a run folder a robot and the table (default: <list>_fleet here)")
+      ->type_name("FOLDER");
+  add_shard(fleet, options.shard,
+            "Run every N-th robot only, beginning with the I-th; the command without it then runs "
+            "what is not done yet, and writes the table");
+  add_estimation_options(fleet, line);
+  add_detection_options(fleet, line.run.detect);
+  add_judgement_options(fleet, line.run);
+  add_force(fleet, options.force,
+            "Run also what is done, and replace what others wrote in the output folder");
+  add_output_options(fleet, line.output);
+  fleet.footer(
+      fmt::format("With --fail-on the exit code is 5 where any robot is outside a limit or without "
+                  "an answer.\n\n"
+                  "Example:\n  kinescope fleet robots.csv --output fleet\n\n{}",
                   kExitCodes));
 }
 
@@ -507,6 +543,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
                   kExitCodes));
   add_run(app, line);
   add_merge(app, line);
+  add_fleet(app, line);
   add_trace(app, line);
   add_correct(app, line);
   add_compare(app, line);

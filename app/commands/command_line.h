@@ -25,6 +25,7 @@ struct OutputOptions {
 struct CommandLine {
   RunOptions run;
   MergeOptions merge;
+  FleetOptions fleet;
   DynamicsOptions dynamics;
   PredictOptions predict;
   SimulateOptions simulate;

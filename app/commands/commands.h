@@ -55,6 +55,19 @@ struct MergeOptions {
   std::string command_line;                  ///< for the report
 };
 
+/// Many robots, each with recordings of its own.
+struct FleetOptions {
+  std::filesystem::path table;         ///< CSV: robot, recording
+  std::vector<std::string> run_words;  ///< options of `run`, for all: "--folds=3"
+  bool has_limits = false;             ///< --fail-on is one of them
+  std::optional<Shard> shard = {};     ///< these robots alone, and no table
+  std::filesystem::path output;        ///< folder: a run folder a robot, and the table
+  bool force = false;                  ///< run again what is done, replace what others wrote
+  std::string command_line;            ///< for the products
+};
+
+[[nodiscard]] ExitCode fleet_command(const FleetOptions& options, const Console& console);
+
 /// On a finished run folder: the run's own command again, with detection taken from the folder.
 struct TraceCommandOptions {
   std::filesystem::path run_folder;

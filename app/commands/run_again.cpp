@@ -7,11 +7,24 @@
 #include "app/io/recording_list.h"
 
 namespace kinescope {
-namespace {
 
 namespace fs = std::filesystem;
 
-// Of words that run.json or part.json keeps, with paths as seen from here.
+RunOptions finished_options(const CommandLine& line, const fs::path& from) {
+  RunOptions out = line.run;
+  std::vector<fs::path> words{out.recording.folder};
+  words.insert(words.end(), out.further.begin(), out.further.end());
+  const std::vector<fs::path> all = listed_recordings(words, from);
+  out.recording.folder = all.front();
+  out.further.assign(all.begin() + 1, all.end());
+  // Of several recordings their names say it, once they are read.
+  if (out.output.empty() && out.further.empty())
+    out.output = recording_name(out.recording.folder) + "_run";
+  out.calibrate.estimate_time_offset = !line.no_time_offset;
+  out.calibrate.estimate_intrinsics = out.estimate_intrinsics;
+  return out;
+}
+
 RunOptions options_of_words(const RunAgain& again, const fs::path& file) {
   CLI::App app;
   CommandLine first;
@@ -31,23 +44,6 @@ RunOptions options_of_words(const RunAgain& again, const fs::path& file) {
   options.arguments = again.arguments;
   options.working_folder = again.working_folder;
   return options;
-}
-
-}  // namespace
-
-RunOptions finished_options(const CommandLine& line, const fs::path& from) {
-  RunOptions out = line.run;
-  std::vector<fs::path> words{out.recording.folder};
-  words.insert(words.end(), out.further.begin(), out.further.end());
-  const std::vector<fs::path> all = listed_recordings(words, from);
-  out.recording.folder = all.front();
-  out.further.assign(all.begin() + 1, all.end());
-  // Of several recordings their names say it, once they are read.
-  if (out.output.empty() && out.further.empty())
-    out.output = recording_name(out.recording.folder) + "_run";
-  out.calibrate.estimate_time_offset = !line.no_time_offset;
-  out.calibrate.estimate_intrinsics = out.estimate_intrinsics;
-  return out;
 }
 
 RunOptions options_of_run(const fs::path& folder) {

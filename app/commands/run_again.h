@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "app/commands/commands.h"
+#include "app/commands/run_folder.h"
 
 namespace kinescope {
 
@@ -15,6 +16,10 @@ struct CommandLine;
 /// are seen from the folder (empty: the current one).
 [[nodiscard]] RunOptions finished_options(const CommandLine& line,
                                           const std::filesystem::path& from = {});
+
+/// Of words that run.json or part.json keeps, paths as seen from here. Throws bad_input, naming the
+/// file that they are from, where they are no command line of `run`.
+[[nodiscard]] RunOptions options_of_words(const RunAgain& again, const std::filesystem::path& file);
 
 /// Of the run in the folder, its paths as seen from here, the folder its output. Throws bad_input
 /// where run.json does not say, or was written by something else.

@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "app/report/contact_summary.h"
+#include "app/report/quoted_cell.h"
 #include "app/report/result_values.h"
 
 namespace kinescope {
@@ -73,14 +74,6 @@ json calibration_json(const ContactCalibration& calibration, const LogClock& clo
             {"model_time_s", numbers(calibration.noise.model_time_s)}}}};
 }
 
-// A cell of a CSV file, in quotes where it needs them.
-std::string cell(const std::string& value) {
-  if (value.find_first_of(",\"\r\n") == std::string::npos) return value;
-  std::string out = "\"";
-  for (const char c : value) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
 std::string counted(std::size_t count) {
   return fmt::format("{} contact{}", count, count == 1 ? "" : "s");
 }
@@ -137,7 +130,7 @@ std::string contacts_csv(const ContactSummary& summary) {
     out += fmt::format("{},{},{},{},{},{},{}", clock.time_s(event.onset_s),
                        clock.time_s(event.end_s), clock.time_s(event.alarm_s),
                        link_name(summary, event.link), link_probability(event), event.open ? 1 : 0,
-                       cell(clock.trajectory(event.onset_s)));
+                       report::quoted_cell(clock.trajectory(event.onset_s)));
     for (Eigen::Index j = 0; j < event.torque.size(); ++j) {
       out += fmt::format(",{},{}", event.torque[j],
                          std::sqrt(std::max(0.0, event.torque_covariance(j, j))));
