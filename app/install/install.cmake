@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# What `cmake --install` copies, in components: `program` (with manual, completion and schemas), `development`
+# What `cmake --install` copies, in components: `program` (with manual, completion, schemas and files for clusters), `development`
 # (libraries, headers, CMake package, pkg-config files, examples) and, from app/python, `python`.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -14,6 +14,8 @@ install(FILES ${manual}/_kinescope COMPONENT program
         DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
 install(DIRECTORY app/io/schema DESTINATION ${CMAKE_INSTALL_DATADIR}/kinescope COMPONENT program
         FILES_MATCHING PATTERN *.json)
+install(PROGRAMS app/install/cluster/kinescope.slurm DESTINATION ${CMAKE_INSTALL_DATADIR}/kinescope/cluster COMPONENT program)
+install(FILES app/install/cluster/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/kinescope/cluster COMPONENT program)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 
 get_property(rooms GLOBAL PROPERTY KINESCOPE_ROOMS)
