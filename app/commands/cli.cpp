@@ -121,7 +121,7 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
     FleetOptions& fleet = line.fleet;
     if (fleet.output.empty()) fleet.output = log_name(fleet.table) + "_fleet";
     fleet.run_words = words_of_all_robots(*app.get_subcommand("fleet"));
-    fleet.has_limits = !line.run.fail_on.empty();
+    fleet.fail_on = line.run.fail_on;
     return fleet_command(fleet, console);
   }
   if (app.got_subcommand("trace")) return run_again(line, console);

@@ -59,7 +59,7 @@ struct MergeOptions {
 struct FleetOptions {
   std::filesystem::path table;         ///< CSV: robot, recording
   std::vector<std::string> run_words;  ///< options of `run`, for all: "--folds=3"
-  bool has_limits = false;             ///< --fail-on is one of them
+  std::vector<std::string> fail_on;    ///< limits, which are among them
   std::optional<Shard> shard = {};     ///< these robots alone, and no table
   std::filesystem::path output;        ///< folder: a run folder a robot, and the table
   bool force = false;                  ///< run again what is done, replace what others wrote

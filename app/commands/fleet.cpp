@@ -11,6 +11,7 @@
 #include "app/commands/cli.h"
 #include "app/commands/commands.h"
 #include "app/commands/kept_observations.h"
+#include "app/commands/limits.h"
 #include "app/commands/run_again.h"
 #include "app/explain/join_recordings.h"
 #include "app/io/json_text.h"
@@ -161,6 +162,7 @@ void print_fleet(const FleetSummary& summary, const FleetOptions& options, const
 }  // namespace
 
 ExitCode fleet_command(const FleetOptions& options, const Console& console) {
+  static_cast<void>(parse_limits(options.fail_on));  // said once, before the long work
   const std::vector<FleetEntry> entries = read_fleet(options.table);
   require_apart(options.output, {options.table});
   const OutputFolder folder(options.output, {.command = "fleet",
@@ -185,7 +187,7 @@ ExitCode fleet_command(const FleetOptions& options, const Console& console) {
   print_fleet(summary, options, console);
   // A shard is done when its robots were run; what they came to the table says.
   const bool any_failed = std::ranges::any_of(summary.robots, &FleetRobot::exit_code);
-  if (options.shard || !options.has_limits || !any_failed) return ExitCode::kDone;
+  if (options.shard || options.fail_on.empty() || !any_failed) return ExitCode::kDone;
   console.say_passed_limit(fleet_verdict(summary));
   return ExitCode::kOutsideLimits;
 }

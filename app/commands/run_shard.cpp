@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/kept_observations.h"
+#include "app/commands/limits.h"
 #include "app/commands/shard_parts.h"
 #include "app/explain/join_recordings.h"
 #include "app/explain/see_alone.h"
@@ -82,6 +83,7 @@ ExitCode run_shard(const RunOptions& options, const Console& console) {
   if (options.further.empty())
     throw bad_request("--shard", "one recording is not shared out",
                       "name several recordings, or leave --shard out");
+  static_cast<void>(parse_limits(options.fail_on));  // of the merged run: said before the long work
   const Shard shard = value_of(options.shard);
   const std::vector<Recording> recordings =
       read_recordings(options.recording, options.further, shard);

@@ -107,6 +107,8 @@ TEST_F(Fleet, ShardsRunTheRobotsAndTheTableTakesThemAsTheyAre) {
 
 TEST_F(Fleet, LimitsAreOfEveryRobotAndOfTheFleet) {
   folder_.write("robots.csv", "robot,recording\nsharp,first\nnoisy,second\n");
+  EXPECT_EQ(fleet({"--fail-on", "nonsense>9"}).code, 2) << "of no robot, but of the command";
+  EXPECT_FALSE(fs::exists(in("fleet")));
   EXPECT_EQ(fleet({"--fail-on", "held_out_px>9"}).code, 0);
   const Outcome outside = fleet({"--fail-on", "held_out_px>0.3"});
   EXPECT_EQ(outside.code, 5) << outside.err;

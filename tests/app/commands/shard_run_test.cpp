@@ -224,6 +224,8 @@ TEST_F(Shards, WhatCannotBeSharedOutIsRefused) {
   expect_refusal({"run", in("monday"), "--shard", "1/2", "-o", in("x")}, ExitCode::kBadRequest,
                  "one recording");
   expect_refusal(of_list({"--shard", "1/2", "-o", in("monday")}), ExitCode::kBadRequest, "monday");
+  expect_refusal(of_list({"--shard", "1/2", "--fail-on", "nonsense>1", "-o", in("x")}),
+                 ExitCode::kBadRequest, "nonsense");
   expect_refusal({"run", "@" + in("nowhere.txt")}, ExitCode::kBadInput, "nowhere.txt");
   folder_.write("list.txt", "# nothing\n");
   expect_refusal(of_list({}), ExitCode::kBadInput, "lists no recordings");
