@@ -8,7 +8,7 @@
 namespace kinescope {
 namespace {
 
-std::optional<int> whole_number(std::string_view text) {
+std::optional<int> whole_number(const std::string& text) {
   int out = 0;
   const char* const end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data(), end, out);
@@ -21,8 +21,8 @@ std::optional<int> whole_number(std::string_view text) {
 std::optional<Shard> parse_shard(std::string_view text) {
   const std::size_t slash = text.find('/');
   if (slash == std::string_view::npos) return std::nullopt;
-  const auto index = whole_number(text.substr(0, slash));
-  const auto count = whole_number(text.substr(slash + 1));
+  const auto index = whole_number(std::string(text.substr(0, slash)));
+  const auto count = whole_number(std::string(text.substr(slash + 1)));
   if (!index || !count || *index < 1 || *index > *count) return std::nullopt;
   return Shard{*index, *count};
 }

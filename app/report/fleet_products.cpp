@@ -42,7 +42,7 @@ auto rank_of(const FleetRobot& robot) {
 }
 
 std::string effect_words(const FleetEffect& effect) {
-  const std::string name = fmt::format("{} at {}", effect.effect, effect.place);
+  std::string name = fmt::format("{} at {}", effect.effect, effect.place);
   if (!effect.size) return name;
   const Quantity shown = effect.unit.empty() ? Quantity::kPlain : report::quantity_of(effect.unit);
   const std::string unit = shown == Quantity::kPlain ? " " + effect.unit : std::string();
