@@ -2,6 +2,7 @@
 #include "app/explain/explain.h"
 
 #include <algorithm>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "app/explain/explainer.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/partly_followed.h"
+#include "calib/tracks/even_stamps.h"
 #include "kinematics/log/exchanged_readings.h"
 #include "kinematics/log/readings_apart.h"
 
@@ -153,12 +155,62 @@ Explanation with_parts_followed(Explanation now, const Evidence& evidence,
   return now;
 }
 
+ChangedEvidence stamped_evenly(const Evidence& evidence, const std::vector<double>& times_s) {
+  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
+  Measurements& measured = out.observed.measurements;
+  for (std::vector<double>* stamps :
+       {&measured.times_s, &measured.poses.times_s, &measured.points.times_s,
+        &out.observed.tags.times_s, &out.tracks.times_s}) {
+    if (stamps->size() == times_s.size()) *stamps = times_s;
+  }
+  return out;
+}
+
+bool shows_postures(const JointLog& log, const std::vector<double>& times_s) {
+  std::vector<int> channels(log.channels.size());
+  std::iota(channels.begin(), channels.end(), 0);
+  return log.empty() || is_posture_log(log, times_s, channels);
+}
+
+// Frames of a camera that runs evenly, stamped as they arrived, where the markers' motion says so.
+std::optional<ChangedEvidence> with_even_stamps(const Evidence& evidence,
+                                                const ExplainOptions& options,
+                                                std::vector<std::string>& warnings) {
+  const Measurements& measured = evidence.observed.measurements;
+  if (!measured.camera_of_frame.empty() || evidence.recording.nominal ||
+      shows_postures(evidence.recording.log, measured.times_s))
+    return std::nullopt;
+  const std::optional<EvenStamps> even = even_stamps(measured.times_s);
+  if (!even) return std::nullopt;
+  ChangedEvidence out = stamped_evenly(evidence, even->times_s);
+  const Explanation as_stamped = plainly_explained(evidence, options);
+  ExplainOptions alike = options;
+  if (as_stamped.fitted) alike.calibrate.fold_of_frame = folds_of(as_stamped.fitted->calibration);
+  const Explanation evenly =
+      plainly_explained({out.recording, out.observed, out.tracks, evidence.camera}, alike);
+  if (!evenly.fitted || !is_better(evenly, as_stamped, measured)) return std::nullopt;
+  warnings.push_back(fmt::format(
+      "the frames' stamps scatter by {:.3g} ms (standard deviation) about a camera that "
+      "runs at {:.5g} Hz, and the markers move as if they did not: taken as even; use "
+      "stamps of the camera's own clock",
+      1e3 * even->scatter_s, even->rate_hz));
+  return out;
+}
+
+Explanation explained_as_stamped(const Evidence& evidence, const ExplainOptions& options,
+                                 std::vector<std::string>& warnings) {
+  return with_parts_followed(with_exchanged_back(evidence, options, warnings), evidence, options,
+                             warnings);
+}
+
 }  // namespace
 
 Explanation explain(const Evidence& evidence, const ExplainOptions& options,
                     std::vector<std::string>& warnings) {
-  return with_parts_followed(with_exchanged_back(evidence, options, warnings), evidence, options,
-                             warnings);
+  const std::optional<ChangedEvidence> even = with_even_stamps(evidence, options, warnings);
+  if (!even) return explained_as_stamped(evidence, options, warnings);
+  return explained_as_stamped({even->recording, even->observed, even->tracks, evidence.camera},
+                              options, warnings);
 }
 
 }  // namespace kinescope

@@ -128,15 +128,23 @@ class Explainer {
 
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
     if (recording().nominal) return of_nominal(warnings);
-    Structure believed = evidence_.structure ? whole_of(as_robot(recording(), *evidence_.structure),
-                                                        evidence_.tracks)
-                                             : structure_of(evidence_.tracks);
+    Structure believed = believed_structure();
     Explanation first = plainly_fitted(believed);
     ExplainOptions options = options_;
     if (first.fitted && options.calibrate.fold_of_frame.empty())
       options.calibrate.fold_of_frame = folds_of(first.fitted->calibration);
     return Explainer(evidence_, std::move(options), std::move(believed))
         .best_beside(std::move(first));
+  }
+
+  [[nodiscard]] Explanation plainly_explained() const {
+    try {
+      return plainly_fitted(believed_structure());
+    } catch (const Error& error) {
+      Explanation out = begun();
+      keep_if_undetermined(error, out);
+      return out;
+    }
   }
 
   [[nodiscard]] std::optional<Explanation> carried_over(const Explanation& of) const {
@@ -147,6 +155,11 @@ class Explainer {
   }
 
  private:
+  [[nodiscard]] Structure believed_structure() const {
+    if (!evidence_.structure) return structure_of(evidence_.tracks);
+    return whole_of(as_robot(recording(), *evidence_.structure), evidence_.tracks);
+  }
+
   /// `first`: a plain fit.
   [[nodiscard]] Explanation best_beside(Explanation first) const {
     Tried tried;
@@ -625,6 +638,10 @@ bool is_better(const Explanation& one, const Explanation& other, const Measureme
 Explanation explained(const Evidence& evidence, const ExplainOptions& options,
                       std::vector<std::string>& warnings) {
   return Explainer(evidence, options).explained(warnings);
+}
+
+Explanation plainly_explained(const Evidence& evidence, const ExplainOptions& options) {
+  return Explainer(evidence, options).plainly_explained();
 }
 
 std::optional<Explanation> carried_over(const Evidence& evidence, const ExplainOptions& options,

@@ -15,6 +15,10 @@ namespace kinescope {
 [[nodiscard]] Explanation explained(const Evidence& evidence, const ExplainOptions& options,
                                     std::vector<std::string>& warnings);
 
+/// The best structure with its parameters, effects apart.
+[[nodiscard]] Explanation plainly_explained(const Evidence& evidence,
+                                            const ExplainOptions& options);
+
 /// The robot and the effects of an account of other evidence, fitted to this; nothing where that
 /// found no robot.
 [[nodiscard]] std::optional<Explanation> carried_over(const Evidence& evidence,

@@ -377,7 +377,8 @@ int main(int argc, char** argv) {
                                         {"dropped_column", Damage::kDroppedColumn},
                                         {"swapped_columns", Damage::kSwappedColumns},
                                         {"exchanged_halfway", Damage::kExchangedHalfway},
-                                        {"forgotten_size", Damage::kForgottenSize}}));
+                                        {"forgotten_size", Damage::kForgottenSize},
+                                        {"late_frames", Damage::kLateFrames}}));
   app.add_option("--keep", request.keep, "leave the recordings and their run folders there");
   app.add_option("--program", request.program, "kinescope of another build, to compare");
   return kinescope::run_experiment(app, argc, argv, [&] {

@@ -175,6 +175,21 @@ std::string joints_csv(const UndeclaredCase& of, World& world, Damage damage) {
   return out;
 }
 
+// When each frame came: never before the one before it.
+std::vector<double> arrivals_s(const std::vector<double>& times_s, Rng& rng) {
+  constexpr double kLate_s = 0.008;  // in the mean
+  constexpr double kHeldUp = 0.01;   // of the frames, until the next ones are there, too
+  constexpr double kHeldUp_s = 0.1;
+  constexpr double kApart_s = 1e-4;
+  std::vector<double> out;
+  for (const double t : times_s) {
+    double arrival = t - kLate_s * std::log(1.0 - rng.uniform());
+    if (rng.uniform() < kHeldUp) arrival += kHeldUp_s;
+    out.push_back(out.empty() ? arrival : std::max(arrival, out.back() + kApart_s));
+  }
+  return out;
+}
+
 std::string corners_csv(const World& world) {
   std::string out = "t,tag,corner,u,v\n";
   for (const TagObservation& seen : world.measurements.corners) {
@@ -279,6 +294,10 @@ UndeclaredCase undeclared_case(int number, Damage damage) {
 
 World write_case(const UndeclaredCase& of, const std::filesystem::path& folder, Damage damage) {
   World world = truth::make_effect_world(of.world);
+  if (damage == Damage::kLateFrames && !of.postures) {
+    Rng rng = Rng::from_name("arrivals", static_cast<std::uint64_t>(of.number));
+    world.measurements.times_s = arrivals_s(world.measurements.times_s, rng);
+  }
   if (of.postures) {
     write_file_atomically(folder / "poses.csv", poses_csv(of, world));
   } else {

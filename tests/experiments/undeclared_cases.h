@@ -31,7 +31,8 @@ enum class Damage {
   kDroppedColumn,
   kSwappedColumns,
   kExchangedHalfway,  ///< two columns, from the middle of the log on
-  kForgottenSize
+  kForgottenSize,
+  kLateFrames,  ///< stamped as they arrive, some together
 };
 
 struct UndeclaredCase {

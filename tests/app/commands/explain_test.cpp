@@ -147,6 +147,19 @@ TEST(Explain, ColumnsExchangedHalfwayAreSeenInTheLogBesideAnEffect) {
   EXPECT_EQ(only_effect(answered), "clock_jump clock");
 }
 
+// As they arrived, some together: their scatter of 13 ms was weighed, and 1.4 px passed for noise.
+TEST(Explain, FramesThatAreStampedAsTheyArriveAreTakenAsEven) {
+  const Answered answered = run_case(10, Damage::kLateFrames);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_NE(answered.outcome.err.find("taken as even"), std::string::npos) << answered.outcome.err;
+  // Where the first one begins, and how long they take, the stamps tell to fractions of a
+  // millisecond.
+  for (const nlohmann::json& effect : answered.trace["accepted"])
+    EXPECT_EQ(effect["place"], "clock");
+  EXPECT_LT(answered.trace["held_out_after"]["value"].get<double>(), 0.044);
+}
+
 // A line of `sizes:` that was forgotten: the marker moves with no joint.
 TEST(Explain, AForgottenSizeIsShownByWhatMovesAboutTheSamePoint) {
   const Answered answered = run_case(10, Damage::kForgottenSize);
