@@ -147,7 +147,8 @@ TEST(Explain, ColumnsExchangedHalfwayAreSeenInTheLogBesideAnEffect) {
   EXPECT_EQ(only_effect(answered), "clock_jump clock");
 }
 
-// As they arrived, some together: their scatter of 13 ms was weighed, and 1.4 px passed for noise.
+// As they arrived, some together: weighed by their scatter, the error on unseen data was ten times
+// the noise.
 TEST(Explain, FramesThatAreStampedAsTheyArriveAreTakenAsEven) {
   const Answered answered = run_case(10, Damage::kLateFrames);
   EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
