@@ -9,7 +9,7 @@ packages=(
   libopencv-dev libapriltag-dev libopenblas-pthread-dev libceres-dev libeigen3-dev liburdfdom-dev
   libtinyxml2-dev libyaml-cpp-dev libcli11-dev libfmt-dev nlohmann-json3-dev libssl-dev zlib1g-dev libsvm-dev libdlib-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev
-  libzstd-dev libsnappy-dev liblz4-dev libbz2-dev libsqlite3-dev
+  libzstd-dev libsnappy-dev liblz4-dev libbz2-dev libsqlite3-dev libcpp-httplib-dev
   esbuild libjs-three
   pybind11-dev python3-dev python3-numpy
 )

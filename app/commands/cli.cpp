@@ -66,7 +66,7 @@ std::string parse_error_words(const CLI::App& app, const CLI::ParseError& error,
         "export, "
         "contact, "
         "experiment, "
-        "policy, inspect, camera or markers; see kinescope --help";
+        "policy, inspect, camera, markers or capture; see kinescope --help";
   } else {
     const std::vector<std::string> extra = command->remaining();
     const auto option =
@@ -180,6 +180,7 @@ ExitCode run_parsed(const CLI::App& app, CommandLine& line, const Console& conso
           log_settings(line.settings, line.inspect.recording.folder, line.inspect.data);
     return inspect_command(line.inspect, console);
   }
+  if (app.got_subcommand("capture")) return capture_command(line.capture, console);
   if (app.got_subcommand("markers")) return markers_command(line.markers, console);
   return camera_command(line.camera, console);
 }

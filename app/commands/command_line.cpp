@@ -14,6 +14,7 @@
 #include "app/commands/simulation_command_line.h"
 #include "app/commands/torque_command_line.h"
 #include "app/io/nearest_name.h"
+#include "calib/vision/tag_detector.h"
 #include "kinematics/core/csv.h"
 
 namespace kinescope {
@@ -529,6 +530,77 @@ void add_markers(CLI::App& app, CommandLine& line) {
       fmt::format("Example:\n  kinescope markers --ids 0-7 --size 0.04\n\n{}", kExitCodes));
 }
 
+void add_capture_inputs(CLI::App& capture, CaptureOptions& options) {
+  const char* group = "What is known";
+  const auto add_file = [&](const char* name, std::optional<std::filesystem::path>& file,
+                            const char* help) {
+    capture
+        .add_option_function<std::string>(
+            name, [&file](const std::string& text) { file = text; }, help)
+        ->check(refuse_empty)
+        ->type_name("FILE")
+        ->group(group);
+  };
+  capture
+      .add_option("--size", options.size_m, "Edge of the markers' black square, m (such as 0.04)")
+      ->check(length_m())
+      ->type_name("M")
+      ->group(group);
+  capture
+      .add_option("--family", options.family,
+                  "As in tags.yaml (default: tag36h11, or what is seen where it is not)")
+      ->check(one_of(known_families()))
+      ->type_name("NAME")
+      ->group(group);
+  add_file("--tags", options.tags,
+           "Marker family and sizes, to be copied (default: tags.yaml in the folder)");
+  add_file("--camera", options.camera,
+           "Intrinsics, to be copied (default: camera.yaml in the folder)");
+  capture
+      .add_option("--joints", options.joints,
+                  "Joint values as lines of CSV, a header first: - (standard input), a pipe, or a "
+                  "file that grows; stamped by its column t, else when they are received")
+      ->check(refuse_empty)
+      ->type_name("FILE")
+      ->group(group);
+}
+
+void add_capture(CLI::App& app, CommandLine& line) {
+  CLI::App& capture = *app.add_subcommand(
+      "capture", "A recording from a running camera, with a page that says what it lacks");
+  CaptureOptions& options = line.capture;
+  capture
+      .add_option(
+          "SOURCE", options.source,
+          "Camera (0, /dev/video0), stream (rtsp://.., http://..), or a video file, which is "
+          "played at its own speed")
+      ->check(refuse_empty)
+      ->required()
+      ->type_name("SOURCE");
+  capture
+      .add_option_function<std::string>(
+          "-o,--output", [&options](const std::string& text) { options.output = text; },
+          "Folder of the recording to make")
+      ->required()
+      ->type_name("FOLDER");
+  add_capture_inputs(capture, options);
+  capture
+      .add_option("--port", options.port,
+                  "Port of the page on 127.0.0.1; 0 (default): any that is free")
+      ->check(number_in(0, 65535))
+      ->type_name("N");
+  capture.add_flag("--no-page", options.no_page, "Without a page: the recording begins at once");
+  capture.add_option("--seconds", options.seconds, "Longest duration of the recording")
+      ->check(number_in(0.1, 86400))
+      ->type_name("S");
+  add_force(capture, options.force, "Replace the recording that is in the folder");
+  add_output_options(capture, line.output);
+  capture.footer(fmt::format(
+      "Examples:\n  kinescope capture 0 --size 0.04 -o arm\n  read_joints | kinescope capture "
+      "rtsp://camera/stream --size 0.04 --joints - -o arm\n\n{}",
+      kExitCodes));
+}
+
 }  // namespace
 
 void add_commands(CLI::App& app, CommandLine& line) {
@@ -559,6 +631,7 @@ void add_commands(CLI::App& app, CommandLine& line) {
   add_inspect(app, line);
   add_camera(app, line);
   add_markers(app, line);
+  add_capture(app, line);
 }
 
 }  // namespace kinescope

@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "app/commands/capture.h"
 #include "app/commands/commands.h"
 #include "app/commands/markers.h"
 #include "app/commands/policy.h"
@@ -36,6 +37,7 @@ struct CommandLine {
   PolicyCommandOptions policy;
   InspectOptions inspect;
   CameraOptions camera;
+  CaptureOptions capture;
   MarkersOptions markers;
   TraceCommandOptions trace;
   CorrectOptions correct;

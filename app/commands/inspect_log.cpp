@@ -9,6 +9,7 @@
 
 #include "app/commands/inspection.h"
 #include "app/explain/log_doubts.h"
+#include "app/explain/recording_advice.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/exchanged_readings.h"
 #include "kinematics/log/readings_apart.h"
@@ -16,42 +17,22 @@
 namespace kinescope {
 namespace {
 
-constexpr double kLongGapS = 0.5;       ///< longer gaps are not bridged by the interpolation
-constexpr double kLittleMotion = 0.01;  ///< rad or m; an axis seen over less is hardly determined
-constexpr double kUnevenShare = 0.5;    ///< of the mean step
-
-/// Whole numbers over a wide range are encoder ticks; more than a turn in either direction are
-/// degrees, or mm.
-std::string guess_unit(const Eigen::VectorXd& values) {
-  const double range = values.maxCoeff() - values.minCoeff();
-  const bool whole = (values.array() == values.array().round()).all();
-  if (whole && range > 20.0) return "ticks?";
-  constexpr double kMoreThanATurn = 2.5 * std::numbers::pi;
-  if (values.cwiseAbs().maxCoeff() > kMoreThanATurn && values.cwiseAbs().maxCoeff() <= 400.0)
-    return "deg or mm?";
-  return "rad or m";
-}
+constexpr double kLongGapS = 0.5;     ///< longer gaps are not bridged by the interpolation
+constexpr double kUnevenShare = 0.5;  ///< of the mean step
 
 ChannelFacts look_at_channel(const JointLog& log, Eigen::Index channel,
                              const RecordingSettings& settings, std::vector<Finding>& findings) {
   const Eigen::VectorXd values = log.values.col(channel);
   ChannelFacts facts{.name = log.channels[static_cast<std::size_t>(channel)], .unit = {}};
-  facts.lower = values.minCoeff();
-  facts.upper = values.maxCoeff();
+  const ChannelSpan span{values.minCoeff(), values.maxCoeff(),
+                         (values.array() == values.array().round()).all()};
+  facts.lower = span.lower;
+  facts.upper = span.upper;
   const auto declared = settings.units.find(facts.name);
-  facts.unit = declared == settings.units.end() ? guess_unit(values) : declared->second;
-  facts.moves = facts.upper - facts.lower > 1e-9 * std::max(1.0, std::abs(facts.upper));
-  if (!facts.moves) {
-    findings.push_back(
-        {false, fmt::format("channel '{}' never changes: its joint cannot be found; move it, "
-                            "or leave it out",
-                            facts.name)});
-  } else if (facts.unit == "rad or m" && facts.upper - facts.lower < kLittleMotion) {
-    findings.push_back(
-        {false, fmt::format("channel '{}' moves by {:.4f} only: its axis will be uncertain; "
-                            "record it over a larger range",
-                            facts.name, facts.upper - facts.lower)});
-  }
+  facts.unit = declared == settings.units.end() ? guess_unit(span) : declared->second;
+  facts.moves = span.moves();
+  if (auto advice = channel_advice(facts.name, facts.unit, span))
+    findings.push_back({false, std::move(*advice)});
   return facts;
 }
 

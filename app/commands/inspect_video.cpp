@@ -11,6 +11,7 @@
 
 #include "app/commands/inspection.h"
 #include "app/explain/families_in_video.h"
+#include "app/explain/recording_advice.h"
 #include "calib/camera/camera_file.h"
 #include "calib/vision/double_ids.h"
 #include "calib/vision/sightings.h"
@@ -21,77 +22,21 @@ namespace kinescope {
 namespace {
 
 constexpr int kFramesSearched = 20;
-constexpr int kFramesDecoded = 900;      ///< 30 s at 30 Hz, a second or two of work
-constexpr double kSmallMarkerPx = 20.0;  ///< below this the pose of a marker flips and jitters
-constexpr double kBlurredPx = 2.0;
-constexpr double kLowContrast = 40.0;
-
-/// Grey value between pixels; nothing outside the image.
-std::optional<double> sample(const ImageView& image, const Eigen::Vector2d& at) {
-  const int x = static_cast<int>(std::floor(at.x()));
-  const int y = static_cast<int>(std::floor(at.y()));
-  if (x < 0 || y < 0 || x + 1 >= image.width || y + 1 >= image.height) return std::nullopt;
-  const std::uint8_t* p = image.data + std::ptrdiff_t{y} * image.stride + x;
-  const double u = at.x() - x;
-  const double v = at.y() - y;
-  return (1 - v) * ((1 - u) * p[0] + u * p[1]) +
-         v * ((1 - u) * p[image.stride] + u * p[image.stride + 1]);
-}
-
-struct Step {
-  double contrast = 0.0;
-  double blur_px = 0.0;
-};
-
-/// The step of grey values across an edge, at its middle: its height, and the sigma of the blur
-/// that would give its steepest slope (a blurred step has slope height / (sigma sqrt(2 pi))).
-std::optional<Step> step_across(const ImageView& image, const Eigen::Vector2d& a,
-                                const Eigen::Vector2d& b) {
-  constexpr double kSpacingPx = 0.5;
-  const Eigen::Vector2d along = b - a;
-  const Eigen::Vector2d normal = Eigen::Vector2d(along.y(), -along.x()).normalized();
-  const double reach = std::clamp(along.norm() / 10.0, 2.0, 8.0);
-  std::vector<double> profile;
-  const auto steps = static_cast<int>(std::floor(2.0 * reach / kSpacingPx));
-  for (int k = 0; k <= steps; ++k) {
-    const auto value = sample(image, 0.5 * (a + b) + (k * kSpacingPx - reach) * normal);
-    if (!value) return std::nullopt;
-    profile.push_back(*value);
-  }
-  const auto [low, high] = std::ranges::minmax(profile);
-  double slope = 0.0;
-  for (std::size_t i = 1; i < profile.size(); ++i) {
-    slope = std::max(slope, std::abs(profile[i] - profile[i - 1]) / kSpacingPx);
-  }
-  if (slope <= 0.0) return std::nullopt;
-  return Step{high - low, (high - low) / (slope * std::sqrt(2.0 * std::numbers::pi))};
-}
+constexpr int kFramesDecoded = 900;  ///< 30 s at 30 Hz, a second or two of work
 
 /// What the searched frames showed of one marker.
 struct Sightings {
-  std::vector<double> edges_px, contrasts, blurs_px;
+  MarkerEdges edges;
   int frames = 0;
   int doubled = 0;  ///< frames in which it was seen in two places
 };
-
-void add_sighting(Sightings& out, const ImageView& image, const TagObservation& tag) {
-  for (std::size_t i = 0; i < tag.corners_px.size(); ++i) {
-    const Eigen::Vector2d& a = tag.corners_px[i];
-    const Eigen::Vector2d& b = tag.corners_px[(i + 1) % tag.corners_px.size()];
-    out.edges_px.push_back((b - a).norm());
-    if (const auto step = step_across(image, a, b)) {
-      out.contrasts.push_back(step->contrast);
-      out.blurs_px.push_back(step->blur_px);
-    }
-  }
-}
 
 void add_frame(std::map<TagId, Sightings>& seen, const ImageView& image,
                const std::vector<TagObservation>& tags) {
   std::map<TagId, const TagObservation*> first;
   std::set<TagId> doubled;
   for (const TagObservation& tag : tags) {
-    add_sighting(seen[tag.id], image, tag);
+    add_edges(seen[tag.id].edges, image, tag);
     const auto [other, is_first] = first.emplace(tag.id, &tag);
     if (!is_first && !is_same_place(tag.corners_px, other->second->corners_px)) {
       doubled.insert(tag.id);
@@ -120,9 +65,9 @@ std::vector<MarkerFacts> summarise(const std::map<TagId, Sightings>& seen,
     out.push_back({.id = id,
                    .size_m = markers.size_m(id),
                    .frames = sightings.frames,
-                   .edge_px = median_of(sightings.edges_px),
-                   .contrast = median_of(sightings.contrasts),
-                   .blur_px = median_of(sightings.blurs_px)});
+                   .edge_px = median_of(sightings.edges.edges_px),
+                   .contrast = median_of(sightings.edges.contrasts),
+                   .blur_px = median_of(sightings.edges.blurs_px)});
   }
   return out;
 }
@@ -149,34 +94,16 @@ void judge_markers(const Recording& recording, const VideoFacts& facts,
                               id)});
       continue;
     }
-    if (marker.edge_px < kSmallMarkerPx) {
-      findings.push_back(
-          {false, fmt::format("tag {} is {:.0f} px wide only: film closer or print it larger "
-                              "({:.0f} px and more)",
-                              id, marker.edge_px, 1.5 * kSmallMarkerPx)});
-    }
-    if (marker.blur_px > kBlurredPx) {
-      findings.push_back(
-          {false, fmt::format("tag {} is blurred (sigma {:.1f} px): focus, light, shorter "
-                              "exposure",
-                              id, marker.blur_px)});
-    }
-    if (marker.contrast > 0.0 && marker.contrast < kLowContrast) {
-      findings.push_back(
-          {false, fmt::format("tag {} has little contrast ({:.0f} of 255): more light", id,
-                              marker.contrast)});
-    }
+    for (std::string& advice :
+         marker_advice(marker.id, marker.edge_px, marker.blur_px, marker.contrast))
+      findings.push_back({false, std::move(advice)});
   }
   for (const auto& [id, size] : recording.markers.sizes_m) {
     if (std::ranges::find(facts.markers, id, &MarkerFacts::id) != facts.markers.end()) continue;
-    findings.push_back(
-        {false, fmt::format("tag {} is listed in tags.yaml but was not seen in the {} frames "
-                            "searched",
-                            id.value, facts.frames_searched)});
+    findings.push_back({false, listed_but_not_seen(id, facts.frames_searched)});
   }
   if (facts.markers.size() == 1) {
-    findings.push_back(
-        {false, "one marker only: at most one joint, between it and the camera, can be found"});
+    findings.push_back({false, kOneMarkerOnly});
   }
 }
 

@@ -14,8 +14,10 @@ namespace kinescope::report {
 using ContentsEntry = std::pair<std::string_view, std::string_view>;
 
 /// From the doctype to the end of the contents; <main> is to follow. Texts are escaped here.
+/// `policy`: what the page may beside showing itself, as directives of its content security policy.
 [[nodiscard]] std::string page_begin(std::string_view brand, std::string_view title,
                                      std::string_view note, std::string_view version,
-                                     std::span<const ContentsEntry> contents);
+                                     std::span<const ContentsEntry> contents,
+                                     std::string_view policy = "");
 
 }  // namespace kinescope::report

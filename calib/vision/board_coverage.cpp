@@ -2,59 +2,29 @@
 #include "calib/vision/board_coverage.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
 
+#include "calib/vision/image_grid.h"
+
 namespace kinescope {
 namespace {
 
-constexpr int kGridColumns = 10;
-constexpr int kGridRows = 8;
-constexpr double kGoodTilt_deg = 35.0;
-constexpr double kGoodCoverage = 0.6;
 constexpr double kGoodFocalSigma = 0.005;
 constexpr int kGoodViews = 10;
-
-std::string empty_side(const IntrinsicCalibration& result) {
-  std::array<int, 4> cells{};  // seen cells in the left, right, upper, lower third
-  for (int r = 0; r < kGridRows; ++r) {
-    for (int c = 0; c < kGridColumns; ++c) {
-      if (result.coverage_counts[static_cast<std::size_t>(r * kGridColumns + c)] == 0) continue;
-      if (c < 3) ++cells[0];
-      if (c >= kGridColumns - 3) ++cells[1];
-      if (r < 3) ++cells[2];
-      if (r >= kGridRows - 3) ++cells[3];
-    }
-  }
-  constexpr std::array<std::string_view, 4> kNames = {"left", "right", "upper", "lower"};
-  constexpr std::array<int, 4> kWhole = {3 * kGridRows, 3 * kGridRows, 3 * kGridColumns,
-                                         3 * kGridColumns};
-  std::size_t worst = 0;
-  for (std::size_t i = 1; i < 4; ++i) {
-    if (cells[i] * kWhole[worst] < cells[worst] * kWhole[i]) worst = i;
-  }
-  return std::string(kNames[worst]);
-}
 
 }  // namespace
 
 void count_coverage(const BoardAlbum& album, const std::vector<std::size_t>& used,
                     IntrinsicCalibration& result) {
-  result.coverage_counts.assign(static_cast<std::size_t>(kGridColumns * kGridRows), 0);
+  result.coverage_counts = empty_grid();
   for (const std::size_t i : used) {
-    for (const Eigen::Vector2d& p : album.sights[i].pixels) {
-      const int c = std::clamp(static_cast<int>((p.x() + 0.5) / album.width * kGridColumns), 0,
-                               kGridColumns - 1);
-      const int r =
-          std::clamp(static_cast<int>((p.y() + 0.5) / album.height * kGridRows), 0, kGridRows - 1);
-      ++result.coverage_counts[static_cast<std::size_t>(r * kGridColumns + c)];
-    }
+    for (const Eigen::Vector2d& p : album.sights[i].pixels)
+      count_point(result.coverage_counts, p, album.width, album.height);
   }
-  const auto seen = std::ranges::count_if(result.coverage_counts, [](int n) { return n > 0; });
-  result.coverage = static_cast<double>(seen) / (kGridColumns * kGridRows);
+  result.coverage = covered_share(result.coverage_counts);
 }
 
 double tilt_range_deg(const std::vector<ViewFit>& fits) {
@@ -78,7 +48,7 @@ void add_board_warnings(IntrinsicCalibration& result, int used) {
     warn(
         fmt::format("corners cover {:.0f} % of the image: photograph the board at the image's rim, "
                     "above all at the {} side",
-                    100.0 * result.coverage, empty_side(result)));
+                    100.0 * result.coverage, emptiest_side(result.coverage_counts)));
   }
   if (result.tilt_range_deg < kGoodTilt_deg) {
     warn(fmt::format(
