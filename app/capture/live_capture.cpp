@@ -96,20 +96,21 @@ class Shared {
     const std::scoped_lock lock(mutex_);
     return {status_.warnings.begin() + static_cast<std::ptrdiff_t>(passed), status_.warnings.end()};
   }
-  /// For the page.
+  /// For the page, which asks for the picture after it.
   [[nodiscard]] std::string state() {
     const CaptureStatus shown = status();
     FrameView now;
     {
       const std::scoped_lock lock(mutex_);
       now = now_;
+      shown_ = jpeg_;  // the picture that goes with these outlines
     }
     if (shown.phase == "ended") end_was_shown = true;
     return live_json(shown, now).dump();
   }
   [[nodiscard]] std::vector<std::uint8_t> picture() const {
     const std::scoped_lock lock(mutex_);
-    return jpeg_;
+    return shown_;
   }
   std::atomic<bool> end_was_shown = false;
 
@@ -120,6 +121,7 @@ class Shared {
   double begin_s_ = 0.0;
   FrameView now_;
   std::vector<std::uint8_t> jpeg_;
+  std::vector<std::uint8_t> shown_;
 };
 
 /// Looks for markers in the newest frame, in a thread of its own.

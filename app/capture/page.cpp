@@ -120,12 +120,12 @@ async function show_picture() {
 async function turn() {
   try {
     const state = await (await fetch("/state")).json();
+    if (state.phase !== "ended") await show_picture();
     show(state);
     if (state.phase === "ended") {
       document.documentElement.dataset.capture = "ended";
       return;
     }
-    await show_picture();
     document.documentElement.dataset.capture = "shown";
   } catch (error) {
     at("phase").textContent = "kinescope capture is not running any more";
