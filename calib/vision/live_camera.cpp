@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <thread>
@@ -88,6 +89,8 @@ class OpenCvCamera final : public LiveCamera {
  public:
   explicit OpenCvCamera(const NamedSource& source) : source_(source) {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    // OpenCV lets FFmpeg's errors through, with addresses in them; -8 is AV_LOG_QUIET.
+    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     open();
     first_ = grab();
     if (!first_) {

@@ -176,6 +176,9 @@ TEST(Capture, RefusesWhatCannotBe) {
                  "/dev/video97: no such camera");
   expect_refusal({"capture", "nowhere.mp4", "-o", out, "--size", "0.04"}, ExitCode::kBadInput,
                  "nowhere.mp4: no such camera, stream or file");
+  // Port 1 is nobody's; FFmpeg's own words would make it two lines.
+  expect_refusal({"capture", "http://me:secret@127.0.0.1:1/", "-o", out, "--size", "0.04"},
+                 ExitCode::kBadInput, "http://127.0.0.1:1/: no picture comes from it");
   expect_refusal({"capture", video, "-o", out}, ExitCode::kBadRequest, "--size");
   expect_refusal({"capture", video, "-o", out, "--size", "0.04", "--no-page", "--joints", "none"},
                  ExitCode::kBadInput, "none: joint values cannot be read");
