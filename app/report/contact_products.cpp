@@ -97,12 +97,23 @@ std::string found_words(const ContactSummary& summary) {
 }
 
 std::string unfit_words(const ContactSummary& summary) {
-  if (summary.unfit.empty()) return "";
-  return fmt::format(
-      " Nothing is known of contact at {}: the model leaves more of the torque there than a "
-      "constant "
-      "would. Check that the columns are this robot's joints, their units, signs and zeros.",
-      fmt::join(summary.unfit, ", "));
+  std::vector<std::string> contradicted = summary.unfit;
+  std::erase_if(contradicted, [&](const std::string& joint) {
+    return std::ranges::find(summary.unmeasured, joint) != summary.unmeasured.end();
+  });
+  std::string out;
+  if (!summary.unmeasured.empty()) {
+    out = fmt::format(
+        " Nothing is known of contact at {}, whose torque never changes and was left out: check "
+        "its sensor.",
+        fmt::join(summary.unmeasured, ", "));
+  }
+  if (contradicted.empty()) return out;
+  return out + fmt::format(
+                   " Nothing is known of contact at {}: the model leaves more of the torque there "
+                   "than a constant would. Check that the columns are this robot's joints, their "
+                   "units, signs and zeros.",
+                   fmt::join(contradicted, ", "));
 }
 
 // How the momentum balance sees the same log.

@@ -49,9 +49,10 @@ struct ContactSummary {
   std::vector<LogFinding> findings;
   std::vector<std::string> new_motion;  ///< where the torque model has not been, in sentences
   std::optional<MomentumComparison> momentum;  ///< beside a torque model
-  /// Joints of whose torque a constant would leave less than the model: contacts there are neither
-  /// found nor excluded.
+  /// Joints whose torque never changes, or of which a constant would leave less than the model:
+  /// contacts there are neither found nor excluded.
   std::vector<std::string> unfit;
+  std::vector<std::string> unmeasured;  ///< of them, those whose torque never changes
 
   std::vector<std::string> joints;
   std::vector<JointType> types;    ///< beside joints

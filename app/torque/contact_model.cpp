@@ -60,6 +60,15 @@ std::optional<RigidPrediction> predicted_by(const RigidModel& rigid, const Torqu
   return out;
 }
 
+// Friction that is not known leaves a joint's torque without a say.
+std::vector<SlidingFriction> friction_of_measured(const RigidModel& rigid,
+                                                  const std::vector<TorqueSamples>& motions,
+                                                  const std::vector<Eigen::Index>& unmeasured) {
+  std::vector<SlidingFriction> out = sliding_friction(rigid, motions);
+  for (const Eigen::Index j : unmeasured) out[static_cast<std::size_t>(j)] = {};
+  return out;
+}
+
 ContactModel from_urdf(const ContactCommandOptions& options, const DynamicModel& model,
                        const TorqueLogReport& looked_at, const TorqueLogReport& learn) {
   const RigidModel rigid = make_rigid_model(model);
@@ -74,7 +83,8 @@ ContactModel from_urdf(const ContactCommandOptions& options, const DynamicModel&
   std::iota(joints.begin(), joints.end(), 0);
   return {.rigid = rigid,
           .joints = joints,
-          .friction = sliding_friction(rigid, unfiltered(learn.log, gains)),
+          .friction = friction_of_measured(rigid, unfiltered(learn.log, gains),
+                                           unmeasured_joints(looked_at.log, learn.log)),
           .gains = gains,
           .identified = {},
           .words = "those of " + options.robot.filename().string() +
@@ -83,10 +93,25 @@ ContactModel from_urdf(const ContactCommandOptions& options, const DynamicModel&
 }
 
 // A joint that may stick tells its torque to within friction only, some ten times the noise.
-Eigen::MatrixXd weights_of(const RigidModel& rigid, const TorqueSamples& samples) {
+Eigen::MatrixXd weights_of(const RigidModel& rigid, const TorqueSamples& samples,
+                           const std::vector<Eigen::Index>& unmeasured) {
   constexpr double kSticking = 0.01;
-  return (sliding_states(rigid, samples).array() == 0)
-      .select(kSticking, Eigen::MatrixXd::Ones(samples.size(), samples.joints()));
+  Eigen::MatrixXd out =
+      (sliding_states(rigid, samples).array() == 0)
+          .select(kSticking, Eigen::MatrixXd::Ones(samples.size(), samples.joints()));
+  for (const Eigen::Index j : unmeasured) out.col(j).setZero();
+  return out;
+}
+
+// Where the joints stand among `chosen`, those that do.
+std::vector<Eigen::Index> places_among(const std::vector<Eigen::Index>& chosen,
+                                       const std::vector<Eigen::Index>& joints) {
+  std::vector<Eigen::Index> out;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    if (std::ranges::find(joints, chosen[k]) != joints.end())
+      out.push_back(static_cast<Eigen::Index>(k));
+  }
+  return out;
 }
 
 // The parameters without what is not significant: along each axis of their covariance, columns
@@ -168,7 +193,7 @@ std::vector<TorqueSamples> with_joints(std::vector<TorqueSamples> motions,
 }
 
 ContactModel from_log(const ContactCommandOptions& options, const DynamicModel& model,
-                      const TorqueLogReport& learn) {
+                      const TorqueLogReport& looked_at, const TorqueLogReport& learn) {
   const auto& files = options.learn_logs.empty() ? options.logs : options.learn_logs;
   const TorqueData data = filtered_data(learn, options.data.motion);
   const RigidModel all = make_rigid_model(model);
@@ -180,21 +205,23 @@ ContactModel from_log(const ContactCommandOptions& options, const DynamicModel& 
   }
   const DynamicModel held = with_joints_held(model, out.joints, learn.log.q);
   const TorqueSamples samples = with_joints(data.samples, out.joints);
+  const std::vector<Eigen::Index> unmeasured =
+      places_among(out.joints, unmeasured_joints(looked_at.log, learn.log));
   // A unit of current is another torque at every drive.
   IdentifyOptions identify;
   identify.gains = data.samples.torque_unit == "A" && out.joints.size() > 1;
-  const Identification found =
-      identify_dynamics(held, samples, identify, weights_of(make_rigid_model(held), samples));
+  const Identification found = identify_dynamics(
+      held, samples, identify, weights_of(make_rigid_model(held), samples, unmeasured));
   out.gains = Eigen::VectorXd::Ones(all.size());
   out.gains(out.joints) = found.gains;
   const std::vector<TorqueSamples> motions =
       with_joints(unfiltered(learn.log, out.gains), out.joints);
   out.rigid = identified_model(found);
   out.identified = found;
-  out.friction = sliding_friction(out.rigid, motions);
+  out.friction = friction_of_measured(out.rigid, motions, unmeasured);
   // Masses that a log hardly moves are noise: friction alone where it explains as much.
   const RigidModel massless = without_inertia(out.rigid);
-  std::vector<SlidingFriction> friction_alone = sliding_friction(massless, motions);
+  std::vector<SlidingFriction> friction_alone = friction_of_measured(massless, motions, unmeasured);
   if (sliding_deviance(friction_alone, 0) <
       sliding_deviance(out.friction, rigid_parameters(found))) {
     out.rigid = massless;
@@ -242,6 +269,17 @@ std::vector<Eigen::Index> joints_in_motion(const RigidModel& rigid, const Torque
   for (Eigen::Index j = 0; j < rigid.size(); ++j) {
     const double way = log.q.col(j).maxCoeff() - log.q.col(j).minCoeff();
     if (counts[static_cast<std::size_t>(j)] >= kFewest || way > kPlace) out.push_back(j);
+  }
+  return out;
+}
+
+std::vector<Eigen::Index> unmeasured_joints(const TorqueLog& looked_at, const TorqueLog& learn) {
+  std::vector<Eigen::Index> out;
+  const auto is_constant = [](const auto& torque) {
+    return torque.maxCoeff() == torque.minCoeff();
+  };
+  for (Eigen::Index j = 0; j < looked_at.torque.cols(); ++j) {
+    if (is_constant(looked_at.torque.col(j)) || is_constant(learn.torque.col(j))) out.push_back(j);
   }
   return out;
 }
@@ -336,7 +374,7 @@ ContactModel make_contact_model(const ContactCommandOptions& options, const Dyna
                                 const TorqueLogReport& looked_at, const TorqueLogReport& learn) {
   const bool masses = has_masses(model) && looked_at.log.torque_unit != "A";
   return masses && !options.identify ? from_urdf(options, model, looked_at, learn)
-                                     : from_log(options, model, learn);
+                                     : from_log(options, model, looked_at, learn);
 }
 
 }  // namespace kinescope

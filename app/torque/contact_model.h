@@ -27,7 +27,8 @@ struct ContactModel {
 
 /// `looked_at`: the log in which contacts are looked for, `learn` the one to learn from (the same
 /// where there is no other). The URDF's masses serve where it has some, unless options.identify or
-/// torques in A, which they say nothing about. Throws the refusals of compare_torque_scale (torques
+/// torques in A, which they say nothing about. Unmeasured joints have no friction that is known, so
+/// that their torque is no evidence. Throws the refusals of compare_torque_scale (torques
 /// in another unit or with another sign than the masses'), undetermined where masses are to be
 /// identified and no joint slides, and what identification throws.
 [[nodiscard]] ContactModel make_contact_model(const ContactCommandOptions& options,
@@ -42,6 +43,10 @@ struct ContactModel {
 /// Joints that slide in the log, or at least change their place: the others are as good as fixed.
 [[nodiscard]] std::vector<Eigen::Index> joints_in_motion(const RigidModel& rigid,
                                                          const TorqueLog& log);
+
+/// Joints whose torque never changes in one of the logs, as of a dead sensor.
+[[nodiscard]] std::vector<Eigen::Index> unmeasured_joints(const TorqueLog& looked_at,
+                                                          const TorqueLog& learn);
 
 /// The columns of these joints.
 [[nodiscard]] TorqueSamples with_joints(const TorqueSamples& samples,

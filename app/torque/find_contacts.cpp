@@ -211,7 +211,9 @@ void report_detection(const Balances& balances, DetectedContacts found, ContactS
   summary.check = check_false_alarms(summary.calibration, looked_at.samples, spans);
   summary.external_torque = observe_momentum(looked_at.samples, kObserverGain);
   summary.t_s = summary.clock.clock.time_s();
-  summary.unfit = unfit_joints(looked_at, summary);
+  summary.unfit = summary.unmeasured;
+  for (std::string& joint : unfit_joints(looked_at, summary))
+    summary.unfit.push_back(std::move(joint));
 }
 
 Balances momentum_balances(const ContactModel& expected, const Logs& logs,
@@ -293,7 +295,9 @@ void find_by_prediction(const ContactCommandOptions& options, const DynamicModel
   std::optional<PredictedLog> learn;
   if (logs.learn) learn = predict_log(file, *logs.learn, options.learn_logs, options.data);
   keep_usable_inertia(file, looked_at, learn);
-  const std::vector<PredictedFriction> friction = friction_beside(file, learn ? *learn : looked_at);
+  std::vector<PredictedFriction> friction = friction_beside(file, learn ? *learn : looked_at);
+  for (const Eigen::Index j : unmeasured_joints(logs.looked_at.log, logs.to_learn_from().log))
+    friction[static_cast<std::size_t>(j)] = {};
   Balances balances{
       .looked_at = balance_of(file, friction, looked_at, logs.looked_at.log, contact.guard_s),
       .learned = {}};
@@ -340,6 +344,8 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.learned =
       logs.learn ? file_list(options.learn_logs) + " and the log itself" : "the log itself";
   summary.findings = logs.looked_at.findings;
+  for (const Eigen::Index j : unmeasured_joints(logs.looked_at.log, logs.to_learn_from().log))
+    summary.unmeasured.push_back(summary.joints[static_cast<std::size_t>(j)]);
 
   ContactOptions contact = options.contact;
   for (const RigidBody& body : make_rigid_model(model).bodies) {

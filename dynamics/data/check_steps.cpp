@@ -23,50 +23,166 @@ constexpr double kImpossibleStepS =
 constexpr double kManyTurns = 4.0 * std::numbers::pi;  // rad; beyond the range of nearly all joints
 constexpr double kLongSlide = 10.0;                    // m
 constexpr double kNearlyAll = 0.99;                    // of the rows: a spike is no unit
-constexpr double kSpikeOfNoise = 40.0;   // times the median distance from the neighbours
-constexpr double kSpikeOfRange = 0.2;    // of the range between the 1st and the 99th percentile
-constexpr double kSpikeOfSteps = 20.0;   // times the usual change from row to row
-constexpr double kMostSpikes = 0.02;     // of the rows
-constexpr Eigen::Index kNeighbours = 2;  // on either side
+constexpr double kSpikeOfNoise = 40.0;  // times the median distance from the neighbours
+constexpr double kSpikeOfRange = 0.2;   // of the range between the 1st and the 99th percentile
+constexpr double kSpikeOfSteps = 20.0;  // times the usual change from row to row
+constexpr double kMostSpikes = 0.02;    // of the rows
+constexpr double kMostWild = 0.1;       // of the rows, where they are of any size
+constexpr int kWildPasses = 3;
+constexpr std::size_t kNeighbours = 2;  // on either side
+
+/// One channel without the samples that were rejected.
+struct Series {
+  std::vector<double> values;
+  std::vector<int> trajectory;
+  std::vector<Eigen::Index> rows;  ///< in the log
+
+  [[nodiscard]] std::size_t size() const { return rows.size(); }
+};
+
+Series series_of(const TorqueLog& log, const Eigen::Ref<const Eigen::VectorXd>& x) {
+  Series out{.values = to_vector(x), .trajectory = {}, .rows = {}};
+  for (Eigen::Index row = 0; row < x.size(); ++row) {
+    out.trajectory.push_back(log.trajectory(row));
+    out.rows.push_back(row);
+  }
+  return out;
+}
+
+Series without(const Series& series, const std::vector<std::size_t>& rejected) {
+  Series out;
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    if (next < rejected.size() && rejected[next] == k) {
+      ++next;
+      continue;
+    }
+    out.values.push_back(series.values[k]);
+    out.trajectory.push_back(series.trajectory[k]);
+    out.rows.push_back(series.rows[k]);
+  }
+  return out;
+}
 
 /// Distance of every sample from the median of itself and its neighbours (Hampel's identifier).
-Eigen::VectorXd from_neighbours(const TorqueLog& log, const Eigen::Ref<const Eigen::VectorXd>& x) {
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(x.size());
-  const std::vector<Eigen::Index> bounds = log.bounds();
-  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
-    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
-      const Eigen::Index last = std::min(bounds[b + 1], row + kNeighbours + 1);
-      const Eigen::Index first = std::max(bounds[b], row - kNeighbours);
-      out(row) = std::abs(x(row) - median_of(to_vector(x.segment(first, last - first))));
-    }
+std::vector<double> from_neighbours(const Series& series) {
+  std::vector<double> out(series.size(), 0.0);
+  const auto is_near = [&](std::size_t k, std::size_t other) {
+    return series.trajectory[k] == series.trajectory[other];
+  };
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    std::size_t first = k;
+    std::size_t last = k;
+    while (k - first < kNeighbours && first > 0 && is_near(k, first - 1)) --first;
+    while (last - k < kNeighbours && last + 1 < out.size() && is_near(k, last + 1)) ++last;
+    const auto begin = series.values.begin();
+    out[k] =
+        std::abs(series.values[k] - median_of({begin + static_cast<std::ptrdiff_t>(first),
+                                               begin + static_cast<std::ptrdiff_t>(last) + 1}));
   }
   return out;
 }
 
 /// Median of the changes that are not zero: at least a step of a quantised signal.
-double usual_change(const TorqueLog& log, const Eigen::Ref<const Eigen::VectorXd>& x) {
+double usual_change(const Series& series) {
   std::vector<double> changes;
-  for (Eigen::Index row = 1; row < x.size(); ++row) {
-    const double change = std::abs(x(row) - x(row - 1));
-    if (change > 0.0 && log.trajectory(row) == log.trajectory(row - 1)) changes.push_back(change);
+  for (std::size_t k = 1; k < series.size(); ++k) {
+    const double change = std::abs(series.values[k] - series.values[k - 1]);
+    if (change > 0.0 && series.trajectory[k] == series.trajectory[k - 1]) changes.push_back(change);
   }
   return median_of(std::move(changes));
 }
 
-std::vector<Eigen::Index> spikes_of(const TorqueLog& log,
-                                    const Eigen::Ref<const Eigen::VectorXd>& x) {
-  const std::vector<double> values = to_vector(x);
-  const double range = quantile(values, 0.99) - quantile(values, 0.01);
-  const Eigen::VectorXd distance = from_neighbours(log, x);
-  const double limit = std::max({kSpikeOfNoise * median_of(to_vector(distance)),
-                                 kSpikeOfRange * range, kSpikeOfSteps * usual_change(log, x)});
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index row = 0; row < x.size(); ++row) {
-    if (limit > 0.0 && distance(row) > limit) rows.push_back(row);
+/// Distances of one channel's samples, sorted.
+class Distances {
+ public:
+  explicit Distances(std::vector<double> values) : sorted_(std::move(values)) {
+    std::ranges::sort(sorted_);
   }
-  // What happens often is how the signal is.
-  if (share_of(static_cast<Eigen::Index>(rows.size()), x.size()) > kMostSpikes) rows.clear();
-  return rows;
+  [[nodiscard]] double median() const { return sorted_[sorted_.size() / 2]; }
+  [[nodiscard]] double count(double low, double high) const {
+    return static_cast<double>(std::ranges::upper_bound(sorted_, high) -
+                               std::ranges::upper_bound(sorted_, low));
+  }
+  /// Samples a unit of distance up to `high`; of few at the far end, their reach is uncertain.
+  [[nodiscard]] double density(double low, double high) const {
+    const double reach = std::min(high, sorted_.back()) - low;
+    const double own = count(low, high) - (high > sorted_.back() ? 1.0 : 0.0);
+    return reach > 0.0 && own > 0.0 ? own / reach : 0.0;
+  }
+  /// The smallest one above `floor` from which on at least half of those below `limit` are as dense
+  /// as told.
+  [[nodiscard]] double least_of(double density, double floor, double limit) const {
+    double out = limit;
+    const auto begin = std::ranges::upper_bound(sorted_, floor);
+    for (auto at = begin; at != sorted_.end() && *at < limit; ++at) {
+      if (count(*at, limit) + 1.0 <= 2.0 * density * (limit - *at)) return std::min(out, *at);
+    }
+    return out;
+  }
+
+ private:
+  std::vector<double> sorted_;
+};
+
+/// Wild readings are of any size, about as dense at half a distance as at the whole; what a signal
+/// does by itself is the denser the smaller it is. From `limit` down, octave by octave, as long as
+/// at least half of an octave's samples are as dense as those above it (local false discovery rate,
+/// Efron 2004).
+double least_spike(const Distances& distances, double limit) {
+  const double top = 2.0 * limit;
+  const double floor = std::max(distances.median(), 1e-9 * limit);
+  double least = limit;
+  double density = distances.density(least, top);
+  while (least > floor && density > 0.0) {
+    const double lower = 0.5 * least;
+    if (distances.count(lower, least) > 2.0 * density * lower) break;
+    density = std::max(distances.density(lower, top), distances.count(lower, least) / lower);
+    least = lower;
+  }
+  return least < limit ? distances.least_of(density, floor, least) : limit;
+}
+
+struct SpikeLimits {
+  double clear = 0.0;  ///< a distance beyond it is a spike's; 0: the channel has no scale
+  double least = 0.0;  ///< less where readings are wild
+
+  [[nodiscard]] bool wild() const { return least < clear; }
+};
+
+SpikeLimits spike_limits(const Series& series) {
+  const double range = quantile(series.values, 0.99) - quantile(series.values, 0.01);
+  const std::vector<double> distance = from_neighbours(series);
+  const double clear = std::max({kSpikeOfNoise * median_of(distance), kSpikeOfRange * range,
+                                 kSpikeOfSteps * usual_change(series)});
+  return {.clear = clear, .least = clear > 0.0 ? least_spike(Distances(distance), clear) : clear};
+}
+
+std::vector<std::size_t> spikes_beyond(const Series& series, double limit) {
+  const std::vector<double> distance = from_neighbours(series);
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < distance.size(); ++k) {
+    if (distance[k] > limit) out.push_back(k);
+  }
+  return out;
+}
+
+/// Rows of the log. Where wild readings stand together, the first of them hide others.
+std::vector<Eigen::Index> spike_rows(Series series) {
+  const SpikeLimits limits = spike_limits(series);
+  std::vector<Eigen::Index> out;
+  if (!(limits.clear > 0.0)) return out;
+  // What happens often is how the signal is, unless it is as often large as small.
+  const double most =
+      (limits.wild() ? kMostWild : kMostSpikes) * static_cast<double>(series.size());
+  for (int pass = 0; pass < (limits.wild() ? kWildPasses : 1); ++pass) {
+    const std::vector<std::size_t> found = spikes_beyond(series, limits.least);
+    for (const std::size_t k : found) out.push_back(series.rows[k]);
+    series = without(series, found);
+  }
+  if (static_cast<double>(out.size()) > most) return {};
+  std::ranges::sort(out);
+  return out;
 }
 
 struct StepFacts {
@@ -140,7 +256,7 @@ CheckedLog check_spikes(TorqueLog log) {
   std::vector<char> keep(static_cast<std::size_t>(log.rows()), 1);
   const auto look = [&](const Eigen::MatrixXd& signal, const std::vector<std::string>& names) {
     for (Eigen::Index c = 0; c < signal.cols(); ++c) {
-      const std::vector<Eigen::Index> rows = spikes_of(log, signal.col(c));
+      const std::vector<Eigen::Index> rows = spike_rows(series_of(log, signal.col(c)));
       if (rows.empty()) continue;
       for (const Eigen::Index row : rows) keep[static_cast<std::size_t>(row)] = 0;
       const std::string& name = names[static_cast<std::size_t>(c)];
