@@ -46,7 +46,8 @@ Learned learned_of_trace(const fs::path& folder, const ControlOptions& options,
                     "give the trace of a log of this robot");
   }
   LearnedTorque out;
-  out.traced = simulated_robot(urdf, robot.model, folder / "trace.json", bench.reference());
+  out.traced =
+      simulated_robot(urdf, robot.model, folder / "trace.json", bench.reference(), bench.console());
   return {"traced", std::make_shared<const LearnedTorque>(std::move(out))};
 }
 

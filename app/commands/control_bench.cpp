@@ -98,7 +98,7 @@ ControlBench::ControlBench(const ControlOptions& options, const Console& console
   check_path(reference_, options.trajectory);
   check_limits();
   const CorrectedTorqueModel model =
-      simulated_robot(options.robot, robot_.model, options.effects, reference_);
+      simulated_robot(options.robot, robot_.model, options.effects, reference_, console);
   plants_[0] = make_plant(model);
   plants_[1] = options.payload_kg ? make_plant(with_load(model, options)) : plants_[0];
   // The same gains for all, from the masses that the controller knows.

@@ -41,6 +41,7 @@ class ControlBench {
   [[nodiscard]] const std::filesystem::path& nominal_file() const { return nominal_file_; }
   [[nodiscard]] const TorqueSamples& reference() const { return reference_; }
   [[nodiscard]] const ServoOptions& servo() const { return servo_; }
+  [[nodiscard]] const Console& console() const { return console_; }
   [[nodiscard]] Eigen::VectorXd shown_times() const;
 
   /// The path that a round learns on; the same number, the same path.

@@ -62,6 +62,20 @@ void put_spring(const TorqueEffect& effect, MjcfOptions& mjcf) {
   mjcf.springs[effect.id.place] = {stiffness, -value("torque_at_zero") / stiffness};
 }
 
+/// A payload is a body of its own where the link has a mass without it: its inertia is hardly
+/// known, and may spoil the link's.
+void put_payload(const TorqueEffect& effect, Exported& out) {
+  const auto link = out.model.tree.link(effect.id.place);
+  constexpr Eigen::Index kParameters = 10;
+  if (!link || effect.values.size() != kParameters) return;
+  const auto load = InertialParameters::from_vector(effect.values);
+  InertialParameters& own = out.model.links[link->index()];
+  const auto bare = InertialParameters::from_vector(own.vector() - effect.values);
+  if (!(load.mass_kg > 0.0) || !(bare.mass_kg > 0.0) || !is_consistent(bare)) return;
+  own = bare;
+  out.mjcf.carried.push_back({"payload_" + effect.id.place, effect.id.place, load});
+}
+
 /// Gravity as the folder's dynamics.json has it.
 void read_gravity(const fs::path& folder, DynamicModel& model, std::vector<fs::path>& inputs) {
   const fs::path path = folder / "dynamics.json";
@@ -97,6 +111,8 @@ Exported from_folder(const fs::path& folder) {
     const bool in_model = entry.in_urdf || effect.id.effect == "gravity_direction";
     if (effect.id.effect == "spring") {
       put_spring(effect, out.mjcf);
+    } else if (effect.id.effect == "payload" && in_model && traced) {
+      put_payload(effect, out);
     } else if (!in_model) {
       out.left_out.push_back(fmt::format("{} at {}", effect.id.effect, effect.id.place));
     }

@@ -38,7 +38,7 @@ ExitCode simulate_command(const SimulateOptions& options, const Console& console
   const TorqueSamples motion =
       reference_motion(options.trajectory, robot, options.servo.rate_hz, console);
   const CorrectedTorqueModel model =
-      simulated_robot(options.robot, robot.model, options.effects, motion);
+      simulated_robot(options.robot, robot.model, options.effects, motion, console);
   const Plant plant = make_plant(model);
   Rng rng(options.seed);
   const ServoLog log = options.in_servo ? run_servo(plant, motion, options.servo, rng)

@@ -2,6 +2,7 @@
 #include "app/commands/simulated_robot.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -103,12 +104,57 @@ void require_plausible_units(const JointLog& log, const Eigen::MatrixXd& values,
     throw bad_input(log.source, finding.what, "write the trajectory in rad and m");
 }
 
+/// Viscous and Coulomb friction of the drives, what tracing calls it, what a URDF does.
+struct FrictionTerm {
+  const char* effect;
+  double JointDynamics::* own;
+  const char* attribute;
+};
+constexpr std::array kFrictionTerms = {
+    FrictionTerm{"viscous", &JointDynamics::viscous, "damping"},
+    FrictionTerm{"coulomb", &JointDynamics::coulomb, "friction"}};
+
+/// A robot and effects to add to it, each of which one of them has.
+struct RobotAndEffects {
+  DynamicModel robot;
+  std::vector<ListedEffect> effects;
+  std::vector<std::string> given_way;  ///< of the URDF's friction, to the effects
+};
+
 /// Of a trace, effects that the URDF already holds are not added again.
 std::vector<ListedEffect> not_yet_in(const fs::path& robot, const fs::path& trace,
-                                     std::vector<ListedEffect> effects) {
-  const bool traced_urdf = same_place(robot, trace.parent_path() / "robot_traced.urdf");
-  std::erase_if(effects, [&](const ListedEffect& effect) { return traced_urdf && effect.in_urdf; });
+                                     const ListedEffects& listed) {
+  const auto is_beside = [&](const char* name) {
+    return same_place(robot, trace.parent_path() / name);
+  };
+  // What was traced on declared masses, the masses and the friction identified beside it hold too.
+  const bool held = is_beside("robot_traced.urdf") ||
+                    (!listed.identified_masses && is_beside("robot_dynamics.urdf"));
+  std::vector<ListedEffect> effects = listed.effects;
+  std::erase_if(effects, [&](const ListedEffect& effect) { return held && effect.in_urdf; });
   return effects;
+}
+
+/// What a trace on declared masses adds to its URDF's friction is an excess; all else is the whole
+/// friction of its kind.
+RobotAndEffects counted_once(const fs::path& urdf, const fs::path& file,
+                             const ListedEffects& listed, DynamicModel robot) {
+  RobotAndEffects out{
+      .robot = std::move(robot), .effects = not_yet_in(urdf, file, listed), .given_way = {}};
+  const bool excess = listed.traced && !listed.identified_masses;
+  if (excess || same_place(urdf, file.parent_path() / "robot_traced.urdf")) return out;
+  for (const FrictionTerm& term : kFrictionTerms) {
+    for (std::size_t j = 0; j < out.robot.tree.joints.size(); ++j) {
+      const EffectId id{term.effect, out.robot.tree.joints[j].name};
+      const bool added = std::ranges::any_of(
+          out.effects, [&](const ListedEffect& entry) { return entry.effect.id == id; });
+      double& own = out.robot.joints[j].*term.own;
+      if (!added || own == 0.0) continue;
+      out.given_way.push_back(fmt::format("{} of {} ({:.4g})", term.attribute, id.place, own));
+      own = 0.0;
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -166,7 +212,7 @@ TorqueSamples reference_motion(const fs::path& trajectory, const TorqueRobot& ro
 
 CorrectedTorqueModel simulated_robot(const fs::path& urdf, const DynamicModel& robot,
                                      const std::optional<fs::path>& effects,
-                                     const TorqueSamples& motion) {
+                                     const TorqueSamples& motion, const Console& console) {
   if (!effects) return with_effects(robot);
   const ListedEffects listed = read_listed_effects(*effects);
   const RobotEffects known = effects_of_robot(robot, motion);
@@ -176,8 +222,15 @@ CorrectedTorqueModel simulated_robot(const fs::path& urdf, const DynamicModel& r
     const auto speed = listed.high_speeds.find(robot.tree.joints[joints[j].index()].name);
     if (speed != listed.high_speeds.end()) travels[j].high_speed = speed->second;
   }
-  return with_effects(robot, resolved(not_yet_in(urdf, *effects, listed.effects), known.candidates),
-                      travels, listed.log.value_or(known.log));
+  RobotAndEffects once = counted_once(urdf, *effects, listed, robot);
+  if (!once.given_way.empty()) {
+    console.warn(fmt::format(
+        "{}: its friction is not counted twice: {} give way to {} (take them out of there to keep "
+        "the URDF's)",
+        urdf.string(), fmt::join(once.given_way, ", "), effects->string()));
+  }
+  return with_effects(once.robot, resolved(once.effects, known.candidates), travels,
+                      listed.log.value_or(known.log));
 }
 
 void require_masses(const fs::path& urdf, const DynamicModel& robot) {

@@ -22,11 +22,13 @@ namespace kinescope {
                                              const Console& console);
 
 /// The robot with the effects of a file (app/io/torque_effects_file.h); none: as it is. Of a trace
-/// beside its robot_traced.urdf, only what that lacks is added. Throws bad_input for an effect that
-/// is none of this robot's.
+/// beside its robot_traced.urdf, only what that lacks is added. Viscous and Coulomb friction of the
+/// file take the place of the URDF's at their joint, of which the console is warned. Throws
+/// bad_input for an effect that is none of this robot's.
 [[nodiscard]] CorrectedTorqueModel simulated_robot(
     const std::filesystem::path& urdf, const DynamicModel& robot,
-    const std::optional<std::filesystem::path>& effects, const TorqueSamples& motion);
+    const std::optional<std::filesystem::path>& effects, const TorqueSamples& motion,
+    const Console& console);
 
 /// Throws bad_input where no link has a mass.
 void require_masses(const std::filesystem::path& urdf, const DynamicModel& robot);

@@ -51,7 +51,7 @@ void add_log_options(CLI::App& command, CommandLine& line, TorqueDataOptions& da
   list("--torque", mapping.torque, "Columns of the torques or motor currents");
   list("--position-unit", mapping.position_unit, "rad, deg, m or mm; one for all or one a joint");
   list("--velocity-unit", mapping.velocity_unit, "rad/s, deg/s, m/s or mm/s");
-  list("--torque-unit", mapping.torque_unit, "Nm, N, mNm, kNm, A or mA");
+  list("--torque-unit", mapping.torque_unit, "Nm, N, mNm, kNm, A, mA or %");
   command
       .add_option("--torque-factor", mapping.torque_factor,
                   "Joint torque per logged value: sign, gear or drive gain")

@@ -104,6 +104,13 @@ bool is_unit_word(std::string_view word) {
   return kWords.contains(word);
 }
 
+/// Of a rated torque or current: of anything else it is no unit.
+bool is_percent(std::string_view word, LoggedQuantity quantity) {
+  static const Words kWords = {"percent", "percentage", "pct", "perc"};
+  return (quantity == LoggedQuantity::kTorque || quantity == LoggedQuantity::kCurrent) &&
+         kWords.contains(word);
+}
+
 /// The names of a unit that unit_factor() knows.
 std::string unit_name(std::string_view word) {
   static const std::map<std::string, std::string, std::less<>> kNames = {
@@ -208,6 +215,8 @@ std::optional<ColumnMeaning> read_column_name(std::string_view name) {
       if (meaning.origin != LoggedOrigin::kComputed) meaning.origin = LoggedOrigin::kCommanded;
     } else if (is_unit_word(word) && unit_may_stand(words, w)) {
       meaning.unit = unit_name(word);
+    } else if (known && is_percent(word, meaning.quantity)) {
+      meaning.unit = "%";
     } else if (!is_filler(word)) {
       meaning.joint.push_back(word);
     }
@@ -226,7 +235,7 @@ std::optional<double> unit_factor(std::string_view unit) {
       {"deg/s", kDegree}, {"m/s", 1.0},     {"mm/s", 1e-3}, {"rad/s^2", 1.0}, {"deg/s^2", kDegree},
       {"m/s^2", 1.0},     {"mm/s^2", 1e-3}, {"s", 1.0},     {"ms", 1e-3},     {"us", 1e-6},
       {"ns", 1e-9},       {"Nm", 1.0},      {"N", 1.0},     {"mNm", 1e-3},    {"kNm", 1e3},
-      {"A", 1.0},         {"mA", 1e-3}};
+      {"A", 1.0},         {"mA", 1e-3},     {"%", 1.0}};
   const auto found = kFactors.find(unit);
   if (found == kFactors.end()) return std::nullopt;
   return found->second;

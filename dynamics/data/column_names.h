@@ -45,7 +45,7 @@ struct ColumnMeaning {
 [[nodiscard]] std::vector<std::string> words_of(std::string_view name);
 
 /// SI units per unit, by its name: rad deg m mm (and the same per s, per s^2), s ms us ns, Nm N mNm
-/// kNm A mA. Nothing for an unknown name.
+/// kNm A mA; % of a rated torque or current, which is 1 of itself. Nothing for an unknown name.
 [[nodiscard]] std::optional<double> unit_factor(std::string_view unit);
 
 }  // namespace kinescope

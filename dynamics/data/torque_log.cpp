@@ -31,7 +31,7 @@ double known_factor(const std::string& unit, std::string_view option) {
   if (const std::optional<double> factor = unit_factor(unit)) return *factor;
   throw bad_request(
       fmt::format("dynamics.{}", option), fmt::format("unknown unit '{}'", unit),
-      "known are rad, deg, m, mm (also /s, /s^2), s, ms, us, ns, Nm, N, mNm, kNm, A, mA");
+      "known are rad, deg, m, mm (also /s, /s^2), s, ms, us, ns, Nm, N, mNm, kNm, A, mA, %");
 }
 
 /// One signal of all joints in SI: values, and what was said about its unit.
@@ -40,6 +40,7 @@ struct Signal {
   std::vector<std::string> names;
   bool unit_declared = false;
   bool ampere = false;
+  bool percent = false;  ///< of a rated torque or current
 };
 
 struct SignalRequest {
@@ -63,6 +64,7 @@ Signal read_signal(const ChannelTable& table, const SignalRequest& request) {
     out.unit_declared = out.unit_declared || !said.empty();
     out.ampere = out.ampere || unit == "A" || unit == "mA" ||
                  (unit.empty() && request.columns.quantity == LoggedQuantity::kCurrent);
+    out.percent = out.percent || unit == "%";
     const double factor =
         (unit.empty() ? 1.0 : known_factor(unit, fmt::format("{}_unit", request.option))) *
         entry(*request.factors, j, joints, 1.0, fmt::format("{}_factor", request.option));
@@ -317,6 +319,15 @@ class Reader {
     out_.log.torque = std::move(signal.values);
     out_.log.torque_columns = std::move(signal.names);
     out_.log.torque_unit = signal.ampere && mapping_.torque_factor.empty() ? "A" : "Nm";
+    if (signal.percent && mapping_.torque_factor.empty()) {
+      out_.findings.push_back(
+          {LogFault::kUnit, FaultWeight::kRefusal, out_.log.torque_columns.front(), 1.0, 0.0,
+           table_.source,
+           fmt::format("the torques ({}) are in percent of a rated torque",
+                       fmt::join(out_.log.torque_columns, ", ")),
+           "say in recording.yaml, dynamics: {torque_factor: [..]}, or with --torque-factor, a "
+           "hundredth of each joint's rated torque in Nm"});
+    }
     if (torque.origin == LoggedOrigin::kCommanded && !torque.named) {
       out_.findings.push_back(
           {LogFault::kCommanded, FaultWeight::kWarning, out_.log.torque_columns.front(), 1.0, 0.0,

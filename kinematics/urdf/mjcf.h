@@ -21,9 +21,17 @@ struct JointSpring {
   double rest = 0.0;       ///< rad or m
 };
 
+/// What a link carries: a body without a joint, welded to it.
+struct CarriedBody {
+  std::string name;
+  std::string link;
+  InertialParameters inertia;  ///< in the link's frame; where no body has it, a point mass instead
+};
+
 struct MjcfOptions {
   double step_s = 1e-3;                             ///< of MuJoCo's integrator
   std::map<std::string, JointSpring> springs = {};  ///< by joint
+  std::vector<CarriedBody> carried = {};            ///< beside the links' own masses
   std::vector<std::string> notes = {};              ///< for the reader, as comments
 };
 

@@ -65,6 +65,9 @@ class Writer {
     XMLElement& site = add(body, "site");
     set(site, "name", model_.tree.links[link.index()].name);
     set_pose(site, T_body_link);
+    for (const CarriedBody& load : options_.carried) {
+      if (load.link == model_.tree.links[link.index()].name) add_load(body, load, T_body_link);
+    }
     for (const Joint& joint : model_.tree.joints) {
       if (joint.parent != link) continue;
       const Pose T_body_child = T_body_link * joint.T_parent_joint;
@@ -74,6 +77,22 @@ class Writer {
         add_body(body, joint, T_body_child);
       }
     }
+  }
+
+  /// MuJoCo takes a point mass where nothing moves on its own, yet none as a full inertia.
+  static void add_load(XMLElement& parent, const CarriedBody& load, const Pose& T_parent_link) {
+    XMLElement& body = add(parent, "body");
+    set(body, "name", load.name);
+    set_pose(body, T_parent_link);
+    constexpr double kBeyondRounding = 1e-9;  // of the largest eigenvalue of the pseudo-inertia
+    if (is_consistent(load.inertia, -kBeyondRounding)) {
+      add_central(body, to_central(load.inertia));
+      return;
+    }
+    XMLElement& inertial = add(body, "inertial");
+    set(inertial, "pos", number_text(to_central(load.inertia).centre_m));
+    set(inertial, "mass", number_text(load.inertia.mass_kg));
+    set(inertial, "diaginertia", "0 0 0");
   }
 
   void add_body(XMLElement& parent, const Joint& joint, const Pose& T_parent_body) {
@@ -106,7 +125,10 @@ class Writer {
       throw bad_request("MJCF", fmt::format("no body has the inertia of link '{}'", name),
                         "export robot_dynamics.urdf, whose masses are consistent");
     }
-    const CentralInertia central = to_central(whole);
+    add_central(body, to_central(whole));
+  }
+
+  static void add_central(XMLElement& body, const CentralInertia& central) {
     const Eigen::Matrix3d& I = central.inertia_kgm2;
     XMLElement& inertial = add(body, "inertial");
     set(inertial, "pos", number_text(central.centre_m));

@@ -72,6 +72,37 @@ std::string currents(TorqueSamples samples) {
   return text;
 }
 
+TEST_F(ContactCommand, ADeadTorqueChannelIsLeftOutAndNamed) {
+  TorqueSamples samples = touched_.samples;
+  samples.torque.col(1).setConstant(0.3);
+  folder_.write("log.csv", torque_log_csv(samples));
+  for (const std::vector<std::string>& masses : {std::vector<std::string>{}, {"--identify"}}) {
+    const Outcome outcome = run(words(masses));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("at joint2, whose torque never changes and was left out"),
+              std::string::npos)
+        << outcome.out;
+    const nlohmann::json found = contacts();
+    EXPECT_EQ(found.at("unfit"), nlohmann::json::array({"joint2"}));
+    EXPECT_LE(found.at("contacts").size(), touched_.labels.size());
+    std::filesystem::remove_all(folder_.path() / "out");
+  }
+}
+
+TEST_F(ContactCommand, WildReadingsAreNoContacts) {
+  TorqueSamples samples = touched_.samples;
+  const double largest = 2.0 * samples.torque.col(1).cwiseAbs().maxCoeff();
+  Rng rng = Rng::from_name("wild readings");
+  for (double& torque : samples.torque.col(1)) {
+    if (rng.uniform() < 0.05) torque = rng.uniform(-largest, largest);
+  }
+  folder_.write("log.csv", torque_log_csv(samples));
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("jumps and comes back"), std::string::npos) << outcome.err;
+  expect_labelled(contacts().at("contacts"));
+}
+
 TEST_F(ContactCommand, FindsEveryContactAndInventsNone) {
   const Outcome outcome = run(words({"--learn", path("free.csv")}));
   ASSERT_EQ(outcome.code, 0) << outcome.err;

@@ -145,6 +145,55 @@ TEST_F(Simulate, DynamicsTracesBackWhatWasPutIn) {
   EXPECT_NE(mjcf.find("damping="), std::string::npos);
 }
 
+TEST_F(Simulate, FrictionOfTheUrdfAndOfTheEffectsIsCountedOnce) {
+  DynamicModel rubbing = model_;
+  JointDynamics& drive = rubbing.joints[moving_joints(model_.tree)[0].index()];
+  drive.viscous = 0.5;
+  drive.coulomb = 1.25;
+  folder_.write("rubbing.urdf", write_urdf(rubbing));
+  ASSERT_EQ(run(words({"--effects", path("effects.yaml")})).code, 0);
+  const std::string once = read_text_file(path("log.csv"));
+  std::vector<std::string> with_friction = words({"--effects", path("effects.yaml")});
+  with_friction[1] = path("rubbing.urdf");
+  const Outcome outcome = run(with_friction);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(read_text_file(path("log.csv")), once);
+  EXPECT_NE(outcome.err.find("damping of " + joints_[0] + " (0.5), friction of " + joints_[0] +
+                             " (1.25) give way"),
+            std::string::npos)
+      << outcome.err;
+}
+
+// The sum of a link and of a payload whose inertia is badly known is none that a body has.
+TEST_F(Simulate, ATracedPayloadIsABodyOfItsOwnForMujoco) {
+  const LinkId last = model_.tree.joints[moving_joints(model_.tree).back().index()].child;
+  const std::string& link = model_.tree.links[last.index()].name;
+  DynamicModel loaded = model_;
+  Eigen::VectorXd load(10);
+  load << 0.5, 0.05, 0.0, 0.1, 9.0, 0.0, 0.0, 0.0, 0.0, 0.0;  // Ixx without Iyy and Izz
+  loaded.links[last.index()] += InertialParameters::from_vector(load);
+  nlohmann::json parameters = nlohmann::json::array();
+  for (std::size_t k = 0; k < kInertialNames.size(); ++k)
+    parameters.push_back(
+        {{"name", kInertialNames[k]}, {"value", load[static_cast<Eigen::Index>(k)]}});
+  const nlohmann::json trace = {{"base", {{"masses", "declared"}}},
+                                {"effects",
+                                 {{{"effect", "payload"},
+                                   {"place", link},
+                                   {"at", 0.0},
+                                   {"in_urdf", true},
+                                   {"parameters", parameters}}}}};
+  folder_.write("traced/robot_traced.urdf", write_urdf(loaded))
+      .write("traced/trace.json", trace.dump());
+  const Outcome exported =
+      run({"export", path("traced"), "--mjcf", path("robot.xml"), "--json", "--quiet"});
+  ASSERT_EQ(exported.code, 0) << exported.err;
+  const std::string mjcf = read_text_file(folder_.path() / "robot.xml");
+  const std::size_t body = mjcf.find("<body name=\"payload_" + link + "\"");
+  ASSERT_NE(body, std::string::npos) << mjcf;
+  EXPECT_NE(mjcf.find("<inertial pos=\"0.1 0 0.2\" mass=\"0.5\"", body), std::string::npos) << mjcf;
+}
+
 TEST_F(Simulate, AServoGivesTheLogOfARobotThatSticks) {
   const Outcome simulated = run(words({"--effects", path("effects.yaml"), "--servo", "--json"}));
   ASSERT_EQ(simulated.code, 0) << simulated.err;

@@ -102,6 +102,25 @@ TEST(TorqueLog, ConvertsUnitsSaidByNamesOrMapping) {
   EXPECT_EQ(mapped.log.torque_unit, "Nm") << "currents with a gain are torques";
 }
 
+TEST(TorqueLog, RefusesPercentOfARatedTorqueUnlessItIsStated) {
+  const char* const text = "t,q1,torque_percent1\n0,1,40\n1,1,60\n";
+  const auto units = findings_of(read(text).findings, LogFault::kUnit);
+  ASSERT_EQ(units.size(), 1U);
+  EXPECT_EQ(units[0].weight, FaultWeight::kRefusal);
+  EXPECT_NE(to_line(units[0]).find("(torque_percent1) are in percent of a rated torque"),
+            std::string::npos);
+  EXPECT_NE(units[0].remedy.find("torque_factor"), std::string::npos);
+  LogMapping rated;
+  rated.torque_factor = {0.5};
+  const auto mapped = read(text, rated);
+  EXPECT_TRUE(findings_of(mapped.findings, LogFault::kUnit).empty());
+  EXPECT_EQ(mapped.log.torque.col(0), Eigen::Vector2d(20, 30));
+  EXPECT_EQ(mapped.log.torque_unit, "Nm");
+  LogMapping newton_metres;  // whatever the name says
+  newton_metres.torque_unit = {"Nm"};
+  EXPECT_TRUE(findings_of(read(text, newton_metres).findings, LogFault::kUnit).empty());
+}
+
 TEST(TorqueLog, ReadsTrajectoriesFromNumbersAndWords) {
   const auto numbers = read("rec,t,q1,tau1\n3,0,1,1\n3,1,1,1\n7,0,1,1\n3,0,1,1\n");
   EXPECT_EQ(numbers.log.trajectory, Eigen::Vector4i(0, 0, 1, 2));

@@ -111,6 +111,24 @@ TEST(Mjcf, SpringsPullInMujocoAsInOurSimulation) {
   EXPECT_LT((our_end(model, {spring}) - mujoco_end(model, options)).norm(), 1e-2);
   EXPECT_GT((our_end(model, {spring}) - our_end(model, {})).norm(), 0.1);
 }
+TEST(Mjcf, CarriesALoadInMujocoAsInOurSimulation) {
+  const DynamicModel model = arm(0.0);
+  const LinkId last = model.tree.joints[moving_joints(model.tree).back().index()].child;
+  // A point mass, and one whose estimated inertia no body has.
+  const InertialParameters point = from_central({1.5, {0.02, -0.05, 0.1}, Eigen::Matrix3d::Zero()});
+  Eigen::VectorXd estimated = point.vector();
+  estimated.tail(6) *= 0.1;
+  DynamicModel loaded = model;
+  loaded.links[last.index()] += point;
+  const Eigen::VectorXd ours = our_end(loaded, {});
+  EXPECT_GT((ours - our_end(model, {})).norm(), 0.05);
+  for (const auto& load : {point, InertialParameters::from_vector(estimated)}) {
+    MjcfOptions options{.step_s = kStep_s};
+    options.carried = {{"load", model.tree.links[last.index()].name, load}};
+    EXPECT_LT((mujoco_end(model, options) - ours).lpNorm<Eigen::Infinity>(), 1e-3);
+  }
+}
+
 #else
 TEST(Mjcf, MovesInMujocoAsInOurSimulation) {
   GTEST_SKIP() << "MuJoCo (package libmujoco-dev) was not installed when this was built";
