@@ -294,6 +294,20 @@ struct JointPast {
   }
 };
 
+/// Slope of each column between the samples before and after, per s.
+Eigen::MatrixXd rates_between_neighbours(const Eigen::VectorXd& t_s,
+                                         const Eigen::MatrixXd& values) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(values.rows(), values.cols());
+  const Eigen::Index last = values.rows() - 1;
+  for (Eigen::Index k = 0; k <= last; ++k) {
+    const Eigen::Index before = std::max<Eigen::Index>(k - 1, 0);
+    const Eigen::Index after = std::min(k + 1, last);
+    if (t_s[after] > t_s[before])
+      out.row(k) = (values.row(after) - values.row(before)) / (t_s[after] - t_s[before]);
+  }
+  return out;
+}
+
 /// Sliding friction of a joint at a sample, in a direction.
 using SlidingTorque = std::function<double(Eigen::Index, Eigen::Index, int)>;
 
@@ -307,6 +321,8 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
   const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
   const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
   const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
+  // A joint that breaks away gains its momentum at once: over a window it would seem pushed before.
+  const Eigen::MatrixXd balanced = rates_between_neighbours(motion.t_s, terms.momentum);
   const Eigen::VectorXd clear =
       knows_inertia ? Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity())
                     : clear_accelerations(model, accelerations, states);
@@ -360,9 +376,12 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
         continue;
       }
       sample.sticks[j] = 1;
-      const double beyond =
-          anything ? 0.0 : wanted - std::clamp(wanted, taken.lowest, taken.highest);
-      sample.drive[j] = rate + beyond;
+      const double nearest = std::clamp(wanted, taken.lowest, taken.highest);
+      if (anything || nearest == wanted) {
+        sample.drive[j] = balanced(t, j);
+      } else {
+        sample.drive[j] -= nearest;
+      }
       if (direction != 0) continue;
       past.stuck_until_s = motion.t_s[t];
       past.stuck_at = motion.q(t, j);

@@ -124,6 +124,35 @@ TEST(Sliding, StickingIsNoEvidenceWithinItsInterval) {
   EXPECT_LT(balance(-6.0)[rest].drive[0], -3.0);
 }
 
+// All within the friction's interval: the momentum that it breaks away with comes at once.
+TEST(Sliding, NothingPushesBeforeABreakaway) {
+  const RigidModel model = make_rigid_model(contact_arm(1));
+  constexpr double kStart_s = 1.0;
+  constexpr double kAcceleration = 4.0;  // rad/s^2
+  const Eigen::Index rows = 500;
+  TorqueSamples motion;
+  motion.t_s = Eigen::VectorXd::LinSpaced(rows, 0.0, kStep_s * static_cast<double>(rows - 1));
+  const Eigen::ArrayXd since = (motion.t_s.array() - kStart_s).max(0.0);
+  motion.q = (0.5 * kAcceleration * since.square()).matrix();
+  motion.dq = (kAcceleration * since).matrix();
+  motion.torque = Eigen::VectorXd::Zero(rows);
+  motion.trajectory = Eigen::VectorXi::Zero(rows);
+  SlidingFriction any;
+  any.slides_forward = any.slides_backward = true;
+  any.lowest = -1e6;
+  any.highest = 1e6;
+  const std::vector<BalanceSample> balance = sliding_balance(model, {any}, motion);
+  const double per_step = balance.back().mass(0, 0) * kAcceleration * kStep_s;
+  for (std::size_t k = 1; balance[k].may_stick(0); ++k) {
+    const double gained = balance[k].momentum[0] - balance[k - 1].momentum[0];
+    const double told = 0.5 * kStep_s * (balance[k].drive[0] + balance[k - 1].drive[0]);
+    EXPECT_NEAR(told, gained, 0.3 * per_step) << motion.t_s[static_cast<Eigen::Index>(k)];
+    if (balance[k].stamp_s < kStart_s - 2.0 * kStep_s) {
+      EXPECT_NEAR(told, 0.0, 1e-12);
+    }
+  }
+}
+
 TEST(Sliding, StopAndGoHasNoContact) {
   const Drives drives({.duration_s = 60.0});
   const std::vector<BalanceSample> samples =
