@@ -27,8 +27,9 @@ constexpr double kSpikeOfNoise = 40.0;  // times the median distance from the ne
 constexpr double kSpikeOfRange = 0.2;   // of the range between the 1st and the 99th percentile
 constexpr double kSpikeOfSteps = 20.0;  // times the usual change from row to row
 constexpr double kMostSpikes = 0.02;    // of the rows
-constexpr double kMostWild = 0.1;       // of the rows, where they are of any size
-constexpr int kWildPasses = 3;
+// Of the rows, where they are of any size: as many as kinematics/log/readings_apart takes.
+constexpr double kMostWild = 0.1;
+constexpr int kWildPasses = 3;          // of one in twenty, some stand three in five
 constexpr std::size_t kNeighbours = 2;  // on either side
 
 /// One channel without the samples that were rejected.
