@@ -169,8 +169,10 @@ std::vector<std::size_t> spikes_beyond(const Series& series, double limit) {
 }
 
 /// Rows of the log. Where wild readings stand together, the first of them hide others.
-std::vector<Eigen::Index> spike_rows(Series series) {
-  const SpikeLimits limits = spike_limits(series);
+/// `clear_only`: of velocities, which the positions tell better where many are wild.
+std::vector<Eigen::Index> spike_rows(Series series, bool clear_only) {
+  SpikeLimits limits = spike_limits(series);
+  if (clear_only) limits.least = limits.clear;
   std::vector<Eigen::Index> out;
   if (!(limits.clear > 0.0)) return out;
   // What happens often is how the signal is, unless it is as often large as small.
@@ -255,9 +257,10 @@ void name_rate(const TorqueLog& log, const StepFacts& facts, std::vector<LogFind
 CheckedLog check_spikes(TorqueLog log) {
   CheckedLog out;
   std::vector<char> keep(static_cast<std::size_t>(log.rows()), 1);
-  const auto look = [&](const Eigen::MatrixXd& signal, const std::vector<std::string>& names) {
+  const auto look = [&](const Eigen::MatrixXd& signal, const std::vector<std::string>& names,
+                        bool clear_only = false) {
     for (Eigen::Index c = 0; c < signal.cols(); ++c) {
-      const std::vector<Eigen::Index> rows = spike_rows(series_of(log, signal.col(c)));
+      const std::vector<Eigen::Index> rows = spike_rows(series_of(log, signal.col(c)), clear_only);
       if (rows.empty()) continue;
       for (const Eigen::Index row : rows) keep[static_cast<std::size_t>(row)] = 0;
       const std::string& name = names[static_cast<std::size_t>(c)];
@@ -271,7 +274,7 @@ CheckedLog check_spikes(TorqueLog log) {
     }
   };
   look(log.q, log.q_columns);
-  look(log.dq, log.dq_columns);
+  look(log.dq, log.dq_columns, true);
   look(log.torque, log.torque_columns);
   out.log = out.findings.empty() ? std::move(log) : keep_rows(log, keep);
   return out;
