@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -125,19 +124,22 @@ class GravityBySagFirst {
                     const TraceOptions& trace_options, const Progress& progress)
       : bundle_(&bundle), options_(&options), trace_options_(trace_options), progress_(&progress) {}
 
-  /// TraceOptions::until.
+  /// TraceOptions::until. The first sag alone: where others stand in for something else, so do
+  /// sags.
   [[nodiscard]] bool leaves_nothing(const std::vector<AddedEffect>& added) {
-    for (const auto& [id, scan, spread] : added) {
-      if (!effects::is_sag(id) || !asked_.insert(id).second) continue;
-      const effects::TracedBundle model(*bundle_, *options_);
-      const TellingSag told{id, effects::gravity_by_sag(model, elsewhere(added, id), id)};
-      CalibrationTrace upright =
-          traced_upright(*bundle_, *options_, trace_options_, told, added, false, *progress_);
-      if (upright.trace.verdict != TraceVerdict::kEffects || !names(upright.trace, id)) continue;
-      found_ = std::move(upright);
-      return true;
-    }
-    return false;
+    const auto sag = std::ranges::find_if(
+        added, [](const AddedEffect& effect) { return effects::is_sag(effect.id); });
+    if (is_asked_ || sag == added.end()) return false;
+    is_asked_ = true;
+    const effects::TracedBundle model(*bundle_, *options_);
+    const TellingSag told{sag->id,
+                          effects::gravity_by_sag(model, elsewhere(added, sag->id), sag->id)};
+    CalibrationTrace upright =
+        traced_upright(*bundle_, *options_, trace_options_, told, added, false, *progress_);
+    if (upright.trace.verdict != TraceVerdict::kEffects || !names(upright.trace, sag->id))
+      return false;
+    found_ = std::move(upright);
+    return true;
   }
 
   [[nodiscard]] std::optional<CalibrationTrace>& found() { return found_; }
@@ -147,7 +149,7 @@ class GravityBySagFirst {
   const CalibrationTraceOptions* options_;
   TraceOptions trace_options_;
   const Progress* progress_;
-  std::set<EffectId> asked_;
+  bool is_asked_ = false;
   std::optional<CalibrationTrace> found_;
 };
 
