@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <span>
 
 #include "kinematics/core/median.h"
 
@@ -14,30 +15,50 @@ namespace {
 constexpr std::size_t kFewestStamps = 30;  // frames; chosen
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-std::complex<double> phasor(const std::vector<double>& times_s, double rate_hz) {
+std::complex<double> phasor(std::span<const double> times_s, double rate_hz) {
   std::complex<double> out = 0.0;
   for (const double t : times_s) out += std::polar(1.0, kTurn * rate_hz * (t - times_s.front()));
   return out / static_cast<double>(times_s.size());
 }
 
-// Frames that come late make the median step too short or too long by some of it.
+// A rate, and how high the periodogram of some first stamps is there.
+struct Peak {
+  double rate_hz = 0.0;
+  double height = 0.0;
+};
+
+void take(std::span<const double> times_s, double rate_hz, Peak& best) {
+  const double height = std::norm(phasor(times_s, rate_hz));
+  if (height > best.height) best = {rate_hz, height};
+}
+
+// Frames that come late make the median step too short or too long by some of it. All near rates
+// are tried on the first stamps, and the best of them follows as there are twice as many: the time
+// is in proportion to their number.
 double likeliest_rate(const std::vector<double>& times_s) {
-  constexpr double kNear = 0.1;     // of the rate, on either side; chosen
-  constexpr double kStep = 0.1;     // of what a period more or less in all of them is
-  constexpr double kFinest = 1e-4;  // of the same
+  constexpr std::size_t kFirst = 500;  // stamps; chosen
+  constexpr double kNear = 0.1;        // of the rate, on either side; chosen
+  constexpr double kStep = 0.1;        // of what a period more or less in all of them is
+  constexpr double kFinest = 1e-4;     // of the same
   std::vector<double> steps;
   for (std::size_t i = 1; i < times_s.size(); ++i) steps.push_back(times_s[i] - times_s[i - 1]);
   const double about = 1.0 / median_of(std::move(steps));
-  const double span_s = times_s.back() - times_s.front();
-  const auto height = [&](double rate_hz) { return std::norm(phasor(times_s, rate_hz)); };
-  double best = about;
-  for (double rate = (1.0 - kNear) * about; rate <= (1.0 + kNear) * about; rate += kStep / span_s)
-    if (height(rate) > height(best)) best = rate;
-  for (double step = 0.5 * kStep / span_s; step > kFinest / span_s; step *= 0.5) {
-    for (const double rate : {best - step, best + step})
-      if (height(rate) > height(best)) best = rate;
+  std::span<const double> some(times_s.data(), std::min(kFirst, times_s.size()));
+  Peak best{about, std::norm(phasor(some, about))};
+  const double coarse = kStep / (some.back() - some.front());
+  for (double rate = (1.0 - kNear) * about; rate <= (1.0 + kNear) * about; rate += coarse)
+    take(some, rate, best);
+  while (true) {
+    const double span_s = some.back() - some.front();
+    for (double step = 2.0 * kStep / span_s; step > kFinest / span_s; step *= 0.5) {
+      const double around = best.rate_hz;
+      take(some, around - step, best);
+      take(some, around + step, best);
+    }
+    if (some.size() == times_s.size()) return best.rate_hz;
+    some = {times_s.data(), std::min(2 * some.size(), times_s.size())};
+    best.height = std::norm(phasor(some, best.rate_hz));
   }
-  return best;
 }
 
 // Of each frame; no two are of one. From the last one back: what arrives late is behind its period.

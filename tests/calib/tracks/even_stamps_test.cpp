@@ -56,6 +56,17 @@ TEST(EvenStamps, FramesThatArriveTogetherAreOfThePeriodsBefore) {
   EXPECT_TRUE(std::ranges::is_sorted(even->times_s));
 }
 
+// An hour: the rate of the first seconds is followed to the end.
+TEST(EvenStamps, ALongRecordingIsEvenToItsEnd) {
+  Rng rng(4);
+  const std::vector<double> exact = even_times(108'000);
+  std::vector<double> stamps = exact;
+  for (double& t : stamps) t += rng.uniform(0.0, 0.02);
+  const auto even = even_stamps(stamps);
+  ASSERT_TRUE(even);
+  EXPECT_LT(unevenness(even->times_s, exact), 0.003);
+}
+
 TEST(EvenStamps, NothingIsMadeOfStampsThatAreEvenOrNoCameras) {
   EXPECT_FALSE(even_stamps(even_times(600)));
   std::vector<double> thinned = even_times(600);
