@@ -36,10 +36,10 @@ void take(std::span<const double> times_s, double rate_hz, Peak& best) {
 // are tried on the first stamps, and the best of them follows as there are twice as many: the time
 // is in proportion to their number.
 double likeliest_rate(const std::vector<double>& times_s) {
-  constexpr std::size_t kFirst = 500;  // stamps; chosen
-  constexpr double kNear = 0.1;        // of the rate, on either side; chosen
-  constexpr double kStep = 0.1;        // of what a period more or less in all of them is
-  constexpr double kFinest = 1e-4;     // of the same
+  constexpr std::size_t kFirst = 1000;  // stamps; chosen
+  constexpr double kNear = 0.1;         // of the rate, on either side; chosen
+  constexpr double kStep = 0.1;         // of what a period more or less in all of them is
+  constexpr double kFinest = 1e-4;      // of the same
   std::vector<double> steps;
   for (std::size_t i = 1; i < times_s.size(); ++i) steps.push_back(times_s[i] - times_s[i - 1]);
   const double about = 1.0 / median_of(std::move(steps));
