@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 
 #include "calib/trace/distribution.h"
+#include "calib/trace/not_found.h"
 #include "calib/trace/scan_slope.h"
+#include "calib/trace/verdict.h"
 
 namespace kinescope::trace {
 namespace {
@@ -76,8 +78,8 @@ void Tracer::search() {
   while (take_the_rest_as_curves()) look_beside_curves();
   describe_curves();
   summarise();
-  list_not_found();
-  conclude();
+  trace_.not_found = not_found(*now_, trace_, options_, level_);
+  conclude(*now_, base_->system.total().rr, trace_);
 }
 
 StagePtr Tracer::stage_of(std::vector<AddedEffect> effects) {
@@ -192,7 +194,7 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   if (best) return best;
   // Where what is left is no noise for certain, too few stretches may be free of it to show
   // anything at all.
-  if (hints.empty() && over_neighbours(now->system.total().rr).value_or(0.0) > kLasts) {
+  if (hints.empty() && now->over_neighbours(now->system.total().rr).value_or(0.0) > kLasts) {
     if (const TestedMember* most = most_telling(*now, family)) hints.push_back(most);
   }
   for (const TestedMember* hint : hints) {

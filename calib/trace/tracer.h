@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The search: forward selection (tracer.cpp), backward check and what cannot be told apart
-// (tracer_backward.cpp), what is left and the answer (tracer_answer.cpp), sizes (tracer_sizes.cpp),
-// what is left and repeats (tracer_curves.cpp), its plain causes (tracer_plain.cpp).
+// (tracer_backward.cpp), what is left (tracer_rest.cpp), repeats (tracer_curves.cpp) or has plain
+// causes (tracer_plain.cpp), the answer in numbers (tracer_answer.cpp; its verdict: verdict.h).
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "calib/trace/common_motion.h"
 #include "calib/trace/encompassing.h"
 #include "calib/trace/family.h"
 #include "calib/trace/lasting.h"
@@ -108,6 +108,8 @@ class Tracer {
   [[nodiscard]] std::optional<std::size_t> one_without_size();
   [[nodiscard]] bool is_usual(const EffectId& id) const;
   [[nodiscard]] bool drop_without_size();
+  /// For good, with its reason; `less`: the model without it.
+  void take_out(std::size_t index, StagePtr less, std::string_view why);
   /// What an effect does, from the model without it.
   void compare_without(const Stage& without, TracedEffect& detail) const;
   /// Other values of the scan that explain what `own` explains, with the size they would have.
@@ -161,17 +163,6 @@ class Tracer {
   [[nodiscard]] bool says_as_much(const Stage& without, FoundRest alone,
                                   const FoundRest& found) const;
   [[nodiscard]] bool rest_replaces_an_effect(const FoundRest& found);
-  /// What is left, in squares, over what differs between neighbours in time: as an rms; nothing
-  /// where that is not known.
-  [[nodiscard]] std::optional<double> over_neighbours(double squares) const;
-  /// "what tag_12 leaves, .., lasts": of one body, which all the others hide; empty: of none.
-  [[nodiscard]] std::string lasting_body_words() const;
-  /// Bodies behind a joint differ alike from instant to instant, and that makes most of what is
-  /// left.
-  [[nodiscard]] std::optional<CommonMotion> common_motion() const;
-  /// True where it is what readings are known to err by.
-  [[nodiscard]] bool is_of_readings(const CommonMotion& motion) const;
-  [[nodiscard]] std::string reading_words(const CommonMotion& motion) const;
   /// Squares that neither effects nor what was found beside them explain.
   [[nodiscard]] double left_over() const;
   [[nodiscard]] bool drop_what_leaves_too_much();
@@ -184,10 +175,6 @@ class Tracer {
   void summarise();
   /// What an added effect is in numbers, as it is fitted; `covariance` of its values.
   void size_up(std::size_t index, const Eigen::MatrixXd& covariance, TracedEffect& effect) const;
-  void list_not_found();
-  /// The answer need not be `unknown` for it.
-  [[nodiscard]] bool is_slight(const Rest& rest) const;
-  void conclude();
 
   const TracedModel* model_;
   TraceOptions options_;

@@ -133,14 +133,20 @@ std::optional<std::size_t> Tracer::one_without_size() {
   return std::nullopt;
 }
 
+void Tracer::take_out(std::size_t index, StagePtr less, std::string_view why) {
+  const EffectId id = now_->added[index].id;
+  removed_.insert(id);
+  mark(round_, id, CandidateState::kRemoved, less->error.value);
+  now_ = std::move(less);
+  details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(index));
+  add_step(round_, fmt::format("{} removed: {}", name_of(id), why), *now_);
+}
+
 bool Tracer::drop_without_size() {
   const std::optional<std::size_t> index = one_without_size();
   if (!index) return false;
-  const EffectId id = now_->added[*index].id;
-  removed_.insert(id);
-  now_ = stage_of(kinescope::trace::without(now_->added, *index));
-  mark(round_, id, CandidateState::kRemoved, now_->error.value);
-  add_step(round_, fmt::format("{} removed: its size may be nothing", name_of(id)), *now_);
+  take_out(*index, stage_of(kinescope::trace::without(now_->added, *index)),
+           "its size may be nothing");
   return true;
 }
 
@@ -202,12 +208,7 @@ bool Tracer::check(std::size_t index) {
       is_large(*candidate, effect.scan, own.score) ||
       (needed && is_large(*candidate, effect.scan, refitted_score(*stage, *now_, own.columns)));
   if (!possible || !large || !shown || stage->held_out_sum() < now_->held_out_sum()) {
-    removed_.insert(effect.id);
-    mark(round_, effect.id, CandidateState::kRemoved, stage->error.value);
-    now_ = stage_of(kinescope::trace::without(now_->added, index));
-    add_step(round_,
-             fmt::format("{} removed: with the others in, it earns nothing", name_of(effect.id)),
-             *now_);
+    take_out(index, stage, "with the others in, it earns nothing");
     return true;
   }
   detail.picture = picture_of(*stage, *now_, *candidate, own.columns, now_->fit.values[index]);

@@ -133,12 +133,8 @@ void Tracer::drop_what_curves_contain() {
     if (!is_part_of_a_curve(i, static_cast<std::size_t>(curve - now_->added.begin()), *stage)) {
       continue;
     }
-    removed_.insert(id);
-    mark(round_, id, CandidateState::kRemoved, stage->error.value);
-    now_ = std::move(stage);
-    details_.erase(details_.begin() + static_cast<std::ptrdiff_t>(i));
+    take_out(i, std::move(stage), "it is part of a curve");
     tune_curves();
-    add_step(round_, fmt::format("{} removed: it is part of a curve", name_of(id)), *now_);
   }
 }
 
