@@ -33,17 +33,7 @@ class DensePosterior : public Posterior {
     Moments out;
     out.mean.resize(at.samples * m);
     if (variance) out.variance = covariance_.diagonal(workers, at);
-    const Index width = covariance_.tile_samples();
-    workers.run((at.samples + width - 1) / width, [&](Index task, Scratch& scratch) {
-      const Scratch::Frame frame(scratch);
-      const Index begin = task * width;
-      const Index size = std::min(width, at.samples - begin);
-      Eigen::Map<Eigen::MatrixXd> cross = scratch.take(factor_.rows(), size * m);
-      for (Index row = 0; row < training_.samples; row += width) {
-        const Index rows = std::min(width, training_.samples - row);
-        covariance_.tile({training_, row, rows}, {at, begin, size}, scratch,
-                         cross.middleRows(row * m, rows * m));
-      }
+    covariance_.cross_panels(workers, training_, at, {}, [&](Index begin, Index size, Block cross) {
       transposed_product(1.0, cross, alpha_, 0.0, out.mean.segment(begin * m, size * m));
       if (!variance) return;
       solve_lower(factor_, cross);
@@ -54,13 +44,7 @@ class DensePosterior : public Posterior {
   }
 
   void mean_of_one(OneSample& work) const override {
-    const Index m = covariance_.outputs();
-    covariance_.prepare(work.input, work.prepared);
-    work.cross.resize(factor_.rows(), m);
-    covariance_.tile({training_, 0, training_.samples}, {work.prepared, 0, 1}, work.scratch,
-                     work.cross);
-    work.mean.resize(m);
-    transposed_product(1.0, work.cross, alpha_, 0.0, work.mean);
+    gp::mean_of_one(covariance_, training_, alpha_, work);
   }
 
   void variance_of_one(OneSample& work) const override {
@@ -144,6 +128,16 @@ class DensePosterior : public Posterior {
 };
 
 }  // namespace
+
+void mean_of_one(const Covariance& covariance, const Prepared& training,
+                 const Eigen::VectorXd& weights, OneSample& work) {
+  const Index m = covariance.outputs();
+  covariance.prepare(work.input, work.prepared);
+  work.cross.resize(weights.size(), m);
+  covariance.tile({training, 0, training.samples}, {work.prepared, 0, 1}, work.scratch, work.cross);
+  work.mean.resize(m);
+  transposed_product(1.0, work.cross, weights, 0.0, work.mean);
+}
 
 double with_jitter(const Covariance& covariance, Index samples, double max_jitter,
                    const std::function<Attempt(double)>& attempt) {

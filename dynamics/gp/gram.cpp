@@ -116,6 +116,25 @@ Eigen::MatrixXd Covariance::cross(Workers& workers, const Prepared& x, const Pre
   return out;
 }
 
+void Covariance::cross_panels(Workers& workers, const Prepared& x, const Prepared& y, Turn turn,
+                              const Panel& use) const {
+  const Index m = outputs_;
+  const Index width = tile_samples_;
+  const Index panels = (y.samples + width - 1) / width;
+  workers.run(
+      (panels - turn.first + turn.count - 1) / turn.count, [&](Index task, Scratch& scratch) {
+        const Scratch::Frame frame(scratch);
+        const Index begin = (task * turn.count + turn.first) * width;
+        const Index size = std::min(width, y.samples - begin);
+        Eigen::Map<Eigen::MatrixXd> cross = scratch.take(x.samples * m, size * m);
+        for (Index row = 0; row < x.samples; row += width) {
+          const Index rows = std::min(width, x.samples - row);
+          tile({x, row, rows}, {y, begin, size}, scratch, cross.middleRows(row * m, rows * m));
+        }
+        use(begin, size, cross);
+      });
+}
+
 Eigen::VectorXd Covariance::diagonal(Workers& workers, const Prepared& x) const {
   Eigen::VectorXd out(x.samples * outputs_);
   constexpr Index kChunk = 1024;
@@ -142,9 +161,9 @@ void Covariance::contract_tile(Samples a, Samples b, const ConstBlock& q, Scratc
   node_->contract(theta_, a, b, own, scratch, out);
 }
 
-Eigen::VectorXd Covariance::contract_tiles(Workers& workers, const std::vector<Tile>& tiles,
-                                           const Prepared& x, const Prepared& y,
+Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
                                            const Weights& weights) const {
+  const std::vector<Tile> tiles = make_tiles(x.samples, x.samples, tile_samples_, true);
   Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), static_cast<Index>(tiles.size()));
   const Index m = outputs_;
   workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
@@ -152,39 +171,9 @@ Eigen::VectorXd Covariance::contract_tiles(Workers& workers, const std::vector<T
     const Scratch::Frame frame(scratch);
     Eigen::Map<Eigen::MatrixXd> q = scratch.take(t.rows * m, t.cols * m);
     weights(t.row * m, t.col * m, scratch, q);
-    contract_tile({x, t.row, t.rows}, {y, t.col, t.cols}, q, scratch, parts.col(task));
-  });
-  return add_columns(parts);
-}
-
-Eigen::VectorXd Covariance::contract_lower(Workers& workers, const Prepared& x,
-                                           const Weights& weights) const {
-  // What lies above the diagonal counts with what lies below.
-  const auto both = [&](Index row, Index col, Scratch& scratch, Block q) {
-    weights(row, col, scratch, q);
-    if (row != col) q *= 2.0;
-  };
-  return contract_tiles(workers, make_tiles(x.samples, x.samples, tile_samples_, true), x, x, both);
-}
-
-Eigen::VectorXd Covariance::contract(Workers& workers, const Prepared& x, const Prepared& y,
-                                     const Weights& weights) const {
-  return contract_tiles(workers, make_tiles(x.samples, y.samples, tile_samples_, false), x, y,
-                        weights);
-}
-
-Eigen::VectorXd Covariance::contract_diagonal(Workers& workers, const Prepared& x,
-                                              const Eigen::VectorXd& q) const {
-  constexpr Index kChunk = 1024;
-  Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(theta_.size(), (x.samples + kChunk - 1) / kChunk);
-  workers.run(parts.cols(), [&](Index task, Scratch& scratch) {
-    const Scratch::Frame frame(scratch);
-    Eigen::Map<Eigen::MatrixXd> own = scratch.take(outputs_, outputs_);
-    for (Index i = task * kChunk; i < std::min(x.samples, (task + 1) * kChunk); ++i) {
-      own.setZero();
-      own.diagonal() = q.segment(i * outputs_, outputs_);
-      node_->contract(theta_, {x, i, 1}, {x, i, 1}, own, scratch, parts.col(task));
-    }
+    // What lies above the diagonal counts with what lies below.
+    if (t.row != t.col) q *= 2.0;
+    contract_tile({x, t.row, t.rows}, {x, t.col, t.cols}, q, scratch, parts.col(task));
   });
   return add_columns(parts);
 }

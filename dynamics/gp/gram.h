@@ -18,6 +18,13 @@ struct Tile {
   Eigen::Index cols;
 };
 
+/// Every `count`-th of several tiles, beginning with the `first`: what one of `count` processes
+/// has.
+struct Turn {
+  Eigen::Index first = 0;
+  Eigen::Index count = 1;
+};
+
 /// A kernel with its parameters, ready for large matrices. Rows and columns of all matrices are
 /// sample-major: sample * outputs + output.
 class Covariance {
@@ -35,6 +42,11 @@ class Covariance {
   /// The same into a matrix of the right size; what lies above the tiles stays.
   void lower(Workers& workers, const Prepared& x, Eigen::MatrixXd& out) const;
   [[nodiscard]] Eigen::MatrixXd cross(Workers& workers, const Prepared& x, const Prepared& y) const;
+  /// Does something with k(x, y) for the samples of y from `begin` on: x.samples * outputs rows.
+  using Panel = std::function<void(Eigen::Index begin, Eigen::Index size, Block cross)>;
+  /// Calls `use` for every panel of tile_samples() of y whose turn it is, workers side by side.
+  void cross_panels(Workers& workers, const Prepared& x, const Prepared& y, Turn turn,
+                    const Panel& use) const;
   /// Some samples against some, in the calling thread.
   void tile(Samples a, Samples b, Scratch& scratch, Block out) const;
   /// k(x_i, x_i): samples * outputs.
@@ -45,22 +57,12 @@ class Covariance {
   /// d/dtheta sum_ij Q_ij k_ij over the whole symmetric matrix, from the tiles of its lower half.
   [[nodiscard]] Eigen::VectorXd contract_lower(Workers& workers, const Prepared& x,
                                                const Weights& weights) const;
-  /// The same for k(x, y) and any Q.
-  [[nodiscard]] Eigen::VectorXd contract(Workers& workers, const Prepared& x, const Prepared& y,
-                                         const Weights& weights) const;
-  /// The same for the diagonal.
-  [[nodiscard]] Eigen::VectorXd contract_diagonal(Workers& workers, const Prepared& x,
-                                                  const Eigen::VectorXd& q) const;
-
   /// Samples in a tile.
   [[nodiscard]] Eigen::Index tile_samples() const { return tile_samples_; }
 
  private:
   void fill_tiles(Workers& workers, const std::vector<Tile>& tiles, const Prepared& x,
                   const Prepared& y, Eigen::MatrixXd& out) const;
-  [[nodiscard]] Eigen::VectorXd contract_tiles(Workers& workers, const std::vector<Tile>& tiles,
-                                               const Prepared& x, const Prepared& y,
-                                               const Weights& weights) const;
   void contract_tile(Samples a, Samples b, const ConstBlock& q, Scratch& scratch,
                      Gradient out) const;
 

@@ -36,6 +36,11 @@ struct OneSample {
   Eigen::VectorXd variance;
 };
 
+/// Posterior::mean_of_one() by the weights of the training samples; leaves k(training, input) in
+/// `work.cross`.
+void mean_of_one(const Covariance& covariance, const Prepared& training,
+                 const Eigen::VectorXd& weights, OneSample& work);
+
 /// Predictions for the targets that a fold leaves out.
 struct LeftOut {
   Eigen::VectorXd mean;

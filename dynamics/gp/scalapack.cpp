@@ -231,13 +231,7 @@ class DistributedPosterior : public Posterior {
   }
 
   void mean_of_one(OneSample& work) const override {
-    const Index m = covariance_.outputs();
-    covariance_.prepare(work.input, work.prepared);
-    work.cross.resize(alpha_.size(), m);
-    covariance_.tile({training_, 0, training_.samples}, {work.prepared, 0, 1}, work.scratch,
-                     work.cross);
-    work.mean.resize(m);
-    transposed_product(1.0, work.cross, alpha_, 0.0, work.mean);
+    gp::mean_of_one(covariance_, training_, alpha_, work);
   }
 
   void variance_of_one(OneSample&) const override { refuse_several("variance of one sample"); }
@@ -253,22 +247,12 @@ class DistributedPosterior : public Posterior {
   // Every process takes its share of the samples.
   [[nodiscard]] VectorXd means(Workers& workers, const Prepared& at) const {
     const Index m = covariance_.outputs();
-    const Index width = covariance_.tile_samples();
-    const Index tiles = (at.samples + width - 1) / width;
     VectorXd out = VectorXd::Zero(at.samples * m);
-    workers.run((tiles - grid_.rank + grid_.count - 1) / grid_.count,
-                [&](Index task, Scratch& scratch) {
-                  const Scratch::Frame frame(scratch);
-                  const Index begin = (task * grid_.count + grid_.rank) * width;
-                  const Index size = std::min(width, at.samples - begin);
-                  Eigen::Map<MatrixXd> cross = scratch.take(alpha_.size(), size * m);
-                  for (Index row = 0; row < training_.samples; row += width) {
-                    const Index rows = std::min(width, training_.samples - row);
-                    covariance_.tile({training_, row, rows}, {at, begin, size}, scratch,
-                                     cross.middleRows(row * m, rows * m));
-                  }
-                  transposed_product(1.0, cross, alpha_, 0.0, out.segment(begin * m, size * m));
-                });
+    covariance_.cross_panels(workers, training_, at, {grid_.rank, grid_.count},
+                             [&](Index begin, Index size, Block cross) {
+                               transposed_product(1.0, cross, alpha_, 0.0,
+                                                  out.segment(begin * m, size * m));
+                             });
     add_up(grid_, out);
     return out;
   }

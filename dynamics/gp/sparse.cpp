@@ -100,32 +100,6 @@ void check_sparse(const GpModel& model, const Dataset& dataset, const Eigen::Mat
   check_memory(inducing.rows(), 1, 8.0, options.memory_limit_bytes);
 }
 
-class SparseObjective : public Objective {
- public:
-  SparseObjective(Kernel kernel, Problem problem, Eigen::MatrixXd inducing, FitOptions options)
-      : kernel_(std::move(kernel)),
-        problem_(std::move(problem)),
-        inducing_(std::move(inducing)),
-        options_(options),
-        workers_(options.threads) {}
-
-  [[nodiscard]] std::optional<Likelihood> evaluate(const Eigen::VectorXd& log_values) override {
-    const auto count = static_cast<Index>(kernel_.parameters().size());
-    const auto system = make_sparse_system(
-        workers_, kernel_.with_log_values(log_values.head(count)),
-        log_values.tail(log_values.size() - count), problem_, inducing_, options_.max_jitter);
-    if (!system || !std::isfinite(system->bound)) return std::nullopt;
-    return Likelihood{system->bound, bound_gradient(workers_, *system, problem_)};
-  }
-
- private:
-  Kernel kernel_;
-  Problem problem_;
-  Eigen::MatrixXd inducing_;
-  FitOptions options_;
-  Workers workers_;
-};
-
 // The first samples in the order of a seeded hash of their values.
 std::vector<Index> candidates_of(const Eigen::MatrixXd& inputs, const InducingOptions& options) {
   std::vector<std::pair<std::uint64_t, Index>> hashed;
@@ -201,21 +175,6 @@ FittedGp fit_sparse(const GpModel& model, const Dataset& dataset, const Eigen::M
                problem.samples, system->count(), nullptr};
   out.posterior = std::make_shared<SparsePosterior>(*std::move(system), std::move(problem));
   return out;
-}
-
-std::unique_ptr<Objective> make_sparse_objective(const GpModel& model, const Dataset& dataset,
-                                                 const Eigen::MatrixXd& inducing,
-                                                 const FitOptions& options) {
-  check_sparse(model, dataset, inducing, options);
-  return std::make_unique<SparseObjective>(model.kernel, make_problem(model, dataset),
-                                           model.normalisation.normalised_inputs(inducing),
-                                           options);
-}
-
-Estimate estimate_sparse(const GpModel& model, const Dataset& dataset,
-                         const Eigen::MatrixXd& inducing, const EstimateOptions& options) {
-  const auto objective = make_sparse_objective(model, dataset, inducing, options.fit);
-  return estimate_hyperparameters(model, dataset, *objective, options);
 }
 
 }  // namespace kinescope::gp

@@ -2,8 +2,8 @@
 //
 // Takes   GpModel of one output, a Dataset too large for its kernel matrix, inducing inputs.
 // Gives   FittedGp, as from fit(): predict() and Predictor work the same.
-// Method  variational inducing points (Titsias 2009): the evidence bound and its gradient; the
-//         samples pass once through a QR in chunks, so memory is that of m x m matrices. Inducing
+// Method  variational inducing points (Titsias 2009): the evidence bound; the samples
+//         pass once through a QR in chunks, so memory is that of m x m matrices. Inducing
 //         inputs by greedy conditional variance (Burt, Rasmussen and van der Wilk 2020).
 // Not here: several outputs; leave_out().
 #pragma once
@@ -32,16 +32,5 @@ struct InducingOptions {
 /// log_likelihood of the result is the lower bound.
 [[nodiscard]] FittedGp fit_sparse(const GpModel& model, const Dataset& dataset,
                                   const Eigen::MatrixXd& inducing, const FitOptions& options = {});
-
-/// The bound as a function of the parameters, for fixed inducing inputs.
-[[nodiscard]] std::unique_ptr<Objective> make_sparse_objective(const GpModel& model,
-                                                               const Dataset& dataset,
-                                                               const Eigen::MatrixXd& inducing,
-                                                               const FitOptions& options = {});
-
-/// Starts on a subset with the exact likelihood, then the bound on all samples.
-[[nodiscard]] Estimate estimate_sparse(const GpModel& model, const Dataset& dataset,
-                                       const Eigen::MatrixXd& inducing,
-                                       const EstimateOptions& options = {});
 
 }  // namespace kinescope::gp

@@ -33,8 +33,4 @@ struct SparseSystem {
                                                              const Eigen::MatrixXd& inducing,
                                                              double max_jitter);
 
-/// d bound / d (theta, log noise).
-[[nodiscard]] Eigen::VectorXd bound_gradient(Workers& workers, const SparseSystem& system,
-                                             const Problem& problem);
-
 }  // namespace kinescope::gp

@@ -21,13 +21,7 @@
 #include "dynamics/gp/process_group.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
-
-extern "C" {
-void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*,
-            const double*, const int*, const double*, const int*, const double*, double*,
-            const int*);
-void dpotrf_(const char*, const int*, double*, const int*, int*);
-}
+#include "tests/truth/lapack.h"
 
 namespace kinescope::gp {
 namespace {

@@ -45,26 +45,6 @@ TEST(Sparse, TheBoundIsBelowAndRisesWithThePoints) {
   EXPECT_NEAR(last, exact, 0.05 * std::abs(exact));
 }
 
-TEST(Sparse, GradientOfTheBoundAgreesWithDifferences) {
-  Rng rng = Rng::from_name("sparse gradient");
-  Dataset data = smooth_data(rng, 120, 2, 0.1);
-  data.noise_scale = random_matrix(rng, 120, 1).cwiseAbs().array() + 0.5;
-  const GpModel model = make_model(rbf(first_columns(2)) + linear(columns({0})), 0.05);
-  const auto objective =
-      make_sparse_objective(model, data, choose_inducing(model, data, {.count = 15}));
-  const Eigen::VectorXd values = log_values_of(model);
-  const Eigen::VectorXd gradient = objective->evaluate(values)->gradient;
-  for (Eigen::Index p = 0; p < values.size(); ++p) {
-    Eigen::VectorXd plus = values;
-    Eigen::VectorXd minus = values;
-    plus[p] += kDifferenceStep;
-    minus[p] -= kDifferenceStep;
-    const double slope = (objective->evaluate(plus)->value - objective->evaluate(minus)->value) /
-                         (2.0 * kDifferenceStep);
-    EXPECT_NEAR(gradient[p], slope, 1e-5 * gradient.cwiseAbs().maxCoeff()) << p;
-  }
-}
-
 TEST(Sparse, PointsDoNotDependOnTheOrderOfSamples) {
   Rng rng = Rng::from_name("sparse order");
   const Dataset data = smooth_data(rng, 200, 2, 0.1);
@@ -74,18 +54,6 @@ TEST(Sparse, PointsDoNotDependOnTheOrderOfSamples) {
   const InducingOptions options{.count = 20, .candidates = 100};
   EXPECT_EQ(choose_inducing(model, data, options),
             choose_inducing(model, subset(data, reversed), options));
-}
-
-TEST(Sparse, EstimatesOnAllSamples) {
-  Rng rng = Rng::from_name("sparse estimate");
-  const Dataset data = smooth_data(rng, 1500, 2, 0.1);
-  const GpModel model = make_model(rbf(first_columns(2)), 0.5);
-  const Eigen::MatrixXd inducing = choose_inducing(model, data, {.count = 60});
-  const Estimate found = estimate_sparse(model, data, inducing, {.starts = 1});
-  EXPECT_EQ(found.status, EstimateStatus::kConverged) << found.message;
-  // Noise of 0.1, from 1500 samples: 4 percent of its variance; two of those and what 60 points
-  // lose.
-  EXPECT_NEAR(found.model.noise_variance[0].value, 0.01, 0.001);
 }
 
 TEST(Sparse, LeavesOutNothing) {
