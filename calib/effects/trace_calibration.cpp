@@ -116,42 +116,20 @@ CalibrationTrace traced_upright(const EffectBundle& bundle, CalibrationTraceOpti
   return out;
 }
 
-// A sag without gravity is a poor picture of what it does, for which others stand in: gravity is
-// asked for as soon as a sag was added, and where that leaves nothing, these are not looked for.
-class GravityBySagFirst {
- public:
-  GravityBySagFirst(const EffectBundle& bundle, const CalibrationTraceOptions& options,
-                    const TraceOptions& trace_options, const Progress& progress)
-      : bundle_(&bundle), options_(&options), trace_options_(trace_options), progress_(&progress) {}
-
-  /// TraceOptions::until. The first sag alone: where others stand in for something else, so do
-  /// sags.
-  [[nodiscard]] bool leaves_nothing(const std::vector<AddedEffect>& added) {
-    const auto sag = std::ranges::find_if(
-        added, [](const AddedEffect& effect) { return effects::is_sag(effect.id); });
-    if (is_asked_ || sag == added.end()) return false;
-    is_asked_ = true;
-    const effects::TracedBundle model(*bundle_, *options_);
-    const TellingSag told{sag->id,
-                          effects::gravity_by_sag(model, elsewhere(added, sag->id), sag->id)};
-    CalibrationTrace upright =
-        traced_upright(*bundle_, *options_, trace_options_, told, added, false, *progress_);
-    if (upright.trace.verdict != TraceVerdict::kEffects || !names(upright.trace, sag->id))
-      return false;
-    found_ = std::move(upright);
-    return true;
-  }
-
-  [[nodiscard]] std::optional<CalibrationTrace>& found() { return found_; }
-
- private:
-  const EffectBundle* bundle_;
-  const CalibrationTraceOptions* options_;
-  TraceOptions trace_options_;
-  const Progress* progress_;
-  bool is_asked_ = false;
-  std::optional<CalibrationTrace> found_;
-};
+// The answer under the gravity that the first of these sags would have, where that leaves nothing.
+// Where others stand in for something else, so do further sags.
+std::optional<CalibrationTrace> explained_upright(const EffectBundle& bundle,
+                                                  const CalibrationTraceOptions& options,
+                                                  const TraceOptions& trace_options,
+                                                  const std::vector<AddedEffect>& added,
+                                                  const EffectId& sag, const Progress& progress) {
+  const effects::TracedBundle model(bundle, options);
+  const TellingSag told{sag, effects::gravity_by_sag(model, elsewhere(added, sag), sag)};
+  CalibrationTrace out =
+      traced_upright(bundle, options, trace_options, told, added, false, progress);
+  if (out.trace.verdict != TraceVerdict::kEffects || !names(out.trace, sag)) return std::nullopt;
+  return out;
+}
 
 CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
                                      const CalibrationTraceOptions& options,
@@ -167,11 +145,21 @@ CalibrationTrace traced_with_gravity(const EffectBundle& bundle,
     trace_options.start.push_back({{"time_offset", "clock"}, 0.0});
   }
   if (options.gravity_base) return traced(model, bundle, options, trace_options, progress);
-  GravityBySagFirst by_sag(bundle, options, trace_options, progress);
+  // A sag without gravity is a poor picture of what it does, for which others stand in: gravity is
+  // asked for as soon as a sag was added, and where that leaves nothing, these are not looked for.
+  bool is_asked = false;
+  std::optional<CalibrationTrace> upright;
   TraceOptions until = trace_options;
-  until.until = [&](const std::vector<AddedEffect>& added) { return by_sag.leaves_nothing(added); };
+  until.until = [&](const std::vector<AddedEffect>& added) {
+    const auto sag = std::ranges::find_if(
+        added, [](const AddedEffect& effect) { return effects::is_sag(effect.id); });
+    if (is_asked || sag == added.end()) return false;
+    is_asked = true;
+    upright = explained_upright(bundle, options, trace_options, added, sag->id, progress);
+    return upright.has_value();
+  };
   CalibrationTrace out = traced(model, bundle, options, until, progress);
-  if (by_sag.found()) return *std::move(by_sag.found());
+  if (upright) return *std::move(upright);
   if (is_told_by_one_other(out.trace)) return out;
   // Where gravity is known, every link's mass is a load of its own: once more, and kept where that
   // predicts better and needs no more effects, or leaves nothing that no effect explains.
