@@ -35,6 +35,29 @@ CLI::Validator number_in(double least, double most) {
           fmt::format("{} to {}", least, most)};
 }
 
+std::string refuse_empty(const std::string& path) {
+  return path.empty() ? "the path is empty" : "";
+}
+
+void add_path(CLI::App& command, const char* name, std::optional<std::filesystem::path>& path,
+              const char* help) {
+  command
+      .add_option_function<std::string>(
+          name, [&path](const std::string& text) { path = text; }, help)
+      ->check(refuse_empty)
+      ->type_name("FILE")
+      ->group("Files in place of those in the recording");
+}
+
+void add_path_argument(CLI::App& command, const char* name, std::filesystem::path& path,
+                       const char* help, const char* type) {
+  command
+      .add_option_function<std::string>(
+          name, [&path](const std::string& text) { path = text; }, help)
+      ->required()
+      ->type_name(type);
+}
+
 void add_force(CLI::App& command, bool& force, const char* help) {
   command.add_flag("--force", force, help);
 }

@@ -3,6 +3,9 @@
 // What several commands say on the command line. Shows CLI11, as command_line.h does.
 #pragma once
 
+#include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +29,27 @@ inline constexpr const char* kExitCodes =
 
 /// One of these words, which stand in the validator's name: for completion.
 [[nodiscard]] CLI::Validator one_of(const std::vector<std::string>& known);
+
+/// One word of several.
+template <typename Enum, typename Value>
+CLI::Option* add_choice(CLI::App& command, const char* name,
+                        const std::map<std::string, Enum>& words, Value& value, const char* help) {
+  std::vector<std::string> known;
+  for (const auto& [word, meaning] : words) known.push_back(word);
+  return command
+      .add_option_function<std::string>(
+          name, [&value, words](const std::string& text) { value = words.at(text); }, help)
+      ->check(one_of(known));
+}
+
+/// A check of paths.
+[[nodiscard]] std::string refuse_empty(const std::string& path);
+/// A file in place of one of the recording's.
+void add_path(CLI::App& command, const char* name, std::optional<std::filesystem::path>& path,
+              const char* help);
+/// A path that must be given.
+void add_path_argument(CLI::App& command, const char* name, std::filesystem::path& path,
+                       const char* help, const char* type);
 
 /// --force of a command that writes a file, and of one that writes into a folder.
 inline constexpr const char* kReplaceFile = "Replace the file that is there";

@@ -11,7 +11,6 @@
 #include <fmt/ranges.h>
 
 #include "app/commands/command_options.h"
-#include "app/io/nearest_name.h"
 #include "dynamics/policy/systems/library.h"
 #include "kinematics/core/csv.h"
 
@@ -40,22 +39,6 @@ constexpr CountOption kCounts[] = {
      "Gradient steps before each trial, at most; it stops where the cost no longer falls"},
 };
 
-template <typename Value, typename Target>
-CLI::Option* add_word(CLI::App& command, const char* name,
-                      const std::map<std::string, Value>& words, Target& target, const char* help) {
-  std::vector<std::string> known;
-  for (const auto& [word, value] : words) known.push_back(word);
-  const auto check = [words, known](const std::string& word) -> std::string {
-    if (words.contains(word)) return {};
-    return fmt::format("'{}' is not known; {}", word, did_you_mean(word, known));
-  };
-  return command
-      .add_option_function<std::string>(
-          name, [&target, words](const std::string& word) { target = words.at(word); }, help)
-      ->check(check, "", fmt::format("{}", fmt::join(known, " ")))  // its name: for completion
-      ->group(kHow);
-}
-
 void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
   static const std::map<std::string, policy::VelocityKernel> kKernels = {
       {"se", policy::VelocityKernel::kSquaredExponential},
@@ -79,14 +62,17 @@ void add_learning(CLI::App& command, PolicyCommandOptions& policy) {
         ->type_name("N")
         ->group(kHow);
   }
-  add_word(command, "--kernel", kKernels, policy.kernel,
-           "Of the model: se (squared exponential; default), se_p2 (and a polynomial of degree 2), "
-           "semi_parametric (and the terms of the plant's equations)")
-      ->type_name("KERNEL");
-  add_word(command, "--sensing", kSensing, policy.sensing,
-           "Of a plant of the literature: full (default), or positions, from which speeds are "
-           "estimated")
-      ->type_name("WHAT");
+  add_choice(
+      command, "--kernel", kKernels, policy.kernel,
+      "Of the model: se (squared exponential; default), se_p2 (and a polynomial of degree 2), "
+      "semi_parametric (and the terms of the plant's equations)")
+      ->type_name("KERNEL")
+      ->group(kHow);
+  add_choice(command, "--sensing", kSensing, policy.sensing,
+             "Of a plant of the literature: full (default), or positions, from which speeds are "
+             "estimated")
+      ->type_name("WHAT")
+      ->group(kHow);
   command
       .add_flag(
           "--plain", policy.plain,
