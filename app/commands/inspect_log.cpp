@@ -92,8 +92,9 @@ void note_readings_apart(const JointLog& log, const std::vector<ReadingApart>& a
   }
 }
 
-void note_exchanged(const JointLog& log, std::vector<Finding>& findings) {
-  for (const ExchangedReadings& exchanged : exchanged_readings(log)) {
+void note_exchanged(const JointLog& log, const std::vector<ReadingApart>& apart,
+                    std::vector<Finding>& findings) {
+  for (const ExchangedReadings& exchanged : exchanged_readings(log, apart)) {
     findings.push_back({false, fmt::format("{}: `run` takes it so unless the markers say otherwise",
                                            words_of(log, exchanged))});
   }
@@ -115,7 +116,7 @@ LogFacts look_at_log(const JointLog& log, const RecordingSettings& settings,
   const std::vector<ReadingApart> apart = readings_apart(log);
   const JointLog calm = without_readings(log, apart);
   note_readings_apart(log, apart, findings);
-  note_exchanged(log, findings);
+  note_exchanged(log, apart, findings);
   for (Eigen::Index c = 0; c < log.values.cols(); ++c) {
     facts.channels.push_back(look_at_channel(calm, c, settings, findings));
   }

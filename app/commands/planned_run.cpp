@@ -11,6 +11,7 @@
 #include "app/commands/compared_runs.h"
 #include "app/commands/run_again.h"
 #include "app/io/recording.h"
+#include "calib/bundle/postures.h"
 #include "calib/camera/marker_set.h"
 #include "calib/effects/joint_shares.h"
 #include "kinematics/core/csv.h"
@@ -253,13 +254,6 @@ void take_recorded_speeds(const JointLog& log, const KinematicTree& tree, double
   }
 }
 
-std::vector<int> driving_channels(const KinematicTree& tree, const JointLog& log) {
-  std::vector<int> out;
-  for (const Joint& joint : tree.joints)
-    if (const auto channel = log.channel(joint.channel)) out.push_back(*channel);
-  return out;
-}
-
 // The log of the run's (first) recording; nothing, and why, where it is gone.
 std::optional<JointLog> recorded_log(const fs::path& folder, std::string& why_not) {
   try {
@@ -321,9 +315,7 @@ PlannedRun read_planned_run(const PlanCommandOptions& options) {
   std::string why_not;
   const std::optional<JointLog> log = recorded_log(options.source, why_not);
   const SeenCorners seen = read_seen_corners(options.source / "residuals.csv", calibration);
-  const bool of_postures =
-      log && !log->empty() &&
-      is_posture_log(*log, seen.times_s, driving_channels(calibration.tree, *log));
+  const bool of_postures = log && shows_postures(calibration.tree, *log, seen.times_s);
   if (log && !of_postures) {
     take_recorded_speeds(*log, calibration.tree, options.speed, limits);
     if (const std::string still = still_joints(calibration.tree, limits); !still.empty())

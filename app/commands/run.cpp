@@ -38,6 +38,7 @@
 #include "app/report/trace_lines.h"
 #include "app/report/verdict_words.h"
 #include "calib/bundle/branches.h"
+#include "calib/bundle/postures.h"
 #include "calib/effects/corrected_log.h"
 #include "calib/quality/error_summary.h"
 #include "calib/quality/odd_readings.h"
@@ -234,14 +235,6 @@ void keep_observations(const std::vector<Recording>& given, const SeenTogether& 
   }
 }
 
-bool shows_postures(const RunSummary& run) {
-  std::vector<int> channels;
-  for (const Joint& joint : run.calibration.tree.joints) {
-    if (const auto channel = run.log.channel(joint.channel)) channels.push_back(*channel);
-  }
-  return !run.log.empty() && is_posture_log(run.log, run.calibration.times_s, channels);
-}
-
 std::string odd_words(const OddReading& odd, const Recording& recording) {
   return fmt::format(
       "{}: at {} = {:.6g} '{}' reads {:.6g}, but the markers it moves say {:.6g}: left out",
@@ -278,15 +271,16 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
   run.effects = std::move(fitted.effects);
   run.gravity_base = fitted.gravity_base;
   run.shown_by_log = shown_by_log(run);
+  const bool of_postures = shows_postures(run.calibration.tree, run.log, run.calibration.times_s);
   if (options.trace) {
     run.trace = std::move(fitted.trace);
     run.second_columns =
-        second_columns(run.log, run.calibration.tree, run.gravity_base, shows_postures(run));
+        second_columns(run.log, run.calibration.tree, run.gravity_base, of_postures);
   }
   if (fitted.stamp_jitter_s > 0.0)
     run.warnings.push_back(jitter_words(fitted.stamp_jitter_s, run.log, observed));
   // Between the readings of a motion a single wrong one is a spike, and stands apart already.
-  if (!shows_postures(run)) return;
+  if (!of_postures) return;
   for (const OddReading& odd : odd_readings(run.calibration, run.tracks, run.log))
     run.warnings.push_back(odd_words(odd, recording));
 }

@@ -2,13 +2,15 @@
 #include "app/explain/explain.h"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "app/explain/compare_explanations.h"
 #include "app/explain/explainer.h"
+#include "app/explain/hypothesis_fit.h"
+#include "app/explain/recording_pieces.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/partly_followed.h"
 #include "calib/tracks/even_stamps.h"
@@ -60,9 +62,10 @@ std::string words_of(const std::vector<ReadingApart>& readings, const Explanatio
 }
 
 // Without the readings that nothing leads to, unless the markers speak for them.
-Explanation with_odd_readings_apart(const Evidence& evidence, const ExplainOptions& options,
+Explanation with_odd_readings_apart(const Evidence& evidence,
+                                    const std::vector<ReadingApart>& apart,
+                                    const ExplainOptions& options,
                                     std::vector<std::string>& warnings) {
-  const std::vector<ReadingApart> apart = readings_apart(evidence.recording.log);
   if (apart.empty()) return explained(evidence, options, warnings);
   const ChangedEvidence changed = without(evidence, apart);
   const Evidence rest{changed.recording, changed.observed, changed.tracks, evidence.camera};
@@ -85,7 +88,8 @@ Explanation with_odd_readings_apart(const Evidence& evidence, const ExplainOptio
       return !is_better(without_them, with_them, evidence.observed.measurements);
     };
     // A robot that the readings contradict is not looked for with them.
-    const std::optional<Explanation> same_robot = carried_over(evidence, alike, without_them);
+    const std::optional<Explanation> same_robot =
+        HypothesisFit(evidence, alike).carried_over(without_them);
     if (!same_robot || is_right(*same_robot)) {
       Explanation with_them = explained(evidence, alike, said_with_them);
       if (is_right(with_them)) {
@@ -104,18 +108,20 @@ Explanation with_odd_readings_apart(const Evidence& evidence, const ExplainOptio
 Explanation with_exchanged_back(const Evidence& evidence, const ExplainOptions& options,
                                 std::vector<std::string>& warnings) {
   const JointLog& log = evidence.recording.log;
-  const std::vector<ExchangedReadings> exchanged = exchanged_readings(log);
-  if (exchanged.empty()) return with_odd_readings_apart(evidence, options, warnings);
+  const std::vector<ReadingApart> apart = readings_apart(log);
+  const std::vector<ExchangedReadings> exchanged = exchanged_readings(log, apart);
+  if (exchanged.empty()) return with_odd_readings_apart(evidence, apart, options, warnings);
   Recording mended = evidence.recording;
   mended.log = with_exchanged_back(log, exchanged);
   std::vector<std::string> said;
-  Explanation back = with_odd_readings_apart(
-      {mended, evidence.observed, evidence.tracks, evidence.camera}, options, said);
+  Explanation back =
+      with_odd_readings_apart({mended, evidence.observed, evidence.tracks, evidence.camera},
+                              readings_apart(mended.log), options, said);
   if (!is_settled(back)) {
     ExplainOptions alike = options;
     if (back.fitted) alike.calibrate.fold_of_frame = folds_of(back.fitted->calibration);
     std::vector<std::string> said_as_logged;
-    Explanation as_logged = with_odd_readings_apart(evidence, alike, said_as_logged);
+    Explanation as_logged = with_odd_readings_apart(evidence, apart, alike, said_as_logged);
     if (!is_better(back, as_logged, evidence.observed.measurements)) {
       warnings.insert(warnings.end(), said_as_logged.begin(), said_as_logged.end());
       return as_logged;
@@ -166,28 +172,24 @@ ChangedEvidence stamped_evenly(const Evidence& evidence, const std::vector<doubl
   return out;
 }
 
-bool shows_postures(const JointLog& log, const std::vector<double>& times_s) {
-  std::vector<int> channels(log.channels.size());
-  std::iota(channels.begin(), channels.end(), 0);
-  return log.empty() || is_posture_log(log, times_s, channels);
-}
-
 // Frames of a camera that runs evenly, stamped as they arrived, where the markers' motion says so.
 std::optional<ChangedEvidence> with_even_stamps(const Evidence& evidence,
                                                 const ExplainOptions& options,
                                                 std::vector<std::string>& warnings) {
   const Measurements& measured = evidence.observed.measurements;
-  if (!measured.camera_of_frame.empty() || evidence.recording.nominal ||
-      shows_postures(evidence.recording.log, measured.times_s))
+  const JointLog& log = evidence.recording.log;
+  if (!measured.camera_of_frame.empty() || evidence.recording.nominal || log.empty() ||
+      is_of_postures(log, measured.times_s))
     return std::nullopt;
   const std::optional<EvenStamps> even = even_stamps(measured.times_s);
   if (!even) return std::nullopt;
   ChangedEvidence out = stamped_evenly(evidence, even->times_s);
-  const Explanation as_stamped = plainly_explained(evidence, options);
+  const Explanation as_stamped = HypothesisFit(evidence, options).plainly_explained();
   ExplainOptions alike = options;
   if (as_stamped.fitted) alike.calibrate.fold_of_frame = folds_of(as_stamped.fitted->calibration);
   const Explanation evenly =
-      plainly_explained({out.recording, out.observed, out.tracks, evidence.camera}, alike);
+      HypothesisFit({out.recording, out.observed, out.tracks, evidence.camera}, alike)
+          .plainly_explained();
   if (!evenly.fitted || !is_better(evenly, as_stamped, measured)) return std::nullopt;
   warnings.push_back(fmt::format(
       "the frames' stamps scatter by {:.3g} ms (standard deviation) about a camera that "

@@ -2,23 +2,14 @@
 #include "app/explain/explainer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <utility>
 
-#include <fmt/format.h>
-
+#include "app/explain/compare_explanations.h"
 #include "app/explain/doubted_sight.h"
-#include "app/explain/fit_nominal.h"
-#include "app/explain/moving_camera.h"
-#include "app/explain/see_cameras.h"
-#include "app/explain/see_recordings.h"
-#include "calib/bundle/undone.h"
+#include "app/explain/hypothesis_fit.h"
 #include "calib/quality/carrying_link.h"
 #include "calib/quality/predictive_score.h"
-#include "calib/quality/unknown_axes.h"
-#include "calib/tracks/pose_tracks_from_tags.h"
-#include "calib/tracks/several_cameras.h"
 #include "calib/tracks/shown_shapes.h"
 #include "kinematics/structure/attach_marker.h"
 #include "kinematics/structure/resting_base.h"
@@ -46,63 +37,6 @@ Shape shape_of(const Structure& structure) {
   return out;
 }
 
-bool has_model_doubt(const Structure& structure) {
-  return std::ranges::any_of(structure.doubts, &StructureDoubt::of_model);
-}
-
-bool is_converged(const Calibration& of) { return of.status == CalibrationStatus::kConverged; }
-
-/// No axis is known of a joint too many that nothing but noise drives (`undeclared`, 11083).
-bool are_axes_known(const Explanation& of) {
-  return !of.fitted || unknown_axes(of.fitted->calibration).empty();
-}
-
-/// By its scale, which then says nothing of a joint that channel drives.
-bool has_joint_at_rest(const Calibration& of) {
-  for (std::size_t j = 0; j < of.joints.size(); ++j) {
-    const auto sigma = of.joints[j].scale_sigma;
-    if (!sigma || of.tree.joints[j].channel.empty()) continue;
-    const double z = of.tree.joints[j].scale / *sigma;
-    if (0.5 * z * z < StructureOptions{}.min_log_odds) return true;
-  }
-  return false;
-}
-
-bool is_structure_clear(const Explanation& of) {
-  return !of.structure || (of.structure->status == StructureStatus::kDetermined &&
-                           !has_model_doubt(*of.structure) && are_axes_known(of));
-}
-
-/// Certain of itself, and a fit of its parameters settled.
-bool is_structure_sound(const Explanation& of) {
-  return is_structure_clear(of) && (!of.fitted || is_converged(of.fitted->calibration));
-}
-
-bool is_all_explained(const Trace& trace) {
-  return trace.verdict != TraceVerdict::kUnknown && trace.verdict != TraceVerdict::kNothingToSay;
-}
-
-/// A fit of the whole that leaves nothing.
-bool is_explained(const Explanation& of) {
-  return of.fitted && is_converged(of.fitted->calibration) &&
-         (of.fitted->trace.verdict == TraceVerdict::kNotRun || is_all_explained(of.fitted->trace));
-}
-
-/// What was found is large beside the noise: tracks with it in them may have bent the structure,
-/// however certain that was of itself.
-bool is_bent(const TracedCalibration& fitted) {
-  constexpr double kBent = 3.0;  // times the noise
-  return !fitted.effects.empty() &&
-         fitted.trace.held_out_before.value > kBent * fitted.trace.held_out_after.value;
-}
-
-/// What it takes for an account: joints, the motion of those that no channel tells, and effects.
-std::size_t parts_of(const Explanation& of) {
-  const auto told_by_none = static_cast<std::size_t>(
-      std::ranges::count(of.start.tree.joints, std::string(), &Joint::channel));
-  return of.start.tree.joints.size() + told_by_none + of.fitted->trace.accepted.size();
-}
-
 /// A structure, and effects to begin with beside it.
 struct Proposal {
   Structure structure;
@@ -122,14 +56,17 @@ std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
 class Explainer {
  public:
   /// `evidence` must outlive it.
-  Explainer(const Evidence& evidence, ExplainOptions options,
+  Explainer(const Evidence& evidence, const ExplainOptions& options,
             std::optional<Structure> believed = {})
-      : evidence_(evidence), options_(std::move(options)), believed_(std::move(believed)) {}
+      : evidence_(evidence),
+        options_(options),
+        fit_(evidence, options),
+        believed_(std::move(believed)) {}
 
   [[nodiscard]] Explanation explained(std::vector<std::string>& warnings) const {
-    if (recording().nominal) return of_nominal(warnings);
-    Structure believed = believed_structure();
-    Explanation first = plainly_fitted(believed);
+    if (recording().nominal) return fit_.of_nominal(warnings);
+    Structure believed = fit_.believed_structure();
+    Explanation first = fit_.plainly_fitted(believed);
     ExplainOptions options = options_;
     if (first.fitted && options.calibrate.fold_of_frame.empty())
       options.calibrate.fold_of_frame = folds_of(first.fitted->calibration);
@@ -137,29 +74,7 @@ class Explainer {
         .best_beside(std::move(first));
   }
 
-  [[nodiscard]] Explanation plainly_explained() const {
-    try {
-      return plainly_fitted(believed_structure());
-    } catch (const Error& error) {
-      Explanation out = begun();
-      keep_if_undetermined(error, out);
-      return out;
-    }
-  }
-
-  [[nodiscard]] std::optional<Explanation> carried_over(const Explanation& of) const {
-    if (!of.fitted || !of.structure) return std::nullopt;
-    // What needs effects here and none there is no better for them.
-    if (of.fitted->effects.empty()) return plainly_fitted(*of.structure);
-    return of_structure(*of.structure, {of.fitted->trace.added});
-  }
-
  private:
-  [[nodiscard]] Structure believed_structure() const {
-    if (!evidence_.structure) return structure_of(evidence_.tracks);
-    return whole_of(as_robot(recording(), *evidence_.structure), evidence_.tracks);
-  }
-
   /// `first`: a plain fit.
   [[nodiscard]] Explanation best_beside(Explanation first) const {
     Tried tried;
@@ -169,135 +84,6 @@ class Explainer {
     now = with_base_at_rest(with_couplings_doubted(std::move(now)));
     now = with_fewer_joints(with_rivals_judged(improved(std::move(now), tried)));
     return with_free_markers_attached(std::move(now));
-  }
-
-  [[nodiscard]] Explanation begun() const {
-    Explanation out;
-    out.log = recording().log;
-    out.tracks = evidence_.tracks;
-    return out;
-  }
-
-  [[nodiscard]] Explanation of_nominal(std::vector<std::string>& warnings) const {
-    Explanation out = begun();
-    CheckedNominal checked = start_from_nominal(recording(), evidence_.observed, evidence_.tracks,
-                                                evidence_.camera, warnings);
-    lap("structure");
-    out.nominal_faults = std::move(checked.faults);
-    out.start = std::move(checked.start);
-    NominalFit fitted = fit_nominal(
-        evidence_.observed.measurements, options_.free,
-        [&](FreeGeometry free) {
-          Calibration plain = calibrated(out.start, free);
-          lap("calibrate");
-          return plain;
-        },
-        [&](FreeGeometry free, const Calibration& plain) {
-          return closed_loop(out.start, free, plain, {});
-        });
-    out.fitted = std::move(fitted.best);
-    out.levels = std::move(fitted.levels);
-    return out;
-  }
-
-  [[nodiscard]] Calibration calibrated(const CalibrationStart& start, FreeGeometry free) const {
-    CalibrateOptions options = options_.calibrate;
-    options.free = free;
-    return calibrate(evidence_.observed.measurements, recording().markers, recording().log, start,
-                     options, options_.progress);
-  }
-
-  [[nodiscard]] TracedCalibration closed_loop(const CalibrationStart& start, FreeGeometry free,
-                                              const Calibration& plain,
-                                              const TraceStart& begin) const {
-    if (!options_.trace) return {{}, plain, {}, {}, 0.0};
-    if (options_.free && free != FreeGeometry::kGeometry) {
-      TracedCalibration out{{}, plain, {}, {}, 0.0};
-      out.trace.verdict = TraceVerdict::kNothingToSay;
-      out.trace.reason =
-          "the robot's geometry is held as declared, and its errors cannot be told from effects: "
-          "trace with --free geometry";
-      return out;
-    }
-    CalibrateOptions options = options_.calibrate;
-    options.free = free;
-    TracedCalibration out = trace_stage(recording(), evidence_.observed, start, plain, begin,
-                                        options, options_.progress);
-    lap("trace");
-    return out;
-  }
-
-  [[nodiscard]] Explanation of_structure(Structure structure, const TraceStart& begin) const {
-    return traced(plainly_fitted(std::move(structure)), begin);
-  }
-
-  /// A fit of the structure alone.
-  [[nodiscard]] Explanation plainly_fitted(Structure structure) const {
-    Explanation out = begun();
-    out.structure = std::move(structure);
-    try {
-      require_determined(*out.structure);
-      out.start = start_from_structure(*out.structure, recording(), evidence_.camera);
-      add_further_cameras(evidence_.observed, out.start);
-      add_moving_camera(recording(), *out.structure, evidence_.tracks, out.start);
-      Calibration plain = calibrated(out.start, options_.calibrate.free);
-      if (is_converged(plain) && take_usual_units(plain.tree, out.start))
-        plain = calibrated(out.start, options_.calibrate.free);
-      out.fitted = {{}, std::move(plain), {}, {}, 0.0};
-      lap("calibrate");
-    } catch (const Error& error) {
-      keep_if_undetermined(error, out);
-    }
-    return out;
-  }
-
-  /// The robot that shows with another sight, beside that; nothing where none does.
-  [[nodiscard]] std::optional<Explanation> fitted_with(const Sight& sight) const {
-    std::optional<Structure> structure = proposed_structure(
-        pose_tracks_from_tags(evidence_.observed.tags, sight.camera, sight.markers));
-    if (!structure) return std::nullopt;
-    ExplainOptions options = options_;
-    options.calibrate.estimate_intrinsics |= sight.is_camera_free;
-    Recording other = recording();
-    other.markers = sight.markers;
-    const Evidence seen{other, evidence_.observed, evidence_.tracks, sight.camera};
-    return Explainer(seen, std::move(options)).plainly_fitted(*std::move(structure));
-  }
-
-  /// What a plain fit lacks, found and added.
-  [[nodiscard]] Explanation traced(Explanation plain, const TraceStart& begin) const {
-    if (!plain.fitted) return plain;
-    try {
-      close_loop(plain, begin);
-    } catch (const Error& error) {
-      keep_if_undetermined(error, plain);
-    }
-    return plain;
-  }
-
-  [[nodiscard]] Structure structure_of(const PoseTracks& tracks,
-                                       std::optional<double> allowance = {}) const {
-    const std::vector<int>& cameras = evidence_.observed.measurements.camera_of_frame;
-    return whole_of(
-        find_robot(recording(), at_common_instants(tracks, cameras), options_.calibrate, allowance),
-        tracks);
-  }
-
-  [[nodiscard]] Structure whole_of(Structure robot, const PoseTracks& tracks) const {
-    Structure out = with_further_markers(std::move(robot), recording(), evidence_.observed, tracks,
-                                         evidence_.camera);
-    lap("structure");
-    return out;
-  }
-
-  // Of a part or a change of the evidence, which may lack what was declared.
-  [[nodiscard]] std::optional<Structure> proposed_structure(
-      const PoseTracks& tracks, std::optional<double> allowance = {}) const {
-    try {
-      return structure_of(tracks, allowance);
-    } catch (const Error&) {
-      return std::nullopt;
-    }
   }
 
   /// Effects are looked for beside the robot that shows with what was declared; or with a camera or
@@ -310,7 +96,7 @@ class Explainer {
     TraceStart begin;
     if (options_.trace) {
       for (const std::optional<Sight>& sight : contradicted_sights(first)) {
-        std::optional<Explanation> with = sight ? fitted_with(*sight) : std::nullopt;
+        std::optional<Explanation> with = sight ? fit_.fitted_with(*sight) : std::nullopt;
         if (!with || !with->fitted || !is_better(*with, best ? *best : first)) continue;
         begin = {sight->told_by, with->fitted->calibration};
         best = std::move(with);
@@ -318,10 +104,10 @@ class Explainer {
     }
     if (!best) {
       if (first.structure) tried.insert(tried_as(*first.structure, {}));
-      return traced(std::move(first), {});
+      return fit_.traced(std::move(first), {});
     }
     tried.insert(tried_as(*best->structure, begin));
-    return of_structure(*std::move(best->structure), begin);
+    return fit_.of_structure(*std::move(best->structure), begin);
   }
 
   [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights(const Explanation& of) const {
@@ -357,7 +143,7 @@ class Explainer {
       for (const Proposal& proposal : (this->*propose)(now)) {
         if (is_settled(now)) break;
         if (!tried.insert(tried_as(proposal.structure, proposal.begin)).second) continue;
-        Explanation other = asked_again(of_structure(proposal.structure, proposal.begin));
+        Explanation other = asked_again(fit_.of_structure(proposal.structure, proposal.begin));
         if (is_better(other, now)) now = std::move(other);
       }
     }
@@ -366,51 +152,8 @@ class Explainer {
 
   [[nodiscard]] const Recording& recording() const { return evidence_.recording; }
 
-  void lap(std::string_view stage) const {
-    if (options_.lap) options_.lap(stage);
-  }
-
-  static void keep_if_undetermined(const Error& error, Explanation& out) {
-    if (error.code() != ExitCode::kUndetermined) throw Error(error);
-    out.fitted.reset();
-    out.failure = error;
-  }
-
-  void close_loop(Explanation& out, const TraceStart& begin) const {
-    const FreeGeometry free = options_.calibrate.free;
-    out.fitted = closed_loop(out.start, free, out.fitted->calibration, begin);
-    // An effect may have looked like another unit.
-    if (!is_converged(out.fitted->calibration) ||
-        !take_usual_units(out.fitted->calibration.tree, out.start))
-      return;
-    const Calibration plain = calibrated(out.start, free);
-    lap("calibrate");
-    out.fitted = closed_loop(out.start, free, plain, {out.fitted->trace.added});
-  }
-
   [[nodiscard]] bool is_better(const Explanation& one, const Explanation& other) const {
     return kinescope::is_better(one, other, evidence_.observed.measurements);
-  }
-
-  [[nodiscard]] double log_odds_of(const Explanation& one, const Explanation& rival) const {
-    constexpr double kMost = 1000.0;  // larger ones mean nothing: the models are not that right
-    if (!rival.fitted || !is_converged(rival.fitted->calibration) || !are_axes_known(rival) ||
-        has_joint_at_rest(rival.fitted->calibration))
-      return kMost;
-    const Measurements& measurements = evidence_.observed.measurements;
-    return std::clamp(log_odds(predictive_score(one.fitted->calibration, measurements),
-                               predictive_score(rival.fitted->calibration, measurements)),
-                      -kMost, kMost);
-  }
-
-  [[nodiscard]] PoseTracks undone(const Calibration& calibration) const {
-    const TagObservations& tags = evidence_.observed.tags;
-    if (tags.observations.empty()) return with_effects_undone(calibration, evidence_.tracks);
-    const MarkerSet& markers = recording().markers;
-    const TagObservations undone = with_effects_undone(calibration, markers, tags);
-    if (!calibration.further_cameras.empty())
-      return tracks_of_cameras(undone, calibration, markers);
-    return pose_tracks_from_tags(undone, calibration.camera, markers);
   }
 
   // The structure was searched for on tracks that the effects were in: again without them, until
@@ -419,14 +162,15 @@ class Explainer {
     std::set<Shape> answers;
     while (now.fitted && now.structure && !now.fitted->effects.empty() &&
            (!is_structure_clear(now) || is_bent(*now.fitted))) {
-      std::optional<Structure> again = proposed_structure(undone(now.fitted->calibration));
+      std::optional<Structure> again =
+          fit_.proposed_structure(fit_.undone(now.fitted->calibration));
       if (!again) return now;
       if (shape_of(*again) == shape_of(*now.structure)) {
         now.structure = std::move(again);
         return now;
       }
       if (!answers.insert(shape_of(*again)).second) return now;
-      Explanation other = of_structure(std::move(*again), {now.fitted->trace.added});
+      Explanation other = fit_.of_structure(std::move(*again), {now.fitted->trace.added});
       if (!is_better(other, now)) return now;
       now = std::move(other);
     }
@@ -443,24 +187,25 @@ class Explainer {
     const bool leaves_noise_only = is_settled(alone) && alone.fitted->effects.empty();
     // A joint more explains of what is left here only what it shows by itself.
     std::optional<Explanation> plain;
-    if (!is_explained(now)) plain = plainly_fitted(*now.structure);
+    if (!is_explained(now)) plain = fit_.plainly_fitted(*now.structure);
     std::vector<double> odds;
     for (const RivalStructure& rival : now.structure->rivals) {
-      Explanation other = plainly_fitted(rival.structure);
+      Explanation other = fit_.plainly_fitted(rival.structure);
       const bool has_more = rival.structure.joints.size() > now.structure->joints.size();
       if (leaves_noise_only) {
-        odds.push_back(log_odds_of(alone, other));
+        odds.push_back(log_odds_of(alone, other, evidence_.observed.measurements));
       } else if (plain && has_more && !is_better(other, *plain)) {
-        odds.push_back(log_odds_of(*plain, other));
+        odds.push_back(log_odds_of(*plain, other, evidence_.observed.measurements));
       } else {
-        odds.push_back(log_odds_of(alone, traced(std::move(other), {now.fitted->trace.added})));
+        odds.push_back(log_odds_of(alone, fit_.traced(std::move(other), {now.fitted->trace.added}),
+                                   evidence_.observed.measurements));
       }
     }
     const auto best = std::ranges::min_element(odds);
     const bool is_exchanged = best != odds.end() && *best < 0.0;
     if (is_exchanged) {
       const auto rival = static_cast<std::size_t>(best - odds.begin());
-      now = of_structure(with_rival(*now.structure, rival, recording().log), {});
+      now = fit_.of_structure(with_rival(*now.structure, rival, recording().log), {});
       const double over_before = -*best;
       for (double& against : odds) against += over_before;
       *best = over_before;
@@ -479,7 +224,7 @@ class Explainer {
       return now;
     Structure free = *now.structure;
     for (StructureJoint& joint : free.joints) joint.couplings.clear();
-    Explanation other = asked_again(of_structure(std::move(free), {}));
+    Explanation other = asked_again(fit_.of_structure(std::move(free), {}));
     return is_better(other, now) ? other : now;
   }
 
@@ -489,7 +234,7 @@ class Explainer {
     std::optional<Structure> resting =
         kinescope::with_base_at_rest(*now.structure, recording().log);
     if (!resting) return now;
-    Explanation other = asked_again(of_structure(std::move(*resting), {}));
+    Explanation other = asked_again(fit_.of_structure(std::move(*resting), {}));
     return is_better(other, now) ? other : now;
   }
 
@@ -503,7 +248,7 @@ class Explainer {
       if (!without && hardly_moves(structure.joints[j]))
         without = with_joint_at_rest(structure, j, log);
       if (!without) continue;
-      Explanation other = of_structure(*std::move(without), {now.fitted->trace.added});
+      Explanation other = fit_.of_structure(*std::move(without), {now.fitted->trace.added});
       if (is_better(other, now)) now = std::move(other);
     }
     return now;
@@ -523,8 +268,8 @@ class Explainer {
       if (links.size() > kMostLinks) links.resize(kMostLinks);
       for (const Marker& marker : links) {
         Explanation other = asked_again(
-            of_structure(with_free_marker_on(*now.structure, marker, now.fitted->calibration),
-                         {now.fitted->trace.added}));
+            fit_.of_structure(with_free_marker_on(*now.structure, marker, now.fitted->calibration),
+                              {now.fitted->trace.added}));
         if (!is_explained(other) || !is_better(other, now)) continue;
         now = std::move(other);
         break;
@@ -562,7 +307,7 @@ class Explainer {
       for (PoseTrack& track : half.tracks)
         std::erase_if(track.samples,
                       [&](const PoseSample& sample) { return (sample.frame < middle) != first; });
-      std::optional<Structure> structure = proposed_structure(half);
+      std::optional<Structure> structure = fit_.proposed_structure(half);
       if (structure && structure->status == StructureStatus::kDetermined)
         out.push_back({std::move(*structure), {}});
     }
@@ -576,7 +321,7 @@ class Explainer {
     // 325`, which the search's own allowances (up to 0.01) do not hold.
     constexpr double kLargeErrors = 0.03;
     if (is_structure_sound(now) || !now.fitted || recording().log.channels.empty()) return {};
-    std::optional<Structure> structure = proposed_structure(evidence_.tracks, kLargeErrors);
+    std::optional<Structure> structure = fit_.proposed_structure(evidence_.tracks, kLargeErrors);
     if (!structure) return {};
     return {{std::move(*structure), {}}};
   }
@@ -590,7 +335,7 @@ class Explainer {
     if (several || (is_structure_clear(now) && now.fitted && !by_place)) return {};
     const std::optional<Sight> other =
         with_other_camera(recording(), evidence_.observed, evidence_.camera, options_.calibrate);
-    const std::optional<Explanation> with = other ? fitted_with(*other) : std::nullopt;
+    const std::optional<Explanation> with = other ? fit_.fitted_with(*other) : std::nullopt;
     if (!with || !with->fitted) return {};
     return {{*with->structure, {other->told_by, with->fitted->calibration}}};
   }
@@ -603,50 +348,15 @@ class Explainer {
 
   const Evidence& evidence_;
   const ExplainOptions options_;
+  const HypothesisFit fit_;
   const std::optional<Structure> believed_;  ///< of all that was declared and read
 };
 
 }  // namespace
 
-std::vector<int> folds_of(const Calibration& calibration) {
-  if (calibration.folds < 2) return {};
-  std::vector<int> out(calibration.times_s.size(), -1);
-  for (const SightingResidual& residual : calibration.residuals)
-    out[static_cast<std::size_t>(residual.frame)] = residual.fold;
-  // A frame that it could not use goes with the one before.
-  const auto known = std::ranges::find_if(out, [](int fold) { return fold >= 0; });
-  int last = known == out.end() ? 0 : *known;
-  for (int& fold : out) {
-    if (fold < 0) fold = last;
-    last = fold;
-  }
-  return out;
-}
-
-bool is_settled(const Explanation& of) { return is_explained(of) && is_structure_clear(of); }
-
-bool is_better(const Explanation& one, const Explanation& other, const Measurements& measurements) {
-  if (!one.fitted || !other.fitted) return one.fitted.has_value();
-  const double clearly = StructureOptions{}.min_log_odds;
-  const double odds = log_odds(predictive_score(one.fitted->calibration, measurements),
-                               predictive_score(other.fitted->calibration, measurements));
-  if (std::abs(odds) > clearly) return odds > 0.0;
-  if (is_settled(one) != is_settled(other)) return is_settled(one);
-  return parts_of(one) < parts_of(other);
-}
-
 Explanation explained(const Evidence& evidence, const ExplainOptions& options,
                       std::vector<std::string>& warnings) {
   return Explainer(evidence, options).explained(warnings);
-}
-
-Explanation plainly_explained(const Evidence& evidence, const ExplainOptions& options) {
-  return Explainer(evidence, options).plainly_explained();
-}
-
-std::optional<Explanation> carried_over(const Evidence& evidence, const ExplainOptions& options,
-                                        const Explanation& of) {
-  return Explainer(evidence, options).carried_over(of);
 }
 
 }  // namespace kinescope

@@ -74,10 +74,14 @@ std::pair<double, double> span_of(const LoneCamera& of) {
   return {std::min(log.front(), frames.front()), std::max(log.back(), frames.back())};
 }
 
-bool is_of_postures(const LoneCamera& of) {
-  std::vector<int> channels(of.recording.log.channels.size());
+bool is_of_postures(const JointLog& log, const std::vector<double>& times_s) {
+  std::vector<int> channels(log.channels.size());
   std::iota(channels.begin(), channels.end(), 0);
-  return is_posture_log(of.recording.log, of.seen.observed.measurements.times_s, channels);
+  return is_posture_log(log, times_s, channels);
+}
+
+bool is_of_postures(const LoneCamera& of) {
+  return is_of_postures(of.recording.log, of.seen.observed.measurements.times_s);
 }
 
 void require_one_kind(const std::vector<LoneCamera>& alone) {

@@ -22,7 +22,8 @@ void rename_marker(TagId from, TagId to, LoneCamera& of);
 /// First and last stamp, frames and log, s.
 [[nodiscard]] std::pair<double, double> span_of(const LoneCamera& of);
 
-/// Measured at rest.
+/// Measured at rest: is_posture_log() of all channels, where it is not known which drive a joint.
+[[nodiscard]] bool is_of_postures(const JointLog& log, const std::vector<double>& times_s);
 [[nodiscard]] bool is_of_postures(const LoneCamera& of);
 
 /// Throws bad_request where some are of postures and some of motion.

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "app/explain/declared.h"
+#include "app/explain/recording_pieces.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "calib/tracks/several_cameras.h"
 #include "kinematics/core/error.h"
@@ -133,11 +133,9 @@ PlacedCameras place(const std::vector<LoneCamera>& cameras, const Recording& rec
     all_times_s.insert(all_times_s.end(), camera.tracks.times_s.begin(),
                        camera.tracks.times_s.end());
   }
-  std::vector<int> channels(recording.log.channels.size());
-  std::iota(channels.begin(), channels.end(), 0);
   PlaceCamerasOptions place_options;
-  place_options.scan_clocks = options.calibrate.estimate_time_offset &&
-                              !is_posture_log(recording.log, all_times_s, channels);
+  place_options.scan_clocks =
+      options.calibrate.estimate_time_offset && !is_of_postures(recording.log, all_times_s);
   PlacedCameras out = place_cameras(tracks, recording.markers, place_options);
   const bool unknown = std::ranges::any_of(
       out.places, [](const auto& place) { return place && !place->clock_known; });

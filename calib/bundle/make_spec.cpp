@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "calib/bundle/postures.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::bundle {
@@ -206,15 +207,6 @@ void add_couplings(const JointLog& log, Spec& spec) {
   }
 }
 
-// The channels that drive a joint.
-std::vector<int> channels_of(const Spec& spec) {
-  std::set<int> channels(spec.channel.begin(), spec.channel.end());
-  for (const auto& couplings : spec.couplings)
-    for (const auto& [channel, ratio] : couplings) channels.insert(channel);
-  channels.erase(-1);
-  return {channels.begin(), channels.end()};
-}
-
 // From the camera's link up to where the ways part, and down from there.
 std::vector<int> path_between(const KinematicTree& tree, LinkId from, LinkId to) {
   std::vector<JointId> up = tree.path_to(from);
@@ -272,7 +264,7 @@ Spec make_spec(const Measurements& measurements, const MarkerSet& markers, const
     spec.channel.push_back(channel.value_or(-1));
   }
   add_couplings(log, spec);
-  spec.postures = !log.empty() && is_posture_log(log, spec.times_s, channels_of(spec));
+  spec.postures = shows_postures(spec.tree, log, spec.times_s);
   spec.corrections = start.corrections;
   add_paths(start, spec);
   if (!measurements.corners.empty()) {

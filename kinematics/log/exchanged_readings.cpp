@@ -12,7 +12,6 @@
 #include <fmt/ranges.h>
 
 #include "kinematics/core/median.h"
-#include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
 namespace {
@@ -149,12 +148,13 @@ std::string words_of(const JointLog& log, const GoesOnAs& reading) {
 
 }  // namespace
 
-std::vector<ExchangedReadings> exchanged_readings(const JointLog& log) {
+std::vector<ExchangedReadings> exchanged_readings(const JointLog& log,
+                                                  const std::vector<ReadingApart>& apart) {
   std::vector<ExchangedReadings> out;
   // Most rows are the motion's.
   constexpr std::size_t kFewestRows = 20 * kMost;
   if (log.size() < kFewestRows) return out;
-  JointLog mended = without_readings(log, readings_apart(log));
+  JointLog mended = without_readings(log, apart);
   const UsualMotion usual(mended);
   for (std::size_t row = 3; row < log.size(); ++row) {
     if (log.is_joined_between(log.times_s[row - 3], log.times_s[row])) continue;

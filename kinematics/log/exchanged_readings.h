@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "kinematics/log/joint_log.h"
+#include "kinematics/log/readings_apart.h"
 
 namespace kinescope {
 
@@ -29,8 +30,10 @@ struct ExchangedReadings {
   std::vector<GoesOnAs> readings;
 };
 
-/// By row, each one as the log is with those before it mended. O(channels * samples log samples).
-[[nodiscard]] std::vector<ExchangedReadings> exchanged_readings(const JointLog& log);
+/// By row, each one as the log is with those before it mended. `apart`: readings_apart(log), which
+/// jump by themselves. O(channels * samples log samples).
+[[nodiscard]] std::vector<ExchangedReadings> exchanged_readings(
+    const JointLog& log, const std::vector<ReadingApart>& apart);
 
 /// As it would be without.
 [[nodiscard]] JointLog with_exchanged_back(JointLog log,

@@ -31,18 +31,22 @@ JointLog exchanged_from(JointLog log, Eigen::Index row, int one, int other) {
   return log;
 }
 
+std::vector<ExchangedReadings> exchanged_in(const JointLog& log) {
+  return exchanged_readings(log, readings_apart(log));
+}
+
 void expect_mended(const JointLog& damaged, std::size_t instants) {
-  const auto found = exchanged_readings(damaged);
+  const auto found = exchanged_in(damaged);
   EXPECT_EQ(found.size(), instants);
   EXPECT_EQ(with_exchanged_back(damaged, found).values, waves().values);
 }
 
-TEST(ExchangedReadings, AMotionHasNone) { EXPECT_TRUE(exchanged_readings(waves()).empty()); }
+TEST(ExchangedReadings, AMotionHasNone) { EXPECT_TRUE(exchanged_in(waves()).empty()); }
 
 TEST(ExchangedReadings, AreColumnsThatJumpIntoEachOthersPlace) {
   const JointLog log = exchanged_from(waves(), 230, 0, 1);
   expect_mended(log, 1);
-  EXPECT_EQ(words_of(log, exchanged_readings(log).front()),
+  EXPECT_EQ(words_of(log, exchanged_in(log).front()),
             "joints.csv: from t = 2.3 on 'a' goes on as 'b', 'b' goes on as 'a'");
 }
 
@@ -58,7 +62,7 @@ TEST(ExchangedReadings, AreOneThatTurnsItsSign) {
   JointLog log = waves();
   log.values.col(1).tail(300) *= -1.0;
   expect_mended(log, 1);
-  EXPECT_EQ(words_of(log, exchanged_readings(log).front()),
+  EXPECT_EQ(words_of(log, exchanged_in(log).front()),
             "joints.csv: from t = 2 on 'b' goes on as -'b'");
 }
 
@@ -70,7 +74,7 @@ TEST(ExchangedReadings, AreNoneOfPosturesInARow) {
     log.values.conservativeResize(90, Eigen::NoChange);
     log.times_s.resize(90);
     for (double& value : log.values.reshaped()) value = rng.uniform(-1.5, 1.5);
-    EXPECT_TRUE(exchanged_readings(log).empty()) << seed;
+    EXPECT_TRUE(exchanged_in(log).empty()) << seed;
   }
 }
 
@@ -80,13 +84,13 @@ TEST(ExchangedReadings, AreNoJumpElsewhere) {
   log.values.col(0).tail(200).array() += 0.4;
   log.values.col(2).setConstant(-1.0);
   log.values.col(2).tail(200).setConstant(1.0);
-  EXPECT_TRUE(exchanged_readings(log).empty());
+  EXPECT_TRUE(exchanged_in(log).empty());
   JointLog gap = waves();
   gap.times_s.erase(gap.times_s.begin() + 100, gap.times_s.begin() + 170);
   const Eigen::MatrixXd behind = gap.values.bottomRows(330);
   gap.values.conservativeResize(430, Eigen::NoChange);
   gap.values.bottomRows(330) = behind;
-  EXPECT_TRUE(exchanged_readings(gap).empty());
+  EXPECT_TRUE(exchanged_in(gap).empty());
 }
 
 // Behind a reading of 0 the motion seems to come from the other side.
@@ -94,14 +98,14 @@ TEST(ExchangedReadings, AreNoneBehindASingleWrongReading) {
   JointLog log = waves();
   for (const int row : {130, 301}) log.values(row, 0) = 0.0;
   log.values.row(222).setZero();
-  EXPECT_TRUE(exchanged_readings(log).empty());
+  EXPECT_TRUE(exchanged_in(log).empty());
 }
 
 // Between episodes the robot was elsewhere.
 TEST(ExchangedReadings, AreNotLookedForBetweenEpisodes) {
   JointLog log = exchanged_from(waves(), 230, 0, 1);
   log.joined_at_s = {log.times_s[230]};
-  EXPECT_TRUE(exchanged_readings(log).empty());
+  EXPECT_TRUE(exchanged_in(log).empty());
 }
 
 }  // namespace
