@@ -114,12 +114,9 @@ Candidate TracedColumns::acceleration_lag(const SharesPtr& shares) const {
 }
 
 Candidate TracedColumns::quantisation() const {
-  constexpr double kAsTheLogSays = 0.5;
   Candidate out =
       effect("quantisation", fmt::format("{} comes in steps", pair_->column), {{"step", unit_}});
-  out.possible = [shown = step_](const Eigen::VectorXd& size) {
-    return std::abs(size[0] - shown) < kAsTheLogSays * shown;
-  };
+  out.possible = as_the_log_shows(step_);
   out.check = "digits that the log is written with, resolution of the command";
   out.record = fmt::format("log {} with more digits", pair_->column);
   out.columns = [share = steps_](double) { return std::vector<EffectColumn>{{0, share}}; };

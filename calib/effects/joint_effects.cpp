@@ -93,17 +93,13 @@ std::vector<Correction> places_in_steps(const EffectWorld& world, const Suspect&
   return out;
 }
 
-// The size that the residual shows is the one that the log shows, or it is another effect's.
 CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const UnsteadyReading& reading) {
-  constexpr double kAsTheLogSays = 0.5;
   const std::string parameter = reading.in_steps ? "step" : "standard deviation";
   CameraEffect out =
       effect(s, reading.in_steps ? "quantisation" : "reading_noise",
              fmt::format("{} is read {}", s.name, reading.in_steps ? "in steps" : "with noise"),
              {{parameter, s.unit}}, s.unit);
-  out.candidate.possible = [shown = reading.size](const Eigen::VectorXd& size) {
-    return std::abs(size[0] - shown) < kAsTheLogSays * shown;
-  };
+  out.candidate.possible = as_the_log_shows(reading.size);
   // Every encoder has some.
   if (world.kind == MeasurementKind::kCorners) out.candidate.floor = kUsualShift;
   out.candidate.check = reading.in_steps
@@ -263,7 +259,6 @@ CameraEffect backlash(const EffectWorld& world, const Suspect& s) {
 
 // A sag whose largest load counts as 1, so that the parameter is the largest sag.
 Correction sag(const Suspect& s, std::string name, const Eigen::VectorXd& load) {
-  constexpr double kNoArm = 1e-9;  // m
   const double largest = load.cwiseAbs().maxCoeff();
   Correction out = turn(s, std::move(name), s.unit, Eigen::VectorXd::Zero(load.size()));
   if (largest < kNoArm) return out;

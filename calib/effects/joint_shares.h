@@ -53,6 +53,9 @@ struct Load {
   Eigen::VectorXd arm_m;  ///< instants: torque of 1 kg under a unit of gravity (sliders: its force)
 };
 
+/// A load with less of an arm is none, m.
+inline constexpr double kNoArm = 1e-9;
+
 /// What gravity does to a joint from the places where masses may be: with a known gravity from
 /// every place that matters (up to two a link), else from one in the middle of all links behind
 /// it, for gravity along each axis of the base.

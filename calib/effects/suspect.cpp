@@ -65,6 +65,12 @@ CameraEffect effect(const Suspect& s, std::string name, std::string words,
   return out;
 }
 
+std::function<bool(const Eigen::VectorXd&)> as_the_log_shows(double size) {
+  constexpr double kOfSize = 0.5;
+  return
+      [size](const Eigen::VectorXd& shown) { return std::abs(shown[0] - size) < kOfSize * size; };
+}
+
 double largest_size(const std::string& unit) {
   if (unit == "rad") return 0.2;
   if (unit == "m") return 0.05;

@@ -3,6 +3,7 @@
 // A joint under suspicion, and what every effect at a joint is made of.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ struct Suspect {
 /// An effect at the joint, still without corrections.
 [[nodiscard]] CameraEffect effect(const Suspect& s, std::string name, std::string words,
                                   std::vector<EffectParameter> parameters, std::string size_unit);
+
+/// The size that the residual shows is the one that the log shows, or it is another effect's.
+[[nodiscard]] std::function<bool(const Eigen::VectorXd&)> as_the_log_shows(double size);
 
 /// An effect as large as that nobody overlooks: a fit that asks for it makes a wave or a ratio of
 /// some other small thing, seen over a small range. `unit`: rad, m or empty (a ratio); infinite for

@@ -204,7 +204,6 @@ void TracedColumns::find_start() {
 }
 
 void TracedColumns::take_loads(const std::optional<Eigen::Vector3d>& gravity_base) {
-  constexpr double kNoArm = 1e-9;  // m
   JointMotion motion;
   motion.times_s = row_s_;
   motion.value.resize(rows(), pair_->used.value.cols());
