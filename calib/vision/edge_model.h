@@ -25,9 +25,6 @@ namespace kinescope::corner_fit {
 inline constexpr int kBlurIndex = 12;
 inline constexpr int kLevelsIndex = 14;
 
-inline constexpr double kRobust = 3.0;    // noise units beyond which a pixel's weight falls
-inline constexpr double kMinNoise = 0.3;  // grey levels, rounding
-
 // How the unknowns are stored.
 struct Layout {
   std::array<int, 4> knots{};   // of each edge, on each side

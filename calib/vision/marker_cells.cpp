@@ -12,7 +12,6 @@
 namespace kinescope {
 namespace {
 
-constexpr double kClearCell = 0.15;    // of the contrast, away from half way: dark or bright
 constexpr double kMostUnclear = 0.25;  // of the cells
 
 }  // namespace

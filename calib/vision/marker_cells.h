@@ -14,6 +14,8 @@ namespace kinescope {
 
 /// Offset from a cell's middle, as a share of its width, within which its grey is its own.
 inline constexpr double kMiddleOfCell = 0.2;
+/// Of the contrast, away from half way: dark or bright.
+inline constexpr double kClearCell = 0.15;
 
 /// Light, by `tone`, between pixels: grey level where that is linear. Beyond the image's rim what
 /// is at the rim.

@@ -15,8 +15,6 @@ constexpr double kReach = 2.0;         // blurs at which a neighbouring step has
 constexpr double kCornerReach = 2.5;   // the same at corners, where two edges meet
 constexpr double kMinHalfWidth = 1.1;  // px, of the strip beside an edge
 constexpr double kMaxHalfWidth = 3.0;  // px, at blurs below 1 px; beyond, in blurs
-constexpr double kTaper = 0.7;  // px over which a strip's weight fades out, so that the result does
-                                // not jump when a pixel enters it
 
 Eigen::Vector2d mapped(const Eigen::Matrix3d& H, double x, double y) {
   return (H * Eigen::Vector3d(x, y, 1.0)).hnormalized();

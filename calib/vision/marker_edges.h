@@ -19,6 +19,15 @@ inline constexpr double kMinContrast = 12.0;
 inline constexpr double kSharp = 0.2;
 /// Px, of a corner that is fitted as well as can be; measured: tests/experiments/corners.cpp.
 inline constexpr double kFloorSigma = 0.002;
+/// Noise units beyond which a pixel's weight falls.
+inline constexpr double kRobust = 3.0;
+/// Grey levels, rounding.
+inline constexpr double kMinNoise = 0.3;
+/// Px over which a pixel's weight fades out at the rim of what is used, so that the result does not
+/// jump when one enters it.
+inline constexpr double kTaper = 0.7;
+/// Px, of the usual video codecs.
+inline constexpr int kCodecBlock = 8;
 
 /// The square that corners are the image of, in their order.
 inline const std::array<Eigen::Vector2d, 4> kSquare = {

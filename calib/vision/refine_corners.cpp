@@ -232,7 +232,6 @@ class BorderFit {
   // By how much neighbouring pixels err together (compression, texture): the variance of the pull
   // on a piece of an edge, against that of independent pixels.
   double correlation() const {
-    constexpr double kPiece = 8.0;  // px, a block of the usual video codecs
     std::map<std::pair<int, int>, std::array<double, 2>> pieces;
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const Sample& s = samples_[i];
@@ -240,7 +239,7 @@ class BorderFit {
       const double r = std::clamp(s.grey - p.grey, -kRobust * noise_, kRobust * noise_);
       const auto e = static_cast<std::size_t>(s.edge);
       const double length = (corners_[(e + 1) % 4] - corners_[e]).norm();
-      const int piece = static_cast<int>(std::floor(0.5 * s.u * length / kPiece));
+      const int piece = static_cast<int>(std::floor(0.5 * s.u * length / kCodecBlock));
       auto& [pull, expected] = pieces[{s.edge, piece}];
       pull += s.weight * p.slope[0] * r;
       expected += std::pow(s.weight * p.slope[0], 2);

@@ -13,7 +13,6 @@
 namespace kinescope::whole_tag {
 namespace {
 
-constexpr double kClear = 0.15;  // of the contrast, away from half way: dark or bright
 constexpr int kSharpenings = 6;  // rounds of undoing the blur
 constexpr double kLeastOwn =
     0.6;                        // of its light that a cell's middle keeps; less does not converge
@@ -151,10 +150,10 @@ std::optional<SeenCode> read_code(const ImageView& image, const Eigen::Matrix3d&
     for (int column = 0; column < layout.cells; ++column) {
       const double off = share(column, row) - 0.5;
       Cell cell = Cell::kUnclear;
-      if (off < -kClear) {
+      if (off < -kClearCell) {
         cell = Cell::kDark;
         dark.push_back(cells.level(column, row));
-      } else if (off > kClear) {
+      } else if (off > kClearCell) {
         cell = Cell::kBright;
         bright.push_back(cells.level(column, row));
       }

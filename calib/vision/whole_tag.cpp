@@ -24,6 +24,10 @@ namespace kinescope {
 namespace {
 
 using namespace whole_tag;
+using corner_fit::kCodecBlock;
+using corner_fit::kMinNoise;
+using corner_fit::kRobust;
+using corner_fit::kTaper;
 
 // Places of the unknowns. Each is a step from what the model has now.
 constexpr int kHomography = 0;  // 8: shift, affine and perspective parts, px at the border
@@ -40,11 +44,9 @@ constexpr int kSize = 24;  // the same with what fills it up to a multiple of 4
 constexpr double kReach = 2.5;          // blurs from a step, of pixels that are used
 constexpr double kMinOuterWidth = 1.1;  // px around the border that are used at least ..
 constexpr double kOuterReach = 2.0;     // .. and at most these blurs less than a cell
-constexpr double kTaper = 0.7;          // px over which a weight fades out there
 constexpr std::size_t kFewestPixels = 112;
 constexpr std::size_t kEnough = 250;  // pixels to come near with
 constexpr std::size_t kCoarse = 4;    // one in so many pixels
-constexpr int kBlock = 8;             // px, of the usual video codecs
 
 // What is known beforehand, standard deviations.
 constexpr double kBlurMean = 0.64;   // px^2
@@ -59,8 +61,6 @@ constexpr double kLeastBlur = 0.0625;  // px^2, below the pixel's own 1/12
 constexpr double kLeastGamma = 0.4;
 constexpr double kMostFittedGamma = 4.0;
 constexpr double kMostPeak = 2.0;  // px^4
-constexpr double kRobust = 3.0;    // noise units beyond which a pixel's weight falls
-constexpr double kMinNoise = 0.3;  // grey levels, rounding
 constexpr int kMostApproaches = 5;
 constexpr double kMostMove = 0.5;   // cells; beyond, it is another code
 constexpr double kMostNoise = 1.6;  // of the border's: compressed pictures stay below 1.4, a shadow
@@ -203,13 +203,13 @@ class WholeTagFit {
     const int x1 = static_cast<int>(box_.max().x());
     const int y0 = static_cast<int>(box_.min().y());
     const int y1 = static_cast<int>(box_.max().y());
-    const int block_columns = x1 / kBlock - x0 / kBlock + 1;
-    blocks_ = static_cast<std::size_t>(block_columns * (y1 / kBlock - y0 / kBlock + 1));
+    const int block_columns = x1 / kCodecBlock - x0 / kCodecBlock + 1;
+    blocks_ = static_cast<std::size_t>(block_columns * (y1 / kCodecBlock - y0 / kCodecBlock + 1));
     std::size_t unclear = 0;
     for (int y = y0; y <= y1; ++y) {
       const UndistortedPatch::Row patch_row = patch_->row(y);
       const std::uint8_t* row = image_.data + static_cast<std::ptrdiff_t>(image_.stride) * y;
-      const int block_row = (y / kBlock - y0 / kBlock) * block_columns;
+      const int block_row = (y / kCodecBlock - y0 / kCodecBlock) * block_columns;
       const auto [first, last] = span(y);
       for (int x = std::max(x0, first); x <= std::min(x1, last); ++x) {
         const Eigen::Vector2d at = patch_row.at(x);
@@ -217,7 +217,7 @@ class WholeTagFit {
         if (!is_clear) ++unclear;
         if (!(weight > 0.0)) continue;
         pixels_.push_back({at.x(), at.y(), static_cast<double>(row[x]), weight,
-                           block_row + x / kBlock - x0 / kBlock, (x + 2 * y) % 4 == 0});
+                           block_row + x / kCodecBlock - x0 / kCodecBlock, (x + 2 * y) % 4 == 0});
       }
     }
     if (pixels_.size() <= kFewestPixels || unclear >= pixels_.size()) return false;

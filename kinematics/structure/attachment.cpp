@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kinematics/structure/attachment_cost.h"
+#include "kinematics/structure/attachment_path.h"
 #include "kinematics/structure/chain_residuals.h"
 
 namespace kinescope::structure_search {
@@ -47,8 +48,7 @@ double less_for_common_errors(const ChainFit& fit, const RelativeMotion& relativ
 }  // namespace
 
 bool Attachment::leaves_noise_only() const {
-  constexpr double kNoiseOnly = 1.5;  // variances over the declared ones
-  return fit.variance < kNoiseOnly && fit.axis_variance < kNoiseOnly;
+  return fit.variance < kInexact && fit.axis_variance < kInexact;
 }
 
 double Attachment::explained_ratio() const {

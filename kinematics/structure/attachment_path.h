@@ -8,8 +8,8 @@
 
 namespace kinescope::structure_search {
 
-/// A channel is inexact (backlash, gear error) when the residual along the joint has this many
-/// times the variance declared.
+/// Residuals of more than this many times the variance declared are more than noise; along the
+/// joint its channel is inexact then (backlash, gear error).
 inline constexpr double kInexact = 1.5;
 
 /// The path of the body that hangs on `parent` by this attachment.

@@ -75,9 +75,10 @@ Eigen::ArrayXd robust(const Eigen::ArrayXd& squared) {
   return (knee / (knee + squared)).square();
 }
 
+constexpr int kPasses = 3;  // of weights
+
 // Median variance across the slope of the rows regressed on one channel.
 double left_by_channel(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
-  constexpr int kPasses = 3;
   Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(q.size());
   double left = 0.0;
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -98,7 +99,6 @@ double left_by_channel(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
 
 // The same across the direction in which most of the motion is.
 double left_by_principal(const Eigen::MatrixXd& y) {
-  constexpr int kPasses = 3;
   Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(y.cols());
   double left = 0.0;
   for (int pass = 0; pass < kPasses; ++pass) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "kinematics/structure/attach_bodies.h"
+#include "kinematics/structure/attachment_path.h"
 #include "kinematics/structure/idle_channels.h"
 #include "kinematics/structure/pair_tree.h"
 #include "kinematics/structure/rearrange.h"
@@ -23,8 +24,6 @@ constexpr int kMostGrowths = 4;
 constexpr int kRoughInstants = 80;
 // How much better (-2 ln likelihood) an offset has to be than one nearer to agreeing clocks.
 constexpr double kClearlyLikelierOffset = 25.0;
-// Variances over the declared ones up to which a tree explains all there is.
-constexpr double kVarianceOfNoise = 1.5;
 
 // Channels of one log are mostly of one kind: when the clear joints are in rad and m, the others
 // are too.
@@ -72,9 +71,9 @@ double score_of(const FoundTree& found) {
 // can be better.
 bool explains_all(const GrownTree& tree) {
   return std::ranges::all_of(tree.bodies, [](const GrownBody& b) {
-    if (b.link < 0 || b.attachment.fit.variance > kVarianceOfNoise) return false;
+    if (b.link < 0 || b.attachment.fit.variance > kInexact) return false;
     if (b.attachment.at_rest()) return true;
-    return b.attachment.driven() && b.attachment.fit.axis_variance < kVarianceOfNoise &&
+    return b.attachment.driven() && b.attachment.fit.axis_variance < kInexact &&
            std::ranges::all_of(
                b.attachment.fit.model.joints,
                [](const ChainJoint& j) { return j.terms.size() == 1; });
