@@ -9,6 +9,7 @@
 #include "app/io/nearest_name.h"
 #include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
+#include "kinematics/core/text.h"
 
 namespace kinescope {
 namespace {
@@ -27,7 +28,8 @@ YamlValue YamlValue::read(const std::filesystem::path& path) {
   try {
     root = YAML::Load(read_text_file(path, kLargestYamlBytes));
   } catch (const YAML::Exception& error) {
-    throw bad_input(line_of(source, error.mark), fmt::format("is not YAML ({})", error.msg),
+    throw bad_input(line_of(source, error.mark),
+                    fmt::format("is not YAML ({})", clean_text(error.msg)),
                     "check indentation, colons and quotes in this line and the one above");
   }
   if (!root.IsDefined() || root.IsNull()) {

@@ -145,8 +145,19 @@ void require_writable_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder, error)) {
-    throw bad_request(folder.string(), "the output folder cannot be made",
-                      "choose another one with --output");
+    const auto is_file = [](const fs::path& path) {
+      std::error_code none;
+      return fs::exists(path, none) && !fs::is_directory(path, none);
+    };
+    fs::path in_the_way = folder;
+    while (in_the_way.has_relative_path() && !is_file(in_the_way))
+      in_the_way = in_the_way.parent_path();
+    throw bad_request(
+        folder.string(),
+        in_the_way.has_relative_path()
+            ? "the output folder cannot be made: " + in_the_way.string() + " is no folder"
+            : "the output folder cannot be made",
+        "choose another one with --output");
   }
   const fs::path probe = temporary_beside(folder / "probe");
   std::ofstream stream(probe);

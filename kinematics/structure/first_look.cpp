@@ -75,13 +75,13 @@ Eigen::ArrayXd robust(const Eigen::ArrayXd& squared) {
   return (knee / (knee + squared)).square();
 }
 
-constexpr int kPasses = 3;  // of weights
+constexpr int kWeightPasses = 3;
 
 // Median variance across the slope of the rows regressed on one channel.
 double left_by_channel(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
   Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(q.size());
   double left = 0.0;
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kWeightPasses; ++pass) {
     const double total = weight.sum();
     const Vector6d y_mean = y * weight.matrix() / total;
     const Eigen::VectorXd centred = q.array() - q.dot(weight.matrix()) / total;
@@ -101,7 +101,7 @@ double left_by_channel(const Eigen::MatrixXd& y, const Eigen::VectorXd& q) {
 double left_by_principal(const Eigen::MatrixXd& y) {
   Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(y.cols());
   double left = 0.0;
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kWeightPasses; ++pass) {
     const Vector6d mean = y * weight.matrix() / weight.sum();
     const Eigen::Matrix<double, 6, Eigen::Dynamic> r = y.colwise() - mean;
     const Matrix6d G = r * weight.matrix().asDiagonal() * r.transpose();
