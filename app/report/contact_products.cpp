@@ -78,6 +78,15 @@ std::string counted(std::size_t count) {
   return fmt::format("{} contact{}", count, count == 1 ? "" : "s");
 }
 
+// The link; where it is less likely than the others together, only that none before it was touched.
+std::string place_words(const ContactSummary& summary, const ContactEvent& event) {
+  std::string name = link_name(summary, event.link);
+  if (event.link < 0 || event.link >= event.link_probability.size()) return name;
+  const double itself = link_probability(event);
+  if (itself >= 0.5) return name;
+  return fmt::format("{} or beyond it ({} itself: {:.0f} %)", name, name, 100.0 * itself);
+}
+
 std::string found_words(const ContactSummary& summary) {
   const std::string rate = fmt::format("false alarms: {:g} an hour asked for, {:.2g} estimated",
                                        summary.calibration.options.false_alarms_per_hour,
@@ -90,7 +99,7 @@ std::string found_words(const ContactSummary& summary) {
                                ? fmt::format(" of {}", summary.clock.trajectory(event.onset_s))
                                : "";
     out += fmt::format(" {:.2f} to {:.2f} s{} at {};", summary.clock.time_s(event.onset_s),
-                       summary.clock.time_s(event.end_s), of, link_name(summary, event.link));
+                       summary.clock.time_s(event.end_s), of, place_words(summary, event));
   }
   out.back() = '.';
   return out;

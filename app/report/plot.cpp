@@ -282,11 +282,12 @@ std::string Plot::str() const {
   }
   // The inner svg clips the marks to the frame; its viewBox keeps their coordinates.
   return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\"{}>{}"
+      "<svg class=\"plot\" viewBox=\"0 0 {} {}\" style=\"--w:{}px\" role=\"img\" "
+      "aria-label=\"{}\"{}>{}"
       "<svg x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" viewBox=\"{} {} {} {}\">{}</svg>{}</svg>",
-      drawn(size_.width), drawn(height), escaped(name_), time, axes(), drawn(left_), drawn(top_),
-      drawn(width), drawn(inner), drawn(left_), drawn(top_), drawn(width), drawn(inner), marks_,
-      legend_text());
+      drawn(size_.width), drawn(height), drawn(size_.width), escaped(name_), time, axes(),
+      drawn(left_), drawn(top_), drawn(width), drawn(inner), drawn(left_), drawn(top_),
+      drawn(width), drawn(inner), marks_, legend_text());
 }
 
 }  // namespace kinescope::report

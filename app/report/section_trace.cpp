@@ -181,7 +181,7 @@ std::string effects_table(const Trace& trace) {
   std::string rows;
   for (const TracedEffect& effect : trace.accepted) {
     rows += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{}</td><td>{}</td></tr>",
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3g} %</td><td>{}</td><td>{}</td></tr>",
         escaped(effect_name(effect)), escaped(effect.words),
         escaped(size_words(effect) + other_sizes_words(effect)), 100.0 * effect.explained,
         escaped(error_change_words(effect.held_out_before, effect.held_out_after)),

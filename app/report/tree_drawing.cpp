@@ -134,9 +134,9 @@ std::string tree_drawing(const Facts& facts) {
     boxes += link_box(facts, k, x_of(link), y_of(link));
   }
   return fmt::format(
-      "<svg class=\"tree\" viewBox=\"0 0 {} {}\" style=\"max-width:{}px\" role=\"img\" "
+      "<svg class=\"tree\" viewBox=\"0 0 {} {}\" style=\"max-width:{}px;--w:{}px\" role=\"img\" "
       "aria-label=\"Tree of links and joints\">{}{}{}</svg>",
-      drawn(width), drawn(height), drawn(width), edges, boxes, words);
+      drawn(width), drawn(height), drawn(width), drawn(width), edges, boxes, words);
 }
 
 }  // namespace kinescope::report
