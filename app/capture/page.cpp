@@ -38,7 +38,7 @@ constexpr std::string_view kBody = R"html(<main>
 <p class="note" id="now"></p></div>
 <div><h3>Still missing</h3><ul id="missing"></ul><ul class="warned" id="warnings"></ul></div></div>
 <div class="columns">
-<div class="scroll"><table id="markers"><caption>Markers</caption><thead><tr><th>marker</th><th>seen in</th><th>of use in</th><th>width, px</th><th>now, px</th><th>tilt now, °</th><th>most, °</th><th>now</th></tr></thead><tbody></tbody></table></div>
+<div class="scroll"><table id="markers"><caption>Markers</caption><thead><tr><th>marker</th><th>seen in, frames</th><th>of use in, frames</th><th>width, px</th><th>now, px</th><th>tilt now, °</th><th>most, °</th><th>now</th></tr></thead><tbody></tbody></table></div>
 <div class="scroll"><table id="joints" hidden><caption>Joint values</caption><thead><tr><th>channel</th><th>from</th><th>to</th><th>range</th><th>unit</th></tr></thead><tbody></tbody></table></div>
 <figure><figcaption>Parts of the image with markers: <span id="coverage"></span></figcaption><div id="grid" role="img" aria-labelledby="coverage"></div></figure>
 <div class="scroll"><table id="refused"><caption>Frames refused</caption><tbody></tbody></table></div>

@@ -92,7 +92,7 @@ std::string cost_section(const PolicySummary& summary, const nlohmann::json& doc
       "A trial has {} steps of {:g} s; each state costs between 0 and 1, so that a trial costs at "
       "most {}.",
       summary.problem.task.steps, layout_of(summary).step_s, summary.problem.task.steps + 1));
-  if (!paid.points.empty()) {
+  if (paid.points.size() > 1) {  // one is in the table
     out += figure(curve_plot("Cost over trials", {.label = "trial"}, {.label = "cost of a trial"},
                              {promised, paid}),
                   "What the particles promised before each trial, and what the system then cost",
