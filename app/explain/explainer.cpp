@@ -46,6 +46,13 @@ struct Proposal {
 /// Structures that were fitted, each with the effects to begin with.
 using Tried = std::set<std::pair<Shape, std::vector<EffectId>>>;
 
+bool has_more_joints_than_channels(const Structure& structure) {
+  std::set<int> channels;
+  for (const StructureJoint& joint : structure.joints)
+    if (joint.channel) channels.insert(joint.channel->channel);
+  return structure.joints.size() > channels.size();
+}
+
 std::pair<Shape, std::vector<EffectId>> tried_as(const Structure& structure,
                                                  const TraceStart& begin) {
   std::pair<Shape, std::vector<EffectId>> out{shape_of(structure), {}};
@@ -103,11 +110,37 @@ class Explainer {
       }
     }
     if (!best) {
+      std::optional<Explanation> simpler = with_one_joint_a_channel(first, tried);
+      if (simpler && is_settled(*simpler)) return *std::move(simpler);
       if (first.structure) tried.insert(tried_as(*first.structure, {}));
-      return fit_.traced(std::move(first), {});
+      Explanation now = fit_.traced(std::move(first), {});
+      return simpler && is_better(*simpler, now) ? *std::move(simpler) : now;
     }
     tried.insert(tried_as(*best->structure, begin));
     return fit_.of_structure(*std::move(best->structure), begin);
+  }
+
+  /// Where channels drive several joints and that is in doubt, a robot with fewer joints comes
+  /// first: errors look like joints, which cost most to trace. Where it explains all, no other
+  /// robot explains more. Nothing where none shows.
+  [[nodiscard]] std::optional<Explanation> with_one_joint_a_channel(const Explanation& first,
+                                                                    Tried& tried) const {
+    if (!options_.trace || !first.fitted || is_structure_sound(first) ||
+        !has_more_joints_than_channels(*first.structure))
+      return std::nullopt;
+    std::optional<Explanation> best;
+    for (const auto& propose :
+         {&Explainer::with_half_the_recording, &Explainer::with_errors_allowed}) {
+      for (const Proposal& proposal : (this->*propose)(first)) {
+        if (proposal.structure.joints.size() >= first.structure->joints.size() ||
+            !tried.insert(tried_as(proposal.structure, proposal.begin)).second)
+          continue;
+        Explanation other = asked_again(fit_.of_structure(proposal.structure, proposal.begin));
+        if (is_settled(other)) return other;
+        if (!best || is_better(other, *best)) best = std::move(other);
+      }
+    }
+    return best;
   }
 
   [[nodiscard]] std::vector<std::optional<Sight>> contradicted_sights(const Explanation& of) const {
