@@ -52,7 +52,7 @@ ExitCode dynamics_command(const DynamicsOptions& options, const Console& console
     for (const std::string& line : trace_lines(*summary.trace)) fmt::print("{}\n", line);
   }
   fmt::print("urdf    {}\n", (options.output / "robot_dynamics.urdf").string());
-  if (summary.trace && summary.trace->verdict != TraceVerdict::kNothingToSay) {
+  if (summary.has_traced_robot) {
     fmt::print("traced  {} (with what tracing found; contacts left out)\n",
                (options.output / "robot_traced.urdf").string());
   }

@@ -77,6 +77,7 @@ struct TorqueSummary {
   std::optional<Eigen::Vector3d> default_gravity_m_s2;
   /// As tracing found it, where it found another one.
   std::optional<Eigen::Vector3d> traced_gravity_m_s2;
+  bool has_traced_robot = false;  ///< robot_traced.urdf was written
   TorqueData data;    ///< of the log learned from; its samples are `train` and, without a log of
                       ///< its own, `test`
   std::string split;  ///< in words: what was held out

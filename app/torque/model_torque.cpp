@@ -273,6 +273,9 @@ std::optional<TracedLog> add_trace(const DynamicsOptions& options, const Dynamic
   TracedLog traced = trace_torque_stage(options, model, log, summary.data.cutoff, folder, progress);
   summary.trace = traced.trace.trace;
   take_traced_drives(traced.trace, model, summary.drives);
+  summary.has_traced_robot = traced.has_urdf;
+  for (const std::string& note : traced.trace.corrected.notes)
+    summary.warnings.push_back("robot_traced.urdf: " + note);
   for (const TracedEffect& effect : summary.trace->accepted) {
     if (effect.id.effect != "gravity_direction") continue;
     summary.traced_gravity_m_s2 = traced.trace.corrected.model.gravity_m_s2;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
 #include "dynamics/data/torque_data.h"
+#include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 
 namespace kinescope {
@@ -82,6 +84,19 @@ SavedTrace saved_trace(const TorqueTrace& trace, const TorqueSamples& samples,
   const Eigen::MatrixXd left = samples.torque - predict_torque(trace.corrected, samples, filter);
   return {trace.corrected, filter,
           left.colwise().norm().transpose() / std::sqrt(static_cast<double>(left.rows()))};
+}
+
+/// The robot as a URDF; nothing where it cannot be read again, which is said in the model's notes.
+std::optional<std::string> readable_urdf(CorrectedTorqueModel& corrected) {
+  try {
+    std::string text = write_urdf(corrected.model);
+    (void)parse_dynamic_urdf(text, "robot_traced.urdf");
+    return text;
+  } catch (const Error& error) {
+    corrected.notes.push_back(fmt::format("is not written: {}", error.what()));
+    corrected.in_model.assign(corrected.effects.size(), 0);
+    return std::nullopt;
+  }
 }
 
 void remove_corrected(const OutputFolder& folder) {
@@ -162,24 +177,27 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
   trace_options.model.filter = {traced.filter, traced.cutoff.cutoff_hz};
   TorqueTrace out = trace_torque(model, traced.samples, trace_options, progress);
 
+  const bool found = out.trace.verdict != TraceVerdict::kNothingToSay;
+  const std::optional<std::string> urdf = found ? readable_urdf(out.corrected) : std::nullopt;
   nlohmann::json document = trace_json(out.trace);
   document["base"] = {{"masses", to_string(out.base.kind)}, {"reason", out.base.reason}};
   document["effects"] = corrected_json(out.corrected);
   document["motion"] = motion_json(out.corrected);
   document["left_out"] = contacts_json(out.contacts, traced.samples);
   folder.write(options.trace_file, json_text(document));
-  if (out.trace.verdict == TraceVerdict::kNothingToSay) {
+  if (!urdf) folder.remove("robot_traced.urdf");
+  if (!found) {
     remove_corrected(folder);
-    return {std::move(out), {}, traced.samples, trace_options};
+    return {std::move(out), {}, traced.samples, trace_options, false};
   }
-  folder.write("robot_traced.urdf", write_urdf(out.corrected.model));
+  if (urdf) folder.write("robot_traced.urdf", *urdf);
   std::vector<std::string> joints;
   for (const WantedJoint& joint : wanted_joints(model.tree)) joints.push_back(joint.name);
   folder.write("torque_compensated.csv",
                compensated_csv(
                    compensate(out.corrected, traced.samples, trace_options.model.filter), joints));
   SavedTrace saved = saved_trace(out, traced.samples, trace_options.model.filter);
-  return {std::move(out), std::move(saved), traced.samples, trace_options};
+  return {std::move(out), std::move(saved), traced.samples, trace_options, urdf.has_value()};
 }
 
 }  // namespace kinescope

@@ -17,6 +17,7 @@ struct TracedLog {
   SavedTrace saved;
   TorqueSamples samples;       ///< that were traced
   TorqueTraceOptions options;  ///< how
+  bool has_urdf = false;       ///< robot_traced.urdf was written
 };
 
 /// One answer for each drive: where tracing sizes a term of a joint, its value (with what the URDF
@@ -27,7 +28,8 @@ void take_traced_drives(const TorqueTrace& trace, const DynamicModel& declared,
                         std::vector<DriveEstimate>& drives);
 
 /// Filters the log at the cut-off that tracing asks for, given the one chosen for identification.
-/// Writes trace.json (or the name given), robot_traced.urdf and torque_compensated.csv. Throws as
+/// Writes trace.json (or the name given), robot_traced.urdf (unless no reader would take it: the
+/// model's notes say why) and torque_compensated.csv. Throws as
 /// filtered_data() and trace_torque().
 [[nodiscard]] TracedLog trace_torque_stage(const DynamicsOptions& options,
                                            const DynamicModel& model, const TorqueLogReport& log,

@@ -4,14 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
 
+#include "calib/trace/normal_system.h"
 #include "dynamics/effects/base_choice.h"
 #include "dynamics/effects/disagreement.h"
+#include "dynamics/identify/consistent_model.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 
 namespace kinescope {
 namespace {
@@ -108,35 +112,89 @@ std::vector<TorqueEffect> effects_of(const Trace& trace) {
   return out;
 }
 
+/// How an effect went into a DynamicModel, and why not, or not as it was found.
+struct PutIn {
+  bool done = false;
+  std::string note;  ///< empty: as it was found, or a DynamicModel has no place for it
+};
+
+PutIn put_into(JointDynamics& joint, const TorqueEffect& effect) {
+  double* value = effect.id.effect == "viscous"         ? &joint.viscous
+                  : effect.id.effect == "coulomb"       ? &joint.coulomb
+                  : effect.id.effect == "motor_inertia" ? &joint.motor_inertia
+                                                        : nullptr;
+  if (value == nullptr) return {};
+  const double sum = *value + effect.values[0];
+  // No URDF reader takes friction that drives.
+  if (sum < 0.0) {
+    return {false, fmt::format("{} of {} would be negative ({:.3g})", effect.id.effect,
+                               effect.id.place, sum)};
+  }
+  *value = sum;
+  return {true, {}};
+}
+
+/// Inverse of the covariance of an added effect's parameters, all others being free; that noise
+/// lasts is allowed for by the median of the ratios of the variances in `found` to those of white
+/// noise.
+Eigen::MatrixXd information_of(const TracedFit& fit, const std::vector<AddedEffect>& added,
+                               std::size_t index, const TracedEffect& found) {
+  Eigen::Index first = fit.linear.jacobian.cols();
+  for (std::size_t k = index; k < added.size(); ++k) first -= fit.values[k].size();
+  const Eigen::Index count = fit.values[index].size();
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index k = 0; k < fit.linear.jacobian.cols(); ++k) {
+    if (k < first || k >= first + count) others.push_back(k);
+  }
+  Eigen::MatrixXd H = fit.linear.jacobian.transpose() * fit.linear.jacobian;
+  if (fit.linear.prior.size() > 0) H += fit.linear.prior;
+  const auto own = Eigen::seqN(first, count);
+  const Eigen::MatrixXd across = H(others, own);
+  const Eigen::MatrixXd information =
+      H(own, own) -
+      across.transpose() * trace::scaled_pseudo_inverse(H(others, others), trace::kUnseen) * across;
+  const Eigen::MatrixXd white = trace::scaled_pseudo_inverse(information, trace::kUnseen);
+  std::vector<double> ratios;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double sigma = found.values[static_cast<std::size_t>(k)].sigma;
+    const double ratio = sigma * sigma / white(k, k);
+    if (std::isfinite(ratio)) ratios.push_back(ratio);
+  }
+  return information / std::max(1.0, median_of(std::move(ratios)));
+}
+
+/// A payload beside its link. What the torques do not show of it is anything, so that the sum may
+/// be no body: the nearest body takes its place, near in what the torques show.
+PutIn put_payload_into(InertialParameters& link, const TorqueEffect& effect,
+                       const std::function<Matrix10d()>& information) {
+  InertialParameters sum = link;
+  sum += InertialParameters::from_vector(effect.values);
+  if (sum.mass_kg > 0.0 && is_consistent(sum)) {
+    link = sum;
+    return {true, {}};
+  }
+  const std::string what =
+      fmt::format("no body has the inertia of {} with the payload found there", effect.id.place);
+  if (!(link.mass_kg > 0.0)) return {false, what + ", and without it the link has no mass"};
+  link = consistent_body(sum, information(), link);
+  return {true, fmt::format("{}: the nearest body has {:.3g} kg instead of {:.3g} kg", what,
+                            link.mass_kg, sum.mass_kg)};
+}
+
 /// Puts an effect into the model where a DynamicModel has a place for it.
-bool put_into(DynamicModel& model, const TorqueEffect& effect) {
+PutIn put_into(DynamicModel& model, const TorqueEffect& effect,
+               const std::function<Matrix10d()>& information) {
   for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
-    if (model.tree.joints[j].name != effect.id.place) continue;
-    JointDynamics& joint = model.joints[j];
-    double* value = effect.id.effect == "viscous"         ? &joint.viscous
-                    : effect.id.effect == "coulomb"       ? &joint.coulomb
-                    : effect.id.effect == "motor_inertia" ? &joint.motor_inertia
-                                                          : nullptr;
-    // No URDF reader takes friction that drives.
-    if (value == nullptr || *value + effect.values[0] < 0.0) return false;
-    *value += effect.values[0];
-    return true;
+    if (model.tree.joints[j].name == effect.id.place) return put_into(model.joints[j], effect);
   }
   const auto link = model.tree.link(effect.id.place);
-  if (effect.id.effect == "payload" && link) {
-    InertialParameters& own = model.links[link->index()];
-    InertialParameters sum = own;
-    sum += InertialParameters::from_vector(effect.values);
-    if (!(sum.mass_kg > 0.0)) return false;
-    own = sum;
-    return true;
-  }
-  return false;
+  if (effect.id.effect != "payload" || !link) return {};
+  return put_payload_into(model.links[link->index()], effect, information);
 }
 
 CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel& traced,
-                             const std::vector<AddedEffect>& added,
-                             std::vector<TorqueEffect> effects) {
+                             const Trace& trace, std::vector<TorqueEffect> effects) {
+  const std::vector<AddedEffect>& added = trace.added;
   CorrectedTorqueModel out;
   out.model = model;
   out.effects = std::move(effects);
@@ -152,7 +210,16 @@ CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel&
       out.in_model.push_back(1);
       continue;
     }
-    out.in_model.push_back(put_into(out.model, effect) ? 1 : 0);
+    const auto information = [&]() -> Matrix10d {
+      const auto at = std::ranges::find(added, effect.id, &AddedEffect::id);
+      const auto found = std::ranges::find(trace.accepted, effect.id, &TracedEffect::id);
+      KINESCOPE_CHECK(at != added.end() && found != trace.accepted.end(), "an effect of the trace");
+      return information_of(traced.fit(added), added, static_cast<std::size_t>(at - added.begin()),
+                            *found);
+    };
+    PutIn put = put_into(out.model, effect, information);
+    out.in_model.push_back(put.done ? 1 : 0);
+    if (!put.note.empty()) out.notes.push_back(std::move(put.note));
   }
   return out;
 }
@@ -251,7 +318,7 @@ TorqueTrace trace_beside_base(const DynamicModel& model, const TorqueSamples& sa
     effects::widen_by_disagreement(traced, out.trace);
     out.base = traced.base();
     out.rows = traced.motion().kept();
-    out.corrected = correct(model, traced, out.trace.added, effects_of(out.trace));
+    out.corrected = correct(model, traced, out.trace, effects_of(out.trace));
     if (pass == 0) before = out.trace.held_out_before;
     if (!options.contacts || out.trace.verdict == TraceVerdict::kNothingToSay) break;
     std::vector<ContactSpan> spans = spans_left(out.corrected, whole, out.base.sigma, options);
@@ -305,7 +372,7 @@ CorrectedTorqueModel refit(const DynamicModel& model, const TorqueSamples& sampl
   }
   traced.leave_out(kept);
   const std::vector<AddedEffect>& added = found.trace.added;
-  return correct(model, traced, added,
+  return correct(model, traced, found.trace,
                  with_values(effects_of(found.trace), added, traced.fit(added).values));
 }
 

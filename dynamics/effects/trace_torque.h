@@ -45,6 +45,8 @@ struct CorrectedTorqueModel {
   /// All of them. Those that `in_model` says are in the DynamicModel must not be added twice.
   std::vector<TorqueEffect> effects;
   std::vector<char> in_model;
+  /// Of effects that a DynamicModel has a place for: why one is not in it, or not as it was found.
+  std::vector<std::string> notes;
   FittedTorque base;                 ///< what the effects come on top of
   std::vector<JointTravel> travels;  ///< of the log in which they were found
   LogSpan log;

@@ -10,6 +10,7 @@
 #include <ceres/dynamic_autodiff_cost_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
+#include <fmt/format.h>
 
 #include "dynamics/identify/log_cholesky.h"
 #include "dynamics/rigid/mass_matrix.h"
@@ -145,6 +146,20 @@ InertialParameters plain_body(const RigidModel& rigid, std::size_t body) {
        .inertia_kgm2 = 0.4 * mass * kRadius * kRadius * Eigen::Matrix3d::Identity()});
 }
 
+/// A plate or a rod is on the border, where the divergence is infinite: it gets a millimetre. So do
+/// directions in which an impossible inertia is negative.
+InertialParameters thickened(const InertialParameters& body) {
+  constexpr double kThickness = 1e-3;
+  const double least = body.mass_kg * kThickness * kThickness;
+  Eigen::Matrix4d J = pseudo_inertia(body);
+  J.topLeftCorner<3, 3>().diagonal().array() += least;
+  if (!is_consistent(body)) {
+    const SymmetricEigen eigen = symmetric_eigen(J);
+    J = eigen.vectors * eigen.values.cwiseMax(least).asDiagonal() * eigen.vectors.transpose();
+  }
+  return from_pseudo_inertia(J);
+}
+
 /// The prior of each body; flat or impossible ones get thickness or are replaced.
 std::vector<InertialParameters> prior_bodies(const RigidModel& rigid,
                                              std::vector<std::string>& replaced) {
@@ -155,11 +170,7 @@ std::vector<InertialParameters> prior_bodies(const RigidModel& rigid,
       body = plain_body(rigid, b);
       replaced.push_back(rigid.bodies[b].name);
     }
-    // A plate or a rod is on the border, where the divergence is infinite: give it a millimetre.
-    constexpr double kThickness = 1e-3;
-    Eigen::Matrix4d J = pseudo_inertia(body);
-    J.topLeftCorner<3, 3>().diagonal().array() += body.mass_kg * kThickness * kThickness;
-    out.push_back(from_pseudo_inertia(J));
+    out.push_back(thickened(body));
   }
   return out;
 }
@@ -180,10 +191,42 @@ double colour_of(const Identification& fit) {
   return std::max(1.0, median_of(std::move(ratios)));
 }
 
+/// R' R = information.
+Eigen::MatrixXd square_root(const Eigen::MatrixXd& information) {
+  const SymmetricEigen eigen = symmetric_eigen(information);
+  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
+}
+
 /// Root of the information that the base parameters carry: R' R = information / colour.
 Eigen::MatrixXd information_root(const Identification& fit) {
-  const SymmetricEigen eigen = symmetric_eigen(fit.information / colour_of(fit));
-  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
+  return square_root(fit.information / colour_of(fit));
+}
+
+/// Squares of how far a body is from its prior; the cost is the problem's.
+void add_body_prior(double relative_sigma, LogCholesky& body, ceres::Problem& problem) {
+  const Eigen::Matrix4d U = identify::upper_factor(body.data());
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<BregmanPrior, 10, 10>(  // owned by the problem
+          new BregmanPrior{.inverse_factor = U.inverse(), .weight = 1.0 / relative_sigma}),
+      nullptr, body.data());
+}
+
+ceres::Solver::Summary solve_exactly(int max_iterations, ceres::Problem& problem) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = max_iterations;
+  options.function_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary;
+}
+
+void require_prior_sigma(const ConsistentOptions& options) {
+  if (options.prior_relative_sigma > 0.0) return;
+  throw bad_request("consistent model", "the prior's relative sigma is not positive",
+                    "give a number above 0; 1 is a loose prior");
 }
 
 /// The nonlinear least squares, its blocks and its answer.
@@ -197,25 +240,13 @@ class ConsistentProblem {
     }
     add_drives();
     add_misfit();
-    const double weight = 1.0 / options.prior_relative_sigma;
     for (LogCholesky& body : bodies_) {
-      const Eigen::Matrix4d U = identify::upper_factor(body.data());
-      problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<BregmanPrior, 10, 10>(  // owned by the problem
-              new BregmanPrior{.inverse_factor = U.inverse(), .weight = weight}),
-          nullptr, body.data());
+      add_body_prior(options.prior_relative_sigma, body, problem_);
     }
   }
 
   ConsistentModel solve(int max_iterations) {
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_QR;
-    options.max_num_iterations = max_iterations;
-    options.function_tolerance = 1e-12;
-    options.parameter_tolerance = 1e-12;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem_, &summary);
+    const ceres::Solver::Summary summary = solve_exactly(max_iterations, problem_);
     ConsistentModel out;
     out.converged = summary.termination_type == ceres::CONVERGENCE;
     out.iterations = static_cast<int>(summary.iterations.size());
@@ -334,15 +365,33 @@ void write_joints(const Identification& fit, const Eigen::VectorXd& terms, Dynam
 ConsistentModel consistent_model(const Identification& identification,
                                  const ConsistentOptions& options) {
   KINESCOPE_CHECK(identification.status != IdentifyStatus::kNotRun, "an identification that ran");
-  if (!(options.prior_relative_sigma > 0.0)) {
-    throw bad_request("consistent model", "the prior's relative sigma is not positive",
-                      "give a number above 0; 1 is a loose prior");
-  }
+  require_prior_sigma(options);
   ConsistentModel out = ConsistentProblem(identification, options).solve(options.max_iterations);
   out.model = identification.prior;
   write_links(identification.rigid, out.terms, out.model);
   write_joints(identification, out.terms, out.model);
   return out;
+}
+
+InertialParameters consistent_body(const InertialParameters& target, const Matrix10d& information,
+                                   const InertialParameters& prior,
+                                   const ConsistentOptions& options) {
+  require_prior_sigma(options);
+  if (!(prior.mass_kg > 0.0)) {
+    throw bad_request("consistent body", fmt::format("the prior's mass is {} kg", prior.mass_kg),
+                      "give the link a mass");
+  }
+  constexpr int kParameters = 10;
+  LogCholesky body = identify::log_cholesky(thickened(prior));
+  ceres::Problem problem;
+  add_body_prior(options.prior_relative_sigma, body, problem);
+  auto* cost = new ceres::DynamicAutoDiffCostFunction<BaseMisfit, kParameters>(  // the problem's
+      new BaseMisfit(square_root(information), Matrix10d::Identity(), target.vector(), 1));
+  cost->AddParameterBlock(kParameters);
+  cost->SetNumResiduals(kParameters);
+  problem.AddResidualBlock(cost, nullptr, body.data());
+  (void)solve_exactly(options.max_iterations, problem);
+  return InertialParameters::from_vector(identify::inertial_vector(body.data()));
 }
 
 }  // namespace kinescope

@@ -35,4 +35,14 @@ struct ConsistentModel {
 [[nodiscard]] ConsistentModel consistent_model(const Identification& identification,
                                                const ConsistentOptions& options = {});
 
+/// Of all bodies that can exist, the one that costs least: (x - target)' information (x - target)
+/// plus the same prior, a Bregman divergence from `prior`. `target`, `information`: inertial
+/// parameters in the order of InertialParameters::vector() and the inverse of their covariance. A
+/// prior that no body has is moved to the nearest one (eigenvalues of its pseudo-inertia); throws
+/// bad_request where it has no mass.
+[[nodiscard]] InertialParameters consistent_body(const InertialParameters& target,
+                                                 const Matrix10d& information,
+                                                 const InertialParameters& prior,
+                                                 const ConsistentOptions& options = {});
+
 }  // namespace kinescope

@@ -128,6 +128,32 @@ TEST(Consistent, ReadBackFromUrdfItPredictsTheSame) {
   EXPECT_DOUBLE_EQ(back.joints[1].motor_inertia, consistent.model.joints[1].motor_inertia);
 }
 
+// What the torques show of a body stays, what they do not show gives way.
+TEST(Consistent, ABodyIsNearWhereItIsKnown) {
+  Rng rng = Rng::from_name("Consistent.ABody");
+  const InertialParameters prior = random_inertia({}, rng);
+  const InertialParameters other = random_inertia({}, rng);
+  constexpr double kKnown = 1e10;  // 1 / sigma^2
+  EXPECT_LT(
+      (consistent_body(other, kKnown * Matrix10d::Identity(), prior).vector() - other.vector())
+          .norm(),
+      1e-6 * other.vector().norm());
+  EXPECT_LT((consistent_body(other, Matrix10d::Zero(), prior).vector() - prior.vector()).norm(),
+            1e-3 * prior.vector().norm());
+  InertialParameters none = other;
+  none.inertia_kgm2 = -other.inertia_kgm2;
+  ASSERT_FALSE(is_consistent(none));
+  Matrix10d information = Matrix10d::Zero();
+  information.diagonal().head<4>().setConstant(kKnown);
+  const InertialParameters body = consistent_body(none, information, prior);
+  EXPECT_TRUE(is_consistent(body));
+  EXPECT_LT((body.vector() - none.vector()).head<4>().norm(),
+            1e-4 * none.vector().head<4>().norm());
+  // A prior that no body has is no reason to give up; one without a mass is.
+  EXPECT_TRUE(is_consistent(consistent_body(none, information, none)));
+  EXPECT_THROW(static_cast<void>(consistent_body(none, information, {})), Error);
+}
+
 TEST(Consistent, ASoftPriorIsRefusedOnlyWhenItIsNone) {
   Rng rng = Rng::from_name("Consistent.ASoftPrior");
   const DynamicModel model = random_arm(2, rng);
