@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "calib/trace/lasting.h"
 #include "calib/trace/score_test.h"
 #include "calib/trace/vibration.h"
 #include "kinematics/core/dense_algebra.h"
@@ -17,6 +18,10 @@ namespace {
 
 constexpr std::size_t kTestKnots = 8;       // of the test: few, for power
 constexpr std::size_t kStretchesAKnot = 5;  // fewer knots where few stretches judge them
+// What lasts is there, and makes its stretches long and few: more of its shape is looked for (the
+// part of a tanh that a coupling leaves, 5 noises large, needs more than four knots: `undeclared`,
+// 13589).
+constexpr std::size_t kStretchesAKnotOfWhatLasts = 3;
 constexpr Eigen::Index kCurveKnots =
     24;  // of the Gaussian process: many, its prior keeps it smooth
 // The variance of the process is looked for from a thousandth to 1e9 times its natural scale.
@@ -252,15 +257,23 @@ std::optional<Driven> first_shown(const NormalSystem& system, const std::vector<
   return std::nullopt;
 }
 
-std::size_t test_knots_of(const NormalSystem& system) {
+std::size_t test_knots_of(const NormalSystem& system,
+                          std::size_t stretches_a_knot = kStretchesAKnot) {
   return std::clamp<std::size_t>(
-      static_cast<std::size_t>(system.partition().stretches) / kStretchesAKnot, 3, kTestKnots);
+      static_cast<std::size_t>(system.partition().stretches) / stretches_a_knot, 3, kTestKnots);
 }
 
 // By how much the sum of squares falls in the step to the system's own solution.
 double still_to_gain(const NormalSystem& system) {
   const Eigen::VectorXd& step = system.step();
   return 2.0 * step.dot(system.total().g) - step.dot(system.total().H * step);
+}
+
+// For certain more than noise: where neighbours in time say how much that is.
+bool lasts(const NormalSystem& system) {
+  if (!system.linear().whitened_by_neighbours) return false;
+  const double left = system.total().rr - still_to_gain(system);
+  return left > kLasts * kLasts * system.freedom();
 }
 
 }  // namespace
@@ -306,14 +319,19 @@ std::optional<FoundRest> find_rest(const NormalSystem& system, const std::vector
                                    const std::vector<Covariate>& covariates,
                                    const std::vector<FoundRest>& known, double level,
                                    const TraceOptions& options) {
-  const double tests = static_cast<double>(places.size() * covariates.size());
-  const std::size_t test_knots = test_knots_of(system);
-  const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
-    return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
+  const auto pairs = static_cast<double>(places.size() * covariates.size());
+  const auto shown_with = [&](std::size_t test_knots, double tests) {
+    const auto columns_of = [&](const RestPlace& place, const Covariate& covariate) {
+      return hats(place.carrier, covariate.value, even_knots(covariate.value, test_knots));
+    };
+    return first_shown(system, by_gain(system, places, covariates, known, columns_of, options),
+                       columns_of, tests, level, options);
   };
-  const std::optional<Driven> best =
-      first_shown(system, by_gain(system, places, covariates, known, columns_of, options),
-                  columns_of, tests, level, options);
+  const std::size_t test_knots = test_knots_of(system);
+  const std::size_t finer_knots = test_knots_of(system, kStretchesAKnotOfWhatLasts);
+  std::optional<Driven> best = shown_with(test_knots, pairs);
+  if (!best && finer_knots > test_knots && lasts(system))
+    best = shown_with(finer_knots, 2.0 * pairs);
   if (best) {
     if (auto found = curve_of(system, *best, options)) return found;
   }

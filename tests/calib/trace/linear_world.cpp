@@ -111,6 +111,7 @@ Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
   if (effect.shape == "direction") return direction_of(q);
   if (effect.shape == "step") return (time_s_.array() >= effect.detail).cast<double>();
   if (effect.shape == "weave") return (9.0 * q.array()).sin() * (7.0 * other.array()).sin();
+  if (effect.shape == "wave_other") return (4.0 * other.array()).cos();
   return (5.0 * (other.array() - 0.2)).tanh();
 }
 
@@ -207,6 +208,10 @@ TracedFit LinearWorld::fit(const std::vector<AddedEffect>& effects) const {
   linear.first_row.push_back(options_.instants * kRows);
   const double memory = options_.noise_memory;
   linear.correlation_time_s = kStep * 0.5 * (1.0 + memory) / (1.0 - memory);
+  if (options_.lasts_s) {
+    linear.whitened_by_neighbours = true;
+    linear.correlation_time_s = *options_.lasts_s;
+  }
 
   std::vector<EffectColumn> columns{{0, {}}, {1, {}}};  // the joints' zeros
   for (const AddedEffect& effect : effects) {

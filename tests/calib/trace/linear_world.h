@@ -33,6 +33,9 @@ struct LinearWorldOptions {
   /// Candidates "first_half" and "second_half" at joint1: far larger each than the "weave" that
   /// they are together, which candidate "weave" tells alone, below a floor that nothing reaches.
   bool stands_in = false;
+  /// The noise is what neighbours differ by: what is left may be seen to last, as the residual's
+  /// own correlation time says, s.
+  std::optional<double> lasts_s;
   std::string converges_with;  ///< the fit converges only with this effect in it; empty: always
 };
 
@@ -40,7 +43,7 @@ struct LinearWorldOptions {
 struct Injected {
   int joint = 0;
   std::string shape;  ///< "scale", "coupling", "sine", "gear", "direction", "step", "tanh_other",
-                      ///< "weave", "field"
+                      ///< "wave_other", "weave", "field"
   double size = 0.0;
   double detail = 0.0;  ///< periods of the gear, time of the step in s
 };

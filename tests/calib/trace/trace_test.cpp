@@ -146,6 +146,26 @@ TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
   EXPECT_GE(right, 9);
 }
 
+// An effect makes what is left last, and its stretches few: four knots, as they bear, do not follow
+// six turns of a curve.
+TEST(TraceTest, TheShapeOfWhatLastsIsLookedForWithMoreKnots) {
+  constexpr int kRuns = 10;
+  int right = 0;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    LinearWorldOptions options;
+    options.seed = static_cast<std::uint64_t>(seed);
+    options.lasts_s = 0.2;
+    const auto is_found = [](const Trace& trace) {
+      return trace.verdict == TraceVerdict::kUnknown && !trace.rest.empty() &&
+             trace.rest.front().place == "joint1" &&
+             trace.rest.front().covariate == "value of joint2";
+    };
+    right += is_found(trace_effects(LinearWorld(options, {{0, "wave_other", 2.0}}))) ? 1 : 0;
+    EXPECT_EQ(trace_effects(LinearWorld(options, {})).verdict, TraceVerdict::kClean);
+  }
+  EXPECT_GE(right, 7);  // 8; none with four
+}
+
 // What the library's effect cannot imitate is a small part of what it explains; one curve says all.
 TEST(TraceTest, ACurveThatSaysMoreThanAnEffectAndACurveTakesItsName) {
   constexpr int kRuns = 10;
