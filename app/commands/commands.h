@@ -13,6 +13,7 @@
 #include "app/commands/shard_parts.h"
 #include "app/experiments/experiment_choice.h"
 #include "app/explain/sight_options.h"
+#include "app/io/lerobot_file.h"
 #include "app/io/recording.h"
 #include "app/io/shard.h"
 #include "app/torque/torque_options.h"
@@ -177,9 +178,12 @@ struct ExportOptions {
   bool tum_in_camera = false;                   ///< in the camera's frame; else in the base's
   std::filesystem::path dh;                     ///< Denavit-Hartenberg table, of a run or a URDF
   DhConvention dh_convention = DhConvention::kModified;
-  std::filesystem::path mcap;  ///< recording for viewers, of a run
-  std::string tip;             ///< link that its chain ends at; empty: all chains
-  bool force = false;          ///< replace a file that is there
+  std::filesystem::path mcap;          ///< recording for viewers, of a run
+  std::filesystem::path lerobot;       ///< calibration file of a LeRobot arm, of a run
+  std::filesystem::path lerobot_from;  ///< the one that the arm had when the log was recorded
+  std::optional<LerobotValues> lerobot_values;  ///< of the log; default: by the joints' scales
+  std::string tip;                              ///< link that its chain ends at; empty: all chains
+  bool force = false;                           ///< replace a file that is there
 };
 
 [[nodiscard]] ExitCode export_command(const ExportOptions& options, const Console& console);

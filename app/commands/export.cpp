@@ -20,9 +20,10 @@ std::vector<ExportForm> forms_of(const ExportOptions& options) {
   if (!options.tum.empty()) out.push_back(export_tum(options));
   if (!options.dh.empty()) out.push_back(export_dh(options));
   if (!options.mcap.empty()) out.push_back(export_mcap(options));
+  if (!options.lerobot.empty()) out.push_back(export_lerobot(options));
   if (!out.empty()) return out;
   throw bad_request("export", "nothing is named that is to be written",
-                    "name it with --mjcf, --tum, --dh or --mcap");
+                    "name it with --mjcf, --tum, --dh, --mcap or --lerobot");
 }
 
 // One path under two options would be what was written last. Before anything is written.

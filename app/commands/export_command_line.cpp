@@ -61,6 +61,27 @@ void add_dh(CLI::App& command, ExportOptions& exported) {
       ->type_name("LINK");
 }
 
+void add_lerobot(CLI::App& command, ExportOptions& exported) {
+  CLI::Option* lerobot = add_path(command, "--lerobot", exported.lerobot, "FILE",
+                                  "Of a run with a nominal robot: the calibration file (JSON) with "
+                                  "which the driver of a LeRobot arm gives that robot's angles");
+  CLI::Option* from = add_path(command, "--lerobot-from", exported.lerobot_from, "FILE",
+                               "The calibration file that the arm had when the log was recorded")
+                          ->needs(lerobot);
+  lerobot->needs(from);
+  command
+      .add_option_function<std::string>(
+          "--lerobot-values",
+          [&exported](const std::string& word) {
+            exported.lerobot_values =
+                word == "degrees" ? LerobotValues::kDegrees : LerobotValues::kPercent;
+          },
+          "What its values are: degrees, or percent of the range (default: by the joints' scales)")
+      ->check(one_of({"degrees", "percent"}))
+      ->needs(lerobot)
+      ->type_name("UNIT");
+}
+
 }  // namespace
 
 void add_export(CLI::App& app, CommandLine& line) {
@@ -76,6 +97,7 @@ void add_export(CLI::App& app, CommandLine& line) {
   add_path(command, "--mcap", exported.mcap, "FILE",
            "Of a run: frames, markers, joint values, residuals and effects over time, for viewers "
            "(Foxglove)");
+  add_lerobot(command, exported);
   add_force(command, exported.force, kReplaceOthers);
   add_output_options(command, line.output);
   command.footer(
@@ -83,7 +105,9 @@ void add_export(CLI::App& app, CommandLine& line) {
                   "  kinescope export log_dynamics --mjcf robot.xml\n"
                   "  kinescope export arm_run --tum arm_tum\n"
                   "  kinescope export arm_run --dh arm.csv --dh-convention standard\n"
-                  "  kinescope export arm_run --mcap arm.mcap\n\n{}",
+                  "  kinescope export arm_run --mcap arm.mcap\n"
+                  "  kinescope export arm_run --lerobot arm.json --lerobot-from arm_before.json"
+                  "\n\n{}",
                   kExitCodes));
 }
 

@@ -33,6 +33,7 @@ struct ExportForm {
 // Each throws bad_request or bad_input, and writes nothing.
 [[nodiscard]] ExportForm export_mjcf(const ExportOptions& options);
 [[nodiscard]] ExportForm export_dh(const ExportOptions& options);
+[[nodiscard]] ExportForm export_lerobot(const ExportOptions& options);
 [[nodiscard]] ExportForm export_mcap(const ExportOptions& options);
 [[nodiscard]] ExportForm export_tum(const ExportOptions& options);
 

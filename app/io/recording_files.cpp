@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/io/container_cameras.h"
 #include "app/io/nearest_name.h"
 #include "kinematics/bags/bag.h"
 #include "kinematics/bags/bag_contents.h"
@@ -345,6 +346,13 @@ void take_from_container(const fs::path& path, RecordingFiles& files) {
   if (const auto dataset = datasets::dataset_source(path)) take_from_dataset(*dataset, files);
 }
 
+/// The whole bag, or the dataset's episodes.
+fs::path without_camera(const fs::path& part) {
+  if (const auto dataset = datasets::dataset_source(part))
+    return datasets::Source{dataset->folder, {}, dataset->episodes}.path();
+  return value_of(recorded::container_of(part)).path;
+}
+
 /// The topic of a bag that --video or --corners named: of several that is the one that is chosen.
 void name_topic(MaybePath& path, const auto& choose) {
   const auto source = path ? bags::bag_source(*path) : std::nullopt;
@@ -440,8 +448,28 @@ std::vector<fs::path> RecordingFiles::all() const {
   return out;
 }
 
+namespace {
+
+/// Cameras that are named behind a bag or dataset are what is seen.
+void refuse_other_sights(const RecordingPaths& paths) {
+  const std::array<std::pair<const MaybePath*, const char*>, 4> others = {
+      {{&paths.video, "--video"},
+       {&paths.corners, "--corners"},
+       {&paths.poses, "--poses"},
+       {&paths.points, "--points"}}};
+  for (const auto& [path, option] : others) {
+    if (!*path) continue;
+    throw bad_request(option, fmt::format("{} names cameras already", paths.folder.string()),
+                      "name the cameras or the file");
+  }
+}
+
+}  // namespace
+
 RecordingFiles find_recording_files(const RecordingPaths& paths) {
-  const auto container = recorded::container_of(paths.folder);
+  const std::vector<fs::path> parts = parts_apart(paths.folder);
+  const bool several = parts.size() > 1;
+  const auto container = recorded::container_of(parts.front());
   if (container && !fs::exists(container->path))
     throw bad_input(container->path.string(), "no such file", "check the path");
   const std::vector<fs::path> places =
@@ -452,6 +480,10 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
   files.folder = folder;
   const bool seen_otherwise = paths.corners || paths.poses || paths.points;
   const bool named = paths.video || seen_otherwise;
+  if (several) {
+    refuse_other_sights(paths);
+    take_cameras(parts, places, files);
+  }
   if (!named && !container) find_cameras(folder, files);
   if (paths.video) {
     files.video = find_file(paths.video, folder, "", "--video");
@@ -482,7 +514,7 @@ RecordingFiles find_recording_files(const RecordingPaths& paths) {
   const bool seen =
       files.video || files.corners || files.poses || files.points || !files.cameras.empty();
   if (container) {
-    take_from_container(paths.folder, files);
+    take_from_container(several ? without_camera(parts.front()) : paths.folder, files);
   } else if (!seen) {
     if (const MaybePath alone = container_in(folder)) take_from_container(*alone, files);
   } else {

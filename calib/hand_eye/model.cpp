@@ -42,7 +42,8 @@ Matrix6d by_motion(const std::vector<bundle::PoseBlock>& blocks, std::size_t at,
 }
 
 Eigen::Index parameters_of(const AddedEffect& effect) {
-  return effect.id.effect == kPositionScale || effect.id.effect == kTimeOffset ? 1 : 6;
+  const std::string_view name = effect.id.effect;
+  return name == kPositionScale || name == kTimeOffset || name == kClockDrift ? 1 : 6;
 }
 
 // Whether a parameter moves the target, or the camera (or what both look through).
@@ -86,6 +87,8 @@ class Columns {
                                           const Predicted& predicted) const {
     if (effect.id.effect == kPositionScale) return predicted.by_scale;
     if (effect.id.effect == kTimeOffset) return predicted.by_time;
+    if (effect.id.effect == kClockDrift)
+      return predicted.by_time * (frame_.time_s - model_.data().middle_s());
     if (frame_.time_s < effect.scan) return Eigen::MatrixXd::Zero(6, 6);
     if (effect.id.effect == kCameraBump) {
       Frame at = frame_;
@@ -152,6 +155,7 @@ State state_for(const Model& model, const Model& from, const State& state) {
   State out;
   out.scale = model.has(kPositionScale) ? state.scale : std::array<double, 1>{};
   out.lag_s = model.has(kTimeOffset) ? state.lag_s : std::array<double, 1>{};
+  out.drift = model.has(kClockDrift) ? state.drift : std::array<double, 1>{};
   // A block that both have begins at the same time in both.
   const auto blocks = [&](const Model& m) {
     std::vector<double> times_s{m.data().first_s()};
@@ -183,8 +187,8 @@ State state_for(const Model& model, const Model& from, const State& state) {
 
 FlangeAt flange_at(const Model& model, const State& state, const Frame& frame) {
   const PoseLog& log = model.log();
-  const double time_s =
-      std::clamp(frame.time_s + state.lag_s[0], log.times_s.front(), log.times_s.back());
+  const double later_s = state.lag_s[0] + state.drift[0] * (frame.time_s - model.data().middle_s());
+  const double time_s = std::clamp(frame.time_s + later_s, log.times_s.front(), log.times_s.back());
   auto logged = pose_at(log, time_s);
   if (!logged) logged = pose_at(log, frame.time_s);
   KINESCOPE_CHECK(logged.has_value(), "a frame has a pose in the log");
@@ -282,6 +286,7 @@ Eigen::VectorXd effect_values(const Model& model, const State& state, std::size_
   const AddedEffect& added = model.effects()[effect];
   if (added.id.effect == kPositionScale) return Eigen::VectorXd::Constant(1, state.scale[0]);
   if (added.id.effect == kTimeOffset) return Eigen::VectorXd::Constant(1, state.lag_s[0]);
+  if (added.id.effect == kClockDrift) return Eigen::VectorXd::Constant(1, state.drift[0]);
   Frame at;
   at.time_s = added.scan;
   if (added.id.effect == kCameraBump) return motion(state.cameras, model.camera_block(at) - 1);

@@ -33,11 +33,13 @@ struct Data {
   bool postures = false;      ///< at rest: nothing to interpolate, no clock
   [[nodiscard]] double first_s() const { return frames.front().time_s; }
   [[nodiscard]] double last_s() const { return frames.back().time_s; }
+  [[nodiscard]] double middle_s() const { return 0.5 * (first_s() + last_s()); }
 };
 
 /// Names of the effects (app/README.md, "Poses of a flange").
 inline constexpr std::string_view kPositionScale = "position_scale";
 inline constexpr std::string_view kTimeOffset = "time_offset";
+inline constexpr std::string_view kClockDrift = "clock_drift";
 inline constexpr std::string_view kCameraBump = "camera_bump";
 inline constexpr std::string_view kTagSlip = "tag_slip";
 
@@ -84,7 +86,8 @@ struct State {
   std::vector<bundle::PoseBlock> cameras;  ///< T_mount_camera, before and after each bump
   std::vector<bundle::PoseBlock> targets;  ///< T_foot_target, each before and after its slips
   std::array<double, 1> scale{};  ///< the log's positions are to be made longer by this share
-  std::array<double, 1> lag_s{};  ///< log time minus frame time
+  std::array<double, 1> lag_s{};  ///< log time minus frame time, in the middle of the frames
+  std::array<double, 1> drift{};  ///< s of log time more than of frame time, a second
 };
 
 /// The same state for a model with more or other effects: what is new is zero.

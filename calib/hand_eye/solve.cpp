@@ -23,8 +23,7 @@ class FrameCost final : public ceres::CostFunction {
     set_num_residuals(static_cast<int>(rows));
     auto& sizes = *mutable_parameter_block_sizes();
     sizes.assign(1 + frame.sightings.size(), kPoseSize);
-    sizes.push_back(1);
-    sizes.push_back(1);
+    sizes.insert(sizes.end(), 3, 1);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -54,6 +53,7 @@ class FrameCost final : public ceres::CostFunction {
     }
     state.scale[0] = parameters[1 + n][0];
     state.lag_s[0] = parameters[2 + n][0];
+    state.drift[0] = parameters[3 + n][0];
     return state;
   }
 
@@ -61,7 +61,7 @@ class FrameCost final : public ceres::CostFunction {
     const std::size_t n = frame_->sightings.size();
     const Eigen::Index all = num_residuals();
     Eigen::MatrixXd camera = Eigen::MatrixXd::Zero(all, 6);
-    Eigen::MatrixXd numbers = Eigen::MatrixXd::Zero(all, 2);
+    Eigen::MatrixXd numbers = Eigen::MatrixXd::Zero(all, 3);
     Eigen::Index row = 0;
     for (std::size_t s = 0; s < n; ++s) {
       const auto& d = rows.errors[s].d_marker;
@@ -77,8 +77,9 @@ class FrameCost final : public ceres::CostFunction {
       row += d.rows();
     }
     if (jacobians[0] != nullptr) put_pose(camera, parameters[0], jacobians[0]);
+    numbers.col(2) = numbers.col(1) * (frame_->time_s - model_->data().middle_s());
     const Eigen::MatrixXd whitened = whitening_.apply(numbers);
-    for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t k = 0; k < 3; ++k) {
       double* out = jacobians[1 + n + k];
       if (out == nullptr) continue;
       Eigen::Map<Eigen::VectorXd>(out, all) = whitened.col(static_cast<Eigen::Index>(k));
@@ -121,6 +122,7 @@ void add_frame(const Model& model, const State& layout, State& state, const Fram
     blocks.push_back(state.targets[model.target_block(frame, sighting.marker)].data());
   blocks.push_back(state.scale.data());
   blocks.push_back(state.lag_s.data());
+  blocks.push_back(state.drift.data());
   // Of a frame without fault the squares sum up to about its rows.
   ceres::LossFunction* loss =
       robust ? new ceres::CauchyLoss(std::sqrt(static_cast<double>(n))) : nullptr;
@@ -137,6 +139,7 @@ Solved solve(const Model& model, const State& start, const Noise& noise,
   ceres::Problem problem;
   hold(problem, out.state.scale, model.has(kPositionScale));
   hold(problem, out.state.lag_s, model.has(kTimeOffset));
+  hold(problem, out.state.drift, model.has(kClockDrift));
   std::vector<std::vector<Frame>> parts;
   for (const std::size_t f : frames) parts.push_back(parts_of(model.data().frames[f], robust));
   for (const std::vector<Frame>& of_frame : parts)

@@ -200,6 +200,19 @@ Candidate time_offset() {
   return out;
 }
 
+Candidate clock_drift(const Model& model, const Eigen::VectorXd& time_s) {
+  Candidate out =
+      candidate({std::string(kClockDrift), "clock"}, "one of the clocks runs faster than the other",
+                {{"drift", "s/s"}}, "s/s");
+  out.signed_words = {"the log's clock runs faster than the camera's",
+                      "the log's clock runs slower than the camera's"};
+  out.check = "which clocks stamp images and poses; declare the camera's frame rate if it is known";
+  out.record = "record for longer";
+  const Eigen::VectorXd since = time_s.array() - model.data().middle_s();
+  out.columns = [since](double) { return std::vector<EffectColumn>{{kClockCarrier, since}}; };
+  return out;
+}
+
 // Of the instants' times: those at which something may have happened once, some instants away
 // from both ends.
 std::vector<double> switching_times(const Eigen::VectorXd& time_s) {
@@ -263,7 +276,10 @@ Candidate tag_slip(const Model& model, const Eigen::VectorXd& time_s, std::size_
 std::vector<Candidate> candidates_of(const Model& model, const Eigen::VectorXd& time_s,
                                      bool jumps) {
   std::vector<Candidate> out{position_scale()};
-  if (!model.data().postures) out.push_back(time_offset());
+  if (!model.data().postures) {
+    out.push_back(time_offset());
+    out.push_back(clock_drift(model, time_s));
+  }
   if (!jumps || switching_times(time_s).empty()) return out;
   out.push_back(camera_bump(model, time_s));
   for (std::size_t k = 0; k < model.data().targets.size(); ++k)

@@ -5,6 +5,7 @@
 //   position_scale, controller   the log's positions are too short or long as a whole (or the
 //                                markers' size is: the two are one)
 //   time_offset, clock           the log is ahead of the camera, or behind; of a motion
+//   clock_drift, clock           the log's clock runs faster than the camera's, or slower; likewise
 //   camera_bump, camera          the camera moved on its mount, once
 //   tag_slip, tag_<id>           a marker moved, once
 #pragma once

@@ -45,7 +45,8 @@ std::string list_of_topics(const Contents& contents) {
   throw bad_input(
       contents.source,
       fmt::format("holds {} of {} topics: {}", kind, topics.size(), fmt::join(topics, ", ")),
-      fmt::format("name one: {}:{}", contents.source, topics.front()));
+      fmt::format("name one: {0}:{1}, or fixed cameras that belong together: {0}:{1},{2}",
+                  contents.source, topics[0], topics[1]));
 }
 
 /// The series of the topic, or all of them.

@@ -71,8 +71,9 @@ const Feature& choose_camera(const Dataset& dataset, const Source& source) {
   if (cameras.size() == 1) return *dataset.feature(cameras.front());
   throw bad_input(dataset.folder.string(),
                   fmt::format("holds {} cameras: {}", cameras.size(), fmt::join(cameras, ", ")),
-                  fmt::format("name the one that stands still and sees the markers: {}:{}",
-                              dataset.folder.string(), cameras.front()));
+                  fmt::format("name the one that stands still and sees the markers: {0}:{1}, or "
+                              "several that do: {0}:{1},{2}",
+                              dataset.folder.string(), cameras[0], cameras[1]));
 }
 
 bool shows_robot(const Dataset& dataset) { return !camera_names(dataset).empty(); }

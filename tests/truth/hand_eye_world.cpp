@@ -115,9 +115,10 @@ class Maker {
     constexpr double kRows = 100.0;
     constexpr double kMargin = 1.0;  // of the log before and behind the frames, s
     const double length = static_cast<double>(o_.poses) / kFrames;
+    const double middle = 0.5 * static_cast<double>(o_.poses - 1) / kFrames;
     for (int k = 0; k < static_cast<int>((length + 2.0 * kMargin) * kRows); ++k) {
       const double t = k / kRows - kMargin;
-      log(t + o_.lag_s, at(t), false);
+      log(t + o_.lag_s + o_.drift * (t - middle), at(t), false);
     }
     for (int i = 0; i < o_.poses; ++i) look(i, i / kFrames, at(i / kFrames));
   }

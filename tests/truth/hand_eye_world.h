@@ -31,6 +31,7 @@ struct HandEyeWorldOptions {
   int wrong_row = -1;     ///< whose position is off by 20 mm
   bool motion = false;    ///< 30 frames and 100 rows a second; else postures
   double lag_s = 0.0;     ///< log time minus frame time, of a motion
+  double drift = 0.0;  ///< and a second of frame time that is more, from the middle of the frames
 };
 
 struct HandEyeWorld {

@@ -88,6 +88,34 @@ TEST(HandEyeEffects, ALagIsFoundAndSized) {
   const Tally out = tally(options, "time_offset", 0.04, 5);
   EXPECT_EQ(out.found, 5);
   EXPECT_GE(out.covered, 4);
+  EXPECT_EQ(out.others, 0) << "clocks that do not run apart";
+}
+
+// A tracker and a camera that see one body, each by its own clock.
+TEST(HandEyeEffects, TwoClocksThatRunApartAreFoundAndSized) {
+  HandEyeWorldOptions options;
+  options.motion = true;
+  options.mount = CameraMount::kFixed;
+  options.corners = false;
+  options.poses = 600;
+  options.lag_s = 0.04;
+  options.drift = 2e-3;  // over 20 s as much as the lag
+  options.flange_sigma_m = 1e-5;
+  options.flange_sigma_rad = 2e-5;
+  int covered = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
+    options.seed = seed;
+    const HandEye result = traced(options);
+    const TracedEffect* drift = effect_in(result, "clock_drift");
+    const TracedEffect* lag = effect_in(result, "time_offset");
+    ASSERT_NE(drift, nullptr) << seed;
+    ASSERT_NE(lag, nullptr) << seed;
+    EXPECT_EQ(result.trace->accepted.size(), 2U) << seed;
+    EXPECT_NEAR(drift->size, options.drift, 0.1 * options.drift);
+    EXPECT_NEAR(lag->size, options.lag_s, 2e-3);
+    if (drift->interval.low <= options.drift && options.drift <= drift->interval.high) ++covered;
+  }
+  EXPECT_GE(covered, 4);
 }
 
 TEST(HandEyeEffects, NothingIsInvented) {
