@@ -146,8 +146,8 @@ TEST(TraceTest, AnEffectOfNoLibraryIsUnknownOverWhatItDependsOn) {
   EXPECT_GE(right, 9);
 }
 
-// An effect makes what is left last, and its stretches few: four knots, as they bear, do not follow
-// six turns of a curve.
+// An effect makes what is left last, and its stretches few: the four knots that they allow do not
+// follow a wave.
 TEST(TraceTest, TheShapeOfWhatLastsIsLookedForWithMoreKnots) {
   constexpr int kRuns = 10;
   int right = 0;
