@@ -56,6 +56,11 @@ double squares_at(const Linearisation& linear, const RestPlace& place) {
   return out;
 }
 
+std::optional<double> over_neighbours(const NormalSystem& system, double squares) {
+  if (!system.linear().whitened_by_neighbours) return std::nullopt;
+  return std::sqrt(squares / system.freedom());
+}
+
 std::vector<LeftOver> left_over(const NormalSystem& system, const std::vector<RestPlace>& places,
                                 const std::vector<Covariate>& covariates, double level) {
   std::vector<LeftOver> out;

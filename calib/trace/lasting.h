@@ -5,6 +5,7 @@
 // there.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,10 @@ namespace kinescope::trace {
 /// What is left over what differs between neighbours in time. Noise, with the sensor's own errors
 /// counted in, makes it 0.6 to 1.0 (`undeclared`, sample videos); what lasts is no noise.
 inline constexpr double kLasts = 1.2;
+
+/// Squares of a residual over what differs between neighbours in time, as an rms; nothing where
+/// that is not known.
+[[nodiscard]] std::optional<double> over_neighbours(const NormalSystem& system, double squares);
 
 /// The residual of every place beside its noise, the most first. It lasts where it is more than
 /// kLasts times as large, at `level` over all places; then with the covariate over which a curve

@@ -269,11 +269,8 @@ double still_to_gain(const NormalSystem& system) {
   return 2.0 * step.dot(system.total().g) - step.dot(system.total().H * step);
 }
 
-// For certain more than noise: where neighbours in time say how much that is.
 bool lasts(const NormalSystem& system) {
-  if (!system.linear().whitened_by_neighbours) return false;
-  const double left = system.total().rr - still_to_gain(system);
-  return left > kLasts * kLasts * system.freedom();
+  return over_neighbours(system, system.total().rr - still_to_gain(system)).value_or(0.0) > kLasts;
 }
 
 }  // namespace

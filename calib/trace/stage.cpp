@@ -23,11 +23,6 @@ double Stage::rms() const {
                    std::max(1.0, linear.points(0, linear.unit.size())));
 }
 
-std::optional<double> Stage::over_neighbours(double squares) const {
-  if (!fit.linear.whitened_by_neighbours) return std::nullopt;
-  return std::sqrt(squares / system.freedom());
-}
-
 double held_out_sum_without(const Stage& stage, std::size_t index) {
   const std::vector<Eigen::VectorXd>& values = stage.fit.values;
   const Linearisation& linear = stage.fit.linear;

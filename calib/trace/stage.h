@@ -4,7 +4,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,9 +27,6 @@ struct Stage {
   [[nodiscard]] double held_out_sum() const { return held_out.whitened.sum(); }
   /// Root mean square of the residual, in its unit.
   [[nodiscard]] double rms() const;
-  /// Of squares that are left: over what differs between neighbours in time, as an rms; nothing
-  /// where that is not known.
-  [[nodiscard]] std::optional<double> over_neighbours(double squares) const;
 };
 
 using StagePtr = std::shared_ptr<const Stage>;

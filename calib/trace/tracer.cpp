@@ -194,7 +194,8 @@ StagePtr Tracer::look_ahead(const std::vector<TestedMember>& family) {
   if (best) return best;
   // Where what is left is no noise for certain, too few stretches may be free of it to show
   // anything at all.
-  if (hints.empty() && now->over_neighbours(now->system.total().rr).value_or(0.0) > kLasts) {
+  if (hints.empty() &&
+      over_neighbours(now->system, now->system.total().rr).value_or(0.0) > kLasts) {
     if (const TestedMember* most = most_telling(*now, family)) hints.push_back(most);
   }
   for (const TestedMember* hint : hints) {

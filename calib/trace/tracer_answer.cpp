@@ -89,7 +89,7 @@ void Tracer::summarise() {
   trace_.held_out_before = base_->error;
   trace_.held_out_after = rests_.empty() ? now_->error : rests_.back().rest.held_out_after;
   trace_.noise = now_->rms();
-  if (const auto over = now_->over_neighbours(now_->system.total().rr))
+  if (const auto over = over_neighbours(now_->system, now_->system.total().rr))
     trace_.over_neighbours = *over;
   trace_.left_over = left_by_place();
   if (!trace_.left_over.empty()) trace_.over_neighbours = trace_.left_over.front().times;

@@ -290,7 +290,7 @@ double Tracer::left_over() const {
 // effect stands in for (a joint that creeps, as a jump of its zero), a curve beside it or not.
 bool Tracer::drop_what_leaves_too_much() {
   const double left = left_over();
-  const bool lasts = now_->over_neighbours(left).value_or(0.0) > kLasts;
+  const bool lasts = over_neighbours(now_->system, left).value_or(0.0) > kLasts;
   const auto common = rests_.empty() ? common_motion(*now_) : std::nullopt;
   if (!lasts && (!common || is_of_readings(*now_, *common))) return false;
   bool dropped = false;
