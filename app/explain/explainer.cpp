@@ -99,6 +99,13 @@ class Explainer {
   /// couplings (`undeclared`, 12006); those of a marker that is not flat hang others elsewhere
   /// (11063).
   [[nodiscard]] Explanation begun_with(Explanation first, Tried& tried) const {
+    std::optional<Explanation> simpler = with_one_joint_a_channel(first, tried);
+    if (simpler && is_settled(*simpler)) return *std::move(simpler);
+    Explanation now = seen_best(std::move(first), tried);
+    return simpler && is_better(*simpler, now) ? *std::move(simpler) : now;
+  }
+
+  [[nodiscard]] Explanation seen_best(Explanation first, Tried& tried) const {
     std::optional<Explanation> best;
     TraceStart begin;
     if (options_.trace) {
@@ -110,11 +117,8 @@ class Explainer {
       }
     }
     if (!best) {
-      std::optional<Explanation> simpler = with_one_joint_a_channel(first, tried);
-      if (simpler && is_settled(*simpler)) return *std::move(simpler);
       if (first.structure) tried.insert(tried_as(*first.structure, {}));
-      Explanation now = fit_.traced(std::move(first), {});
-      return simpler && is_better(*simpler, now) ? *std::move(simpler) : now;
+      return fit_.traced(std::move(first), {});
     }
     tried.insert(tried_as(*best->structure, begin));
     return fit_.of_structure(*std::move(best->structure), begin);

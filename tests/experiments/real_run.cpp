@@ -106,6 +106,8 @@ Outcome run_recording(const RecordingPaths& paths, const fs::path& output,
   run.recording = paths;
   run.output = output;
   run.calibrate = options;
+  // Of a nominal robot all levels are fitted where none is asked for.
+  if (options.free != FreeGeometry::kGeometry) run.free = options.free;
   run.force = true;
   try {
     out.code = run_command(run, {.json = false, .quiet = true, .progress = {}});
