@@ -147,7 +147,8 @@ std::vector<LoggedJoint> logged_joints(const StoredRun& run, const Recording& re
     LoggedJoint one{joint.name, joint.channel, {}, {}, nominal.limits, zeros[j], 0.0};
     for (Eigen::Index i = 0; i < log.values.rows(); ++i) {
       const double said = log.values(i, *channel);
-      const double angle = zeros[j].angle_rad + joint.scale * corrected.log.values(i, *channel);
+      const double angle =
+          zeros[j].angle_rad + joint.scale * corrected.log.values(i, *channel) + joint.offset;
       if (!std::isfinite(said) || !std::isfinite(angle)) continue;
       one.value.push_back(factor == log.unit_factors.end() ? said : said / factor->second);
       one.angle_deg.push_back(kDegreesPerRad * angle);

@@ -92,6 +92,11 @@ TorqueStages torque_stages(const Recording& recording, const RunOptions& options
     if (!mapping) {
       return {.words = {"Torques: not every joint has a logged channel and a torque column."}};
     }
+    if (std::ranges::any_of(calibration.tree.joints,
+                            [](const Joint& joint) { return joint.offset != 0.0; })) {
+      return {.words = {"Torques: not modelled: joints are logged in units and from zeros of their "
+                        "own; log rad and m beside torques."}};
+    }
     data.mapping = *mapping;
     DynamicsOptions dynamics;
     dynamics.logs = {joints};

@@ -93,11 +93,9 @@ class Explainer {
     return with_free_markers_attached(std::move(now));
   }
 
-  /// Effects are looked for beside the robot that shows with what was declared; or with a camera or
-  /// markers that the images themselves speak for, where that predicts unseen frames better. Tracks
-  /// that a focal length of 19 % too much bends keep tracing busy for minutes, and leave it beside
-  /// couplings (`undeclared`, 12006); those of a marker that is not flat hang others elsewhere
-  /// (11063).
+  /// Where channels drive several joints and that is in doubt, a robot with fewer joints comes
+  /// first: errors look like joints, which cost most to find with other cameras and markers, and to
+  /// trace. Where it explains all, no other robot explains more.
   [[nodiscard]] Explanation begun_with(Explanation first, Tried& tried) const {
     std::optional<Explanation> simpler = with_one_joint_a_channel(first, tried);
     if (simpler && is_settled(*simpler)) return *std::move(simpler);
@@ -105,6 +103,11 @@ class Explainer {
     return simpler && is_better(*simpler, now) ? *std::move(simpler) : now;
   }
 
+  /// Effects are looked for beside the robot that shows with what was declared; or with a camera or
+  /// markers that the images themselves speak for, where that predicts unseen frames better. Tracks
+  /// that a focal length of 19 % too much bends keep tracing busy for minutes, and leave it beside
+  /// couplings (`undeclared`, 12006); those of a marker that is not flat hang others elsewhere
+  /// (11063).
   [[nodiscard]] Explanation seen_best(Explanation first, Tried& tried) const {
     std::optional<Explanation> best;
     TraceStart begin;
@@ -124,9 +127,7 @@ class Explainer {
     return fit_.of_structure(*std::move(best->structure), begin);
   }
 
-  /// Where channels drive several joints and that is in doubt, a robot with fewer joints comes
-  /// first: errors look like joints, which cost most to trace. Where it explains all, no other
-  /// robot explains more. Nothing where none shows.
+  /// Nothing where none shows, or nothing is in doubt.
   [[nodiscard]] std::optional<Explanation> with_one_joint_a_channel(const Explanation& first,
                                                                     Tried& tried) const {
     if (!options_.trace || !first.fitted || is_structure_sound(first) ||

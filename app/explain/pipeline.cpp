@@ -371,6 +371,7 @@ CheckedNominal start_from_nominal(const Recording& recording, const Observed& ob
         recording, at_common_instants(tracks, measurements.camera_of_frame), structure_options);
     if (matched.in_order) matched = by_motion(std::move(matched), structure, recording.log);
     require_drawn_types(matched, structure, recording);
+    matched = with_own_units(std::move(matched), structure, recording);
   }
   require_columns_known(matched, recording.log);
   const KinematicTree& nominal = matched.tree;

@@ -45,7 +45,7 @@ KinematicTree tree_at_parameters(const Calibration& calibration) {
     Joint& joint = out.joints[j];
     const double at = calibration.joints[j].parameters_at;
     joint.T_parent_joint = joint.T_parent_joint * joint_motion(joint.type, joint.axis, at);
-    joint.offset = -at;
+    joint.offset -= at;
   }
   return out;
 }

@@ -145,9 +145,14 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
     // A nominal robot's joint without a channel is held at its offset, unless values are given.
     const bool held = start.nominal && start.joint_values.size() == 0;
     spec.free_value.push_back(movable && !driven && !held);
-    spec.free_offset.push_back(start.nominal && movable && driven &&
-                               options.free == FreeGeometry::kOffsets);
-    spec.free_scale.push_back(driven && (options.estimate_scales || !is_unit_scale(joint.scale)));
+    const bool own_unit = driven && !is_unit_scale(joint.scale);
+    // What follows another joint has its line as drawn.
+    const bool follows = std::ranges::count(spec.tree.joints, joint.channel, &Joint::channel) > 1;
+    spec.keeps_offset.push_back(start.nominal && movable && own_unit && !follows);
+    spec.free_offset.push_back(
+        spec.keeps_offset.back() ||
+        (start.nominal && movable && driven && options.free == FreeGeometry::kOffsets));
+    spec.free_scale.push_back(own_unit || (driven && options.estimate_scales));
   }
 }
 

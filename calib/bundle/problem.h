@@ -83,7 +83,9 @@ struct Spec {
   std::vector<TangentMask> free_mount;
   std::vector<bool> free_scale;
   std::vector<bool> free_offset;
-  std::vector<bool> free_value;  ///< joints whose value is unknown in every frame
+  std::vector<bool> keeps_offset;  ///< a reading counts from a zero of its own, values do from the
+                                   ///< drawn one; else the offset goes into the joint's frame
+  std::vector<bool> free_value;    ///< joints whose value is unknown in every frame
   bool free_time_offset = false;
   std::vector<Correction> corrections;
   bool hold_corrections = false;       ///< false: all are free

@@ -52,6 +52,15 @@ Eigen::VectorXd mean_values(const Calibration& out) {
   return mean;
 }
 
+// Added to what a reading is in SI units, and what goes into the joint's frame instead.
+double offset_of_value(const Spec& spec, const State& state, std::size_t joint) {
+  return spec.keeps_offset[joint] ? state.joint_maps[joint][1] : 0.0;
+}
+
+double offset_of_frame(const Spec& spec, const State& state, std::size_t joint) {
+  return spec.keeps_offset[joint] ? 0.0 : state.joint_maps[joint][1];
+}
+
 void fill_joint_values(const Spec& spec, const State& state, const Readings& readings,
                        Calibration& out) {
   const auto frames = static_cast<Eigen::Index>(spec.times_s.size());
@@ -64,10 +73,10 @@ void fill_joint_values(const Spec& spec, const State& state, const Readings& rea
       if (spec.free_value[j]) {
         value = state.values[j][f];
       } else if (spec.channel[j] >= 0) {
-        // The offset goes into the joint's frame, so that the value is the reading in SI units.
         const int joint = static_cast<int>(j);
         value = readings.known(static_cast<int>(f), joint)
-                    ? state.joint_maps[j][0] * readings.value(static_cast<int>(f), joint)
+                    ? state.joint_maps[j][0] * readings.value(static_cast<int>(f), joint) +
+                          offset_of_value(spec, state, j)
                     : kUnknown;
       }
       out.joint_values(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(j)) = value;
@@ -166,9 +175,9 @@ void fill_tree(const Spec& spec, const State& state, const RobustSolution& robus
   for (std::size_t j = 0; j < out.tree.joints.size(); ++j) {
     Joint& joint = out.tree.joints[j];
     joint.T_parent_joint = from_block(state.joint_frames[j].data()) *
-                           joint_motion(joint.type, joint.axis, state.joint_maps[j][1]);
+                           joint_motion(joint.type, joint.axis, offset_of_frame(spec, state, j));
     joint.scale = state.joint_maps[j][0];
-    joint.offset = 0.0;
+    joint.offset = offset_of_value(spec, state, j);
     if (joint.type == JointType::kFixed || is_held(spec, j)) continue;
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
@@ -238,7 +247,7 @@ void fill_joints(const Spec& spec, const State& state, const Uncertainty& uncert
     estimate.axis_base = T_base_joint.rotation * joint.axis;
     estimate.point_base = T_base_joint.translation;
     if (joint.limits && !held[j]) estimate.range = *joint.limits;
-    estimate.parameters_at = -state.joint_maps[j][1];  // fill_tree moved the frame on by that
+    estimate.parameters_at = -offset_of_frame(spec, state, j);  // fill_tree moved the frame so far
     out.joints.push_back(estimate);
   }
   fill_axis_uncertainty(spec, state, uncertainty, out.tree, mean, held, out.joints);

@@ -172,7 +172,7 @@ std::vector<OddReading> odd_readings(const Calibration& calibration, const PoseT
         continue;
       const std::optional<double> value = reader.value_seen(id, q, seen);
       if (!value) continue;
-      const double read = q[id.value] / joint.scale;
+      const double read = (q[id.value] - joint.offset) / joint.scale;
       out.push_back({calibration.times_s[static_cast<std::size_t>(frame)], joint.channel, read,
                      read + (*value - q[id.value]) / joint.scale});
       break;

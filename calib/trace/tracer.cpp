@@ -13,6 +13,7 @@
 #include "calib/trace/not_found.h"
 #include "calib/trace/scan_slope.h"
 #include "calib/trace/verdict.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::trace {
 namespace {
@@ -117,6 +118,13 @@ bool Tracer::can_look(const Stage& stage) {
 
 bool Tracer::is_added(const EffectId& id) const {
   return std::ranges::find(now_->added, id, &AddedEffect::id) != now_->added.end();
+}
+
+const Candidate& Tracer::candidate_of(const EffectId& id) const {
+  const Candidate* candidate = find_candidate(base_->fit, id);
+  if (candidate == nullptr) candidate = find_candidate(now_->fit, id);
+  KINESCOPE_CHECK(candidate != nullptr, "an added effect is a candidate");
+  return *candidate;
 }
 
 bool Tracer::may_go_on() const { return options_.most_fits == 0 || fits_ < options_.most_fits; }

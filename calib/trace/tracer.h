@@ -56,6 +56,8 @@ class Tracer {
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_look(const Stage& stage);
   [[nodiscard]] bool is_added(const EffectId& id) const;
+  /// Of an effect that was added: as it is offered without any, or beside those that there are.
+  [[nodiscard]] const Candidate& candidate_of(const EffectId& id) const;
   /// TraceOptions::most_fits.
   [[nodiscard]] bool may_go_on() const;
   void say_nothing(std::string reason);

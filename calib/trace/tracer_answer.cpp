@@ -9,6 +9,7 @@
 #include "calib/trace/distribution.h"
 #include "calib/trace/scan_slope.h"
 #include "calib/trace/tracer.h"
+#include "kinematics/core/error.h"
 
 namespace kinescope::trace {
 namespace {
@@ -56,7 +57,7 @@ void Tracer::add_step(int round, std::string words, const Stage& stage) {
 void Tracer::size_up(std::size_t index, const Eigen::MatrixXd& covariance,
                      TracedEffect& effect) const {
   const Eigen::VectorXd& values = now_->fit.values[index];
-  const Candidate& candidate = *find_candidate(base_->fit, now_->added[index].id);
+  const Candidate& candidate = candidate_of(now_->added[index].id);
   effect.scan = now_->added[index].scan;
   if (candidate.scan_words) effect.scan_words = candidate.scan_words(effect.scan);
   effect.size = size_of(candidate, values);
@@ -107,7 +108,7 @@ void Tracer::summarise() {
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const AddedEffect& added = now_->added[i];
     const Eigen::VectorXd& values = now_->fit.values[i];
-    const Candidate& candidate = *find_candidate(base_->fit, added.id);
+    const Candidate& candidate = candidate_of(added.id);
     TracedEffect effect = details_[i].effect;
     effect.id = added.id;
     effect.words = words_of(candidate, values);
@@ -118,7 +119,9 @@ void Tracer::summarise() {
     if (candidate.is_curve()) {
       effect.scan = added.scan;
       effect.covariance = posterior.block(at, at, values.size(), values.size());
-      size_up_curve(find_candidate(now_->fit, added.id)->columns(added.scan), t, effect);
+      const Candidate* curve = find_candidate(now_->fit, added.id);
+      KINESCOPE_CHECK(curve != nullptr, "a curve that was added is a candidate");
+      size_up_curve(curve->columns(added.scan), t, effect);
     } else {
       size_up(i, covariance.block(at, at, values.size(), values.size()), effect);
     }

@@ -114,7 +114,7 @@ std::optional<std::size_t> Tracer::one_without_size() {
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const Eigen::VectorXd& values = now_->fit.values[i];
-    const Candidate& candidate = *find_candidate(base_->fit, now_->added[i].id);
+    const Candidate& candidate = candidate_of(now_->added[i].id);
     const Eigen::Index count = values.size(), first = at;
     at += count;
     if (candidate.is_curve()) continue;  // its prior says that it may be nothing

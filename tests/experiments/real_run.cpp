@@ -99,7 +99,7 @@ std::string Outcome::types() const { return joined(joints, &FoundJoint::type); }
 std::string Outcome::order() const { return joined(joints, &FoundJoint::channel); }
 
 Outcome run_recording(const RecordingPaths& paths, const fs::path& output,
-                      const CalibrateOptions& options) {
+                      const CalibrateOptions& options, bool trace) {
   Outcome out;
   const auto begin = std::chrono::steady_clock::now();
   RunOptions run;
@@ -108,6 +108,7 @@ Outcome run_recording(const RecordingPaths& paths, const fs::path& output,
   run.calibrate = options;
   // Of a nominal robot all levels are fitted where none is asked for.
   if (options.free != FreeGeometry::kGeometry) run.free = options.free;
+  run.trace = trace;
   run.force = true;
   try {
     out.code = run_command(run, {.json = false, .quiet = true, .progress = {}});

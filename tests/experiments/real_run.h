@@ -65,7 +65,7 @@ struct Outcome {
 /// Runs the whole pipeline into `output`; an error ends up in the outcome.
 [[nodiscard]] Outcome run_recording(const RecordingPaths& paths,
                                     const std::filesystem::path& output,
-                                    const CalibrateOptions& options = {});
+                                    const CalibrateOptions& options = {}, bool trace = true);
 
 /// A folder below the system's temporary one that is gone when this is.
 class ScratchFolder {

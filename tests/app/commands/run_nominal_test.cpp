@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope run --nominal` with a drawing that is grossly wrong.
+#include <numbers>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -72,6 +74,87 @@ TEST(RunNominal, ColumnsInDegreesAreSaidAndTakenSo) {
   for (const nlohmann::json& fault : result["nominal_faults"])
     EXPECT_EQ(fault["unit"], kRadPerDegree);
   EXPECT_LT(result["calibration"]["held_out_rms"].get<double>(), 0.01);
+}
+
+// Servos count in ticks, some against the drawn direction, and none from the drawn zero.
+TEST(RunNominal, TicksAreTakenAsTheAxesOfTheDrawingSay) {
+  const RecordingFolder folder;
+  RobotRecording recording = arm("nominal in ticks", {}, 4).recording;
+  write_poses(recording, folder);
+  KinematicTree drawing = learned_from(folder);
+  drawing.markers.clear();
+  folder.write("drawing.urdf", write_urdf(drawing));
+  constexpr double kTicksPerRad = 4096.0 / (2.0 * std::numbers::pi);
+  const std::vector<double> directions{-1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0};
+  std::string units = "units:\n";
+  for (Eigen::Index c = 0; c < recording.log.values.cols(); ++c) {
+    const double per_rad = directions.at(static_cast<std::size_t>(c)) * kTicksPerRad;
+    recording.log.values.col(c) =
+        (per_rad * recording.log.values.col(c).array() + 500.0 * static_cast<double>(c + 1))
+            .round();
+    units += "  " + recording.log.channels[static_cast<std::size_t>(c)] + ": ticks\n";
+  }
+  write_poses(recording, folder);
+  folder.write("recording.yaml", units);
+
+  const std::filesystem::path out = folder.path() / "out";
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", out.string(), "--quiet", "--no-trace",
+           "--nominal", (folder.path() / "drawing.urdf").string(), "--free", "offsets"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("count in units of their own"), std::string::npos) << outcome.err;
+  const nlohmann::json result = nlohmann::json::parse(read_text_file(out / "result.json"));
+  EXPECT_EQ(result.at("nominal_faults").size(), 0U) << result["nominal_faults"].dump(2);
+  const nlohmann::json calibrated = nlohmann::json::parse(read_text_file(out / "calibration.json"));
+  const nlohmann::json& joints = calibrated.at("robot").at("joints");
+  int inner = 0;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const nlohmann::json& joint = joints[j];
+    if (joint.value("channel", "").empty()) continue;
+    const auto channel = recording.log.channel(joint["channel"].get<std::string>());
+    ASSERT_TRUE(channel);
+    const double per_rad = directions.at(static_cast<std::size_t>(*channel)) * kTicksPerRad;
+    const double scale = joint["scale"].get<double>();
+    EXPECT_NEAR(scale * per_rad, 1.0, 2e-3) << joint["name"];
+    // Of the first joint and the last no axes tell the zero.
+    ++inner;
+    if (inner == 1 || inner == 4) continue;
+    const double tick_of_zero = 500.0 * static_cast<double>(*channel + 1);
+    EXPECT_NEAR(joint["offset"].get<double>() + scale * tick_of_zero, 0.0, 0.01) << joint["name"];
+  }
+  EXPECT_EQ(inner, 4);
+  // Frames stay as drawn, and so do limits.
+  const KinematicTree robot = read_urdf(out / "robot.urdf");
+  for (const Joint& joint : robot.joints) {
+    const auto drawn = drawing.joint(joint.name);
+    if (!drawn || joint.type == JointType::kFixed) continue;
+    const Pose apart =
+        drawing.joints[drawn->index()].T_parent_joint.inverse() * joint.T_parent_joint;
+    EXPECT_LT(log_pose(apart).norm(), 1e-6) << joint.name;
+  }
+}
+
+// Without what shows the joints by themselves, nothing says what a tick is.
+TEST(RunNominal, TicksOfJointsThatNoMarkerShowsAreRefused) {
+  const RecordingFolder folder;
+  RobotRecording recording = arm("nominal in ticks, a marker at the end", {}, 3).recording;
+  write_poses(recording, folder);
+  KinematicTree drawing = learned_from(folder);
+  drawing.markers.clear();
+  folder.write("drawing.urdf", write_urdf(drawing));
+  std::string units = "units:\n";
+  for (const std::string& channel : recording.log.channels) units += "  " + channel + ": ticks\n";
+  recording.log.values *= 600.0;
+  recording.tracks.tracks.erase(recording.tracks.tracks.begin(), recording.tracks.tracks.end() - 1);
+  write_poses(recording, folder);
+  folder.write("recording.yaml", units);
+  const Outcome outcome =
+      run({"run", folder.path().string(), "--output", (folder.path() / "out").string(), "--quiet",
+           "--no-trace", "--nominal", (folder.path() / "drawing.urdf").string()});
+  EXPECT_EQ(outcome.code, 4) << outcome.out;
+  EXPECT_NE(outcome.err.find("count in units of their own, and the markers do not show"),
+            std::string::npos)
+      << outcome.err;
 }
 
 TEST(RunNominal, AGripperThatIsNotLoggedRestsAndKeepsItsJoint) {
