@@ -163,4 +163,19 @@ void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceO
     trace.reason = trace::found_words(trace.found, trace.accepted);
 }
 
+void shift_ratios_by_design(const EffectBundle& bundle, double times, Trace& trace) {
+  for (const DesignCoupling& coupling : bundle.couplings()) {
+    const AddedEffect own = effect_of(bundle, coupling);
+    if (std::ranges::find(trace.added, own) == trace.added.end()) continue;
+    for (TracedEffect& known : trace.accepted) {
+      if (known.id != own.id || known.scan != own.scan) continue;
+      const double more = times * coupling.ratio;
+      known.size += more;
+      known.interval.low += more;
+      known.interval.high += more;
+      known.values.front().value += more;
+    }
+  }
+}
+
 }  // namespace kinescope::effects

@@ -16,4 +16,8 @@ namespace kinescope::effects {
 void add_couplings_by_design(const EffectBundle& bundle, const CalibrationTraceOptions& options,
                              const TraceOptions& trace_options, Trace& trace);
 
+/// Of couplings by design that the search found something beyond, all that is accepted is `times`
+/// the ratio more: the model knows what is beyond it.
+void shift_ratios_by_design(const EffectBundle& bundle, double times, Trace& trace);
+
 }  // namespace kinescope::effects

@@ -14,6 +14,7 @@
 #include "calib/effects/traced_bundle.h"
 #include "calib/trace/family.h"
 #include "calib/trace/held_out.h"
+#include "calib/trace/tracer.h"
 
 namespace kinescope {
 namespace {
@@ -110,9 +111,11 @@ CalibrationTrace traced_upright(const EffectBundle& bundle, CalibrationTraceOpti
   if (!may_go) trace_options.about = told_by.id;
   CalibrationTrace out =
       traced(effects::TracedBundle(bundle, options), bundle, options, trace_options, progress);
-  if (out.trace.steps.empty()) return out;
-  out.trace.steps.front().words =
-      fmt::format("the model as it is; gravity points where the sag of {} says", told_by.id.place);
+  // Without couplings by design stands before it.
+  const auto as_it_is = std::ranges::find(out.trace.steps, trace::kModelAsItIs, &TraceStep::words);
+  if (as_it_is == out.trace.steps.end()) return out;
+  as_it_is->words = fmt::format("{}; gravity points where the sag of {} says", trace::kModelAsItIs,
+                                told_by.id.place);
   return out;
 }
 
@@ -224,7 +227,9 @@ void size_again(const EffectBundle& chosen, const CalibrationTraceOptions& optio
                 CalibrationTrace& out) {
   const effects::TracedBundle model(chosen, options);
   if (model.possible(out.trace.added) != out.trace.added) return;
+  effects::shift_ratios_by_design(chosen, -1.0, out.trace);
   kinescope::size_again(model, out.trace);
+  effects::shift_ratios_by_design(chosen, 1.0, out.trace);
   take_corrections(model, options, out);
 }
 

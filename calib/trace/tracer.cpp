@@ -51,7 +51,7 @@ std::optional<AddedEffect> Tracer::first() {
 }
 
 void Tracer::search() {
-  add_step(0, "the model as it is", *base_);
+  add_step(0, std::string(kModelAsItIs), *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
   for (bool again = true; again;) {
     forward();

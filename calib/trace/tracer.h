@@ -29,6 +29,9 @@ inline constexpr double kSmallLoss = 0.05;
 // A rest that explains this much of what a named effect at its place explains puts that name in
 // doubt.
 inline constexpr double kDoubtfulShare = 0.1;
+/// The first step, in words.
+inline constexpr std::string_view kModelAsItIs = "the model as it is";
+
 class Tracer {
  public:
   Tracer(const TracedModel& model, const TraceOptions& options, const Progress& progress);
