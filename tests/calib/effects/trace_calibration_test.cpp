@@ -9,6 +9,7 @@
 
 #include "calib/bundle/effect_bundle.h"
 #include "calib/effects/corrected_log.h"
+#include "calib/effects/coupling_by_design.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/rng.h"
 #include "kinematics/model/kinematic_tree.h"
@@ -500,6 +501,34 @@ TEST(TraceCalibration, ACouplingByDesignThatIsNothingIsNotNamed) {
   EXPECT_EQ(trace.verdict, TraceVerdict::kClean) << answer(trace);
   EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
   EXPECT_FALSE(trace.design_comes_first);
+}
+
+// What is sized again beside the ratio that the model has.
+TEST(TraceCalibration, ACouplingBeyondItsDesignIsGivenWithTheRatio) {
+  const World world = make_effect_world(filmed());
+  CalibrationStart start = start_of(world);
+  start.tree.joints[value_of(start.tree.joint("q3")).index()].couplings = {{"q2", -1.0}};
+  const EffectBundle bundle(world.measurements, world.markers, world.log, start, {});
+  ASSERT_EQ(bundle.couplings().size(), 1U);
+  const AddedEffect own{{"coupling", "q3"}, static_cast<double>(bundle.couplings().front().other)};
+  TracedEffect beyond;
+  beyond.id = own.id;
+  beyond.scan = own.scan;
+  beyond.size = 0.02;
+  beyond.interval = {0.019, 0.021};
+  beyond.values.resize(1);
+  beyond.values.front().value = 0.02;
+  Trace trace;
+  trace.accepted = {beyond};
+  effects::shift_ratios_by_design(bundle, 1.0, trace);
+  EXPECT_EQ(trace.accepted.front().size, 0.02) << "nothing was found beyond the ratio";
+  trace.added = {own};
+  effects::shift_ratios_by_design(bundle, 1.0, trace);
+  const TracedEffect& whole = trace.accepted.front();
+  EXPECT_DOUBLE_EQ(whole.size, -0.98);
+  EXPECT_DOUBLE_EQ(whole.interval.low, -0.981);
+  EXPECT_DOUBLE_EQ(whole.interval.high, -0.979);
+  EXPECT_DOUBLE_EQ(whole.values.front().value, -0.98);
 }
 
 TEST(TraceCalibration, WhatACouplingIsBeyondItsDesignIsPartOfIt) {
