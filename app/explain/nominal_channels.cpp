@@ -12,7 +12,6 @@
 
 #include "app/io/nearest_name.h"
 #include "kinematics/core/error.h"
-#include "kinematics/model/usual_unit.h"
 #include "kinematics/model/values_on_drawing.h"
 #include "kinematics/structure/copied_channels.h"
 
@@ -179,9 +178,18 @@ const Joint* driven_by(const KinematicTree& found, const std::string& channel) {
   return out;
 }
 
+// As far from rad and degrees (m and mm) as no gear is wrong: what a lens does to the scales of a
+// log in rad is no unit of its own.
+bool is_no_usual_unit(JointType type, double scale) {
+  constexpr double kNoGear = 0.25;
+  const double other = type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
+  return std::abs(std::abs(scale) - 1.0) > kNoGear &&
+         std::abs(std::abs(scale) / other - 1.0) > kNoGear;
+}
+
 bool counts_in_its_own(const Recording& recording, const Joint& found) {
   if (is_declared(recording, found.channel, true)) return true;
-  return !is_declared(recording, found.channel, false) && !usual_unit(found.type, found.scale);
+  return !is_declared(recording, found.channel, false) && is_no_usual_unit(found.type, found.scale);
 }
 
 // Of the movable joints, in the order of the drawing. Nothing where other joints were found.
