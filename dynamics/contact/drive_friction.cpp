@@ -412,6 +412,14 @@ Eigen::MatrixXd left_by(const PredictedTorque& predicted, const TorqueSamples& m
   return terms.drive - terms.rate;
 }
 
+/// Part of the prediction that the accelerations of the low-pass make, samples x joints.
+Eigen::MatrixXd inertial_torque(const Eigen::VectorXd& t_s, const PredictedTorque& predicted) {
+  Eigen::MatrixXd out = rates_between_neighbours(t_s, predicted.speed);
+  for (Eigen::Index t = 0; t < out.rows(); ++t)
+    out.row(t) *= predicted.inertia[static_cast<std::size_t>(t)].transpose();
+  return out;
+}
+
 /// A predicted sigma in units of what sliding leaves; where a model has no idea, so much doubt that
 /// it hides all.
 Eigen::VectorXd in_units_of(double unit, const Eigen::VectorXd& sigma) {
@@ -553,18 +561,24 @@ std::vector<char> usable_inertia(const RigidModel& model, const std::vector<Torq
                                  const std::vector<PredictedTorque>& predicted) {
   std::vector<Eigen::MatrixXd> with;
   std::vector<Eigen::MatrixXd> without;
+  std::vector<Eigen::MatrixXd> massless;
   for (std::size_t m = 0; m < motions.size(); ++m) {
     with.push_back(left_by(predicted[m], motions[m], predicted[m].mean));
     without.emplace_back(motions[m].torque - predicted[m].mean);
+    massless.emplace_back(without[m] + inertial_torque(motions[m].t_s, predicted[m]));
   }
   const std::vector<SlidingFriction> left_with = sliding_friction(model, motions, with);
   const std::vector<SlidingFriction> left_without = sliding_friction(model, motions, without);
+  const std::vector<SlidingFriction> left_massless = sliding_friction(model, motions, massless);
+  // Evidence for or against a row of as many numbers as joints (Schwarz 1978).
+  const int row = static_cast<int>(model.size());
   std::vector<char> out;
   for (std::size_t j = 0; j < left_with.size(); ++j) {
-    // Evidence against a row of as many numbers as joints (Schwarz 1978).
-    const bool worse = sliding_deviance({left_with[j]}, 0) >
-                       sliding_deviance({left_without[j]}, static_cast<int>(model.size()));
-    out.push_back(worse ? 0 : 1);
+    const bool worse =
+        sliding_deviance({left_with[j]}, 0) > sliding_deviance({left_without[j]}, row);
+    const bool shown =
+        sliding_deviance({left_without[j]}, row) < sliding_deviance({left_massless[j]}, 0);
+    out.push_back(worse && !shown ? 0 : 1);
   }
   return out;
 }

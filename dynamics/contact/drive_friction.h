@@ -93,9 +93,12 @@ struct PredictedFriction {
     const RigidModel& model, const std::vector<TorqueSamples>& motions,
     const std::vector<PredictedTorque>& predicted);
 
-/// One a joint: 0 where PredictedTorque::inertia is significantly worse than none in the motions. A
-/// model of a hardly accelerated joint has some that is noise, and would carry the noise of speeds
-/// into the balance.
+/// One a joint: 0 where PredictedTorque::inertia is significantly worse than none in the motions,
+/// and does not significantly explain the torque at the low-pass's accelerations either. A model of
+/// a hardly accelerated joint has some that is noise, and would carry the noise of speeds into the
+/// balance. Noise of speeds alone says nothing against an inertia that the motion shows: the
+/// detector knows that noise, and not what the low-pass takes at the ends of a log and where
+/// accelerations change fast.
 [[nodiscard]] std::vector<char> usable_inertia(const RigidModel& model,
                                                const std::vector<TorqueSamples>& motions,
                                                const std::vector<PredictedTorque>& predicted);

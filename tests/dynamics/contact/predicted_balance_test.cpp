@@ -170,5 +170,78 @@ TEST(PredictedBalance, InertiaThatNoMotionShowsIsLeftOut) {
   }
 }
 
+/// A log that begins and ends in motion, and a low-pass that shows no acceleration at its ends.
+/// Noise of speeds, over some 50 ms, is more torque than the low-pass takes from most of the
+/// motion.
+class InertiaBehindNoisySpeeds : public testing::Test {
+ protected:
+  static constexpr Eigen::Index kRows = 10000;
+  static constexpr double kStep_s = 0.002;
+  static constexpr double kInertia = 3.0;       // kg m^2
+  static constexpr double kHardest = 2.0;       // rad/s^2
+  static constexpr double kOnwards = 1.0;       // rad/s: the joint never turns round
+  static constexpr double kEnd_s = 0.04;        // without acceleration
+  static constexpr double kSpeedNoise = 1e-3;   // rad/s
+  static constexpr double kTorqueNoise = 0.02;  // N m
+
+  InertiaBehindNoisySpeeds() {
+    Rng rng = Rng::from_name("inertia behind noisy speeds");
+    const double rate = 3.0;  // rad/s
+    motion_.t_s = Eigen::VectorXd::LinSpaced(kRows, 0.0, kStep_s * (kRows - 1));
+    const Eigen::ArrayXd angle = rate * motion_.t_s.array();
+    const Eigen::VectorXd acceleration = kHardest * angle.cos();
+    const Eigen::VectorXd speed = kOnwards + kHardest / rate * angle.sin();
+    motion_.q = kOnwards * motion_.t_s.array() - kHardest / (rate * rate) * angle.cos();
+    motion_.dq = speed;
+    motion_.torque = kInertia * acceleration;
+    motion_.trajectory = Eigen::VectorXi::Zero(kRows);
+    for (double& value : motion_.dq.reshaped()) value += rng.normal(kSpeedNoise);
+    for (double& value : motion_.torque.reshaped()) value += rng.normal(kTorqueNoise);
+    const double last_s = motion_.t_s[kRows - 1];
+    Eigen::VectorXd shown = acceleration;
+    predicted_.speed = speed.row(0);
+    predicted_.speed.conservativeResize(kRows, 1);
+    for (Eigen::Index t = 0; t < kRows; ++t) {
+      if (std::min(motion_.t_s[t], last_s - motion_.t_s[t]) < kEnd_s) shown[t] = 0.0;
+      if (t > 0)
+        predicted_.speed(t, 0) =
+            predicted_.speed(t - 1, 0) + 0.5 * kStep_s * (shown[t] + shown[t - 1]);
+    }
+    predicted_.mean = predicted_.frictionless = kInertia * shown;
+    predicted_.sigma = Eigen::MatrixXd::Constant(kRows, 1, kTorqueNoise);
+    predicted_.inertia.assign(kRows, Eigen::MatrixXd::Constant(1, 1, kInertia));
+  }
+  [[nodiscard]] std::vector<ContactEvent> contacts(const TorqueSamples& motion) const {
+    const PredictedTorque used =
+        with_inertia_of(predicted_, usable_inertia(rigid_, {motion}, {predicted_}));
+    const std::vector<BalanceSample> samples =
+        predicted_balance(rigid_, predicted_friction(rigid_, {motion}, {used}), motion, used);
+    return detect_contacts(calibrate_contacts(samples), samples);
+  }
+
+  RigidModel rigid_ = make_rigid_model(contact_arm(1));
+  TorqueSamples motion_;
+  PredictedTorque predicted_;
+};
+
+TEST_F(InertiaBehindNoisySpeeds, IsUsedWhereTheMotionShowsIt) {
+  EXPECT_EQ(usable_inertia(rigid_, {motion_}, {predicted_}).at(0), 1);
+}
+
+TEST_F(InertiaBehindNoisySpeeds, EndsInMotionAreNoContacts) {
+  EXPECT_TRUE(contacts(motion_).empty());
+}
+
+TEST_F(InertiaBehindNoisySpeeds, AContactAtTheEndIsFound) {
+  constexpr double kPush = 3.0;          // N m
+  constexpr Eigen::Index kPushed = 100;  // samples, the last ones
+  TorqueSamples pushed = motion_;
+  pushed.torque.bottomRows(kPushed).array() += kPush;
+  const std::vector<ContactEvent> found = contacts(pushed);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_NEAR(found[0].onset_s, motion_.t_s[kRows - kPushed], 0.02);
+  EXPECT_TRUE(found[0].cut_off);
+}
+
 }  // namespace
 }  // namespace kinescope
