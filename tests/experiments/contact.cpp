@@ -2,8 +2,8 @@
 //
 // Contact detection on recordings of others, beside the momentum observer at the same false-alarm
 // rate, and `kinescope contact` as users run it. Needs the shared data; prints a table each.
-// build/test/contact [ur6] [ur5] [logs_ur5] [logs_free] [logs_models]
-// [logs_simulated]
+// build/test/contact [ur6] [ur5] [logs_ur5] [logs_free] [logs_models] [logs_parametric] [logs_gip]
+// [logs_semi_parametric] [logs_simulated]; logs_models is all of the models
 #include <cstdio>
 #include <set>
 #include <string>
@@ -19,7 +19,10 @@ int main(int argc, char** argv) {
     if (asked("ur5")) kinescope::contact_on_ur5();
     if (asked("logs_ur5")) kinescope::contact_logs_ur5();
     if (asked("logs_free")) kinescope::contact_logs_free();
-    if (asked("logs_models")) kinescope::contact_logs_models();
+    for (const char* model : {"parametric", "gip", "semi_parametric"}) {
+      if (asked("logs_models") || asked((std::string("logs_") + model).c_str()))
+        kinescope::contact_logs_model(model);
+    }
     if (asked("logs_simulated")) kinescope::contact_logs_simulated();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -389,18 +389,18 @@ void contact_logs_ur5() {
   ur5_table(*set, "joint 1 alone", lone_joint());
 }
 
-void contact_logs_models() {
+void contact_logs_model(const char* model) {
   const std::vector<std::string> sweeps{"base_sweep_1degps_1", "base_sweep_3degps_1",
                                         "base_sweep_5degps_1", "base_sweep_7degps_1"};
   if (const auto set = shared_data("dynamics/ur5_contact")) {
-    for (const char* model : {"", "gip", "semi_parametric"}) {
-      const std::string name = *model != 0 ? model : "momentum";
-      ur5_table(*set, ("from itself, by " + name).c_str(), ur5_kinematics(), {}, model);
+    for (const char* method : {"", model}) {
+      const std::string name = *method != 0 ? method : "momentum";
+      ur5_table(*set, ("from itself, by " + name).c_str(), ur5_kinematics(), {}, method);
       ur5_table(*set, ("learned from free sweeps, by " + name).c_str(), ur5_kinematics(), sweeps,
-                model);
+                method);
     }
   }
-  for (const char* model : {"gip", "semi_parametric"}) contact_logs_free(model);
+  contact_logs_free(model);
 }
 
 void contact_logs_free(const char* model) {

@@ -18,9 +18,9 @@ void contact_logs_ur5();
 /// from another, and from itself. `model`: as --model; empty: the momentum balance.
 void contact_logs_free(const char* model = "");
 
-/// ur5_contact by the momentum balance and by torque models, each file from itself and learned from
-/// the free parts of four sweeps; then contact_logs_free() by the torque models.
-void contact_logs_models();
+/// ur5_contact by the momentum balance and by a torque model, each file from itself and learned
+/// from the free parts of four sweeps; then contact_logs_free() by the torque model.
+void contact_logs_model(const char* model);
 
 /// The same on simulated robots that nothing touched, at rest, starting, reversing.
 void contact_logs_simulated();
