@@ -12,10 +12,9 @@
 namespace kinescope {
 namespace {
 
-// A slide's scale may be the tags' size; a hinge's cannot, and is an effect of the robot unless no
-// gear is so wrong.
+// A slide's scale may be the tags' size; a hinge's cannot, and is an effect of the robot within
+// kHingeTolerance.
 constexpr double kSlideTolerance = 0.05;
-constexpr double kHingeTolerance = 0.25;
 constexpr double kClearSigmas = 4.0;
 
 bool has_answer(const Structure& structure) {

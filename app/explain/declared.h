@@ -11,6 +11,10 @@
 
 namespace kinescope {
 
+/// No gear is so wrong: a turning joint that moves by this share more or less than its unit says is
+/// in another one.
+inline constexpr double kHingeTolerance = 0.25;
+
 /// True when the joint's channel is declared in rad, deg, m or mm, as suits the joint: its readings
 /// are rad or m, and what the joint does beyond them is an effect.
 [[nodiscard]] bool is_declared_in_si(const Recording& recording, const Joint& joint);

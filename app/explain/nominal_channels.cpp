@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/explain/declared.h"
 #include "app/io/nearest_name.h"
 #include "kinematics/core/error.h"
 #include "kinematics/model/values_on_drawing.h"
@@ -178,13 +179,12 @@ const Joint* driven_by(const KinematicTree& found, const std::string& channel) {
   return out;
 }
 
-// As far from rad and degrees (m and mm) as no gear is wrong: what a lens does to the scales of a
-// log in rad is no unit of its own.
+// Far from rad and degrees (m and mm): what a lens does to the scales of a log in rad is no unit of
+// its own.
 bool is_no_usual_unit(JointType type, double scale) {
-  constexpr double kNoGear = 0.25;
   const double other = type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
-  return std::abs(std::abs(scale) - 1.0) > kNoGear &&
-         std::abs(std::abs(scale) / other - 1.0) > kNoGear;
+  return std::abs(std::abs(scale) - 1.0) > kHingeTolerance &&
+         std::abs(std::abs(scale) / other - 1.0) > kHingeTolerance;
 }
 
 bool counts_in_its_own(const Recording& recording, const Joint& found) {
