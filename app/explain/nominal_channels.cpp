@@ -13,6 +13,7 @@
 #include "app/explain/declared.h"
 #include "app/io/nearest_name.h"
 #include "kinematics/core/error.h"
+#include "kinematics/model/usual_unit.h"
 #include "kinematics/model/values_on_drawing.h"
 #include "kinematics/structure/copied_channels.h"
 
@@ -179,17 +180,11 @@ const Joint* driven_by(const KinematicTree& found, const std::string& channel) {
   return out;
 }
 
-// Far from rad and degrees (m and mm): what a lens does to the scales of a log in rad is no unit of
-// its own.
-bool is_no_usual_unit(JointType type, double scale) {
-  const double other = type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
-  return std::abs(std::abs(scale) - 1.0) > kHingeTolerance &&
-         std::abs(std::abs(scale) / other - 1.0) > kHingeTolerance;
-}
-
+// What a lens does to the scales of a log in rad is no unit of its own.
 bool counts_in_its_own(const Recording& recording, const Joint& found) {
   if (is_declared(recording, found.channel, true)) return true;
-  return !is_declared(recording, found.channel, false) && is_no_usual_unit(found.type, found.scale);
+  return !is_declared(recording, found.channel, false) &&
+         !usual_unit(found.type, std::abs(found.scale), kHingeTolerance);
 }
 
 // Of the movable joints, in the order of the drawing. Nothing where other joints were found.

@@ -5,10 +5,10 @@
 
 namespace kinescope {
 
-std::optional<double> usual_unit(JointType type, double scale) {
+std::optional<double> usual_unit(JointType type, double scale, double tolerance) {
   const double other = type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
   for (const double unit : {1.0, other}) {
-    if (std::abs(scale / unit - 1.0) < kUnitTolerance) return unit;
+    if (std::abs(scale / unit - 1.0) < tolerance) return unit;
   }
   return std::nullopt;
 }

@@ -14,6 +14,7 @@ namespace kinescope {
 inline constexpr double kUnitTolerance = 0.05;
 
 /// rad per degree or 1; of a joint that slides m per mm or 1. Nothing where the scale is near none.
-[[nodiscard]] std::optional<double> usual_unit(JointType type, double scale);
+[[nodiscard]] std::optional<double> usual_unit(JointType type, double scale,
+                                               double tolerance = kUnitTolerance);
 
 }  // namespace kinescope

@@ -24,6 +24,12 @@ KinematicTree learned_from(const RecordingFolder& folder) {
   return read_urdf(found / "robot.urdf");
 }
 
+std::string declared_as_ticks(const JointLog& log) {
+  std::string text = "units:\n";
+  for (const std::string& channel : log.channels) text += "  " + channel + ": ticks\n";
+  return text;
+}
+
 TEST(RunNominal, AnAxisDrawnTheWrongWayRoundIsNamedAndMended) {
   const RecordingFolder folder;
   write_poses(arm("nominal the wrong way round", {}).recording, folder);
@@ -86,16 +92,14 @@ TEST(RunNominal, TicksAreTakenAsTheAxesOfTheDrawingSay) {
   folder.write("drawing.urdf", write_urdf(drawing));
   constexpr double kTicksPerRad = 4096.0 / (2.0 * std::numbers::pi);
   const std::vector<double> directions{-1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0};
-  std::string units = "units:\n";
   for (Eigen::Index c = 0; c < recording.log.values.cols(); ++c) {
     const double per_rad = directions.at(static_cast<std::size_t>(c)) * kTicksPerRad;
     recording.log.values.col(c) =
         (per_rad * recording.log.values.col(c).array() + 500.0 * static_cast<double>(c + 1))
             .round();
-    units += "  " + recording.log.channels[static_cast<std::size_t>(c)] + ": ticks\n";
   }
   write_poses(recording, folder);
-  folder.write("recording.yaml", units);
+  folder.write("recording.yaml", declared_as_ticks(recording.log));
 
   const std::filesystem::path out = folder.path() / "out";
   const Outcome outcome =
@@ -142,12 +146,10 @@ TEST(RunNominal, TicksOfJointsThatNoMarkerShowsAreRefused) {
   KinematicTree drawing = learned_from(folder);
   drawing.markers.clear();
   folder.write("drawing.urdf", write_urdf(drawing));
-  std::string units = "units:\n";
-  for (const std::string& channel : recording.log.channels) units += "  " + channel + ": ticks\n";
   recording.log.values *= 600.0;
   recording.tracks.tracks.erase(recording.tracks.tracks.begin(), recording.tracks.tracks.end() - 1);
   write_poses(recording, folder);
-  folder.write("recording.yaml", units);
+  folder.write("recording.yaml", declared_as_ticks(recording.log));
   const Outcome outcome =
       run({"run", folder.path().string(), "--output", (folder.path() / "out").string(), "--quiet",
            "--no-trace", "--nominal", (folder.path() / "drawing.urdf").string()});
