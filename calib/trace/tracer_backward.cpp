@@ -14,6 +14,7 @@
 #include "calib/trace/distribution.h"
 #include "calib/trace/encompassing.h"
 #include "calib/trace/picture.h"
+#include "calib/trace/scan_slope.h"
 #include "calib/trace/tracer.h"
 
 namespace kinescope::trace {
@@ -103,14 +104,17 @@ bool Tracer::backward() {
 
 // An effect that bends the model can be significant where it is absent and of no certain size where
 // it is fitted: a gain of 7 that may be -5, a camera that turned by 0.5 deg or by nothing. Several
-// parameters may be uncertain one by one and yet predict: they stay if they clearly do.
+// parameters may be uncertain one by one and yet predict, and a size may be uncertain only because
+// its scan is (how far and how fast a zero drifts): such effects stay if they clearly predict.
 std::optional<std::size_t> Tracer::one_without_size() {
   Eigen::Index all = 0;
   for (const Eigen::VectorXd& values : now_->fit.values) all += values.size();
   if (all == 0) return std::nullopt;
-  const Eigen::MatrixXd covariance = jackknife_covariance(now_->system, all);
+  const Eigen::MatrixXd as_scanned = jackknife_covariance(now_->system, all);
+  const Eigen::MatrixXd covariance = effect_covariance(*now_, all);
   const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
   std::vector<std::pair<double, std::size_t>> weak;  // size in sigmas, index
+  std::vector<bool> is_certain_as_scanned(now_->added.size());
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < now_->added.size(); ++i) {
     const Eigen::VectorXd& values = now_->fit.values[i];
@@ -118,15 +122,17 @@ std::optional<std::size_t> Tracer::one_without_size() {
     const Eigen::Index count = values.size(), first = at;
     at += count;
     if (candidate.is_curve()) continue;  // its prior says that it may be nothing
-    const double sigma =
-        size_sigma(candidate, values, covariance.block(first, first, count, count));
-    if (!(sigma > 0.0)) continue;
-    const double ratio = std::abs(size_of(candidate, values)) / sigma;
+    const auto in_sigmas = [&](const Eigen::MatrixXd& of) {
+      const double sigma = size_sigma(candidate, values, of.block(first, first, count, count));
+      return sigma > 0.0 ? std::abs(size_of(candidate, values)) / sigma : t;
+    };
+    const double ratio = in_sigmas(covariance);
+    is_certain_as_scanned[i] = in_sigmas(as_scanned) >= t;
     if (ratio < t) weak.emplace_back(ratio, i);
   }
   std::ranges::sort(weak);
   for (const auto& [ratio, index] : weak) {
-    if (now_->fit.values[index].size() == 1) return index;
+    if (now_->fit.values[index].size() == 1 && !is_certain_as_scanned[index]) return index;
     const StagePtr less = stage_of(kinescope::trace::without(now_->added, index));
     if (!predicts_clearly_worse(less->held_out.whitened, now_->held_out.whitened)) return index;
   }

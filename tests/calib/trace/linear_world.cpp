@@ -110,6 +110,7 @@ Eigen::VectorXd LinearWorld::share(const Injected& effect) const {
   if (effect.shape == "gear") return (effect.detail * q.array() + 0.7).sin();
   if (effect.shape == "direction") return direction_of(q);
   if (effect.shape == "step") return (time_s_.array() >= effect.detail).cast<double>();
+  if (effect.shape == "drift") return 1.0 - (-time_s_.array() / effect.detail).exp();
   if (effect.shape == "weave") return (9.0 * q.array()).sin() * (7.0 * other.array()).sin();
   if (effect.shape == "wave_other") return (4.0 * other.array()).cos();
   return (5.0 * (other.array() - 0.2)).tanh();
@@ -161,6 +162,14 @@ std::vector<Candidate> LinearWorld::candidates() const {
         share({0, "tanh_other"}).array() + 0.25 * (2.1 * time_s_.array()).sin();
     imitation.columns = [shape](double) { return std::vector<EffectColumn>{{0, shape}}; };
     out.push_back(std::move(imitation));
+  }
+  if (options_.drifts) {
+    Candidate drift = simple("drift", 0, 1);
+    for (double tau_s = 2.0; tau_s <= 200.0; tau_s *= 1.2) drift.scan.push_back(tau_s);
+    drift.columns = [time_s = time_s_](double tau_s) {
+      return std::vector<EffectColumn>{{0, 1.0 - (-time_s.array() / tau_s).exp()}};
+    };
+    out.push_back(std::move(drift));
   }
   if (options_.other_is_small) {
     Candidate other = simple("tanh_other", 0, 1);

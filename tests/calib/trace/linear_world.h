@@ -33,6 +33,8 @@ struct LinearWorldOptions {
   /// Candidates "first_half" and "second_half" at joint1: far larger each than the "weave" that
   /// they are together, which candidate "weave" tells alone, below a floor that nothing reaches.
   bool stands_in = false;
+  /// Candidate "drift" at joint1: what a time constant of 2 to 200 s leaves of it after the start.
+  bool drifts = false;
   /// The noise is what neighbours differ by: what is left may be seen to last, as the residual's
   /// own correlation time says, s.
   std::optional<double> lasts_s;
@@ -43,9 +45,9 @@ struct LinearWorldOptions {
 struct Injected {
   int joint = 0;
   std::string shape;  ///< "scale", "coupling", "sine", "gear", "direction", "step", "tanh_other",
-                      ///< "wave_other", "weave", "field"
+                      ///< "wave_other", "weave", "drift", "field"
   double size = 0.0;
-  double detail = 0.0;  ///< periods of the gear, time of the step in s
+  double detail = 0.0;  ///< periods of the gear, time (constant) of the step (the drift) in s
 };
 
 class LinearWorld final : public TracedModel {

@@ -29,6 +29,10 @@ bool only(const Trace& trace, const EffectId& id) {
          trace.accepted.front().id == id;
 }
 
+bool names(const Trace& trace, const EffectId& id) {
+  return std::ranges::find(trace.accepted, id, &TracedEffect::id) != trace.accepted.end();
+}
+
 TEST(TraceTest, CleanDataHoldNothing) {
   // At a rate of 1 % more than four of 100 would be a chance of 3e-3.
   constexpr int kRuns = 100;
@@ -308,6 +312,34 @@ TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
 
 // Beside the others its columns are what the model can do itself; fitted, it predicts clearly
 // better.
+// How far it goes and how fast cannot be told apart before its time constant is over.
+TEST(TraceTest, ASizeInDoubtBecauseOfItsTimeConstantIsNamedWhereItClearlyPredicts) {
+  constexpr int kRuns = 50;
+  constexpr double kTau_s = 20.0;  // of 13 s
+  const auto traces_of = [](double size) {
+    std::vector<Trace> out;
+    for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+      LinearWorldOptions options;
+      options.seed = seed;
+      options.drifts = true;
+      out.push_back(trace_effects(LinearWorld(options, {{0, "drift", size, kTau_s}})));
+    }
+    return out;
+  };
+  const auto is_named = [](const Trace& trace) { return names(trace, {"drift", "joint1"}); };
+  const auto is_taken_out = [](const Trace& trace) {
+    return std::ranges::any_of(trace.steps, [](const TraceStep& step) {
+      return step.words == "drift at joint1 removed: its size may be nothing";
+    });
+  };
+  const std::vector<Trace> large = traces_of(4.0);
+  EXPECT_GE(std::ranges::count_if(large, is_named), kRuns - 1);
+  EXPECT_EQ(std::ranges::count_if(large, is_taken_out), 0);
+  // None where the doubt about the time constant was not counted in.
+  const std::vector<Trace> slight = traces_of(1.4);
+  EXPECT_GE(std::ranges::count_if(slight, is_taken_out), 3);
+}
+
 TEST(TraceTest, WhatOnlyTheFitShowsIsPicturedAndSizedFromTheFit) {
   LinearWorldOptions options;
   options.bends = true;
