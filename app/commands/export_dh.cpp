@@ -33,9 +33,8 @@ DescribedRobot described_robot(const fs::path& source) {
 }
 
 bool is_moved(const KinematicTree& tree, LinkId link) {
-  return std::ranges::any_of(tree.path_to(link), [&](JointId id) {
-    return tree.joints[id.index()].type != JointType::kFixed;
-  });
+  return std::ranges::any_of(tree.path_to(link),
+                             [&](JointId id) { return is_movable(tree.joints[id.index()]); });
 }
 
 std::vector<LinkId> described_tips(const KinematicTree& tree, const std::string& tip,

@@ -103,8 +103,7 @@ class McapOfRun {
       for (std::size_t j = 0; j < tree.joints.size(); ++j) {
         const double value =
             recorded_.joints.values(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(j));
-        if (tree.joints[j].type != JointType::kFixed && std::isfinite(value))
-          values[tree.joints[j].name] = value;
+        if (is_movable(tree.joints[j]) && std::isfinite(value)) values[tree.joints[j].name] = value;
       }
       say(channel, stamp(f), {{"timestamp", foxglove::timestamp(stamp(f))}, {"values", values}});
     }

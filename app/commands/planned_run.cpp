@@ -268,9 +268,8 @@ std::optional<JointLog> recorded_log(const fs::path& folder, std::string& why_no
 std::string still_joints(const KinematicTree& tree, const design::MotionLimits& limits) {
   std::vector<std::string> out;
   for (std::size_t j = 0; j < tree.joints.size(); ++j)
-    if (tree.joints[j].type != JointType::kFixed &&
-        !(limits.velocity[static_cast<Eigen::Index>(j)] > 0.0 &&
-          limits.acceleration[static_cast<Eigen::Index>(j)] > 0.0))
+    if (is_movable(tree.joints[j]) && !(limits.velocity[static_cast<Eigen::Index>(j)] > 0.0 &&
+                                        limits.acceleration[static_cast<Eigen::Index>(j)] > 0.0))
       out.push_back(tree.joints[j].name);
   return fmt::format("{}", fmt::join(out, ", "));
 }

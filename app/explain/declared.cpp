@@ -157,7 +157,7 @@ void require_fixed_tags(const Recording& recording, const KinematicTree& tree) {
     const Marker* marker = tree.marker(id);
     if (marker == nullptr) throw not_seen(recording, id);
     const bool carried = std::ranges::any_of(tree.path_to(marker->link), [&](JointId joint) {
-      return tree.joints[joint.index()].type != JointType::kFixed;
+      return is_movable(tree.joints[joint.index()]);
     });
     if (!carried) continue;
     throw moves(recording, id,

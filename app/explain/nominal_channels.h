@@ -39,11 +39,4 @@ void require_columns_known(const NominalChannels& matched, const JointLog& log);
 void require_drawn_types(const NominalChannels& matched, const Structure& structure,
                          const Recording& recording);
 
-/// The same where columns count in units of their own (declared as ticks, or by what the markers
-/// show in none that people log): what one of them is, which way and from where, by the axes of the
-/// drawing; what these do not tell is said, and taken as drawn, from the middle of what was seen.
-/// Throws undetermined where the markers do not show the joints by themselves.
-[[nodiscard]] NominalChannels with_own_units(NominalChannels matched, const Structure& structure,
-                                             const Recording& recording);
-
 }  // namespace kinescope

@@ -14,6 +14,7 @@
 #include "app/explain/families_in_video.h"
 #include "app/explain/moving_camera.h"
 #include "app/explain/nominal_channels.h"
+#include "app/explain/own_units.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/camera_from_tags.h"
@@ -148,7 +149,7 @@ void place_before_held_joints(KinematicTree& tree) {
     const std::vector<JointId> path = tree.path_to(marker.link);
     const auto held = std::ranges::find_if(path, [&](JointId id) {
       const Joint& joint = tree.joints[id.index()];
-      return joint.type != JointType::kFixed && joint.channel.empty();
+      return is_movable(joint) && joint.channel.empty();
     });
     if (held == path.end()) continue;
     Pose T_parent_link;

@@ -21,7 +21,7 @@ constexpr const char* kJointValuesRemedy = "run the recording again";
 std::vector<std::size_t> moving_columns(const KinematicTree& tree) {
   std::vector<std::size_t> out;
   for (std::size_t j = 0; j < tree.joints.size(); ++j)
-    if (tree.joints[j].type != JointType::kFixed) out.push_back(j);
+    if (is_movable(tree.joints[j])) out.push_back(j);
   return out;
 }
 

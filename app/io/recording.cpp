@@ -54,7 +54,7 @@ void convert_units(JointLog& log, RecordingSettings& settings, const fs::path& s
 void require_no_joints(const KinematicTree& nominal, const fs::path& folder) {
   std::vector<std::string> names;
   for (const Joint& joint : nominal.joints) {
-    if (joint.type != JointType::kFixed) names.push_back(joint.name);
+    if (is_movable(joint)) names.push_back(joint.name);
   }
   if (names.empty()) return;
   throw bad_input((folder / "joints.csv").string(),

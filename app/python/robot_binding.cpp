@@ -23,8 +23,7 @@ class Robot {
     tree_ = std::move(read.tree);
     camera_ = read.camera;
     for (std::size_t j = 0; j < tree_.joints.size(); ++j)
-      if (tree_.joints[j].type != JointType::kFixed)
-        moving_.push_back(static_cast<Eigen::Index>(j));
+      if (is_movable(tree_.joints[j])) moving_.push_back(static_cast<Eigen::Index>(j));
   }
 
   /// T_base_link: links x samples x 4 x 4.

@@ -212,8 +212,7 @@ void add_small_travel(const RunSummary& run, const Analysis& analysis,
   const Joint* const weakest = &calibration.tree.joints[j];
   const JointLimits& range = calibration.joints[j].range;
   const double travel = range.upper - range.lower;
-  const auto moving = std::ranges::count_if(
-      calibration.tree.joints, [](const Joint& one) { return one.type != JointType::kFixed; });
+  const auto moving = std::ranges::count_if(calibration.tree.joints, is_movable);
   const bool slides = weakest->type == JointType::kPrismatic;
   const std::string moved = text_with_unit(travel, slides ? Quantity::kLength : Quantity::kAngle);
   const bool small = !slides && travel < kSmallTurn;

@@ -19,12 +19,10 @@ constexpr Eigen::Index kMostPostures = 100;
 // Of a common motion, relative: rounding.
 constexpr double kRounding = 1e-9;
 
-bool moves(const Joint& joint) { return joint.type != JointType::kFixed; }
-
 int moving_joints(const KinematicTree& tree, LinkId link) {
   const std::vector<JointId> path = tree.path_to(link);
   return static_cast<int>(std::ranges::count_if(
-      path, [&](const JointId joint) { return moves(tree.joints[joint.index()]); }));
+      path, [&](const JointId joint) { return is_movable(tree.joints[joint.index()]); }));
 }
 
 // The first observed one of those that most joints move.
@@ -44,7 +42,7 @@ const Marker* last_marker(const Calibration& calibration) {
 bool is_driven(const KinematicTree& tree, LinkId link) {
   return std::ranges::all_of(tree.path_to(link), [&](const JointId id) {
     const Joint& joint = tree.joints[id.index()];
-    return !moves(joint) || !joint.channel.empty();
+    return !is_movable(joint) || !joint.channel.empty();
   });
 }
 
@@ -55,7 +53,7 @@ std::vector<Eigen::VectorXd> observed_postures(const Calibration& calibration) {
   for (Eigen::Index f = 0; f < calibration.joint_values.rows(); ++f) {
     Eigen::VectorXd values = calibration.joint_values.row(f).transpose();
     for (Eigen::Index j = 0; j < values.size(); ++j)
-      if (!moves(calibration.tree.joints[static_cast<std::size_t>(j)])) values[j] = 0.0;
+      if (!is_movable(calibration.tree.joints[static_cast<std::size_t>(j)])) values[j] = 0.0;
     if (values.allFinite()) known.push_back(std::move(values));
   }
   if (std::ssize(known) <= kMostPostures) return known;

@@ -57,15 +57,14 @@ bool is_chain(const KinematicTree& tree) {
 }
 
 std::size_t moving_joint_count(const KinematicTree& tree) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      tree.joints, [](const Joint& joint) { return joint.type != JointType::kFixed; }));
+  return static_cast<std::size_t>(std::ranges::count_if(tree.joints, is_movable));
 }
 
 /// "q3 drives 2 of them", by channel.
 std::vector<std::string> shared_channels(const KinematicTree& tree) {
   std::map<std::string, int> count;
   for (const Joint& joint : tree.joints) {
-    if (joint.type != JointType::kFixed) ++count[joint.channel];
+    if (is_movable(joint)) ++count[joint.channel];
   }
   std::vector<std::string> out;
   for (const auto& [channel, joints] : count) {
@@ -78,7 +77,7 @@ std::vector<std::string> shared_channels(const KinematicTree& tree) {
 std::string driving_words(const RunSummary& run) {
   std::vector<std::string> undriven;
   for (const Joint& joint : run.calibration.tree.joints) {
-    if (joint.type != JointType::kFixed && joint.channel.empty()) undriven.push_back(joint.name);
+    if (is_movable(joint) && joint.channel.empty()) undriven.push_back(joint.name);
   }
   if (run.log.empty()) return "no joint log: the joint values are estimates from the markers";
   const std::size_t moving = moving_joint_count(run.calibration.tree);

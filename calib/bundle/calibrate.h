@@ -46,7 +46,6 @@ struct CalibrationStart {
   double time_offset_s = 0.0;
   Eigen::MatrixXd joint_values;  ///< frames x joints where no channel drives; empty: none, or held
   bool nominal = false;  ///< the tree is a nominal robot: names, zeros and link frames are kept
-  bool markers_placed = true;  ///< false: marker mounts and T_camera_base are to be found first
   std::vector<Correction> corrections;  ///< of effects beyond the plain model; all are estimated
   std::string camera_name = {};         ///< of the reference camera; empty where there is one
   std::vector<FurtherCamera> further_cameras = {};  ///< 1, 2, .. of Measurements::camera_of_frame

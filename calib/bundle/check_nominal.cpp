@@ -153,9 +153,7 @@ double other_unit(JointType type) {
   return type == JointType::kRevolute ? kRadPerDegree : kMetrePerMillimetre;
 }
 
-bool is_driven(const Joint& joint) {
-  return joint.type != JointType::kFixed && !joint.channel.empty();
-}
+bool is_driven(const Joint& joint) { return is_movable(joint) && !joint.channel.empty(); }
 
 // A log has one unit for angles and one for lengths, mostly.
 std::vector<NominalFault> other_units(const KinematicTree& tree, JointType type) {

@@ -554,7 +554,6 @@ double EffectBundle::corner_bias_px() const { return impl_->bias_px; }
 double EffectBundle::stamp_jitter_s() const { return impl_->jitter_s; }
 bool EffectBundle::postures() const { return impl_->spec.postures; }
 const std::vector<int>& EffectBundle::fold_of_frame() const { return impl_->fold; }
-const std::vector<double>& EffectBundle::frame_times_s() const { return impl_->spec.times_s; }
 
 double EffectBundle::start_time_offset_s() const { return impl_->offset_start_s; }
 

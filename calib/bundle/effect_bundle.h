@@ -122,7 +122,6 @@ class EffectBundle {
   [[nodiscard]] bool postures() const;
   /// A fold for every frame, by posture; -1 for frames without a sighting.
   [[nodiscard]] const std::vector<int>& fold_of_frame() const;
-  [[nodiscard]] const std::vector<double>& frame_times_s() const;
   /// Of the plain model, where it is free.
   [[nodiscard]] double start_time_offset_s() const;
   /// Frames x joints: joint-log time minus frame time by that offset, and by the lags of cameras

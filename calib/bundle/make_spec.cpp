@@ -130,7 +130,7 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
   for (std::size_t j = 0; j < spec.tree.joints.size(); ++j) {
     const Joint& joint = spec.tree.joints[j];
     TangentMask mask = kHeld;
-    if (options.free == FreeGeometry::kGeometry && joint.type != JointType::kFixed) {
+    if (options.free == FreeGeometry::kGeometry && is_movable(joint)) {
       if (start.nominal) {
         // Zeros belong to a nominal robot's frames; a prior holds what the data leave open. The
         // frame of a joint that stands still is a part of its neighbours'.
@@ -140,7 +140,7 @@ void free_joints(const CalibrationStart& start, const CalibrateOptions& options,
       }
     }
     spec.free_joint.push_back(mask);
-    const bool movable = joint.type != JointType::kFixed;
+    const bool movable = is_movable(joint);
     const bool driven = spec.channel[j] >= 0;
     // A nominal robot's joint without a channel is held at its offset, unless values are given.
     const bool held = start.nominal && start.joint_values.size() == 0;

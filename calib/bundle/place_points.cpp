@@ -216,9 +216,8 @@ std::vector<PointChoice> choose_links(const std::vector<PointSightings>& points)
 }
 
 bool carries_links(const KinematicTree& tree, LinkId link) {
-  return std::ranges::any_of(tree.joints, [&](const Joint& joint) {
-    return joint.parent == link && joint.type != JointType::kFixed;
-  });
+  return std::ranges::any_of(
+      tree.joints, [&](const Joint& joint) { return joint.parent == link && is_movable(joint); });
 }
 
 // A point on an inner joint's axis rests whatever the joints do: sockets alone would always choose

@@ -13,7 +13,7 @@ bool shows_postures(const KinematicTree& tree, const JointLog& log,
     if (const auto channel = log.channel(name)) channels.insert(*channel);
   };
   for (const Joint& joint : tree.joints) {
-    if (joint.type != JointType::kFixed) add(joint.channel);
+    if (is_movable(joint)) add(joint.channel);
     for (const ChannelShare& share : joint.couplings) add(share.channel);
   }
   return !log.empty() && is_posture_log(log, times_s, {channels.begin(), channels.end()});

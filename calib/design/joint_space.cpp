@@ -25,15 +25,13 @@ std::size_t index_of(const std::vector<std::string>& names, const std::string& n
   return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
 }
 
-bool moves(const Joint& joint) { return joint.type != JointType::kFixed; }
-
 }  // namespace
 
 JointSpace::JointSpace(KinematicTree tree, MotionLimits limits)
     : tree_(std::move(tree)), limits_(std::move(limits)) {
   for (std::size_t j = 0; j < tree_.joints.size(); ++j) {
     const Joint& joint = tree_.joints[j];
-    if (!moves(joint)) continue;
+    if (!is_movable(joint)) continue;
     if (joint.channel.empty()) {
       throw bad_input(joint.name, "no channel drives it, and no motion of it can be planned",
                       "record a log that has its column");
@@ -52,7 +50,7 @@ JointSpace::JointSpace(KinematicTree tree, MotionLimits limits)
   at_zero_ = Eigen::VectorXd::Zero(rows);
   for (std::size_t j = 0; j < tree_.joints.size(); ++j) {
     const Joint& joint = tree_.joints[j];
-    if (!moves(joint)) continue;
+    if (!is_movable(joint)) continue;
     const auto row = static_cast<Eigen::Index>(j);
     at_zero_[row] = joint.offset;
     const auto add = [&](const std::string& channel, double ratio) {
@@ -87,7 +85,7 @@ double JointSpace::reading_for(std::size_t channel, double value,
 
 bool JointSpace::within(const Eigen::VectorXd& values) const {
   for (std::size_t j = 0; j < tree_.joints.size(); ++j) {
-    if (!moves(tree_.joints[j])) continue;
+    if (!is_movable(tree_.joints[j])) continue;
     const double value = values[static_cast<Eigen::Index>(j)];
     if (value < limits_.range[j].lower || value > limits_.range[j].upper) return false;
   }
@@ -122,7 +120,7 @@ double JointSpace::shortest_s(const Eigen::VectorXd& from, const Eigen::VectorXd
   const Eigen::VectorXd way = (by_reading_ * (to - from)).cwiseAbs();
   double longest_s = 0.0;
   for (Eigen::Index j = 0; j < way.size(); ++j) {
-    if (!moves(tree_.joints[static_cast<std::size_t>(j)])) continue;
+    if (!is_movable(tree_.joints[static_cast<std::size_t>(j)])) continue;
     longest_s = std::max({longest_s, kPeakRate * way[j] / limits_.velocity[j],
                           std::sqrt(kPeakAcceleration * way[j] / limits_.acceleration[j])});
   }

@@ -59,8 +59,6 @@ class Model {
   /// Blocks of State::cameras and of State::targets that a frame looks through.
   [[nodiscard]] std::size_t camera_block(const Frame& frame) const;
   [[nodiscard]] std::size_t target_block(const Frame& frame, int target) const;
-  [[nodiscard]] std::size_t camera_blocks() const { return bumps_.size() + 1; }
-  [[nodiscard]] std::size_t target_blocks() const { return first_target_.back(); }
   /// Of a target before it slips.
   [[nodiscard]] std::size_t first_block(int target) const {
     return first_target_[static_cast<std::size_t>(target)];

@@ -24,7 +24,7 @@ struct Seen {
 
 // By its own channel, and no other one.
 bool is_read_alone(const Joint& joint) {
-  return joint.type != JointType::kFixed && !joint.channel.empty() && joint.couplings.empty();
+  return is_movable(joint) && !joint.channel.empty() && joint.couplings.empty();
 }
 
 using Frames = std::map<int, std::vector<Seen>>;

@@ -161,7 +161,7 @@ std::vector<std::size_t> undriven_joints(const Calibration& calibration) {
   std::vector<std::size_t> out;
   for (std::size_t j = 0; j < calibration.tree.joints.size(); ++j) {
     const Joint& joint = calibration.tree.joints[j];
-    if (joint.type != JointType::kFixed && joint.channel.empty()) out.push_back(j);
+    if (is_movable(joint) && joint.channel.empty()) out.push_back(j);
   }
   return out;
 }

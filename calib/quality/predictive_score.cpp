@@ -66,7 +66,7 @@ double values_read_off(const Calibration& calibration) {
   std::set<int> frames;
   for (const SightingResidual& residual : calibration.residuals) frames.insert(residual.frame);
   const auto undriven = std::ranges::count_if(calibration.tree.joints, [](const Joint& joint) {
-    return joint.type != JointType::kFixed && joint.channel.empty() && joint.limits &&
+    return is_movable(joint) && joint.channel.empty() && joint.limits &&
            joint.limits->upper > joint.limits->lower;
   });
   return static_cast<double>(frames.size()) * static_cast<double>(undriven);

@@ -20,7 +20,7 @@ namespace {
 std::vector<int> moving_joints(const KinematicTree& tree) {
   std::vector<int> out;
   for (std::size_t j = 0; j < tree.joints.size(); ++j)
-    if (tree.joints[j].type != JointType::kFixed) out.push_back(static_cast<int>(j));
+    if (is_movable(tree.joints[j])) out.push_back(static_cast<int>(j));
   return out;
 }
 

@@ -6,8 +6,7 @@
 namespace kinescope {
 
 bool is_axis_estimated(const Calibration& calibration, const Joint& joint) {
-  return joint.type != JointType::kFixed &&
-         std::ranges::any_of(calibration.parameters, [&](const Parameter& p) {
+  return is_movable(joint) && std::ranges::any_of(calibration.parameters, [&](const Parameter& p) {
            return p.block == joint.name && p.name.starts_with(joint.name + " turn");
          });
 }

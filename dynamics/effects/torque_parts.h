@@ -48,8 +48,10 @@ struct TorqueTracedModel::Parts {
   std::vector<int> fold;       ///< of every sample
   Eigen::MatrixXd q, dq, ddq;  ///< at the instants
   Eigen::VectorXd viscous,
-      coulomb;             ///< that the model declares, of each joint; 0 where masses are free
-  Eigen::MatrixXd widest;  ///< whitened, see widest_residual()
+      coulomb;  ///< that the model declares, of each joint; 0 where masses are free
+  /// Whitened residuals of the widest linear description (every joint alone, all that a joint may
+  /// have), instants x joints: what is neither rigid bodies nor any common effect.
+  Eigen::MatrixXd widest;
 
   effects::GravityRegressors regressors;  ///< of the geometry, at the instants
   Eigen::MatrixXd declared_load;  ///< of the bodies of context.rigid in the declared gravity

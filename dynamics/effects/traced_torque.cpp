@@ -301,6 +301,4 @@ FittedTorque TorqueTracedModel::fitted(const std::vector<AddedEffect>& effects) 
   return fitter.fitted();
 }
 
-Eigen::MatrixXd TorqueTracedModel::widest_residual() const { return parts_->widest; }
-
 }  // namespace kinescope

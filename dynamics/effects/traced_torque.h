@@ -80,9 +80,6 @@ class TorqueTracedModel : public TracedModel {
   /// What every instant's torque lacks after a fit, in the unit of the torque: instants x joints.
   [[nodiscard]] Eigen::MatrixXd residual_torque(const TracedFit& fit) const;
   [[nodiscard]] FittedTorque fitted(const std::vector<AddedEffect>& effects) const;
-  /// Whitened residuals of the widest linear description (every joint alone, all that a joint may
-  /// have), instants x joints: what is neither rigid bodies nor any common effect.
-  [[nodiscard]] Eigen::MatrixXd widest_residual() const;
 
   struct Parts;  ///< internal
 

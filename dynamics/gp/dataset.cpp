@@ -69,11 +69,4 @@ Normalisation standardise(const Dataset& dataset) {
   return out;
 }
 
-MeanFunction linear_mean(FeatureMap map, Eigen::MatrixXd coefficients) {
-  KINESCOPE_CHECK(coefficients.rows() == map.size(), "one row of coefficients for each feature");
-  return [map = std::move(map), coefficients = std::move(coefficients)](const Inputs& inputs) {
-    return Eigen::MatrixXd(map(inputs) * coefficients);
-  };
-}
-
 }  // namespace kinescope::gp

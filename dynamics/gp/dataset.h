@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
-
 #include <Eigen/Core>
 
 #include "dynamics/gp/feature_map.h"
@@ -37,10 +35,5 @@ struct Normalisation {
 [[nodiscard]] Normalisation standardise(const Dataset& dataset);
 /// Targets alone: for kernels that need inputs in rad and m.
 [[nodiscard]] Normalisation standardise_targets(const Dataset& dataset);
-
-/// Prior mean of the outputs: inputs (as given, not normalised) -> samples x outputs.
-using MeanFunction = std::function<Eigen::MatrixXd(const Inputs&)>;
-/// features * coefficients (features x outputs).
-[[nodiscard]] MeanFunction linear_mean(FeatureMap map, Eigen::MatrixXd coefficients);
 
 }  // namespace kinescope::gp

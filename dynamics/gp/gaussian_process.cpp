@@ -14,7 +14,7 @@ namespace kinescope::gp {
 GpModel make_model(Kernel kernel, double noise_variance, Normalisation normalisation,
                    bool noise_per_output) {
   const int noises = noise_per_output ? kernel.outputs() : 1;
-  GpModel out{std::move(kernel), {}, {}, std::move(normalisation)};
+  GpModel out{std::move(kernel), {}, std::move(normalisation)};
   for (int k = 0; k < noises; ++k) {
     out.noise_variance.push_back(
         {.name = noises > 1 ? "noise variance " + std::to_string(k) : "noise variance",
@@ -75,7 +75,6 @@ Prediction predict(const FittedGp& fitted, const Inputs& inputs, const PredictOp
   if (model.normalisation.target_shift.size() > 0) {
     out.mean.rowwise() += model.normalisation.target_shift;
   }
-  if (model.mean) out.mean += model.mean(inputs);
   if (options.variance) {
     out.variance = by_sample(moments.variance, outputs).array().rowwise() * scale.array().square();
   }
@@ -102,7 +101,6 @@ struct Predictor::State {
 };
 
 Predictor::Predictor(const FittedGp& fitted) : state_(std::make_unique<State>()) {
-  KINESCOPE_CHECK(!fitted.model.mean, "a predictor of single samples knows no mean function");
   state_->owner = fitted.posterior;
   state_->posterior = fitted.posterior.get();
   state_->normalisation = fitted.model.normalisation;

@@ -20,7 +20,6 @@ struct GpModel {
   Kernel kernel;
   /// Of normalised targets, squared units: one for all outputs, or one for each.
   std::vector<Parameter> noise_variance;
-  MeanFunction mean;  ///< empty: zero
   Normalisation normalisation;
 };
 

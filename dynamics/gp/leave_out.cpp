@@ -34,7 +34,6 @@ LeaveOut leave_out(const FittedGp& fitted, const Dataset& dataset, const std::ve
   out.log_density = left.log_density;
   out.mean = by_sample(left.mean, outputs).array().rowwise() * scale.array();
   if (normalisation.target_shift.size() > 0) out.mean.rowwise() += normalisation.target_shift;
-  if (fitted.model.mean) out.mean += fitted.model.mean(dataset.inputs);
   if (dataset.prior_mean.size() > 0) out.mean += dataset.prior_mean;
   out.variance = by_sample(left.variance, outputs).array().rowwise() * scale.array().square();
   out.residual = dataset.targets - out.mean;

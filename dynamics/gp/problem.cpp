@@ -81,7 +81,6 @@ Problem make_problem(const GpModel& model, const Dataset& dataset) {
   out.inputs = model.normalisation.normalised_inputs(dataset.inputs);
   Eigen::MatrixXd targets = dataset.targets;
   if (dataset.prior_mean.size() > 0) targets -= dataset.prior_mean;
-  if (model.mean) targets -= model.mean(dataset.inputs);
   const Normalisation& normalisation = model.normalisation;
   if (normalisation.target_shift.size() > 0) {
     targets = ((targets.rowwise() - normalisation.target_shift).array().rowwise() /

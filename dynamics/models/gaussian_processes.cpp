@@ -568,7 +568,7 @@ SavedTorqueModel save(TorqueModelKind kind, const DynamicModel& model,
                         static_cast<double>(trained.all.data.samples());
   std::vector<JointProcess> processes(
       static_cast<std::size_t>(joints),
-      {gp::GpModel{gp::constant(), {}, {}, {}}, {}, {}, {}, false, {}, {}});
+      {gp::GpModel{gp::constant(), {}, {}}, {}, {}, {}, false, {}, {}});
   std::vector<Matrix> roots(processes.size());
   std::vector<Eigen::VectorXd> doubts(
       processes.size(), Eigen::VectorXd::Zero(left != nullptr ? left->residual.rows() : 0));

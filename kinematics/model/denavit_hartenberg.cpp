@@ -78,7 +78,7 @@ PlacedAxis placed_axis(const KinematicTree& tree, const std::vector<Pose>& T_bas
 DhChain chain_to(const KinematicTree& tree, LinkId tip, const DhChain* like) {
   DhChain out{.tip = tip, .joints = {}, .base = {}, .steps = {}, .tool = {}};
   for (const JointId id : tree.path_to(tip))
-    if (tree.joints[id.index()].type != JointType::kFixed) out.joints.push_back(id);
+    if (is_movable(tree.joints[id.index()])) out.joints.push_back(id);
   const std::vector<Pose> T_base_link =
       forward_kinematics(tree, Eigen::VectorXd::Zero(std::ssize(tree.joints)));
   const std::size_t n = out.joints.size();
@@ -112,9 +112,7 @@ std::vector<LinkId> chain_tips(const KinematicTree& tree) {
     const LinkId link{static_cast<int>(l)};
     if (std::ranges::find(tree.joints, link, &Joint::parent) != tree.joints.end()) continue;
     const std::vector<JointId> path = tree.path_to(link);
-    const auto moves = [&](JointId id) {
-      return tree.joints[id.index()].type != JointType::kFixed;
-    };
+    const auto moves = [&](JointId id) { return is_movable(tree.joints[id.index()]); };
     if (std::ranges::any_of(path, moves)) out.push_back(link);
   }
   return out;

@@ -32,7 +32,7 @@ void check_model(const DynamicModel& model) {
 std::vector<JointId> moving_joints(const KinematicTree& tree) {
   std::vector<JointId> movable;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
-    if (tree.joints[j].type != JointType::kFixed) movable.push_back(JointId{static_cast<int>(j)});
+    if (is_movable(tree.joints[j])) movable.push_back(JointId{static_cast<int>(j)});
   }
   return movable;
 }

@@ -127,30 +127,4 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> body_jacobian(const KinematicTree& tree
   return jacobian;
 }
 
-KinematicTree with_z_axes(const KinematicTree& tree) {
-  KinematicTree out = tree;
-  // T_old_new of every link frame: the frame moves with the joint, so it must commute with the
-  // motion up to the change of axis; moving along the axis does.
-  std::vector<Pose> T_old_new(tree.links.size());
-  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
-    const Joint& joint = tree.joints[j];
-    const Pose T_parent_joint = T_old_new[joint.parent.index()].inverse() * joint.T_parent_joint;
-    Pose shift;
-    if (joint.type != JointType::kFixed) {
-      shift.rotation = rotation_to_axis(joint.axis);
-      if (joint.type == JointType::kRevolute) {
-        const Eigen::Vector3d origin_in_joint = T_parent_joint.inverse().translation;
-        shift.translation = joint.axis * joint.axis.dot(origin_in_joint);
-      }
-      out.joints[j].axis = Eigen::Vector3d::UnitZ();
-    }
-    out.joints[j].T_parent_joint = T_parent_joint * shift;
-    T_old_new[joint.child.index()] = shift;
-  }
-  for (Marker& marker : out.markers) {
-    marker.T_link_marker = T_old_new[marker.link.index()].inverse() * marker.T_link_marker;
-  }
-  return out;
-}
-
 }  // namespace kinescope

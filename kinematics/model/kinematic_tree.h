@@ -59,6 +59,8 @@ struct Joint {
   std::optional<double> velocity;  ///< rad/s or m/s
 };
 
+[[nodiscard]] inline bool is_movable(const Joint& joint) { return joint.type != JointType::kFixed; }
+
 struct Link {
   std::string name;
 };
@@ -102,10 +104,5 @@ void check_tree(const KinematicTree& tree);
 [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> body_jacobian(const KinematicTree& tree,
                                                                      const Eigen::VectorXd& values,
                                                                      LinkId link);
-
-/// The same robot with every joint's frame turned so that its axis is z and (for a revolute joint)
-/// moved along the axis to the point closest to the parent's frame. Marker and joint poses follow;
-/// forward kinematics of the markers is unchanged.
-[[nodiscard]] KinematicTree with_z_axes(const KinematicTree& tree);
 
 }  // namespace kinescope

@@ -70,7 +70,7 @@ void set_joint(const XMLElement& element, const KinematicTree& drawn, const Join
                   "a calibrated joint joins what the file says");
   if (!same_place(from.T_parent_joint, to.T_parent_joint))
     set_origin(element, to.T_parent_joint, exchange);
-  if (from.type != JointType::kFixed && (from.axis - to.axis).norm() > kSame)
+  if (is_movable(from) && (from.axis - to.axis).norm() > kSame)
     exchange.set(element, "axis", fmt::format("xyz=\"{}\"", urdf_document::number_text(to.axis)));
 }
 

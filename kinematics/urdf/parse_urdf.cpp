@@ -105,7 +105,7 @@ Joint to_joint(const urdf::Joint& from, LinkId parent, LinkId child) {
   joint.parent = parent;
   joint.child = child;
   joint.T_parent_joint = to_pose(from.parent_to_joint_origin_transform);
-  if (joint.type != JointType::kFixed) {
+  if (is_movable(joint)) {
     joint.axis = Eigen::Vector3d(from.axis.x, from.axis.y, from.axis.z).normalized();
   }
   // Limits without width are none: a joint that cannot move would be a fixed one.
@@ -115,11 +115,11 @@ Joint to_joint(const urdf::Joint& from, LinkId parent, LinkId child) {
   }
   const bool known = from.limits && (from.limits->effort != urdf_document::kAnyEffort ||
                                      from.limits->velocity != urdf_document::kAnyVelocity);
-  if (joint.type != JointType::kFixed && known) {
+  if (is_movable(joint) && known) {
     joint.effort = from.limits->effort;
     joint.velocity = from.limits->velocity;
   }
-  if (joint.type != JointType::kFixed && from.mimic) {
+  if (is_movable(joint) && from.mimic) {
     joint.channel = from.mimic->joint_name;
     joint.scale = from.mimic->multiplier;
     joint.offset = from.mimic->offset;

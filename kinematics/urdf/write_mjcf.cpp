@@ -107,7 +107,7 @@ class Writer {
   [[nodiscard]] InertialParameters carried(LinkId link, const Pose& T_body_link) const {
     InertialParameters sum = in_frame(T_body_link, model_.links[link.index()]);
     for (const Joint& joint : model_.tree.joints) {
-      if (joint.parent != link || joint.type != JointType::kFixed) continue;
+      if (joint.parent != link || is_movable(joint)) continue;
       sum += carried(joint.child, T_body_link * joint.T_parent_joint);
     }
     return sum;

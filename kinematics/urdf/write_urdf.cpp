@@ -29,13 +29,12 @@ using urdf_document::number_text;
 using urdf_document::roll_pitch_yaw;
 
 std::string first_comment(const KinematicTree& tree, LimitSource source) {
-  const auto moves = [](const Joint& joint) { return joint.type != JointType::kFixed; };
-  const auto has_drive = [&](const Joint& joint) { return moves(joint) && joint.effort; };
+  const auto has_drive = [&](const Joint& joint) { return is_movable(joint) && joint.effort; };
   const bool all = std::ranges::all_of(
-      tree.joints, [&](const Joint& joint) { return !moves(joint) || joint.effort; });
+      tree.joints, [&](const Joint& joint) { return !is_movable(joint) || joint.effort; });
   std::string drive = fmt::format("effort {:g} with velocity {:g} stands where neither is known",
                                   kAnyEffort, kAnyVelocity);
-  if (all && std::ranges::any_of(tree.joints, moves))
+  if (all && std::ranges::any_of(tree.joints, is_movable))
     drive = "effort and velocity are the robot's own";
   if (std::ranges::none_of(tree.joints, has_drive)) {
     drive = "effort and velocity were not measured and bind nowhere";
@@ -250,8 +249,8 @@ void add_mimic(XMLElement& element, const KinematicTree& tree, std::size_t numbe
   const Joint& joint = tree.joints[number];
   if (joint.channel.empty() || joint.type == JointType::kFixed || !joint.couplings.empty()) return;
   const auto first = std::ranges::find_if(tree.joints, [&](const Joint& other) {
-    return other.channel == joint.channel && other.type != JointType::kFixed &&
-           other.couplings.empty() && other.scale != 0.0;
+    return other.channel == joint.channel && is_movable(other) && other.couplings.empty() &&
+           other.scale != 0.0;
   });
   const auto leader = static_cast<std::size_t>(first - tree.joints.begin());
   if (leader >= number) return;

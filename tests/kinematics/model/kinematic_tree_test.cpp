@@ -97,44 +97,6 @@ TEST(BodyJacobian, AgainstDifferences) {
   }
 }
 
-TEST(WithZAxes, KeepsTheMarkersWhereTheyAre) {
-  Rng rng = Rng::from_name("WithZAxes");
-  for (int robot = 0; robot < 50; ++robot) {
-    const KinematicTree tree = random_tree(rng, 8, 5);
-    const KinematicTree turned = with_z_axes(tree);
-    check_tree(turned);
-    for (const Joint& joint : turned.joints) {
-      if (joint.type == JointType::kFixed) continue;
-      EXPECT_EQ(joint.axis, Eigen::Vector3d::UnitZ());
-      // The point of the axis that is nearest to the parent's frame: no part of the way lies along
-      // the axis.
-      if (joint.type != JointType::kRevolute) continue;
-      const Eigen::Vector3d axis = joint.T_parent_joint.rotation * Eigen::Vector3d::UnitZ();
-      EXPECT_NEAR(axis.dot(joint.T_parent_joint.translation), 0.0, kExact);
-    }
-    for (int posture = 0; posture < 10; ++posture) {
-      const Eigen::VectorXd q = random_values(rng, tree);
-      const std::vector<Pose> before = forward_kinematics(tree, q);
-      const std::vector<Pose> after = forward_kinematics(turned, q);
-      for (std::size_t m = 0; m < tree.markers.size(); ++m) {
-        const std::size_t link = tree.markers[m].link.index();
-        EXPECT_LT(pose_distance(before[link] * tree.markers[m].T_link_marker,
-                                after[link] * turned.markers[m].T_link_marker),
-                  kExact);
-      }
-    }
-  }
-}
-
-TEST(WithZAxes, ChangesNothingTheSecondTime) {
-  Rng rng = Rng::from_name("WithZAxes.Twice");
-  const KinematicTree once = with_z_axes(random_tree(rng, 8, 2));
-  const KinematicTree twice = with_z_axes(once);
-  for (std::size_t j = 0; j < once.joints.size(); ++j) {
-    EXPECT_LT(pose_distance(once.joints[j].T_parent_joint, twice.joints[j].T_parent_joint), kExact);
-  }
-}
-
 TEST(Tree, Lookups) {
   const KinematicTree tree = scara();
   EXPECT_EQ(tree.link("fore"), LinkId{2});
