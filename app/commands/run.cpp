@@ -227,11 +227,11 @@ void keep_observations(const std::vector<Recording>& given, const SeenTogether& 
   if (given.size() > 1) return;
   const Recording& recording = given.front();
   const Observed& observed = seen.observed;
-  if (recording.cameras.empty()) folder.keep_observations(recording, observed.tags);
+  if (recording.cameras.empty()) folder.keep_observations(recording, all_tags(observed));
   for (const RecordedCamera& camera : recording.cameras) {
     const auto used = std::ranges::find(observed.cameras, camera.name, &ObservedCamera::name);
     if (used != observed.cameras.end())
-      folder.keep_observations(of_camera(recording, camera), used->tags);
+      folder.keep_observations(of_camera(recording, camera), all_tags(*used));
   }
 }
 

@@ -140,7 +140,7 @@ ExitCode run_hand_eye(const RunOptions& options, const Recording& recording,
   run.tracks = observed.tags.observations.empty()
                    ? observed.measurements.poses
                    : pose_tracks_from_tags(observed.tags, camera, recording.markers);
-  const TagObservations tags = observed.tags;
+  const TagObservations tags = all_tags(observed);
   HandEyeOptions hand_eye;
   hand_eye.reject_sigma = options.calibrate.reject_sigma;
   hand_eye.folds = options.calibrate.folds;

@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -21,6 +22,7 @@
 #include "calib/tracks/pose_tracks_from_tags.h"
 #include "calib/tracks/several_cameras.h"
 #include "calib/vision/repeated_frames.h"
+#include "calib/vision/thinned_frames.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -200,6 +202,17 @@ double edge_px(const TagObservation& seen) {
   return sum / static_cast<double>(n);
 }
 
+// Of a film so long that its neighbouring frames say the same.
+void leave_out_neighbours(Observed& observed) {
+  TagObservations thinned = observed.tags;
+  const int every = thin_frames(thinned);
+  if (every == 1) return;
+  observed.warnings.push_back(fmt::format(
+      "{} sightings in {} frames: one frame in {} is calibrated on, which says nearly as much",
+      observed.tags.observations.size(), observed.tags.times_s.size(), every));
+  observed.detected = std::exchange(observed.tags, std::move(thinned));
+}
+
 }  // namespace
 
 Observed observe(const Recording& recording, const SightOptions& options,
@@ -243,6 +256,7 @@ Observed observe(const Recording& recording, const SightOptions& options,
   if (recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners) {
     require_markers(recording, out.tags);
     leave_out_repeated_frames(out.tags);
+    leave_out_neighbours(out);
     out.measurements.times_s = out.tags.times_s;
     out.measurements.corners = out.tags.observations;
   }
@@ -420,7 +434,7 @@ void require_determined(const Structure& structure) {
 
 std::vector<MarkerSummary> summarise_markers(const Observed& observed, const MarkerSet& markers) {
   std::map<TagId, std::vector<const TagObservation*>> seen;
-  for (const TagObservation& tag : observed.tags.observations) seen[tag.id].push_back(&tag);
+  for (const TagObservation& tag : all_tags(observed).observations) seen[tag.id].push_back(&tag);
   std::vector<MarkerSummary> out;
   for (const auto& [id, sightings] : seen) {
     std::vector<double> edges;

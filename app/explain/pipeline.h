@@ -29,7 +29,8 @@ struct ObservedCamera {
   std::string name;
   CameraModel model;
   bool estimate_intrinsics = false;
-  TagObservations tags;  ///< on its own clock
+  TagObservations tags;                          ///< on its own clock
+  std::optional<TagObservations> detected = {};  ///< as in Observed
   Pose T_reference_camera;
   double ahead_s = 0.0;  ///< time of the common frames = own time + ahead
   /// Of a recording of its own: time of the common log = its log's time + this.
@@ -41,10 +42,17 @@ struct ObservedCamera {
 struct Observed {
   Measurements measurements;
   TagObservations tags;  ///< empty unless the recording enters by video or corners
+  /// Of a film so long that frames were left out: `tags` as they were detected.
+  std::optional<TagObservations> detected = {};
   std::vector<std::string> warnings;
   /// Of several: those that are used, the reference camera first, as `measurements` numbers them.
   std::vector<ObservedCamera> cameras = {};
 };
+
+/// Of an Observed or an ObservedCamera: the sightings of all frames.
+[[nodiscard]] const TagObservations& all_tags(const auto& seen) {
+  return seen.detected ? *seen.detected : seen.tags;
+}
 
 /// No marker of the declared family in any frame: what observe() throws then.
 class NothingSeen : public Error {

@@ -197,6 +197,7 @@ ObservedCamera observed_camera(LoneCamera& lone, const CameraPlace& place,
   out.model = lone.seen.camera;
   out.estimate_intrinsics = options.estimate_intrinsics || !lone.recording.camera;
   out.tags = std::move(lone.seen.observed.tags);
+  out.detected = std::move(lone.seen.observed.detected);
   out.T_reference_camera = place.T_reference_camera;
   out.ahead_s = place.ahead_s;
   return out;

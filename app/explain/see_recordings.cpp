@@ -485,7 +485,7 @@ class Joiner {
     if (now.fitted) {
       const KinematicTree& tree = now.fitted->tree;
       for (std::size_t j = 0; j < tree.joints.size(); ++j)
-        if (tree.joints[j].type != JointType::kFixed && !tree.joints[j].channel.empty())
+        if (is_movable(tree.joints[j]) && !tree.joints[j].channel.empty())
           out.push_back({k, std::nullopt, j});
     }
     std::set<TagId> others;
@@ -566,7 +566,7 @@ SeenTogether see_recordings(const std::vector<Recording>& given, const SightOpti
     one.tracks = observed.tags.observations.empty()
                      ? observed.measurements.poses
                      : pose_tracks_from_tags(observed.tags, one.seen.camera, recording.markers);
-    detected.push_back(observed.tags);
+    detected.push_back(all_tags(observed));
   }
   require_one_kind(alone);
   std::vector<std::string> pieces;
