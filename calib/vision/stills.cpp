@@ -51,6 +51,7 @@ std::vector<Still> stills_at(const std::filesystem::path& video, const std::vect
   const auto reader = open_video(video);
   std::size_t next = 0;
   while (next < times_s.size()) {
+    reader->skip_to(times_s[next]);
     const std::optional<VideoFrame> frame = reader->next();
     if (!frame) break;
     while (next < times_s.size() && times_s[next] < frame->time_s - kSameFrame) ++next;

@@ -18,8 +18,7 @@ struct Still {
 };
 
 /// The frames of those times, in their order; what does not decode is left out. `times_s`:
-/// increasing. `width`: px that a picture has at most. Reads the video up to the last of them.
-/// Throws as open_video does.
+/// increasing. `width`: px that a picture has at most. Throws as open_video does.
 [[nodiscard]] std::vector<Still> stills_at(const std::filesystem::path& video,
                                            const std::vector<double>& times_s, int width);
 

@@ -38,6 +38,9 @@ class VideoReader {
   [[nodiscard]] virtual const VideoInfo& info() const = 0;
   /// The next frame, or nothing at the end (or where the file is cut off).
   [[nodiscard]] virtual std::optional<VideoFrame> next() = 0;
+  /// May go on at a later frame, none after `time_s`, where that is far ahead: frames are no longer
+  /// counted from the first one then.
+  virtual void skip_to(double time_s) { static_cast<void>(time_s); }
   /// What was wrong on the way, one line each: frames that do not decode, a file that ends early,
   /// stamps that do not increase.
   [[nodiscard]] virtual const std::vector<std::string>& warnings() const = 0;

@@ -76,7 +76,7 @@ class VideoFileReader final : public VideoReader {
     open_container();
     open_decoder();
     fill_info();
-    if (from_s > 0.0) go_to(from_s);
+    if (from_s > 0.0) in_the_middle_ = go_to(from_s);
     first_ = decode_next();
     if (!first_) {
       throw bad_input(path_, "no frame of the video can be decoded",
@@ -93,6 +93,17 @@ class VideoFileReader final : public VideoReader {
     std::optional<VideoFrame> frame = decode_next();
     if (!frame) finish();
     return frame;
+  }
+
+  // Frames that come once more because the key frame lies behind have no stamp after the last one.
+  void skip_to(double time_s) override {
+    constexpr double kFar_s = 10.0;  // about what lies between the key frames of usual encoders
+    // Frames shown before a key frame and stored behind it need those of the key frame before.
+    constexpr double kLead_s = 5.0;
+    if (finished_ || drained_ || time_s < last_time_ + kFar_s || !go_to(time_s - kLead_s)) return;
+    avcodec_flush_buffers(decoder_.get());
+    in_the_middle_ = true;
+    first_.reset();
   }
 
  private:
@@ -178,11 +189,11 @@ class VideoFileReader final : public VideoReader {
     }
   }
 
-  // Where it cannot go there, reading begins with the file.
-  void go_to(double from_s) {
+  // Where it cannot go there, reading goes on where it is.
+  bool go_to(double from_s) {
     const double tick = av_q2d(stream().time_base);
     const auto stamp = static_cast<std::int64_t>(std::floor((from_s + kHalfTick * tick) / tick));
-    in_the_middle_ = av_seek_frame(container_.get(), stream_, stamp, AVSEEK_FLAG_BACKWARD) >= 0;
+    return av_seek_frame(container_.get(), stream_, stamp, AVSEEK_FLAG_BACKWARD) >= 0;
   }
 
   [[nodiscard]] const AVStream& stream() const {
