@@ -107,32 +107,33 @@ bool Tracer::backward() {
 // parameters may be uncertain one by one and yet predict, and a size may be uncertain only because
 // its scan is (how far and how fast a zero drifts): such effects stay if they clearly predict.
 std::optional<std::size_t> Tracer::one_without_size() {
+  std::vector<Eigen::Index> first;  // parameter of every effect
   Eigen::Index all = 0;
-  for (const Eigen::VectorXd& values : now_->fit.values) all += values.size();
+  for (const Eigen::VectorXd& values : now_->fit.values) {
+    first.push_back(all);
+    all += values.size();
+  }
   if (all == 0) return std::nullopt;
-  const Eigen::MatrixXd as_scanned = jackknife_covariance(now_->system, all);
-  const Eigen::MatrixXd covariance = effect_covariance(*now_, all);
   const double t = t_quantile(0.025, std::max(2.0, now_->system.partition().stretches - 1.0));
-  std::vector<std::pair<double, std::size_t>> weak;  // size in sigmas, index
-  std::vector<bool> is_certain_as_scanned(now_->added.size());
-  Eigen::Index at = 0;
-  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+  const auto in_sigmas = [&](std::size_t i, const Eigen::MatrixXd& covariance) {
     const Eigen::VectorXd& values = now_->fit.values[i];
     const Candidate& candidate = candidate_of(now_->added[i].id);
-    const Eigen::Index count = values.size(), first = at;
-    at += count;
-    if (candidate.is_curve()) continue;  // its prior says that it may be nothing
-    const auto in_sigmas = [&](const Eigen::MatrixXd& of) {
-      const double sigma = size_sigma(candidate, values, of.block(first, first, count, count));
-      return sigma > 0.0 ? std::abs(size_of(candidate, values)) / sigma : t;
-    };
-    const double ratio = in_sigmas(covariance);
-    is_certain_as_scanned[i] = in_sigmas(as_scanned) >= t;
+    const double sigma = size_sigma(
+        candidate, values, covariance.block(first[i], first[i], values.size(), values.size()));
+    return sigma > 0.0 ? std::abs(size_of(candidate, values)) / sigma : t;
+  };
+  std::vector<std::pair<double, std::size_t>> weak;  // size in sigmas, index
+  const Eigen::MatrixXd with_scans = effect_covariance(*now_, all);
+  for (std::size_t i = 0; i < now_->added.size(); ++i) {
+    if (candidate_of(now_->added[i].id).is_curve()) continue;  // its prior says it may be nothing
+    const double ratio = in_sigmas(i, with_scans);
     if (ratio < t) weak.emplace_back(ratio, i);
   }
+  if (weak.empty()) return std::nullopt;
   std::ranges::sort(weak);
+  const Eigen::MatrixXd as_scanned = jackknife_covariance(now_->system, all);
   for (const auto& [ratio, index] : weak) {
-    if (now_->fit.values[index].size() == 1 && !is_certain_as_scanned[index]) return index;
+    if (now_->fit.values[index].size() == 1 && in_sigmas(index, as_scanned) < t) return index;
     const StagePtr less = stage_of(kinescope::trace::without(now_->added, index));
     if (!predicts_clearly_worse(less->held_out.whitened, now_->held_out.whitened)) return index;
   }
