@@ -76,15 +76,16 @@ void describe_recording(const Recording& recording, const Observed& observed,
                         const RunOptions& options, RunSummary& run) {
   describe_input(recording, observed, options, run);
   if (run.frames > 1) {
-    run.duration_s = observed.measurements.times_s.back() - observed.measurements.times_s.front();
+    run.duration_s = frame_times(observed).back() - frame_times(observed).front();
   }
   std::map<std::string, int> rejected;
-  for (const RejectedTag& tag : observed.tags.rejected) ++rejected[tag.reason];
+  const TagObservations& tags = all_tags(observed);
+  for (const RejectedTag& tag : tags.rejected) ++rejected[tag.reason];
   run.rejected.assign(rejected.begin(), rejected.end());
   for (const std::vector<std::string>& more :
        {clock_jump_words(recording.log), frozen_log_words(recording.log, observed),
-        uncovered_words(recording.log, observed.measurements.times_s),
-        unlisted_marker_words(observed.tags), repeated_frame_words(observed.tags)}) {
+        uncovered_words(recording.log, frame_times(observed)), unlisted_marker_words(tags),
+        repeated_frame_words(tags)}) {
     run.warnings.insert(run.warnings.end(), more.begin(), more.end());
   }
   run.camera_declared = recording.camera.has_value() || observed.tags.observations.empty();
@@ -102,7 +103,7 @@ double mean_step(const std::vector<double>& times_s) {
 std::string jitter_words(double jitter_s, const JointLog& log, const Observed& observed) {
   constexpr double kSlow = 2.0;  // frames
   const double log_step = log.size() > 1 ? mean_step(log.times_s) : 0.0;
-  if (log_step > kSlow * mean_step(observed.measurements.times_s)) {
+  if (log_step > kSlow * mean_step(frame_times(observed))) {
     return fmt::format(
         "the frames and the joint log scatter by {:.2g} ms (standard deviation) about each other: "
         "{} has {:.2g} readings a second, and the motion between them is interpolated: log faster",

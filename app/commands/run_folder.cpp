@@ -234,7 +234,7 @@ void describe_input(const Recording& recording, const Observed& observed, const 
       (options.working_folder.empty() ? fs::current_path() : options.working_folder).string();
   run.inputs = hash_inputs(recording);
   run.options = list_options(options);
-  run.frames = static_cast<int>(observed.measurements.times_s.size());
+  run.frames = static_cast<int>(frame_times(observed).size());
   run.markers = summarise_markers(observed, recording.markers);
   run.warnings = recording.warnings;
   append_unsaid(run.warnings, observed.warnings);

@@ -204,13 +204,12 @@ double edge_px(const TagObservation& seen) {
 
 // Of a film so long that its neighbouring frames say the same.
 void leave_out_neighbours(Observed& observed) {
-  TagObservations thinned = observed.tags;
-  const int every = thin_frames(thinned);
-  if (every == 1) return;
+  std::optional<ThinnedFrames> thinned = thin_frames(observed.tags);
+  if (!thinned) return;
   observed.warnings.push_back(fmt::format(
       "{} sightings in {} frames: one frame in {} is calibrated on, which says nearly as much",
-      observed.tags.observations.size(), observed.tags.times_s.size(), every));
-  observed.detected = std::exchange(observed.tags, std::move(thinned));
+      observed.tags.observations.size(), observed.tags.times_s.size(), thinned->every));
+  observed.detected = std::exchange(observed.tags, std::move(thinned->tags));
 }
 
 }  // namespace

@@ -42,16 +42,21 @@ struct ObservedCamera {
 struct Observed {
   Measurements measurements;
   TagObservations tags;  ///< empty unless the recording enters by video or corners
-  /// Of a film so long that frames were left out: `tags` as they were detected.
+  /// Of a film so long that frames were left out: `tags` with all of them.
   std::optional<TagObservations> detected = {};
   std::vector<std::string> warnings;
   /// Of several: those that are used, the reference camera first, as `measurements` numbers them.
   std::vector<ObservedCamera> cameras = {};
 };
 
-/// Of an Observed or an ObservedCamera: the sightings of all frames.
+/// Of an Observed or an ObservedCamera: all frames.
 [[nodiscard]] const TagObservations& all_tags(const auto& seen) {
   return seen.detected ? *seen.detected : seen.tags;
+}
+
+/// s, of all frames, also of those that were left out.
+[[nodiscard]] inline const std::vector<double>& frame_times(const Observed& observed) {
+  return observed.detected ? observed.detected->times_s : observed.measurements.times_s;
 }
 
 /// No marker of the declared family in any frame: what observe() throws then.

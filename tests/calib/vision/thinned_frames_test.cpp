@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/thinned_frames.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace kinescope {
@@ -10,7 +11,7 @@ namespace {
 TagObservations film(int frames) {
   TagObservations out;
   for (int f = 0; f < frames; ++f) {
-    out.times_s.push_back(0.1 * f);
+    out.times_s.push_back(0.5 * f);
     for (const int id : {1, 2}) {
       if (f == 2) continue;
       TagObservation& seen = out.observations.emplace_back();
@@ -29,24 +30,24 @@ std::vector<int> frames_of(const TagObservations& tags, int id) {
   return out;
 }
 
-TEST(ThinFrames, KeepsEveryKthOfTheFramesThatShowAMarker) {
+TEST(ThinFrames, KeepsEveryKthOfTheFramesThatShowAMarkerAndOfTheOthers) {
   TagObservations tags = film(9);
-  EXPECT_EQ(thin_frames(tags, 23), 3);
-  const std::vector<int> kept = {0, 4, 7};
-  EXPECT_EQ(frames_of(tags, 1), kept);
-  EXPECT_EQ(frames_of(tags, 2), kept);
-  EXPECT_EQ(tags.times_s.size(), 9U);
+  tags.rejected = {{2, TagId{3}, ""}, {3, TagId{3}, ""}};
+  const std::optional<ThinnedFrames> thinned = thin_frames(tags, 23);
+  ASSERT_TRUE(thinned);
+  EXPECT_EQ(thinned->every, 3);
+  EXPECT_THAT(thinned->tags.times_s, testing::ElementsAre(0.0, 1.0, 2.0, 3.5));
+  EXPECT_THAT(frames_of(thinned->tags, 1), testing::ElementsAre(0, 2, 3));
+  EXPECT_THAT(frames_of(thinned->tags, 2), testing::ElementsAre(0, 2, 3));
+  ASSERT_EQ(thinned->tags.rejected.size(), 1U);
+  EXPECT_EQ(thinned->tags.rejected.front().frame, 1);
   // What was thinned already stays.
-  EXPECT_EQ(thin_frames(tags, 24), 1);
-  EXPECT_EQ(frames_of(tags, 1), kept);
+  EXPECT_FALSE(thin_frames(thinned->tags, 24));
 }
 
 TEST(ThinFrames, LeavesWhatIsNoMoreThanAllowed) {
-  TagObservations tags = film(9);
-  EXPECT_EQ(thin_frames(tags, 64), 1);
-  EXPECT_EQ(tags.observations.size(), 16U);
-  TagObservations none;
-  EXPECT_EQ(thin_frames(none), 1);
+  EXPECT_FALSE(thin_frames(film(9), 64));
+  EXPECT_FALSE(thin_frames(TagObservations()));
 }
 
 }  // namespace
