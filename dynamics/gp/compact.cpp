@@ -1,113 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Sums run in eight lanes whatever the registers' width, exponentials are made of products and sums
-// alone, and the compiler fuses none of them (CMakeLists.txt): a saved model has the same answer on
-// every processor.
 #include "dynamics/gp/compact.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <utility>
 
-#include "dynamics/gp/simd.h"
+#include "dynamics/gp/compact_loops.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::gp {
 namespace {
 
 using Eigen::Index;
-
-constexpr Index kLanes = 8;
-constexpr Index kRows = 256;  // of one pass: its values stay in the first-level cache
-
-// e^x for x <= 0: 2^n e^r with |r| <= ln(2) / 2, Taylor's series to the last bit but one.
-inline double exponential(double x) {
-  constexpr double kLog2E = 1.4426950408889634;
-  constexpr double kLn2High =
-      0.693147180369123816490;  // without its last bits: n times it is exact
-  constexpr double kLn2Low = 1.90821492927058770002e-10;
-  constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: its last bits count units
-  constexpr double kLeast = -700.0;              // 1e-304
-  x = x > kLeast ? x : kLeast;
-  const double shifted = x * kLog2E + kRound;
-  const double n = shifted - kRound;
-  const double r = (x - n * kLn2High) - n * kLn2Low;
-  double sum = 1.0 / 479001600.0;
-  sum = sum * r + 1.0 / 39916800.0;
-  sum = sum * r + 1.0 / 3628800.0;
-  sum = sum * r + 1.0 / 362880.0;
-  sum = sum * r + 1.0 / 40320.0;
-  sum = sum * r + 1.0 / 5040.0;
-  sum = sum * r + 1.0 / 720.0;
-  sum = sum * r + 1.0 / 120.0;
-  sum = sum * r + 1.0 / 24.0;
-  sum = sum * r + 1.0 / 6.0;
-  sum = sum * r + 0.5;
-  sum = sum * r + 1.0;
-  sum = sum * r + 1.0;
-  const std::uint64_t power = (std::bit_cast<std::uint64_t>(shifted) + 1023U) << 52U;
-  return sum * std::bit_cast<double>(power);
-}
-
-// out_i += v exp(-1/2 sum_d (table_id - x_d)^2).
-KINESCOPE_WIDE void add_rbf(const double* table, Index stride, Index columns, const double* x,
-                            double variance, Index rows, double* out) {
-  double squares[kRows];
-  for (Index i = 0; i < rows; ++i) squares[i] = 0.0;
-  for (Index d = 0; d < columns; ++d) {
-    const double* column = table + d * stride;
-    const double at = x[d];
-    for (Index i = 0; i < rows; ++i) {
-      const double difference = column[i] - at;
-      squares[i] += difference * difference;
-    }
-  }
-  for (Index i = 0; i < rows; ++i) out[i] += variance * exponential(-0.5 * squares[i]);
-}
-
-// out_i = offset + sum_d table_id x_d.
-KINESCOPE_WIDE void linear_values(const double* table, Index stride, Index columns, const double* x,
-                                  double offset, Index rows, double* out) {
-  for (Index i = 0; i < rows; ++i) out[i] = offset;
-  for (Index d = 0; d < columns; ++d) {
-    const double* column = table + d * stride;
-    const double at = x[d];
-    for (Index i = 0; i < rows; ++i) out[i] += column[i] * at;
-  }
-}
-
-// out_i *= (1 + a0 p_i + a1 q_i) (1 + b0 p_i + b1 q_i).
-KINESCOPE_WIDE void multiply_position(const double* p, const double* q, double a0, double a1,
-                                      double b0, double b1, Index rows, double* out) {
-  for (Index i = 0; i < rows; ++i) {
-    out[i] *= (1.0 + a0 * p[i] + a1 * q[i]) * (1.0 + b0 * p[i] + b1 * q[i]);
-  }
-}
-
-KINESCOPE_WIDE double dot(const double* a, const double* b, Index size) {
-  double lanes[kLanes] = {};
-  const Index whole = size / kLanes * kLanes;
-  for (Index i = 0; i < whole; i += kLanes) {
-    for (Index lane = 0; lane < kLanes; ++lane) lanes[lane] += a[i + lane] * b[i + lane];
-  }
-  for (Index i = whole; i < size; ++i) lanes[i - whole] += a[i] * b[i];
-  double sum = 0.0;
-  for (const double lane : lanes) sum += lane;
-  return sum;
-}
-
-// out = R k for an upper triangle packed by columns.
-KINESCOPE_WIDE void triangle_times(const double* packed, const double* k, Index size, double* out) {
-  for (Index i = 0; i < size; ++i) out[i] = 0.0;
-  for (Index j = 0; j < size; ++j) {
-    const double factor = k[j];
-    for (Index i = 0; i <= j; ++i) out[i] += packed[i] * factor;
-    packed += j + 1;
-  }
-}
 
 // One row of position features a joint: (cos, sin) or q.
 void position_features(const JointKinds& joints, const double* q, double* out) {
@@ -137,6 +42,8 @@ void motion_features(const double* motion, Index joints, double* out) {
 
 Index motion_count(Index joints) { return joints + joints * (joints + 1) / 2; }
 
+bool has_rbf(const CompactGp& gp) { return gp.kernel.rbf_rates.size() > 0; }
+
 void check_parts(const CompactGp& gp, const Eigen::MatrixXd& motions,
                  const Eigen::MatrixXd& features) {
   const CompactKernel& kernel = gp.kernel;
@@ -146,7 +53,7 @@ void check_parts(const CompactGp& gp, const Eigen::MatrixXd& motions,
       joints == 0 ||
       (motions.cols() == 3 * joints && kernel.gip_motion.size() == motion_count(joints) &&
        kernel.gip_first.size() == positions && kernel.gip_second.size() == positions);
-  const bool rbf = kernel.rbf_rates.size() == 0 || kernel.rbf_rates.size() == motions.cols();
+  const bool rbf = !has_rbf(gp) || kernel.rbf_rates.size() == motions.cols();
   const bool linear = kernel.linear.size() == features.cols();
   const bool sizes = gp.weights.size() == std::ssize(gp.points) &&
                      gp.root.rows() == gp.root.cols() && gp.root.cols() <= gp.weights.size() &&
@@ -158,115 +65,209 @@ void check_parts(const CompactGp& gp, const Eigen::MatrixXd& motions,
                     "make it with the program that reads it");
 }
 
+std::vector<int> each_once(std::vector<int> rows) {
+  std::ranges::sort(rows);
+  rows.erase(std::ranges::unique(rows).begin(), rows.end());
+  return rows;
+}
+
 }  // namespace
 
-CompactPredictor::CompactPredictor(const CompactGp& gp, const Eigen::MatrixXd& motions,
-                                   const Eigen::MatrixXd& features)
-    : kernel_(gp.kernel), shift_(gp.shift), weights_(gp.weights), carriers_(gp.root.cols()) {
-  check_parts(gp, motions, features);
-  const auto rows = std::ssize(gp.points);
-  const auto joints = std::ssize(kernel_.gip_joints);
-  const Eigen::MatrixXd at = motions(gp.points, Eigen::all);
-  if (kernel_.rbf_rates.size() > 0) rbf_ = at * kernel_.rbf_rates.asDiagonal();
-  scaled_.resize(kernel_.rbf_rates.size());
-  motion_features_.resize(joints > 0 ? motion_count(joints) : 0);
-  position_features_.resize(position_count(kernel_.gip_joints));
-  if (joints > 0) {
-    gip_.resize(rows, motion_features_.size());
-    positions_.resize(rows, position_features_.size());
-    for (Index i = 0; i < rows; ++i) {
-      const Eigen::VectorXd own = at.row(i);
-      motion_features(own.data(), joints, motion_features_.data());
-      position_features(kernel_.gip_joints, own.data(), position_features_.data());
-      gip_.row(i) = motion_features_.cwiseProduct(kernel_.gip_motion);
-      positions_.row(i) = position_features_;
+// What a process has of its own.
+struct CompactPredictor::Process {
+  CompactKernel kernel;
+  double shift = 0.0;
+  std::size_t group = 0;
+  Index column = 0;             // of its group's values
+  Eigen::VectorXd weights;      // one a row of its group
+  std::vector<Index> carriers;  // rows of its group
+  Eigen::VectorXd linear_mean;  // what the linear part adds up to
+  Eigen::MatrixXd linear;       // weighted features of the carriers
+  Eigen::VectorXd root;         // columns of R, one after another, without zeros
+  // Of the last sample.
+  Eigen::VectorXd features, carried, product;
+
+  // `rows` of the tables, ascending: those of its group.
+  Process(const CompactGp& gp, const std::vector<int>& rows, const Eigen::MatrixXd& table)
+      : kernel(gp.kernel),
+        shift(gp.shift),
+        weights(Eigen::VectorXd::Zero(std::ssize(rows))),
+        linear_mean(gp.kernel.linear.size()),
+        root(gp.root.cols() * (gp.root.cols() + 1) / 2),
+        features(gp.kernel.linear.size()),
+        carried(gp.root.cols()),
+        product(gp.root.cols()) {
+    const Index count = gp.root.cols();
+    for (Index i = 0; i < gp.weights.size(); ++i) {
+      const auto row = std::ranges::lower_bound(rows, gp.points[static_cast<std::size_t>(i)]);
+      weights[row - rows.begin()] += gp.weights[i];
+      if (i < count) carriers.push_back(row - rows.begin());
+    }
+    const Eigen::MatrixXd own = table(gp.points, Eigen::all);
+    for (Index d = 0; d < linear_mean.size(); ++d) {
+      linear_mean[d] =
+          kernel.linear[d] * loops::dot(own.col(d).data(), gp.weights.data(), gp.weights.size());
+    }
+    linear = own.topRows(count) * kernel.linear.asDiagonal();
+    for (Index j = 0, next = 0; j < count; next += ++j) {
+      root.segment(next, j + 1) = gp.root.col(j).head(j + 1);
     }
   }
-  const Eigen::MatrixXd own_features = features(gp.points, Eigen::all);
-  linear_mean_ = Eigen::VectorXd::Zero(kernel_.linear.size());
-  for (Index d = 0; d < linear_mean_.size(); ++d) {
-    linear_mean_[d] = kernel_.linear[d] * dot(own_features.col(d).data(), weights_.data(), rows);
+};
+
+// What processes of the same points and parts share.
+struct CompactPredictor::Group {
+  std::vector<int> points;  // rows of the tables, ascending
+  bool rbf = false;
+  JointKinds gip_joints;
+  loops::LaneTable motions, motion_features, positions;  // of the points
+  // Of the kernels, one row a process.
+  Eigen::MatrixXd square_rates;
+  Eigen::VectorXd rbf_variances;
+  loops::PolynomialFactors gip;
+  // Of the last sample.
+  Eigen::VectorXd own_motion, own_positions;
+  loops::PolynomialFactors by_sample;  // the same times its features
+  Eigen::MatrixXd values;              // points x processes
+
+  Group(std::vector<int> rows, const CompactGp& gp, const Eigen::MatrixXd& table)
+      : points(std::move(rows)), rbf(has_rbf(gp)), gip_joints(gp.kernel.gip_joints) {
+    const Eigen::MatrixXd at = table(points, Eigen::all);
+    if (rbf) motions = loops::LaneTable(at);
+    if (gip_joints.empty()) return;
+    own_motion.resize(motion_count(std::ssize(gip_joints)));
+    own_positions.resize(position_count(gip_joints));
+    Eigen::MatrixXd of_motion(at.rows(), own_motion.size());
+    Eigen::MatrixXd of_positions(at.rows(), own_positions.size());
+    for (Index i = 0; i < at.rows(); ++i) {
+      take(at.row(i));
+      of_motion.row(i) = own_motion;
+      of_positions.row(i) = own_positions;
+    }
+    motion_features = loops::LaneTable(of_motion);
+    positions = loops::LaneTable(of_positions);
   }
-  linear_ = own_features.topRows(carriers_) * kernel_.linear.asDiagonal();
-  root_.resize(carriers_ * (carriers_ + 1) / 2);
-  for (Index j = 0, next = 0; j < carriers_; next += ++j) {
-    root_.segment(next, j + 1) = gp.root.col(j).head(j + 1);
+
+  [[nodiscard]] bool fits(const std::vector<int>& rows, const CompactGp& gp) const {
+    return points == rows && rbf == has_rbf(gp) && gip_joints == gp.kernel.gip_joints;
   }
-  features_.resize(kernel_.linear.size());
-  values_.resize(rows);
-  carried_.resize(carriers_);
-  product_.resize(carriers_);
+
+  [[nodiscard]] Index size() const { return rbf_variances.size(); }
+
+  void add(const CompactKernel& kernel) {
+    append(kernel.rbf_variance, rbf_variances);
+    append(kernel.gip_offset, gip.offsets);
+    append(kernel.rbf_rates.cwiseAbs2(), square_rates);
+    append(kernel.gip_motion, gip.motion);
+    append(kernel.gip_first, gip.first);
+    append(kernel.gip_second, gip.second);
+    by_sample = gip;
+    const Index whole = (std::ssize(points) + loops::kLanes - 1) / loops::kLanes * loops::kLanes;
+    values = Eigen::MatrixXd::Zero(whole, size());
+  }
+
+  // All but the linear parts of the kernels between the points and a motion.
+  void evaluate(const Eigen::VectorXd& motion) {
+    if (gip_joints.empty()) {
+      values.setZero();
+    } else {
+      take(motion);
+      by_sample.motion = gip.motion * own_motion.asDiagonal();
+      by_sample.first = gip.first * own_positions.asDiagonal();
+      by_sample.second = gip.second * own_positions.asDiagonal();
+      loops::polynomials(motion_features, positions, gip_joints, by_sample, values);
+    }
+    if (rbf) loops::add_rbf(motions, motion, square_rates, rbf_variances, values);
+  }
+
+ private:
+  static void append(double value, Eigen::VectorXd& to) {
+    to.conservativeResize(to.size() + 1);
+    to[to.size() - 1] = value;
+  }
+  static void append(const Eigen::VectorXd& row, Eigen::MatrixXd& to) {
+    to.conservativeResize(to.rows() + 1, row.size());
+    to.bottomRows(1) = row.transpose();
+  }
+
+  void take(const Eigen::VectorXd& motion) {
+    gp::motion_features(motion.data(), std::ssize(gip_joints), own_motion.data());
+    gp::position_features(gip_joints, motion.data(), own_positions.data());
+  }
+};
+
+CompactPredictor::CompactPredictor(const std::vector<CompactGp>& processes,
+                                   const Eigen::MatrixXd& motions,
+                                   const std::vector<Eigen::MatrixXd>& features)
+    : mean_(std::ssize(processes)) {
+  for (std::size_t j = 0; j < processes.size(); ++j) {
+    const CompactGp& gp = processes[j];
+    check_parts(gp, motions, features.at(j));
+    const std::vector<int> rows = each_once(gp.points);
+    auto group =
+        std::ranges::find_if(groups_, [&](const Group& known) { return known.fits(rows, gp); });
+    if (group == groups_.end()) group = groups_.insert(groups_.end(), Group(rows, gp, motions));
+    Process& own = processes_.emplace_back(gp, rows, features[j]);
+    own.group = static_cast<std::size_t>(group - groups_.begin());
+    own.column = group->size();
+    group->add(gp.kernel);
+  }
 }
 
-// All but the linear part.
-void CompactPredictor::kernel_values(Index begin, Index rows) {
-  double* out = values_.data() + begin;
-  if (gip_.cols() > 0) {
-    linear_values(gip_.data() + begin, gip_.rows(), gip_.cols(), motion_features_.data(),
-                  kernel_.gip_offset, rows, out);
+CompactPredictor::~CompactPredictor() = default;
+CompactPredictor::CompactPredictor(CompactPredictor&&) noexcept = default;
+CompactPredictor& CompactPredictor::operator=(CompactPredictor&&) noexcept = default;
+
+const Eigen::VectorXd& CompactPredictor::mean(const Eigen::VectorXd& motion,
+                                              const std::vector<Eigen::VectorXd>& features) {
+  for (Group& group : groups_) group.evaluate(motion);
+  for (std::size_t j = 0; j < processes_.size(); ++j) {
+    Process& own = processes_[j];
+    own.features = features[j];
+    const Eigen::MatrixXd& values = groups_[own.group].values;
+    mean_[static_cast<Index>(j)] =
+        own.shift +
+        loops::dot(own.weights.data(), values.col(own.column).data(), own.weights.size()) +
+        loops::dot(own.linear_mean.data(), own.features.data(), own.features.size());
+  }
+  return mean_;
+}
+
+double CompactPredictor::variance(Index process) {
+  Process& own = processes_[static_cast<std::size_t>(process)];
+  const Group& group = groups_[own.group];
+  const CompactKernel& kernel = own.kernel;
+  double prior = group.rbf ? kernel.rbf_variance : 0.0;
+  if (!kernel.gip_joints.empty()) {
+    double polynomial = kernel.gip_offset;
+    for (Index d = 0; d < group.own_motion.size(); ++d) {
+      polynomial += kernel.gip_motion[d] * group.own_motion[d] * group.own_motion[d];
+    }
     Index at = 0;
-    for (const JointKind kind : kernel_.gip_joints) {
-      const bool turns = kind == JointKind::kRevolute;
-      const double* p = positions_.col(at).data() + begin;
-      const double x0 = position_features_[at];
-      const double x1 = turns ? position_features_[at + 1] : 0.0;
-      multiply_position(p, turns ? p + positions_.rows() : p, kernel_.gip_first[at] * x0,
-                        turns ? kernel_.gip_first[at + 1] * x1 : 0.0, kernel_.gip_second[at] * x0,
-                        turns ? kernel_.gip_second[at + 1] * x1 : 0.0, rows, out);
-      at += turns ? 2 : 1;
-    }
-  } else {
-    std::fill_n(out, rows, 0.0);
-  }
-  if (rbf_.cols() > 0) {
-    add_rbf(rbf_.data() + begin, rbf_.rows(), rbf_.cols(), scaled_.data(), kernel_.rbf_variance,
-            rows, out);
-  }
-}
-
-double CompactPredictor::mean(const Eigen::VectorXd& motion, const Eigen::VectorXd& features) {
-  for (Index d = 0; d < scaled_.size(); ++d) scaled_[d] = motion[d] * kernel_.rbf_rates[d];
-  if (gip_.cols() > 0) {
-    const auto joints = std::ssize(kernel_.gip_joints);
-    motion_features(motion.data(), joints, motion_features_.data());
-    position_features(kernel_.gip_joints, motion.data(), position_features_.data());
-  }
-  features_ = features;
-  for (Index begin = 0; begin < values_.size(); begin += kRows) {
-    kernel_values(begin, std::min(kRows, values_.size() - begin));
-  }
-  return shift_ + dot(weights_.data(), values_.data(), values_.size()) +
-         dot(linear_mean_.data(), features_.data(), features_.size());
-}
-
-double CompactPredictor::variance() {
-  double prior = kernel_.rbf_rates.size() > 0 ? kernel_.rbf_variance : 0.0;
-  if (gip_.cols() > 0) {
-    double own = kernel_.gip_offset;
-    for (Index d = 0; d < motion_features_.size(); ++d) {
-      own += kernel_.gip_motion[d] * motion_features_[d] * motion_features_[d];
-    }
-    Index at = 0;
-    for (const JointKind kind : kernel_.gip_joints) {
+    for (const JointKind kind : kernel.gip_joints) {
       double first = 1.0;
       double second = 1.0;
       for (Index k = 0; k < (kind == JointKind::kRevolute ? 2 : 1); ++k, ++at) {
-        const double square = position_features_[at] * position_features_[at];
-        first += kernel_.gip_first[at] * square;
-        second += kernel_.gip_second[at] * square;
+        const double square = group.own_positions[at] * group.own_positions[at];
+        first += kernel.gip_first[at] * square;
+        second += kernel.gip_second[at] * square;
       }
-      own *= first * second;
+      polynomial *= first * second;
     }
-    prior += own;
+    prior += polynomial;
   }
-  for (Index d = 0; d < features_.size(); ++d) {
-    prior += kernel_.linear[d] * features_[d] * features_[d];
+  for (Index d = 0; d < own.features.size(); ++d) {
+    prior += kernel.linear[d] * own.features[d] * own.features[d];
   }
-  linear_values(linear_.data(), linear_.rows(), linear_.cols(), features_.data(), 0.0, carriers_,
-                carried_.data());
-  for (Index i = 0; i < carriers_; ++i) carried_[i] += values_[i];
-  triangle_times(root_.data(), carried_.data(), carriers_, product_.data());
-  const double out = prior - dot(product_.data(), product_.data(), carriers_);
+  const auto values = group.values.col(own.column);
+  for (Index i = 0; i < own.carried.size(); ++i) {
+    own.carried[i] = values[own.carriers[static_cast<std::size_t>(i)]];
+    for (Index d = 0; d < own.features.size(); ++d)
+      own.carried[i] += own.linear(i, d) * own.features[d];
+  }
+  loops::triangle_times(own.root.data(), own.carried.data(), own.carried.size(),
+                        own.product.data());
+  const double out = prior - loops::dot(own.product.data(), own.product.data(), own.product.size());
   return std::isnan(out) ? std::numeric_limits<double>::infinity() : std::max(0.0, out);
 }
 

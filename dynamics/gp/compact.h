@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes   a process of one output as numbers: kernel, points, weights, a triangle for its variance.
+// Takes   processes of one output as numbers: kernel, points, weights, a triangle for the variance.
 // Gives   mean and variance of one sample in a few microseconds; the same bits on any processor.
 // Units   of inputs and targets as they are: nothing is normalised.
 // Method  mean: weights of kernel values at the points (Rasmussen and Williams 2006, eq. 2.27);
@@ -50,34 +50,31 @@ struct CompactVariance {
                                                const Eigen::MatrixXd& inducing,
                                                const FitOptions& options = {});
 
-/// One sample after another: no allocation after the first. One for each thread.
+/// One sample after another, of the processes of all joints: no allocation after the first. One for
+/// each thread. Processes of the same points and parts are computed together.
 class CompactPredictor {
  public:
-  /// Tables: rows x columns of the motion; rows x features. Throws bad_request for parts that do
-  /// not fit each other.
-  CompactPredictor(const CompactGp& gp, const Eigen::MatrixXd& motions,
-                   const Eigen::MatrixXd& features);
+  /// `motions`: rows x columns of the motion; `features`: one table a process, rows x features.
+  /// Throws bad_request for parts that do not fit each other.
+  CompactPredictor(const std::vector<CompactGp>& processes, const Eigen::MatrixXd& motions,
+                   const std::vector<Eigen::MatrixXd>& features);
+  ~CompactPredictor();
+  CompactPredictor(CompactPredictor&&) noexcept;
+  CompactPredictor& operator=(CompactPredictor&&) noexcept;
 
-  [[nodiscard]] double mean(const Eigen::VectorXd& motion, const Eigen::VectorXd& features);
+  /// One entry a process, as `features`.
+  const Eigen::VectorXd& mean(const Eigen::VectorXd& motion,
+                              const std::vector<Eigen::VectorXd>& features);
   /// Of the function, at the sample of the last `mean`; infinite where it overflows.
-  [[nodiscard]] double variance();
+  [[nodiscard]] double variance(Eigen::Index process);
 
  private:
-  void kernel_values(Eigen::Index begin, Eigen::Index rows);
+  struct Process;
+  struct Group;
 
-  CompactKernel kernel_;
-  double shift_ = 0.0;
-  Eigen::VectorXd weights_;
-  Eigen::VectorXd linear_mean_;  // what the linear part adds up to
-  Eigen::MatrixXd rbf_;          // scaled motions of the points
-  Eigen::MatrixXd gip_;          // weighted motion features
-  Eigen::MatrixXd positions_;
-  Eigen::MatrixXd linear_;  // weighted features of the points that carry the variance
-  Eigen::VectorXd root_;    // columns of R, one after another, without zeros
-  Eigen::Index carriers_ = 0;
-  // Of the last sample.
-  Eigen::VectorXd scaled_, motion_features_, position_features_, features_;
-  Eigen::VectorXd values_, carried_, product_;
+  std::vector<Process> processes_;
+  std::vector<Group> groups_;
+  Eigen::VectorXd mean_;
 };
 
 }  // namespace kinescope::gp

@@ -8,6 +8,7 @@
 // other name; nothing where the compiler or a sanitizer cannot.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define KINESCOPE_HAS_WIDE
 #define KINESCOPE_WIDE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define KINESCOPE_WIDE

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "dynamics/rigid/regressor.h"
 #include "kinematics/core/error.h"
@@ -156,7 +157,7 @@ struct TorquePredictor::State {
   SavedTorqueModel model;
   TermColumns columns;
   bool needs_columns = false;
-  std::vector<gp::CompactPredictor> processes;
+  std::optional<gp::CompactPredictor> processes;
   std::vector<Eigen::VectorXd> features;    // of each process
   std::vector<Eigen::VectorXd> parametric;  // columns of its parameters, one a joint
   Eigen::VectorXd motion;
@@ -196,9 +197,9 @@ struct TorquePredictor::State {
         tables[at].row(i) = features[at];
       }
     }
-    for (std::size_t j = 0; j < tables.size(); ++j) {
-      processes.emplace_back(model.processes[j].gp, model.motions, tables[j]);
-    }
+    std::vector<gp::CompactGp> compact;
+    for (const SavedProcess& process : model.processes) compact.push_back(process.gp);
+    if (!compact.empty()) processes.emplace(compact, model.motions, tables);
   }
 
   void set_parametric_sigma() {
@@ -246,11 +247,11 @@ const Eigen::VectorXd& TorquePredictor::mean(const Eigen::VectorXd& q, const Eig
       }
       state.mean[j] = own.gains[j] * torque;
     }
-    if (state.processes.empty()) continue;
+    if (!state.processes) continue;
     features_of(state.model.processes[at], state.columns, state.model.drives, dq[j], j,
                 state.features[at]);
-    state.mean[j] += state.processes[at].mean(state.motion, state.features[at]);
   }
+  if (state.processes) state.mean += state.processes->mean(state.motion, state.features);
   for (std::size_t k = 0; k < state.model.constants.joints.size(); ++k) {
     state.mean[state.model.constants.joints[k]] =
         state.model.constants.torque[static_cast<Index>(k)];
@@ -260,11 +261,11 @@ const Eigen::VectorXd& TorquePredictor::mean(const Eigen::VectorXd& q, const Eig
 
 const Eigen::VectorXd& TorquePredictor::sigma() {
   State& state = *state_;
-  if (state.processes.empty()) {
+  if (!state.processes) {
     state.set_parametric_sigma();
   } else {
     for (Index j = 0; j < state.mean.size(); ++j) {
-      state.model_sigma[j] = std::sqrt(state.processes[static_cast<std::size_t>(j)].variance());
+      state.model_sigma[j] = std::sqrt(state.processes->variance(j));
     }
   }
   const SigmaParts& parts = state.model.parts;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a fit (torque_model.h) as numbers: SavedTorqueModel, a plain value that files hold.
-// Gives   TorquePredictor: mean and sigma of every joint's torque for one sample of a running
-// robot. Units   those of the samples learned from; vectors have one entry a joint. Method  base
-// parameters times regressor (dynamics/rigid); processes by gp/compact.h. The value in
+// Gives   TorquePredictor: mean and sigma of every joint's torque, one sample after another.
+// Units   those of the samples learned from; vectors have one entry a joint.
+// Method  base parameters times regressor (dynamics/rigid); processes by gp/compact.h. The value in
 //         memory and the one read from a file give the same bits.
 // Not here: files (app/io/torque_model_file.h), effects with a memory (dynamics/effects).
 #pragma once

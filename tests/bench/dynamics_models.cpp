@@ -49,12 +49,13 @@ gp::CompactGp process(bool polynomial, int points) {
 
 void one_process(benchmark::State& state) {
   const auto points = static_cast<int>(state.range(1));
-  gp::CompactPredictor predictor(process(state.range(0) != 0, points),
-                                 random_matrix(points, 3L * kJoints), Eigen::MatrixXd(points, 0));
+  gp::CompactPredictor predictor({process(state.range(0) != 0, points)},
+                                 random_matrix(points, 3L * kJoints), {Eigen::MatrixXd(points, 0)});
   const Eigen::VectorXd x = Eigen::VectorXd::Constant(3L * kJoints, 0.2);
+  const std::vector<Eigen::VectorXd> no_features(1);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(predictor.mean(x, {}));
-    if (state.range(2) != 0) benchmark::DoNotOptimize(predictor.variance());
+    benchmark::DoNotOptimize(predictor.mean(x, no_features));
+    if (state.range(2) != 0) benchmark::DoNotOptimize(predictor.variance(0));
   }
 }
 BENCHMARK(one_process)

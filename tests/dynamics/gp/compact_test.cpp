@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dynamics/gp/compact.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <gtest/gtest.h>
 
+#include "dynamics/gp/compact_loops.h"
 #include "dynamics/gp/sparse.h"
 #include "kinematics/core/error.h"
 #include "tests/dynamics/gp/gp_samples.h"
@@ -14,6 +17,7 @@ namespace kinescope::gp {
 namespace {
 
 constexpr int kColumns = 3;
+const std::vector<Eigen::VectorXd> kNoFeatures(1);
 
 CompactKernel squared_exponential(const GpModel& model) {
   CompactKernel out;
@@ -43,14 +47,14 @@ TEST(Compact, IsTheProcessThroughItsInducingPoints) {
   compact.points = numbers(inducing.rows());
   compact.weights = kernel_weights(fitted);
   compact.root = compact_variance(model, {data}, {}, inducing).root;
-  CompactPredictor predictor(compact, inducing, Eigen::MatrixXd(inducing.rows(), 0));
+  CompactPredictor predictor({compact}, inducing, {Eigen::MatrixXd(inducing.rows(), 0)});
   const Eigen::MatrixXd x = 2.0 * random_matrix(rng, 50, kColumns);
   const Prediction expected = predict(fitted, x);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     // The kernel matrix of the points is singular to 1e-8 (InducingOptions): weights lose its root.
-    EXPECT_NEAR(predictor.mean(x.row(i).transpose(), {}), expected.mean(i, 0), 1e-7);
-    EXPECT_NEAR(predictor.variance(), expected.variance(i, 0), 1e-7);
-    EXPECT_EQ(predictor.variance(), predictor.variance());
+    EXPECT_NEAR(predictor.mean(x.row(i).transpose(), kNoFeatures)[0], expected.mean(i, 0), 1e-7);
+    EXPECT_NEAR(predictor.variance(0), expected.variance(i, 0), 1e-7);
+    EXPECT_EQ(predictor.variance(0), predictor.variance(0));
   }
 }
 
@@ -67,12 +71,12 @@ TEST(Compact, VarianceIsTheMeanOfTheParts) {
   compact.points = numbers(inducing.rows());
   compact.weights = Eigen::VectorXd::Zero(inducing.rows());
   compact.root = both.root;
-  CompactPredictor predictor(compact, inducing, Eigen::MatrixXd(inducing.rows(), 0));
+  CompactPredictor predictor({compact}, inducing, {Eigen::MatrixXd(inducing.rows(), 0)});
   const Eigen::VectorXd of_a = predict(fit_sparse(model, a, inducing), x).variance;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     EXPECT_NEAR(both.own[0][i], of_a[i], 1e-12);
-    (void)predictor.mean(x.row(i).transpose(), {});
-    EXPECT_NEAR(predictor.variance(), 0.5 * (both.own[0][i] + both.own[1][i]), 1e-7);
+    (void)predictor.mean(x.row(i).transpose(), kNoFeatures)[0];
+    EXPECT_NEAR(predictor.variance(0), 0.5 * (both.own[0][i] + both.own[1][i]), 1e-7);
   }
 }
 
@@ -83,13 +87,14 @@ TEST(Compact, ExponentialIsRightToTheLastBits) {
   compact.kernel.rbf_rates = Eigen::VectorXd::Ones(1);
   compact.points = {0};
   compact.weights = Eigen::VectorXd::Ones(1);
-  CompactPredictor predictor(compact, Eigen::MatrixXd::Zero(1, 1), Eigen::MatrixXd(1, 0));
+  CompactPredictor predictor({compact}, Eigen::MatrixXd::Zero(1, 1), {Eigen::MatrixXd(1, 0)});
   for (double x = 0.0; x < 37.0; x += 0.0137) {
     const double expected = std::exp(-0.5 * x * x);
-    EXPECT_NEAR(predictor.mean(Eigen::VectorXd::Constant(1, x), {}), expected, 4e-16 * expected)
+    EXPECT_NEAR(predictor.mean(Eigen::VectorXd::Constant(1, x), kNoFeatures)[0], expected,
+                4e-16 * expected)
         << x;
   }
-  EXPECT_LT(predictor.mean(Eigen::VectorXd::Constant(1, 1e6), {}), 1e-300);
+  EXPECT_LT(predictor.mean(Eigen::VectorXd::Constant(1, 1e6), kNoFeatures)[0], 1e-300);
 }
 
 TEST(Compact, PolynomialAndLinearPartsAreTheKernels) {
@@ -121,7 +126,7 @@ TEST(Compact, PolynomialAndLinearPartsAreTheKernels) {
   const Eigen::MatrixXd features = friction(2, 0.1)(points);
   compact.points = numbers(points.rows());
   compact.weights = random_matrix(rng, 300, 1);
-  CompactPredictor predictor(compact, points, features);
+  CompactPredictor predictor({compact}, points, {features});
   const Eigen::MatrixXd x = random_matrix(rng, 10, 6);
   const Eigen::VectorXd expected = covariance(changed, x, points) * compact.weights;
   const Eigen::VectorXd prior = covariance(changed, x).diagonal();
@@ -129,9 +134,89 @@ TEST(Compact, PolynomialAndLinearPartsAreTheKernels) {
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     // Sums of 300 terms of that size.
     const double rounding = 1e-14 * std::sqrt(300.0) * prior[i];
-    EXPECT_NEAR(predictor.mean(x.row(i).transpose(), own.row(i).transpose()), expected[i],
+    EXPECT_NEAR(predictor.mean(x.row(i).transpose(), {own.row(i).transpose()})[0], expected[i],
                 300.0 * rounding);
-    EXPECT_NEAR(predictor.variance(), prior[i], rounding);
+    EXPECT_NEAR(predictor.variance(0), prior[i], rounding);
+  }
+}
+
+// Two turning joints and a sliding one.
+const JointKinds kThreeJoints{JointKind::kRevolute, JointKind::kPrismatic, JointKind::kRevolute};
+
+CompactGp random_process(Rng& rng, bool polynomial, std::vector<int> points) {
+  CompactGp out;
+  const auto positive = [&](Eigen::Index size) {
+    Eigen::VectorXd values(size);
+    for (double& value : values) value = rng.uniform(0.1, 0.5);
+    return values;
+  };
+  out.kernel.rbf_variance = 1.5;
+  out.kernel.rbf_rates = positive(9);
+  if (polynomial) {
+    out.kernel.gip_joints = kThreeJoints;
+    out.kernel.gip_offset = 0.7;
+    out.kernel.gip_motion = positive(9);
+    out.kernel.gip_first = positive(5);
+    out.kernel.gip_second = positive(5);
+  }
+  out.weights = random_matrix(rng, std::ssize(points), 1);
+  out.root = 0.1 * random_matrix(rng, 7, 7);
+  out.points = std::move(points);
+  return out;
+}
+
+// Six processes of the same points, one of others and one of none: each as it is alone.
+TEST(Compact, ProcessesTogetherAreEachAlone) {
+  Rng rng = Rng::from_name("compact together");
+  constexpr int kRows = 301;  // more than a pass, and not eight by eight
+  const Eigen::MatrixXd motions = random_matrix(rng, kRows, 9);
+  std::vector<CompactGp> processes;
+  for (int j = 0; j < 6; ++j) {
+    std::vector<int> points = numbers(kRows);
+    std::rotate(points.begin(), points.begin() + 11 * j, points.end());
+    processes.push_back(random_process(rng, j > 4, std::move(points)));
+  }
+  processes.push_back(random_process(rng, true, {5, 17, 3, 300, 8, 40, 2, 17}));
+  processes.emplace_back().shift = 2.0;
+  const std::vector<Eigen::MatrixXd> tables(processes.size(), Eigen::MatrixXd(kRows, 0));
+  const std::vector<Eigen::VectorXd> none(processes.size());
+  CompactPredictor together(processes, motions, tables);
+  for (int sample = 0; sample < 5; ++sample) {
+    const Eigen::VectorXd x = random_matrix(rng, 9, 1);
+    const Eigen::VectorXd mean = together.mean(x, none);
+    for (std::size_t j = 0; j < processes.size(); ++j) {
+      const auto process = static_cast<Eigen::Index>(j);
+      CompactPredictor alone({processes[j]}, motions, {tables[j]});
+      EXPECT_EQ(mean[process], alone.mean(x, kNoFeatures)[0]) << j;
+      EXPECT_EQ(together.variance(process), alone.variance(0)) << j;
+    }
+    EXPECT_EQ(mean[7], 2.0);
+  }
+}
+
+TEST(CompactLoops, GiveTheSameBitsForRegistersOfAnyWidth) {
+  Rng rng = Rng::from_name("compact loops");
+  const Eigen::MatrixXd table = random_matrix(rng, 531, 9);
+  const loops::LaneTable motions(table);
+  const loops::LaneTable positions(table.leftCols(5));
+  for (const Eigen::Index processes : {1, 2, 3, 4, 7}) {
+    const Eigen::MatrixXd start = random_matrix(rng, motions.rows(), processes);
+    const Eigen::MatrixXd factors = random_matrix(rng, processes, 9).cwiseAbs();
+    const Eigen::VectorXd x = random_matrix(rng, 9, 1);
+    const loops::PolynomialFactors of_each{factors.col(0), factors, factors.leftCols(5),
+                                           factors.rightCols(5)};
+    const auto values = [&](loops::Registers registers) {
+      Eigen::MatrixXd out = start;
+      loops::polynomials(motions, positions, kThreeJoints, of_each, out, registers);
+      loops::add_rbf(motions, x, factors, factors.col(1), out, registers);
+      return out;
+    };
+    const Eigen::MatrixXd narrow = values(loops::Registers::k128);
+    EXPECT_GT(narrow.cwiseAbs().minCoeff(), 0.0);
+    for (const loops::Registers registers : {loops::Registers::k256, loops::Registers::k512}) {
+      if (registers > loops::widest_registers()) continue;
+      EXPECT_EQ(narrow, values(registers));
+    }
   }
 }
 
@@ -142,14 +227,14 @@ TEST(Compact, RefusesPartsThatDoNotFit) {
   compact.weights = Eigen::VectorXd::Ones(2);
   const Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3, 2);
   const Eigen::MatrixXd none(3, 0);
-  EXPECT_THROW(CompactPredictor(compact, motions, none), Error) << "no row 5";
+  EXPECT_THROW(CompactPredictor({compact}, motions, {none}), Error) << "no row 5";
   compact.points = {0, 1};
-  EXPECT_NO_THROW(CompactPredictor(compact, motions, none));
+  EXPECT_NO_THROW(CompactPredictor({compact}, motions, {none}));
   compact.root = Eigen::MatrixXd::Zero(3, 3);
-  EXPECT_THROW(CompactPredictor(compact, motions, none), Error) << "more carriers than points";
+  EXPECT_THROW(CompactPredictor({compact}, motions, {none}), Error) << "more carriers than points";
   compact.root.resize(0, 0);
   compact.kernel.rbf_rates = Eigen::VectorXd::Ones(3);
-  EXPECT_THROW(CompactPredictor(compact, motions, none), Error) << "lengths of three columns";
+  EXPECT_THROW(CompactPredictor({compact}, motions, {none}), Error) << "lengths of three columns";
 }
 
 }  // namespace
