@@ -2,7 +2,11 @@
 #include "app/commands/kept_observations.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <limits>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -12,6 +16,7 @@
 #include "app/io/products.h"
 #include "app/io/sha256.h"
 #include "kinematics/bags/bag.h"
+#include "kinematics/core/csv.h"
 #include "kinematics/core/file.h"
 #include "kinematics/datasets/dataset.h"
 #include "kinematics/recorded/container.h"
@@ -21,6 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+constexpr std::size_t kColumns = 8;  // of observations_csv()
 
 // What one camera saw: "observations.csv", "observations_left.csv".
 std::string observations_file(const std::string& camera, std::string_view ending) {
@@ -52,28 +59,71 @@ std::string sha256_of_path(const fs::path& path) {
   return sha256_of_text(list);
 }
 
+// The numbers of a row as observations_csv() writes it; false for any other.
+bool read_row(std::string_view line, std::array<double, kColumns>& row) {
+  for (double& value : row) {
+    const std::size_t end = std::min(line.find(','), line.size());
+    const std::optional<double> number = parse_number(line.substr(0, end));
+    if (!number) return false;
+    value = *number;
+    line.remove_prefix(std::min(end + 1, line.size()));
+  }
+  return line.empty();
+}
+
+bool is_whole(double value) {
+  return value >= 0.0 && value <= std::numeric_limits<int>::max() && value == std::floor(value);
+}
+
+// What observations_csv() wrote, row by row: a film of an hour has millions. Frames are those of
+// `times_s`. Nothing where it is not what was written.
+std::optional<std::vector<TagObservation>> read_table(const fs::path& path,
+                                                      const std::vector<double>& times_s) {
+  std::vector<TagObservation> out;
+  std::ifstream file(path);
+  std::string line;
+  if (!std::getline(file, line)) return std::nullopt;  // the header
+  std::array<double, kColumns> row{};
+  std::size_t frame = 0;
+  while (std::getline(file, line)) {
+    if (!read_row(line, row)) return std::nullopt;
+    const auto [t, tag, corner, u, v, sigma, hamming, margin] = row;
+    if (!is_whole(tag) || !is_whole(hamming)) return std::nullopt;
+    if (corner == 0.0) {
+      while (frame < times_s.size() && times_s[frame] < t) ++frame;
+      if (frame == times_s.size()) return std::nullopt;
+      TagObservation& seen = out.emplace_back();
+      seen.frame = static_cast<int>(frame);
+      seen.id = TagId{static_cast<int>(tag)};
+      seen.sigma_px = sigma;
+      seen.hamming = static_cast<int>(hamming);
+      seen.decision_margin = margin;
+    }
+    if (out.empty() || corner != static_cast<double>(out.back().corners_px.size()))
+      return std::nullopt;
+    out.back().corners_px.emplace_back(u, v);
+  }
+  return out;
+}
+
 // The table holds only frames with a marker; the times of all frames, what was rejected and the
 // detection's warnings stand in `kept`. Nothing where the two do not belong together; throws
 // json::exception where something is missing.
-std::optional<TagObservations> observations_of(const json& kept, TagObservations table) {
-  const auto times = kept.at("times_s").get<std::vector<double>>();
-  std::size_t next = 0;
-  for (TagObservation& seen : table.observations) {
-    const double t = table.times_s[static_cast<std::size_t>(seen.frame)];
-    while (next < times.size() && times[next] < t) ++next;
-    if (next == times.size()) return std::nullopt;
-    seen.frame = static_cast<int>(next);
-  }
-  table.times_s = times;
-  table.width = kept.at("width").get<int>();
-  table.height = kept.at("height").get<int>();
+std::optional<TagObservations> observations_of(const json& kept, const fs::path& table) {
+  TagObservations out;
+  out.times_s = kept.at("times_s").get<std::vector<double>>();
+  auto observations = read_table(table, out.times_s);
+  if (!observations) return std::nullopt;
+  out.observations = std::move(*observations);
+  out.width = kept.at("width").get<int>();
+  out.height = kept.at("height").get<int>();
   for (const json& tag : kept.at("rejected")) {
-    table.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
-                              tag.at("reason").get<std::string>()});
+    out.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
+                            tag.at("reason").get<std::string>()});
   }
-  table.warnings = kept.at("warnings").get<std::vector<std::string>>();
-  table.lens_known = kept.at("lens_known").get<bool>();
-  return table;
+  out.warnings = kept.at("warnings").get<std::vector<std::string>>();
+  out.lens_known = kept.at("lens_known").get<bool>();
+  return out;
 }
 
 // What the detection depends on.
@@ -116,7 +166,7 @@ std::optional<TagObservations> read_kept_observations(const fs::path& folder,
     return std::nullopt;
   }
   try {
-    return observations_of(kept, read_corners(table, recording.markers));
+    return observations_of(kept, table);
   } catch (const json::exception&) {
     return std::nullopt;  // damaged: the video is read once more
   }
@@ -125,9 +175,10 @@ std::optional<TagObservations> read_kept_observations(const fs::path& folder,
 std::vector<std::pair<std::string, std::string>> kept_observations(
     const Recording& recording, const TagObservations& observations, const DetectOptions& detect) {
   if (observations.observations.empty()) return {};
-  const std::string table = observations_csv(observations);
-  std::vector<std::pair<std::string, std::string>> out{
-      {observations_file(recording.camera_name, "csv"), table}};
+  std::vector<std::pair<std::string, std::string>> out;
+  const std::string& table = out.emplace_back(observations_file(recording.camera_name, "csv"),
+                                              observations_csv(observations))
+                                 .second;
   if (recording.entry != RecordingEntry::kVideo) return out;
   json rejected = json::array();
   for (const RejectedTag& tag : observations.rejected) {

@@ -52,7 +52,7 @@ PartOfRecording seen_part(const Recording& recording, const RunOptions& options,
       console.warn(fmt::format("{}: {}", recording.camera_name, warning));
   PartOfRecording out{recording.camera_name, hash_inputs(recording), {}};
   if (recording.entry != RecordingEntry::kVideo) return out;
-  const auto files = kept_observations(recording, seen.observed.tags, options.detect);
+  const auto files = kept_observations(recording, all_tags(seen.observed), options.detect);
   folder.write(files);
   for (const auto& [name, content] : files) out.files.push_back({name, sha256_of_text(content)});
   return out;

@@ -151,7 +151,11 @@ void append_vector(std::string& out, const std::vector<Eigen::Vector2d>& corners
 }  // namespace
 
 std::string observations_csv(const TagObservations& observations) {
+  constexpr std::size_t kRow = 100;  // bytes, about: a film of an hour makes 200 MB
+  std::size_t corners = 0;
+  for (const TagObservation& seen : observations.observations) corners += seen.corners_px.size();
   std::string out = "t,tag,corner,u,v,sigma,hamming,margin\n";
+  out.reserve(kRow * corners);
   for (const TagObservation& seen : observations.observations) {
     for (std::size_t c = 0; c < seen.corners_px.size(); ++c) {
       fmt::format_to(std::back_inserter(out), "{},{},{},{},{},{},{},{}\n",

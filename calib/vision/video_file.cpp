@@ -98,9 +98,12 @@ class VideoFileReader final : public VideoReader {
   // Frames that come once more because the key frame lies behind have no stamp after the last one.
   void skip_to(double time_s) override {
     constexpr double kFar_s = 10.0;  // about what lies between the key frames of usual encoders
-    // Frames shown before a key frame and stored behind it need those of the key frame before.
-    constexpr double kLead_s = 5.0;
-    if (finished_ || drained_ || time_s < last_time_ + kFar_s || !go_to(time_s - kLead_s)) return;
+    // Frames shown before a key frame and stored behind it need those of the key frame before: at
+    // most so many (H.264: max_num_reorder_frames), however rarely they come.
+    constexpr double kReordered = 16.0;
+    constexpr double kLeast_s = 1.0;
+    const double lead_s = std::max(kLeast_s, kReordered * step_s_);
+    if (finished_ || drained_ || time_s < last_time_ + kFar_s || !go_to(time_s - lead_s)) return;
     avcodec_flush_buffers(decoder_.get());
     in_the_middle_ = true;
     first_.reset();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/io/sha256.h"
 #include "tests/app/commands/folder_contents.h"
 #include "tests/app/commands/poses_of_arm.h"
 #include "tests/app/commands/program.h"
@@ -345,6 +346,27 @@ TEST_F(RunRefusalsOfImages, ADamagedCache) {
     EXPECT_EQ(expect_refusal(words, ExitCode::kUndetermined, "move"), line) << damage;
     EXPECT_EQ(nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json")),
               kept);
+  }
+}
+
+// Also where its hash is right.
+TEST_F(RunRefusalsOfImages, ATableThatIsNotWhatWasKept) {
+  film(false);
+  const std::vector<std::string> words{"run", folder_.path().string(), "--output", output(),
+                                       "--quiet"};
+  const std::string line = expect_refusal(words, ExitCode::kUndetermined, "move");
+  const std::string table = read_text_file(fs::path(output()) / "observations.csv");
+  const std::string header = table.substr(0, table.find('\n') + 1);
+  auto kept = nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json"));
+  for (const char* row :
+       {"0,4,0,5,5,0.1,0", "0,4,0,5,5,0.1,0,9,1", "0,4,1,5,5,0.1,0,9", "0,1e300,0,5,5,0.1,0,9",
+        "0,nan,0,5,5,0.1,0,9", "1e9,4,0,5,5,0.1,0,9", "0,4,0,u,5,0.1,0,9", ""}) {
+    const std::string damaged = header + row + "\n";
+    kept["sha256"] = sha256_of_text(damaged);
+    folder_.write("out/observations.csv", damaged);
+    folder_.write("out/observations.json", kept.dump());
+    EXPECT_EQ(expect_refusal(words, ExitCode::kUndetermined, "move"), line) << row;
+    EXPECT_EQ(read_text_file(fs::path(output()) / "observations.csv"), table);
   }
 }
 
