@@ -2,6 +2,7 @@
 #include "app/commands/cli.h"
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -16,6 +17,7 @@
 #include "app/commands/shell_line.h"
 #include "app/io/nearest_name.h"
 #include "app/torque/saved_model_log.h"
+#include "kinematics/core/blas_kernels.h"
 #include "kinematics/core/single_threaded_blas.h"
 #include "kinematics/recorded/container.h"
 
@@ -276,6 +278,11 @@ void begin_line(CLI::App& app, CommandLine& line, int argc, const char* const* a
 }
 
 }  // namespace
+
+void prepare_process(char** argv) {
+  take_better_blas_kernels(argv);
+  static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
+}
 
 int run_program(int argc, const char* const* argv) {
   const SingleThreadedBlas same_bytes_on_any_number_of_cores;

@@ -9,6 +9,10 @@
 
 namespace kinescope {
 
+/// Of a process of its own, first of all: may start it anew (kinematics/core/blas_kernels.h); a
+/// file over the limit (ulimit -f) is then one that cannot be written, and said to be.
+void prepare_process(char** argv);
+
 /// Parses the command line, runs one command, prints one line for an error. Returns the exit code
 /// (README, "Exit codes").
 [[nodiscard]] int run_program(int argc, const char* const* argv);

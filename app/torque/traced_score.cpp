@@ -6,10 +6,13 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "dynamics/data/splits.h"
 #include "dynamics/models/constant_joints.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope {
 namespace {
@@ -63,15 +66,25 @@ class TracedJudge {
     step_s_ = 1.0 / std::min(summary.data.rate_hz, rate_hz(traced.samples));
   }
 
-  /// Fitted to the samples near `kept`.
-  [[nodiscard]] CorrectedTorqueModel fitted(const TorqueSamples& kept) const {
-    return refit(model_, traced_.samples, traced_.options, traced_.trace,
-                 near(traced_.samples, kept, step_s_));
+  /// Blocks of the training samples that are left out in turn; nothing where they are too few.
+  [[nodiscard]] std::optional<Folds> folds() const {
+    try {
+      return split_folds(train_, {.folds = kFolds});
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kUndetermined) throw;
+      return std::nullopt;
+    }
   }
 
-  /// Effects have a memory: the whole log is predicted.
-  [[nodiscard]] Eigen::MatrixXd of_log(const CorrectedTorqueModel& corrected) const {
-    return predict_torque(corrected, all_, filter_);
+  /// Torques of the whole log, for effects have a memory, by fits to each of these parts of it.
+  [[nodiscard]] std::vector<Eigen::MatrixXd> of_log(const std::vector<TorqueSamples>& parts) const {
+    std::vector<Eigen::MatrixXd> out(parts.size());
+    parallel_for(parts.size(), [&](std::size_t k) {
+      out[k] = of(refit(model_, traced_.samples, traced_.options, traced_.trace,
+                        near(traced_.samples, parts[k], step_s_)),
+                  all_);
+    });
+    return out;
   }
 
   [[nodiscard]] Eigen::MatrixXd of(const CorrectedTorqueModel& corrected,
@@ -79,14 +92,9 @@ class TracedJudge {
     return predict_torque(corrected, samples, filter_);
   }
 
-  [[nodiscard]] std::optional<LeftOutTorques> left_out() const {
-    Folds split;
-    try {
-      split = split_folds(train_, {.folds = kFolds});
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::kUndetermined) throw;
-      return std::nullopt;
-    }
+  /// `means`: of the whole log, without each fold.
+  [[nodiscard]] LeftOutTorques left_out(const Folds& split,
+                                        const std::vector<Eigen::MatrixXd>& means) const {
     const std::vector<Eigen::Index> in_log = rows_of(all_, train_);
     LeftOutTorques out;
     out.folds = static_cast<int>(split.folds.size());
@@ -97,9 +105,8 @@ class TracedJudge {
     out.fold.resize(train_.size());
     for (int f = 0; f < out.folds; ++f) {
       const Fold& fold = split.folds[static_cast<std::size_t>(f)];
-      const TorqueSamples rest = select_rows(train_, fold.train);
-      const Eigen::MatrixXd mean = of_log(fitted(rest));
-      const Eigen::RowVectorXd constant = rest.torque.colwise().mean();
+      const Eigen::MatrixXd& mean = means[static_cast<std::size_t>(f)];
+      const Eigen::RowVectorXd constant = train_.torque(fold.train, Eigen::all).colwise().mean();
       for (const Eigen::Index row : fold.test) {
         out.residual.row(row) =
             train_.torque.row(row) - mean.row(in_log[static_cast<std::size_t>(row)]);
@@ -137,22 +144,27 @@ TracedScore judged(const TracedJudge& judge, const TracedLog& traced, const Torq
   TracedScore out;
   const TorqueSamples& test = summary.test;
   TorquePrediction& prediction = out.prediction;
-  const CorrectedTorqueModel corrected =
-      unseen_test ? traced.trace.corrected : judge.fitted(summary.train);
+  const std::optional<Folds> split = judge.folds();
+  std::vector<TorqueSamples> parts;
+  if (split) {
+    for (const Fold& fold : split->folds) parts.push_back(select_rows(summary.train, fold.train));
+  }
+  if (!unseen_test) parts.push_back(summary.train);
+  const std::vector<Eigen::MatrixXd> means = judge.of_log(parts);
   if (unseen_test) {
-    prediction.mean = judge.of(corrected, test);
+    prediction.mean = judge.of(traced.trace.corrected, test);
   } else {
-    const std::vector<Eigen::Index> rows = rows_of(summary.data.samples, test);
-    prediction.mean = judge.of_log(corrected)(rows, Eigen::all);
+    prediction.mean = means.back()(rows_of(summary.data.samples, test), Eigen::all);
   }
   prediction.model_sigma = Eigen::MatrixXd::Zero(test.size(), test.joints());
   prediction.sigma = prediction.model_sigma;
   Eigen::VectorXd left_out_percent;
-  if (const auto left = judge.left_out()) {
-    const CalibratedSigma calibrated = calibrate(*left);
+  if (split) {
+    const LeftOutTorques left = judge.left_out(*split, means);
+    const CalibratedSigma calibrated = calibrate(left);
     out.bands = calibrated.bands;
     prediction = with_sigma_parts(std::move(prediction), calibrated.parts);
-    left_out_percent = left_out_nmse_percent(*left);
+    left_out_percent = left_out_nmse_percent(left);
   }
   out.score = score_prediction(prediction, out.bands, test);
   out.score.left_out_nmse_percent = left_out_percent;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -14,6 +15,7 @@
 #include "calib/trace/scan_slope.h"
 #include "calib/trace/verdict.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/parallel_for.h"
 
 namespace kinescope::trace {
 namespace {
@@ -423,14 +425,18 @@ bool Tracer::may_be_added(const Candidate& candidate, double scan, const Score& 
 std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,
                                                   const std::vector<Candidate>& candidates,
                                                   const std::vector<TestedMember>& family) const {
-  std::vector<Contender> out;
-  for (const TestedMember& member : family) {
+  std::vector<std::optional<Contender>> found(family.size());
+  parallel_for(family.size(), [&](std::size_t k) {
+    const TestedMember& member = family[k];
     const Candidate& candidate = candidates[member.index];
-    if (member.p_value > level_ || !may_be_added(candidate, member.scan, member.score)) continue;
-    const EffectId& id = candidate.id;
+    if (member.p_value > level_ || !may_be_added(candidate, member.scan, member.score)) return;
     const Score confirmed = jackknife_test(system, member.columns);
-    if (confirmed.p_value * member.tests > level_) continue;
-    out.push_back({member, id, held_out_instants(system, member.columns).whitened});
+    if (confirmed.p_value * member.tests > level_) return;
+    found[k] = {member, candidate.id, held_out_instants(system, member.columns).whitened};
+  });
+  std::vector<Contender> out;
+  for (std::optional<Contender>& one : found) {
+    if (one) out.push_back(std::move(*one));
   }
   const std::vector<Contender> all = out;
   std::erase_if(out, [&](const Contender& contender) {

@@ -40,18 +40,52 @@ std::vector<FilterSection> sections(int order, double w) {
   return out;
 }
 
-/// One pass along a column, starting as if the first value had always been there (transposed direct
-/// form II; gain 1 at zero frequency, so the state follows from the first value).
+/// A section (transposed direct form II) that has always seen `first`: at zero frequency its gain
+/// is 1, so its state follows from that.
+class RunningSection {
+ public:
+  RunningSection() = default;
+  RunningSection(const FilterSection& section, double first)
+      : s_(section), z1_((1.0 - section.b0) * first), z2_((section.b2 - section.a2) * first) {}
+
+  double next(double x) {
+    const double y = s_.b0 * x + z1_;
+    z1_ = (s_.b1 * x + z2_) - s_.a1 * y;
+    z2_ = s_.b2 * x - s_.a2 * y;
+    return y;
+  }
+
+ private:
+  FilterSection s_;
+  double z1_ = 0.0;
+  double z2_ = 0.0;
+};
+
+/// One pass along a column, starting as if the first value had always been there. All sections go
+/// along together: each waits for its own last value, and they wait at the same time.
+template <std::size_t kSections>
 void pass(std::vector<double>& x, const std::vector<FilterSection>& filter) {
-  for (const FilterSection& s : filter) {
-    double z1 = (1.0 - s.b0) * x.front();
-    double z2 = (s.b2 - s.a2) * x.front();
-    for (double& value : x) {
-      const double y = s.b0 * value + z1;
-      z1 = s.b1 * value - s.a1 * y + z2;
-      z2 = s.b2 * value - s.a2 * y;
-      value = y;
-    }
+  std::array<RunningSection, kSections> running;
+  double first = x.front();
+  for (std::size_t k = 0; k < kSections; ++k) {
+    running[k] = RunningSection(filter[k], first);
+    first = RunningSection(running[k]).next(first);
+  }
+  for (double& value : x) {
+    for (RunningSection& section : running) value = section.next(value);
+  }
+}
+
+void pass(std::vector<double>& x, const std::vector<FilterSection>& filter) {
+  switch (filter.size()) {
+    case 1:
+      return pass<1>(x, filter);
+    case 2:
+      return pass<2>(x, filter);
+    case 3:
+      return pass<3>(x, filter);
+    default:
+      return pass<4>(x, filter);  // order 8
   }
 }
 

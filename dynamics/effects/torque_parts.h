@@ -60,6 +60,7 @@ struct TorqueTracedModel::Parts {
   Memo<int, std::shared_ptr<const effects::GravityCase>> starts;
 
   /// All that follows from the instants that are kept.
+  void leave_out(const std::vector<char>& wanted) const;
   void refresh();
   void choose_base(const effects::BaseData& data, bool masses);
 };

@@ -364,13 +364,13 @@ CorrectedTorqueModel refit(const DynamicModel& model, const TorqueSamples& sampl
                            const std::vector<char>& wanted) {
   TracedTorqueOptions same = options.model;
   same.base = found.base.kind;
-  TorqueTracedModel traced(model, samples, same);
-  std::vector<char> kept =
-      outside_spans(traced.motion(), found.contacts, contact_margin_s(options));
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (wanted[k] == 0) kept[k] = 0;
-  }
-  traced.leave_out(kept);
+  const TorqueTracedModel traced(model, samples, same, [&](const EffectMotion& motion) {
+    std::vector<char> kept = outside_spans(motion, found.contacts, contact_margin_s(options));
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      if (wanted[k] == 0) kept[k] = 0;
+    }
+    return kept;
+  });
   const std::vector<AddedEffect>& added = found.trace.added;
   return correct(model, traced, found.trace,
                  with_values(effects_of(found.trace), added, traced.fit(added).values));

@@ -142,7 +142,7 @@ std::string_view to_string(TorqueBaseKind kind) {
 TorqueTracedModel::~TorqueTracedModel() = default;
 
 TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamples& samples,
-                                     const TracedTorqueOptions& options)
+                                     const TracedTorqueOptions& options, const Kept& kept)
     : parts_(std::make_unique<Parts>()) {
   if (options.folds < 2 || options.most_instants < kFewestInstants ||
       !(options.trust_factor >= 1.0)) {
@@ -177,7 +177,18 @@ TorqueTracedModel::TorqueTracedModel(const DynamicModel& model, const TorqueSamp
     p.context.widths[static_cast<Eigen::Index>(p.context.turns.size()) - 1] =
         turns ? options.widths.rad_s : options.widths.m_s;
   }
+  if (kept) p.leave_out(kept(*p.motion));
   p.refresh();
+}
+
+void TorqueTracedModel::Parts::leave_out(const std::vector<char>& wanted) const {
+  KINESCOPE_CHECK(static_cast<Eigen::Index>(wanted.size()) == motion->samples().size(),
+                  "one flag a sample");
+  motion->leave_out(wanted);
+  if (motion->instants() < kFewestInstants) {
+    throw undetermined("trace", "hardly anything is left when contacts are left out",
+                       "record a longer motion without contact");
+  }
 }
 
 void TorqueTracedModel::Parts::refresh() {
@@ -279,13 +290,7 @@ const EffectContext& TorqueTracedModel::context() const { return parts_->context
 const EffectMotion& TorqueTracedModel::motion() const { return *parts_->motion; }
 
 void TorqueTracedModel::leave_out(const std::vector<char>& wanted) {
-  KINESCOPE_CHECK(static_cast<Eigen::Index>(wanted.size()) == parts_->motion->samples().size(),
-                  "one flag a sample");
-  parts_->motion->leave_out(wanted);
-  if (parts_->motion->instants() < kFewestInstants) {
-    throw undetermined("trace", "hardly anything is left when contacts are left out",
-                       "record a longer motion without contact");
-  }
+  parts_->leave_out(wanted);
   parts_->refresh();
 }
 

@@ -10,6 +10,7 @@
 // (trace_torque.h).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -63,9 +64,12 @@ struct FittedTorque {
 
 class TorqueTracedModel : public TracedModel {
  public:
+  /// One flag a sample: those of 0 do not count.
+  using Kept = std::function<std::vector<char>(const EffectMotion& motion)>;
+
   /// Throws bad_request for arrays or options that do not fit; undetermined for logs too short.
   TorqueTracedModel(const DynamicModel& model, const TorqueSamples& samples,
-                    const TracedTorqueOptions& options = {});
+                    const TracedTorqueOptions& options = {}, const Kept& kept = {});
   ~TorqueTracedModel() override;
 
   [[nodiscard]] TracedFit fit(const std::vector<AddedEffect>& effects) const override;
@@ -74,7 +78,7 @@ class TorqueTracedModel : public TracedModel {
   [[nodiscard]] const EffectMotion& motion() const;
   [[nodiscard]] const EffectContext& context() const;
 
-  /// Samples for which `wanted` is 0 count no more.
+  /// Samples for which `wanted` is 0 count no more. Throws undetermined where too few are left.
   void leave_out(const std::vector<char>& wanted);
 
   /// What every instant's torque lacks after a fit, in the unit of the torque: instants x joints.

@@ -145,7 +145,7 @@ class SharedMatrix {
   std::array<int, 9> descriptor_{};
 };
 
-constexpr int kFirst = 1;  // Fortran's
+constexpr int kFirstIndex = 1;  // Fortran's
 
 // The same everywhere: what each process has of a diagonal, in its place, zero elsewhere.
 VectorXd diagonal_of(const Grid& grid, const SharedMatrix& matrix) {
@@ -177,7 +177,7 @@ void fill(Workers& workers, const Covariance& covariance, const Prepared& x, con
 int factor(SharedMatrix& matrix) {
   const int n = static_cast<int>(matrix.rows());
   int info = 0;
-  pdpotrf_("L", &n, matrix.data(), &kFirst, &kFirst, matrix.descriptor(), &info);
+  pdpotrf_("L", &n, matrix.data(), &kFirstIndex, &kFirstIndex, matrix.descriptor(), &info);
   KINESCOPE_CHECK(info >= 0, "arguments of pdpotrf");
   return info;
 }
@@ -191,8 +191,8 @@ VectorXd solved(const Grid& grid, const SharedMatrix& factor, const VectorXd& y,
   const int n = static_cast<int>(y.size());
   const int one = 1;
   int info = 0;
-  pdpotrs_("L", &n, &one, factor.data(), &kFirst, &kFirst, factor.descriptor(), right.data(),
-           &kFirst, &kFirst, right.descriptor(), &info);
+  pdpotrs_("L", &n, &one, factor.data(), &kFirstIndex, &kFirstIndex, factor.descriptor(),
+           right.data(), &kFirstIndex, &kFirstIndex, right.descriptor(), &info);
   KINESCOPE_CHECK(info == 0, "arguments of pdpotrs");
   VectorXd out = VectorXd::Zero(y.size());
   for (const SharedMatrix::Part& part : right.parts()) {
@@ -271,8 +271,8 @@ class DistributedPosterior : public Posterior {
     const int n = static_cast<int>(cross.rows());
     const int columns = static_cast<int>(cross.cols());
     const double one = 1.0;
-    pdtrsm_("L", "L", "N", "N", &n, &columns, &one, factor_.data(), &kFirst, &kFirst,
-            factor_.descriptor(), cross.data(), &kFirst, &kFirst, cross.descriptor());
+    pdtrsm_("L", "L", "N", "N", &n, &columns, &one, factor_.data(), &kFirstIndex, &kFirstIndex,
+            factor_.descriptor(), cross.data(), &kFirstIndex, &kFirstIndex, cross.descriptor());
     VectorXd explained = VectorXd::Zero(size * m);
     for (const SharedMatrix::Part& part : parts) {
       explained.segment(part.col, part.cols) +=

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kinematics/core/blas_kernels.h"
+
+#include <cstdlib>
+#include <string>
+
+#include <cblas.h>
+#include <unistd.h>
+
+namespace kinescope {
+namespace {
+
+constexpr const char* kVariable = "OPENBLAS_CORETYPE";
+
+VectorUnits vector_units() {
+#if defined(__x86_64__)
+  const bool avx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  const bool avx512 =
+      __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+      __builtin_cpu_supports("avx512cd") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+      __builtin_cpu_supports("avx512vl") != 0;
+  return {avx2, avx512};
+#else
+  return {};
+#endif
+}
+
+}  // namespace
+
+std::string_view better_blas_kernels(std::string_view chosen, VectorUnits units) {
+  if (chosen != "Prescott") return "";
+  if (units.avx512) return "SkylakeX";
+  return units.avx2 ? "Haswell" : "";
+}
+
+void take_better_blas_kernels(char** arguments) {
+  if (std::getenv(kVariable) != nullptr) return;
+  const std::string kernels(better_blas_kernels(openblas_get_corename(), vector_units()));
+  if (kernels.empty() || setenv(kVariable, kernels.c_str(), 0) != 0) return;
+  execv("/proc/self/exe", arguments);
+}
+
+}  // namespace kinescope
