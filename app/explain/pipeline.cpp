@@ -16,6 +16,7 @@
 #include "app/explain/moving_camera.h"
 #include "app/explain/nominal_channels.h"
 #include "app/explain/own_units.h"
+#include "app/explain/recording_pieces.h"
 #include "calib/bundle/place_markers.h"
 #include "calib/camera/camera_file.h"
 #include "calib/tracks/camera_from_tags.h"
@@ -202,17 +203,33 @@ double edge_px(const TagObservation& seen) {
   return sum / static_cast<double>(n);
 }
 
-// Of a film so long that its neighbouring frames say the same.
-void leave_out_neighbours(Observed& observed) {
-  std::optional<ThinnedFrames> thinned = thin_frames(observed.tags);
-  if (!thinned) return;
-  observed.warnings.push_back(fmt::format(
-      "{} sightings in {} frames: one frame in {} is calibrated on, which says nearly as much",
-      observed.tags.observations.size(), observed.tags.times_s.size(), thinned->every));
-  observed.detected = std::exchange(observed.tags, std::move(thinned->tags));
+// Where neighbouring frames say nearly the same: of motion, not of postures.
+bool is_film(const Recording& recording, const std::vector<double>& times_s) {
+  constexpr double kSlowest_s = 0.5;  // between two frames; chosen
+  if (times_s.size() < 2) return false;
+  const double whole_s = times_s.back() - times_s.front();
+  if (whole_s > kSlowest_s * static_cast<double>(times_s.size() - 1)) return false;
+  return recording.flange.empty() ? !is_of_postures(recording.log, times_s)
+                                  : !is_posture_log(recording.flange.front().log, times_s);
+}
+
+void measure_corners(Observed& observed) {
+  observed.measurements.times_s = observed.tags.times_s;
+  observed.measurements.corners = observed.tags.observations;
 }
 
 }  // namespace
+
+void leave_out_neighbours(const Recording& recording, int k, Observed& observed) {
+  if (k < 2 || !is_film(recording, observed.tags.times_s)) return;
+  observed.warnings.push_back(fmt::format(
+      "{} sightings in {} frames: one frame in {} is calibrated on, which says nearly as much",
+      observed.tags.observations.size(), observed.tags.times_s.size(), k));
+  TagObservations thinned = every_kth_frame(observed.tags, k);
+  if (!observed.detected) observed.detected = std::move(observed.tags);
+  observed.tags = std::move(thinned);
+  measure_corners(observed);
+}
 
 Observed observe(const Recording& recording, const SightOptions& options,
                  const std::optional<CameraModel>& lens,
@@ -255,9 +272,8 @@ Observed observe(const Recording& recording, const SightOptions& options,
   if (recording.entry == RecordingEntry::kVideo || recording.entry == RecordingEntry::kCorners) {
     require_markers(recording, out.tags);
     leave_out_repeated_frames(out.tags);
-    leave_out_neighbours(out);
-    out.measurements.times_s = out.tags.times_s;
-    out.measurements.corners = out.tags.observations;
+    measure_corners(out);
+    leave_out_neighbours(recording, thinning_of(corners_of(out.tags)), out);
   }
   if (recording.entry == RecordingEntry::kVideo) {
     require_time_overlap(recording.log, out.measurements.times_s, recording.video.string());

@@ -73,6 +73,10 @@ class NothingSeen : public Error {
                                const std::optional<TagObservations>& cached,
                                const Progress& progress);
 
+/// Of a film so long that neighbouring frames say nearly the same, one frame in k is measured by;
+/// of postures all of them.
+void leave_out_neighbours(const Recording& recording, int k, Observed& observed);
+
 /// The declared camera, checked against the image size, or what the markers' shapes say of it.
 [[nodiscard]] CameraModel choose_camera(const Recording& recording, const TagObservations& tags);
 

@@ -16,6 +16,7 @@
 #include "calib/bundle/place_recording.h"
 #include "calib/quality/predictive_score.h"
 #include "calib/tracks/pose_tracks_from_tags.h"
+#include "calib/vision/thinned_frames.h"
 #include "kinematics/core/error.h"
 #include "kinematics/log/join_logs.h"
 #include "kinematics/structure/attach_marker.h"
@@ -554,18 +555,28 @@ SeenTogether as_one_recording(LoneCamera one, const std::vector<Recording>& give
           std::move(recording)};
 }
 
+// So many recordings are thinned as one film of their length is.
+void leave_out_neighbours(std::vector<LoneCamera>& alone) {
+  std::size_t corners = 0;
+  for (const LoneCamera& one : alone) corners += corners_of(one.seen.observed.tags);
+  for (LoneCamera& one : alone)
+    leave_out_neighbours(one.recording, thinning_of(corners), one.seen.observed);
+}
+
 }  // namespace
 
 SeenTogether see_recordings(const std::vector<Recording>& given, const SightOptions& options,
                             const std::function<SeenAlone(const Recording&)>& see_alone) {
   std::vector<LoneCamera> alone;
+  for (const Recording& recording : given)
+    alone.push_back(LoneCamera{recording, see_alone(recording), {}});
+  leave_out_neighbours(alone);
   std::vector<TagObservations> detected;
-  for (const Recording& recording : given) {
-    LoneCamera& one = alone.emplace_back(LoneCamera{recording, see_alone(recording), {}});
+  for (LoneCamera& one : alone) {
     const Observed& observed = one.seen.observed;
     one.tracks = observed.tags.observations.empty()
                      ? observed.measurements.poses
-                     : pose_tracks_from_tags(observed.tags, one.seen.camera, recording.markers);
+                     : pose_tracks_from_tags(observed.tags, one.seen.camera, one.recording.markers);
     detected.push_back(all_tags(observed));
   }
   require_one_kind(alone);

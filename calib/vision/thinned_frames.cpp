@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/vision/thinned_frames.h"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -9,14 +10,8 @@ namespace {
 
 constexpr int kLeftOut = -1;
 
-std::size_t corners_of(const TagObservations& tags) {
-  std::size_t out = 0;
-  for (const TagObservation& seen : tags.observations) out += seen.corners_px.size();
-  return out;
-}
-
 // The new number of each frame.
-std::vector<int> numbered_anew(const TagObservations& tags, int every) {
+std::vector<int> numbered_anew(const TagObservations& tags, int k) {
   std::vector<bool> shows_one(tags.times_s.size());
   for (const TagObservation& seen : tags.observations)
     shows_one[static_cast<std::size_t>(seen.frame)] = true;
@@ -24,7 +19,7 @@ std::vector<int> numbered_anew(const TagObservations& tags, int every) {
   int kept = 0;
   std::vector<int> out;
   for (const bool shows : shows_one)
-    out.push_back(rank[shows ? 1 : 0]++ % every == 0 ? kept++ : kLeftOut);
+    out.push_back(rank[shows ? 1 : 0]++ % k == 0 ? kept++ : kLeftOut);
   return out;
 }
 
@@ -36,15 +31,23 @@ void keep(auto& seen, const std::vector<int>& number) {
 
 }  // namespace
 
-std::optional<ThinnedFrames> thin_frames(const TagObservations& tags, std::size_t most) {
-  const auto every = static_cast<int>((corners_of(tags) + most - 1) / most);
-  if (every < 2) return std::nullopt;
-  ThinnedFrames out{every, tags};
-  const std::vector<int> number = numbered_anew(tags, every);
-  keep(out.tags.observations, number);
-  keep(out.tags.rejected, number);
+std::size_t corners_of(const TagObservations& tags) {
+  std::size_t out = 0;
+  for (const TagObservation& seen : tags.observations) out += seen.corners_px.size();
+  return out;
+}
+
+int thinning_of(std::size_t corners, std::size_t most) {
+  return static_cast<int>(std::max<std::size_t>(1, (corners + most - 1) / most));
+}
+
+TagObservations every_kth_frame(const TagObservations& tags, int k) {
+  TagObservations out = tags;
+  const std::vector<int> number = numbered_anew(tags, k);
+  keep(out.observations, number);
+  keep(out.rejected, number);
   std::size_t frame = 0;
-  std::erase_if(out.tags.times_s, [&](double) { return number[frame++] == kLeftOut; });
+  std::erase_if(out.times_s, [&](double) { return number[frame++] == kLeftOut; });
   return out;
 }
 

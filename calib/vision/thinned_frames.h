@@ -6,7 +6,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 
 #include "calib/camera/tag_observations.h"
 
@@ -15,15 +14,13 @@ namespace kinescope {
 /// Corners of markers: 30000 squares, or 8 minutes of four at 15 frames a second.
 inline constexpr std::size_t kMostCorners = 120000;
 
-/// What every k-th frame shows, numbered anew.
-struct ThinnedFrames {
-  int every = 2;  ///< k, the least that leaves so many corners or fewer
-  TagObservations tags;
-};
+[[nodiscard]] std::size_t corners_of(const TagObservations& tags);
 
-/// Of the frames that show a marker and of those that show none, each k-th; frames keep their
-/// times. Nothing where there are `most` corners or fewer.
-[[nodiscard]] std::optional<ThinnedFrames> thin_frames(const TagObservations& tags,
-                                                       std::size_t most = kMostCorners);
+/// The least k for which one frame in k leaves `most` corners or fewer; 1: all frames stay.
+[[nodiscard]] int thinning_of(std::size_t corners, std::size_t most = kMostCorners);
+
+/// Of the frames that show a marker and of those that show none, each k-th, numbered anew; they
+/// keep their times.
+[[nodiscard]] TagObservations every_kth_frame(const TagObservations& tags, int k);
 
 }  // namespace kinescope

@@ -44,6 +44,34 @@ TEST(Pipeline, OfAFilmOfHoursFramesAreLeftOutAndAllDetectionsKept) {
   EXPECT_EQ(summarise_markers(observed, recording.markers).front().frames_seen, kFrames);
 }
 
+// As photographs of a board of many corners are, at whatever times.
+TEST(Pipeline, OfPosturesEveryFrameIsUsedHoweverMany) {
+  constexpr int kFrames = 40000;
+  Recording recording = film(kFrames);
+  const TagObservations tags = value_of(recording.corners);
+  recording.log.channels = {"q"};
+  recording.log.times_s = tags.times_s;
+  recording.log.values.resize(kFrames, 1);
+  for (Eigen::Index row = 0; row < kFrames; ++row)
+    recording.log.values(row, 0) = static_cast<double>(row * 7919 % 1000) / 1000.0;
+  EXPECT_EQ(observe(recording, {}, {}, {}, {}).tags.observations.size(), kFrames);
+  for (double& time_s : recording.corners->times_s) time_s *= 10.0;  // one a second, without a log
+  recording.log = {};
+  EXPECT_EQ(observe(recording, {}, {}, {}, {}).tags.observations.size(), kFrames);
+}
+
+// Of several recordings that are thinned once more, all together.
+TEST(Pipeline, WhatWasDetectedStaysWhereAFilmIsThinnedTwice) {
+  constexpr int kFrames = 60000;
+  const Recording recording = film(kFrames);
+  Observed observed = observe(recording, {}, {}, {}, {});
+  leave_out_neighbours(recording, 5, observed);
+  EXPECT_EQ(observed.measurements.corners.size(), kFrames / 10);
+  EXPECT_EQ(observed.measurements.times_s.size(), kFrames / 10);
+  EXPECT_EQ(all_tags(observed).observations.size(), kFrames);
+  EXPECT_EQ(frame_times(observed).size(), kFrames);
+}
+
 TEST(Pipeline, OfAnOrdinaryFilmEveryFrameIsUsed) {
   const Observed observed = observe(film(300), {}, {}, {}, {});
   EXPECT_EQ(observed.measurements.corners.size(), 300U);

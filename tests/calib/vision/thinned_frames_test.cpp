@@ -30,24 +30,24 @@ std::vector<int> frames_of(const TagObservations& tags, int id) {
   return out;
 }
 
-TEST(ThinFrames, KeepsEveryKthOfTheFramesThatShowAMarkerAndOfTheOthers) {
+TEST(ThinnedFrames, AreEveryKthOfThoseThatShowAMarkerAndOfTheOthers) {
   TagObservations tags = film(9);
   tags.rejected = {{2, TagId{3}, ""}, {3, TagId{3}, ""}};
-  const std::optional<ThinnedFrames> thinned = thin_frames(tags, 23);
-  ASSERT_TRUE(thinned);
-  EXPECT_EQ(thinned->every, 3);
-  EXPECT_THAT(thinned->tags.times_s, testing::ElementsAre(0.0, 1.0, 2.0, 3.5));
-  EXPECT_THAT(frames_of(thinned->tags, 1), testing::ElementsAre(0, 2, 3));
-  EXPECT_THAT(frames_of(thinned->tags, 2), testing::ElementsAre(0, 2, 3));
-  ASSERT_EQ(thinned->tags.rejected.size(), 1U);
-  EXPECT_EQ(thinned->tags.rejected.front().frame, 1);
-  // What was thinned already stays.
-  EXPECT_FALSE(thin_frames(thinned->tags, 24));
+  const TagObservations thinned = every_kth_frame(tags, 3);
+  EXPECT_THAT(thinned.times_s, testing::ElementsAre(0.0, 1.0, 2.0, 3.5));
+  EXPECT_THAT(frames_of(thinned, 1), testing::ElementsAre(0, 2, 3));
+  EXPECT_THAT(frames_of(thinned, 2), testing::ElementsAre(0, 2, 3));
+  ASSERT_EQ(thinned.rejected.size(), 1U);
+  EXPECT_EQ(thinned.rejected.front().frame, 1);
+  EXPECT_EQ(corners_of(tags), 64U);
+  EXPECT_EQ(corners_of(thinned), 24U);
 }
 
-TEST(ThinFrames, LeavesWhatIsNoMoreThanAllowed) {
-  EXPECT_FALSE(thin_frames(film(9), 64));
-  EXPECT_FALSE(thin_frames(TagObservations()));
+TEST(ThinnedFrames, LeaveNoMoreThanAllowed) {
+  EXPECT_EQ(thinning_of(64, 64), 1);
+  EXPECT_EQ(thinning_of(0), 1);
+  EXPECT_EQ(thinning_of(65, 64), 2);
+  EXPECT_EQ(thinning_of(64, 23), 3);
 }
 
 }  // namespace
