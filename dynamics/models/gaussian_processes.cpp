@@ -18,6 +18,7 @@
 #include "dynamics/gp/sparse.h"
 #include "dynamics/gp/workers.h"
 #include "dynamics/identify/model_features.h"
+#include "dynamics/models/joint_kinds.h"
 #include "dynamics/models/process_values.h"
 #include "kinematics/core/median.h"
 

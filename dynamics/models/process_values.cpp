@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "dynamics/models/joint_kinds.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope::models {
@@ -89,15 +90,6 @@ void append_motions(const Eigen::MatrixXd& motions, Eigen::MatrixXd& all) {
 }
 
 }  // namespace
-
-gp::JointKinds joint_kinds(const RigidModel& rigid) {
-  gp::JointKinds kinds;
-  for (const RigidBody& body : rigid.bodies) {
-    kinds.push_back(body.type == JointType::kPrismatic ? gp::JointKind::kPrismatic
-                                                       : gp::JointKind::kRevolute);
-  }
-  return kinds;
-}
 
 void add_process(TorqueModelKind kind, const JointProcess& process, const Eigen::MatrixXd& root,
                  SavedTorqueModel& model) {

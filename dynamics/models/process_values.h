@@ -21,8 +21,6 @@ struct JointProcess {
   Eigen::VectorXd feature_prior;
 };
 
-[[nodiscard]] gp::JointKinds joint_kinds(const RigidModel& rigid);
-
 /// Adds it to the model; `root` is that of gp::compact_variance().
 void add_process(TorqueModelKind kind, const JointProcess& process, const Eigen::MatrixXd& root,
                  SavedTorqueModel& model);

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "dynamics/models/process_values.h"
+#include "dynamics/models/joint_kinds.h"
 #include "dynamics/models/saved_model_file.h"
 #include "dynamics/models/saved_model_json.h"
 #include "dynamics/models/saved_model_schema.h"
