@@ -2,7 +2,9 @@
 #include "kinematics/core/blas_kernels.h"
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 #include <cblas.h>
 #include <unistd.h>
@@ -37,7 +39,10 @@ void take_better_blas_kernels(char** arguments) {
   if (std::getenv(kVariable) != nullptr) return;
   const std::string kernels(better_blas_kernels(openblas_get_corename(), vector_units()));
   if (kernels.empty() || setenv(kVariable, kernels.c_str(), 0) != 0) return;
-  execv("/proc/self/exe", arguments);
+  // By its path: by the link the process would be named "exe".
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error) execv(program.c_str(), arguments);
 }
 
 }  // namespace kinescope
