@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -118,8 +119,10 @@ std::optional<TagObservations> observations_of(const json& kept, const fs::path&
   out.width = kept.at("width").get<int>();
   out.height = kept.at("height").get<int>();
   for (const json& tag : kept.at("rejected")) {
-    out.rejected.push_back({tag.at("frame").get<int>(), TagId{tag.at("id").get<int>()},
-                            tag.at("reason").get<std::string>()});
+    const int frame = tag.at("frame").get<int>();
+    if (frame < 0 || std::cmp_greater_equal(frame, out.times_s.size())) return std::nullopt;
+    out.rejected.push_back(
+        {frame, TagId{tag.at("id").get<int>()}, tag.at("reason").get<std::string>()});
   }
   out.warnings = kept.at("warnings").get<std::vector<std::string>>();
   out.lens_known = kept.at("lens_known").get<bool>();

@@ -339,7 +339,8 @@ TEST_F(RunRefusalsOfImages, ADamagedCache) {
   const auto kept = nlohmann::json::parse(read_text_file(fs::path(output()) / "observations.json"));
   for (const char* damage :
        {R"({"key": 5})", R"({"times_s": null})", R"({"times_s": []})", R"({"rejected": [{}]})",
-        R"({"rejected": null, "width": "wide"})", R"({"warnings": null})"}) {
+        R"({"rejected": null, "width": "wide"})", R"({"warnings": null})",
+        R"({"rejected": [{"frame": 1000000, "id": 1, "reason": "far"}]})"}) {
     nlohmann::json damaged = kept;
     damaged.merge_patch(nlohmann::json::parse(damage));
     folder_.write("out/observations.json", damaged.dump());
