@@ -187,7 +187,7 @@ struct CompactPredictor::Group {
   }
   static void append(const Eigen::VectorXd& row, Eigen::MatrixXd& to) {
     to.conservativeResize(to.rows() + 1, row.size());
-    to.bottomRows(1) = row.transpose();
+    if (row.size() > 0) to.bottomRows(1) = row.transpose();
   }
 
   void take(const Eigen::VectorXd& motion) {
