@@ -47,6 +47,7 @@
 #include "calib/vision/repeated_frames.h"
 #include "calib/vision/stills.h"
 #include "kinematics/core/file.h"
+#include "kinematics/core/mean_step.h"
 #include "kinematics/urdf/calibrated_urdf.h"
 #include "kinematics/urdf/camera_links.h"
 #include "kinematics/urdf/urdf.h"
@@ -94,16 +95,12 @@ void describe_recording(const Recording& recording, const Observed& observed,
   run.free_asked = options.free.has_value();
 }
 
-double mean_step(const std::vector<double>& times_s) {
-  return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
-}
-
 // Motion between the readings of a slow log is interpolated: all that moves is then off by a time,
 // too.
 std::string jitter_words(double jitter_s, const JointLog& log, const Observed& observed) {
   constexpr double kSlow = 2.0;  // frames
-  const double log_step = log.size() > 1 ? mean_step(log.times_s) : 0.0;
-  if (log_step > kSlow * mean_step(frame_times(observed))) {
+  const double log_step = log.size() > 1 ? mean_step_s(log.times_s) : 0.0;
+  if (log_step > kSlow * mean_step_s(frame_times(observed))) {
     return fmt::format(
         "the frames and the joint log scatter by {:.2g} ms (standard deviation) about each other: "
         "{} has {:.2g} readings a second, and the motion between them is interpolated: log faster",

@@ -26,6 +26,7 @@
 #include "calib/vision/thinned_frames.h"
 #include "calib/vision/video.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/mean_step.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/rotation_between.h"
 #include "kinematics/model/usual_unit.h"
@@ -206,9 +207,7 @@ double edge_px(const TagObservation& seen) {
 // Where neighbouring frames say nearly the same: of motion, not of postures.
 bool is_film(const Recording& recording, const std::vector<double>& times_s) {
   constexpr double kSlowest_s = 0.5;  // between two frames; chosen
-  if (times_s.size() < 2) return false;
-  const double whole_s = times_s.back() - times_s.front();
-  if (whole_s > kSlowest_s * static_cast<double>(times_s.size() - 1)) return false;
+  if (times_s.size() < 2 || mean_step_s(times_s) > kSlowest_s) return false;
   return recording.flange.empty() ? !is_of_postures(recording.log, times_s)
                                   : !is_posture_log(recording.flange.front().log, times_s);
 }

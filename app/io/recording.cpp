@@ -17,6 +17,7 @@
 #include "calib/camera/camera_file.h"
 #include "kinematics/core/bad_rows.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/mean_step.h"
 #include "kinematics/recorded/container.h"
 #include "kinematics/recorded/recorded_log.h"
 #include "kinematics/urdf/urdf.h"
@@ -397,10 +398,6 @@ void check_fixed_tags(const Recording& recording, const RecordingFiles& files) {
                                 value_of(files.tags).filename().string()),
                     "correct one of the two");
   }
-}
-
-double mean_step_s(const std::vector<double>& times_s) {
-  return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
 }
 
 /// One clock in a thousandth, millionth or billionth of a second: seen by how long both run, where

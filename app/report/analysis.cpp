@@ -11,6 +11,7 @@
 
 #include "app/report/prediction.h"
 #include "calib/camera/marker_set.h"
+#include "kinematics/core/mean_step.h"
 
 namespace kinescope::report {
 namespace {
@@ -22,8 +23,7 @@ constexpr std::array<int, 2> kCoverageGrid = {8, 6};
 
 /// Mean time from one frame to the next, s; 0 where there is one frame or none.
 double frame_interval(const std::vector<double>& times_s) {
-  if (times_s.size() < 2) return 0.0;
-  return (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
+  return times_s.size() < 2 ? 0.0 : mean_step_s(times_s);
 }
 
 /// Frames that count as one because their residuals are alike.

@@ -101,7 +101,7 @@ class VideoFileReader final : public VideoReader {
     // Frames shown before a key frame and stored behind it need those of the key frame before: at
     // most so many (H.264: max_num_reorder_frames), however rarely they come.
     constexpr double kReordered = 16.0;
-    constexpr double kLeast_s = 1.0;
+    constexpr double kLeast_s = 1.0;  // chosen: where frames come less evenly than they are stamped
     const double lead_s = std::max(kLeast_s, kReordered * step_s_);
     if (finished_ || drained_ || time_s < last_time_ + kFar_s || !go_to(time_s - lead_s)) return;
     avcodec_flush_buffers(decoder_.get());

@@ -85,7 +85,7 @@ void pass(std::vector<double>& x, const std::vector<FilterSection>& filter) {
     case 3:
       return pass<3>(x, filter);
     default:
-      return pass<4>(x, filter);  // order 8
+      return pass<4>(x, filter);  // orders 7 and 8
   }
 }
 

@@ -59,8 +59,8 @@ struct TorqueTracedModel::Parts {
   /// From a base that stands as gravity_starts() says: every fit that seeks gravity begins there.
   Memo<int, std::shared_ptr<const effects::GravityCase>> starts;
 
-  /// All that follows from the instants that are kept.
   void leave_out(const std::vector<char>& wanted) const;
+  /// All that follows from the instants that are kept.
   void refresh();
   void choose_base(const effects::BaseData& data, bool masses);
 };

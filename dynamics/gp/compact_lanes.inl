@@ -71,7 +71,7 @@ KINESCOPE_INLINE void rbf_blocks(const RbfTask& task, Index first, Index k) {
 
 // As many sums at a time as hide how long each addition takes.
 template <std::size_t J>
-KINESCOPE_INLINE void rbf_pass(const RbfTask& task, const Pass& pass) {
+KINESCOPE_INLINE void one_pass(const RbfTask& task, const Pass& pass) {
   constexpr std::size_t kTogether = kProcesses / J;
   constexpr auto kStep = static_cast<Index>(kTogether);
   Index k = pass.begin;
@@ -80,7 +80,7 @@ KINESCOPE_INLINE void rbf_pass(const RbfTask& task, const Pass& pass) {
 }
 
 template <std::size_t J>
-KINESCOPE_INLINE void polynomial_pass(const PolynomialTask& task, const Pass& pass) {
+KINESCOPE_INLINE void one_pass(const PolynomialTask& task, const Pass& pass) {
   const double* offsets = task.offsets + pass.first;
   for (Index k = pass.begin; k < pass.end; ++k) {
     Lanes values[J];
@@ -116,40 +116,27 @@ KINESCOPE_INLINE void polynomial_pass(const PolynomialTask& task, const Pass& pa
   }
 }
 
-void add_rbf(const RbfTask& task) {
+// With the number of processes known to the compiler.
+template <typename Task>
+KINESCOPE_INLINE void all_passes(const Task& task) {
   for (Pass pass; pass.next(task.rows, task.processes);) {
     switch (pass.processes) {
       case 1:
-        rbf_pass<1>(task, pass);
+        one_pass<1>(task, pass);
         break;
       case 2:
-        rbf_pass<2>(task, pass);
+        one_pass<2>(task, pass);
         break;
       case 3:
-        rbf_pass<3>(task, pass);
+        one_pass<3>(task, pass);
         break;
       default:
-        rbf_pass<kProcesses>(task, pass);
+        one_pass<kProcesses>(task, pass);
     }
   }
 }
 
-void polynomials(const PolynomialTask& task) {
-  for (Pass pass; pass.next(task.rows, task.processes);) {
-    switch (pass.processes) {
-      case 1:
-        polynomial_pass<1>(task, pass);
-        break;
-      case 2:
-        polynomial_pass<2>(task, pass);
-        break;
-      case 3:
-        polynomial_pass<3>(task, pass);
-        break;
-      default:
-        polynomial_pass<kProcesses>(task, pass);
-    }
-  }
-}
+void add_rbf(const RbfTask& task) { all_passes(task); }
+void polynomials(const PolynomialTask& task) { all_passes(task); }
 
 #undef KINESCOPE_INLINE

@@ -16,12 +16,8 @@ constexpr const char* kVariable = "OPENBLAS_CORETYPE";
 
 VectorUnits vector_units() {
 #if defined(__x86_64__)
-  const bool avx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  const bool avx512 =
-      __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
-      __builtin_cpu_supports("avx512cd") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-      __builtin_cpu_supports("avx512vl") != 0;
-  return {avx2, avx512};
+  return {.avx2 = __builtin_cpu_supports("x86-64-v3") != 0,
+          .avx512 = __builtin_cpu_supports("x86-64-v4") != 0};
 #else
   return {};
 #endif

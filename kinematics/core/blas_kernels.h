@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // OpenBLAS chooses its kernels by the processor's name when it is loaded, and for one that is newer
-// than itself those of 2004 (SSE3): half the speed of Gaussian processes. What it is told to take
-// (OPENBLAS_CORETYPE) has to stand in the environment before.
+// than itself those of 2004 (SSE3): little more than half the speed of Gaussian processes. What it
+// is told to take (OPENBLAS_CORETYPE) has to stand in the environment before.
 #pragma once
 
 #include <string_view>
