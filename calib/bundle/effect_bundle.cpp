@@ -366,11 +366,11 @@ bundle::SolveSummary EffectBundle::Impl::solve_from(const BundleChange& change, 
   const State begin = state;
   state = end_with_less(ends, change, begin).value_or(begin);
   bundle::SolveSummary out = bundle::solve(with, state, used, {}, kIterations);
-  if (out.converged) return out;
+  if (out.settled) return out;
   // Far from where it ends: with more freedom another one may have come near.
   if (std::optional<State> nearer = end_with_more(ends, change, begin)) {
     const bundle::SolveSummary other = bundle::solve(with, *nearer, used, {}, kIterations);
-    if (other.converged) {
+    if (other.settled) {
       state = *std::move(nearer);
       return other;
     }
@@ -388,7 +388,7 @@ BundleSolution EffectBundle::Impl::solve(const BundleChange& change, Spec& with,
   change_model(change, with, state);
   const bundle::SolveSummary summary = solve_from(change, with, state);
   BundleSolution out;
-  out.converged = summary.converged;
+  out.converged = summary.settled;
   out.reason = summary.message;
   out.time_offset_s = state.time_offset[0];
   out.ahead_s = bundle::clock_of(with, state);

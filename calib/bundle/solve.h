@@ -13,6 +13,8 @@ namespace kinescope::bundle {
 
 struct SolveSummary {
   bool converged = false;
+  /// Or its last steps took next to nothing: along what the data hardly tell apart.
+  bool settled = false;
   std::string message;
   int iterations = 0;  ///< 0: it cannot be evaluated at the start, where the state has been left
   double initial_cost = 0.0;

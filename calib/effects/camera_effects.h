@@ -86,6 +86,9 @@ struct CameraEffect {
   bool is_time_offset = false;
   /// Gravity by the values of the nuisances. Empty: the effect knows nothing of it.
   std::function<Eigen::Vector3d(const Eigen::VectorXd&)> gravity_base;
+  /// Candidate::size where the nuisances have these values. Empty: it does not depend on them.
+  std::function<std::function<double(const Eigen::VectorXd& theta)>(const Eigen::VectorXd&)>
+      size_beside;
 };
 
 /// Joints of those driven whose readings jump: in a log, or (`postures`) from posture to posture.

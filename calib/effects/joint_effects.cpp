@@ -287,18 +287,24 @@ Correction turn_of_gravity(const EffectWorld& world, const Suspect& s, const Eig
   return out;
 }
 
-// Gravity stands beside a sag that depends on it, as two turns across it.
+// Gravity stands beside a sag that depends on it, as two turns across it. `shares`: instants x
+// parameters.
 void doubt_gravity(const EffectWorld& world, const Suspect& s, const Eigen::VectorXd& sags,
-                   CameraEffect& sag) {
+                   const Eigen::MatrixXd& shares, CameraEffect& sag) {
   const Eigen::Vector3d gravity = *world.gravity_base;
   const auto sides = across(gravity);
-  sag.nuisances = [turns = std::vector{
-                       turn_of_gravity(world, s, sags, sides[0], "turn of gravity, x"),
-                       turn_of_gravity(world, s, sags, sides[1], "turn of gravity, y")}](double) {
-    return turns;
+  const std::vector turns{turn_of_gravity(world, s, sags, sides[0], "turn of gravity, x"),
+                          turn_of_gravity(world, s, sags, sides[1], "turn of gravity, y")};
+  sag.nuisances = [turns](double) { return turns; };
+  sag.gravity_base = [gravity, sides](const Eigen::VectorXd& values) {
+    return Eigen::Vector3d(gravity + values[0] * sides[0] + values[1] * sides[1]).normalized();
   };
-  sag.gravity_base = [gravity, sides](const Eigen::VectorXd& turns) {
-    return Eigen::Vector3d(gravity + turns[0] * sides[0] + turns[1] * sides[1]).normalized();
+  // Where gravity points along an axis, nearly, a turn takes much of the sag, or gives it.
+  sag.size_beside = [shares, turns](const Eigen::VectorXd& values) {
+    const Eigen::VectorXd beside = values[0] * turns[0].share + values[1] * turns[1].share;
+    return [shares, beside](const Eigen::VectorXd& theta) {
+      return (shares * theta + beside).cwiseAbs().maxCoeff();
+    };
   };
 }
 
@@ -329,7 +335,7 @@ CameraEffect compliance(const EffectWorld& world, const Suspect& s) {
                                const Eigen::VectorXd& theta) { return size(theta) < limit; };
   out.corrections = [corrections](double) { return corrections; };
   if (const auto known = world.sags.find(s.joint); world.gravity_base && known != world.sags.end())
-    doubt_gravity(world, s, known->second, out);
+    doubt_gravity(world, s, known->second, shares, out);
   return out;
 }
 

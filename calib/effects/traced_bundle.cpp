@@ -294,6 +294,18 @@ void add_values(const std::vector<Correction>& corrections, const BundleSolution
   }
 }
 
+// Of what stands beside an effect, as it was fitted.
+Eigen::VectorXd values_of(const std::vector<Correction>& nuisances,
+                          const std::vector<Correction>& fitted) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(nuisances.size()));
+  for (std::size_t k = 0; k < nuisances.size(); ++k) {
+    const auto known = std::ranges::find(fitted, nuisances[k].name, &Correction::name);
+    KINESCOPE_CHECK(known != fitted.end(), "what stands beside an effect is fitted with it");
+    out[static_cast<Eigen::Index>(k)] = known->value;
+  }
+  return out;
+}
+
 // Gravity as the joint says whose sag hangs on it most; nothing where none does.
 std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& library,
                                           const std::vector<AddedEffect>& effects,
@@ -304,17 +316,11 @@ std::optional<Eigen::Vector3d> gravity_of(const std::vector<CameraEffect>& libra
     const CameraEffect& effect = effect_of(library, added.id);
     if (!effect.gravity_base) continue;
     const std::vector<Correction> turns = effect.nuisances(added.scan);
-    Eigen::VectorXd values(static_cast<Eigen::Index>(turns.size()));
     double telling = 0.0;
-    for (std::size_t k = 0; k < turns.size(); ++k) {
-      const auto known = std::ranges::find(fitted, turns[k].name, &Correction::name);
-      KINESCOPE_CHECK(known != fitted.end(), "what stands beside an effect is fitted with it");
-      values[static_cast<Eigen::Index>(k)] = known->value;
-      telling += turns[k].share.squaredNorm();
-    }
+    for (const Correction& turn : turns) telling += turn.share.squaredNorm();
     if (telling <= most) continue;
     most = telling;
-    out = effect.gravity_base(values);
+    out = effect.gravity_base(values_of(turns, fitted));
   }
   return out;
 }
@@ -598,8 +604,11 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
     linear.time_s[static_cast<Eigen::Index>(i)] = world.frames.times_s[frame];
     linear.fold.push_back(bundle_->fold_of_frame()[frame]);
   }
+  std::vector<Correction> fitted = change.corrections;
+  for (std::size_t c = 0; c < fitted.size(); ++c)
+    fitted[c].value = fit.values[static_cast<Eigen::Index>(c)];
   const auto shared = std::make_shared<const Carriers>(std::move(carriers));
-  for (CameraEffect& effect : library) {
+  for (const CameraEffect& effect : library) {
     Candidate candidate = effect.candidate;
     candidate.columns = [shared, frames = fit.frames,
                          corrections = effect.corrections](double scan) {
@@ -609,6 +618,9 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
       }
       return columns;
     };
+    const auto added = std::ranges::find(effects, candidate.id, &AddedEffect::id);
+    if (effect.size_beside && added != effects.end())
+      candidate.size = effect.size_beside(values_of(effect.nuisances(added->scan), fitted));
     out.candidates.push_back(std::move(candidate));
   }
   out.covariates = covariates_of(world, fit.frames);

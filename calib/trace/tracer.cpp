@@ -38,6 +38,7 @@ Trace Tracer::run() {
   report_progress(progress_, "trace", 0, 0);
   // From the model's own start, which may have in it what they do; not from where it ends without.
   now_ = stage_of(options_.start);
+  known_searched_ = options_.start.empty();
   base_ = stage_of({});
   if (can_look(*now_)) search();
   const int rounds = std::max(1, round_);
@@ -123,8 +124,8 @@ bool Tracer::is_added(const EffectId& id) const {
 }
 
 const Candidate& Tracer::candidate_of(const EffectId& id) const {
-  const Candidate* candidate = find_candidate(base_->fit, id);
-  if (candidate == nullptr) candidate = find_candidate(now_->fit, id);
+  const Candidate* candidate = find_candidate(now_->fit, id);
+  if (candidate == nullptr) candidate = find_candidate(base_->fit, id);
   KINESCOPE_CHECK(candidate != nullptr, "an added effect is a candidate");
   return *candidate;
 }
@@ -144,6 +145,12 @@ void Tracer::forward() {
     const std::vector<TestedMember> family = test_family(now_->system, now_->fit.candidates);
     record(family, *now_, round_);
     StagePtr next = refit_best(contenders(*now_, family), round_);
+    if (next && !known_searched_) {
+      // Sightings chosen since may say when or where better: a jump at the wrong time leaves what
+      // looks like another one (`undeclared`, 13845).
+      known_searched_ = true;
+      if (search_again(std::nullopt)) continue;
+    }
     if (next) next = or_what_is_below_floors(std::move(next), family);
     // What hides behind others is looked for where all of these are beyond doubt: the backward
     // check takes out the others first.

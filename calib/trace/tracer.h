@@ -59,7 +59,8 @@ class Tracer {
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_look(const Stage& stage);
   [[nodiscard]] bool is_added(const EffectId& id) const;
-  /// Of an effect that was added: as it is offered without any, or beside those that there are.
+  /// Of an effect that was added: as it is offered where it was fitted (what a size is counted in
+  /// depends on that fit), or without any.
   [[nodiscard]] const Candidate& candidate_of(const EffectId& id) const;
   /// TraceOptions::most_fits.
   [[nodiscard]] bool may_go_on() const;
@@ -197,6 +198,7 @@ class Tracer {
   int round_ = 0;
   int fits_ = 0;
   bool is_ended_ = false;            // by TraceOptions::until
+  bool known_searched_ = false;      // the scans of TraceOptions::start, once more
   bool look_ahead_put_off_ = false;  // by the last forward()
   StagePtr checked_;  // the backward check left it as it is, after a look ahead was put off
   Trace trace_;

@@ -66,12 +66,6 @@ std::string lasting_body_words(const Stage& now) {
       found->over_differences);
 }
 
-std::string ambiguity_words(const Ambiguity& ambiguity) {
-  std::string names;
-  for (const EffectId& id : ambiguity.effects) names += (names.empty() ? "" : " or ") + name_of(id);
-  return fmt::format("{}: this recording cannot tell them apart", names);
-}
-
 // What no known effect explains; empty where there is nothing of the kind.
 std::string unknown_words(const Stage& now, bool slight, const std::optional<CommonMotion>& common,
                           const Trace& trace) {
@@ -120,6 +114,12 @@ bool same_place(const std::string& rest, const std::string& effect) {
   return rest == effect || rest.starts_with(effect + " ") || effect.starts_with(rest + " ");
 }
 
+std::string cannot_tell_words(const Ambiguity& ambiguity) {
+  std::string names;
+  for (const EffectId& id : ambiguity.effects) names += (names.empty() ? "" : " or ") + name_of(id);
+  return fmt::format("{}: this recording cannot tell them apart", names);
+}
+
 void conclude(const Stage& now, double base_squares, Trace& trace) {
   const bool slight = std::ranges::all_of(trace.rest, [&](const Rest& rest) {
     return is_slight(rest, now.system.total().rr, base_squares, trace);
@@ -131,7 +131,7 @@ void conclude(const Stage& now, double base_squares, Trace& trace) {
     trace.reason = std::move(unknown);
   } else if (!trace.ambiguities.empty()) {
     trace.verdict = TraceVerdict::kAmbiguous;
-    trace.reason = ambiguity_words(trace.ambiguities.front());
+    trace.reason = cannot_tell_words(trace.ambiguities.front());
   } else if (!trace.accepted.empty()) {
     trace.verdict = TraceVerdict::kEffects;
     trace.reason = found_words(trace.found, trace.accepted);

@@ -23,6 +23,9 @@ namespace kinescope::trace {
 /// one place.
 [[nodiscard]] bool same_place(const std::string& rest, const std::string& effect);
 
+/// "backlash at joint2 or gear_error at joint2: this recording cannot tell them apart".
+[[nodiscard]] std::string cannot_tell_words(const Ambiguity& ambiguity);
+
 /// Fills in verdict and reason from all the rest of `trace`. `now`: the model with the accepted
 /// effects; `base_squares`: what the model without any leaves, whitened.
 void conclude(const Stage& now, double base_squares, Trace& trace);

@@ -168,12 +168,15 @@ std::vector<std::size_t> spikes_beyond(const Series& series, double limit) {
   return out;
 }
 
-/// Rows of the log. Where wild readings stand together, the first of them hide others.
+/// Of one channel, rows of the log.
+using Spikes = std::vector<Eigen::Index>;
+
+/// Where wild readings stand together, the first of them hide others.
 /// `clear_only`: of velocities, which the positions tell better where many are wild.
-std::vector<Eigen::Index> spike_rows(Series series, bool clear_only) {
+Spikes spikes_of(Series series, bool clear_only) {
   SpikeLimits limits = spike_limits(series);
   if (clear_only) limits.least = limits.clear;
-  std::vector<Eigen::Index> out;
+  Spikes out;
   if (!(limits.clear > 0.0)) return out;
   // What happens often is how the signal is, unless it is as often large as small.
   const double most =
@@ -186,6 +189,39 @@ std::vector<Eigen::Index> spike_rows(Series series, bool clear_only) {
   if (static_cast<double>(out.size()) > most) return {};
   std::ranges::sort(out);
   return out;
+}
+
+bool jumps_near(const Spikes& spikes, Eigen::Index row) {
+  constexpr auto kNear = static_cast<Eigen::Index>(kNeighbours);
+  const auto near = std::ranges::lower_bound(spikes, row - kNear);
+  return near != spikes.end() && *near <= row + kNear;
+}
+
+/// A blow moves the torques of several joints in a few rows, each in its own way, and no position
+/// (`moved`: of every row). What is wrong with a reading is wrong with one column, or all of them
+/// read the same; what a trajectory begins with may be that of drives that are switched on.
+void spare_blows(const TorqueLog& log, const std::vector<char>& moved,
+                 std::vector<Spikes>& torques) {
+  const auto begins = [&](Eigen::Index row) {
+    const Eigen::Index before = row - static_cast<Eigen::Index>(kNeighbours);
+    return before < 0 || log.trajectory(before) != log.trajectory(row);
+  };
+  const auto differ = [&](Eigen::Index row, std::size_t a, std::size_t b) {
+    return log.torque(row, static_cast<Eigen::Index>(a)) !=
+           log.torque(row, static_cast<Eigen::Index>(b));
+  };
+  const std::vector<Spikes> all = torques;
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const auto is_of_blow = [&](Eigen::Index row) {
+      if (moved[static_cast<std::size_t>(row)] != 0 || begins(row)) return false;
+      for (std::size_t o = 0; o < all.size(); ++o)
+        if (o != c && jumps_near(all[o], row) && differ(row, o, c)) return true;
+      return false;
+    };
+    // Wild readings of several columns meet by chance, blows as a rule.
+    if (2 * std::ranges::count_if(all[c], is_of_blow) < std::ssize(all[c])) continue;
+    std::erase_if(torques[c], is_of_blow);
+  }
 }
 
 struct StepFacts {
@@ -257,25 +293,36 @@ void name_rate(const TorqueLog& log, const StepFacts& facts, std::vector<LogFind
 CheckedLog check_spikes(TorqueLog log) {
   CheckedLog out;
   std::vector<char> keep(static_cast<std::size_t>(log.rows()), 1);
-  const auto look = [&](const Eigen::MatrixXd& signal, const std::vector<std::string>& names,
-                        bool clear_only = false) {
-    for (Eigen::Index c = 0; c < signal.cols(); ++c) {
-      const std::vector<Eigen::Index> rows = spike_rows(series_of(log, signal.col(c)), clear_only);
+  const auto look = [&](const Eigen::MatrixXd& signal, bool clear_only) {
+    std::vector<Spikes> spikes;
+    for (Eigen::Index c = 0; c < signal.cols(); ++c)
+      spikes.push_back(spikes_of(series_of(log, signal.col(c)), clear_only));
+    return spikes;
+  };
+  const auto leave_out = [&](const Eigen::MatrixXd& signal, const std::vector<std::string>& names,
+                             const std::vector<Spikes>& spikes) {
+    for (std::size_t c = 0; c < spikes.size(); ++c) {
+      const Spikes& rows = spikes[c];
       if (rows.empty()) continue;
       for (const Eigen::Index row : rows) keep[static_cast<std::size_t>(row)] = 0;
-      const std::string& name = names[static_cast<std::size_t>(c)];
       out.findings.push_back(
-          {LogFault::kSpike, FaultWeight::kWarning, name,
-           share_of(static_cast<Eigen::Index>(rows.size()), log.rows()),
-           static_cast<double>(rows.size()), log.place(rows.front()),
-           fmt::format("column '{}' jumps and comes back in {} rows ({:g} in the first)", name,
-                       rows.size(), signal(rows.front(), c)),
+          {LogFault::kSpike, FaultWeight::kWarning, names[c],
+           share_of(std::ssize(rows), log.rows()), static_cast<double>(rows.size()),
+           log.place(rows.front()),
+           fmt::format("column '{}' jumps and comes back in {} rows ({:g} in the first)", names[c],
+                       rows.size(), signal(rows.front(), static_cast<Eigen::Index>(c))),
            "the rows were left out"});
     }
   };
-  look(log.q, log.q_columns);
-  look(log.dq, log.dq_columns, true);
-  look(log.torque, log.torque_columns);
+  const std::vector<Spikes> positions = look(log.q, false);
+  std::vector<char> moved(keep.size(), 0);
+  for (const Spikes& rows : positions)
+    for (const Eigen::Index row : rows) moved[static_cast<std::size_t>(row)] = 1;
+  leave_out(log.q, log.q_columns, positions);
+  leave_out(log.dq, log.dq_columns, look(log.dq, true));
+  std::vector<Spikes> torques = look(log.torque, false);
+  spare_blows(log, moved, torques);
+  leave_out(log.torque, log.torque_columns, torques);
   out.log = out.findings.empty() ? std::move(log) : keep_rows(log, keep);
   return out;
 }

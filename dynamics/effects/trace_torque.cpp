@@ -5,12 +5,15 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "calib/trace/normal_system.h"
+#include "calib/trace/stage.h"
+#include "calib/trace/verdict.h"
 #include "dynamics/effects/base_choice.h"
 #include "dynamics/effects/disagreement.h"
 #include "dynamics/identify/consistent_model.h"
@@ -275,14 +278,53 @@ bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan
   });
 }
 
-/// True where masses that are declared wrongly would look like what was found, or left.
-bool may_be_of_masses(const Trace& trace) {
+/// Masses that are declared wrongly would look like it.
+bool is_like_masses(const TracedEffect& effect) {
   constexpr std::array<std::string_view, 6> kLikeMasses{
       "payload", "torque_gain", "motor_inertia", "spring", "cross_talk", "gravity_direction"};
+  return std::ranges::find(kLikeMasses, effect.id.effect) != kLikeMasses.end();
+}
+
+/// Of what was found, or left.
+bool may_be_of_masses(const Trace& trace) {
   return trace.verdict == TraceVerdict::kUnknown ||
-         std::ranges::any_of(trace.accepted, [&](const TracedEffect& effect) {
-           return std::ranges::find(kLikeMasses, effect.id.effect) != kLikeMasses.end();
-         });
+         std::ranges::any_of(trace.accepted, is_like_masses);
+}
+
+/// What identified masses make superfluous. A payload is a link of another mass by another name.
+std::vector<TracedEffect> in_place_of_masses(const Trace& trace, const Trace& beside_identified) {
+  std::vector<TracedEffect> out;
+  std::ranges::copy_if(trace.accepted, std::back_inserter(out), [&](const TracedEffect& effect) {
+    return is_like_masses(effect) && effect.id.effect != "payload" &&
+           std::ranges::find(beside_identified.accepted, effect.id, &TracedEffect::id) ==
+               beside_identified.accepted.end();
+  });
+  return out;
+}
+
+/// Identified masses explain as much without `effect`: the torques alone cannot tell which it is.
+/// What both accounts find is known no better than they agree.
+void doubt_masses(const TracedEffect& effect, const Trace& beside_identified, Trace& out) {
+  Ambiguity doubt{
+      {effect.id, {"masses", "links"}},
+      {effect.words, "the links have other masses than the model says"},
+      "weigh the links, or record the same motion with a known load; the torques fit both"};
+  for (TracedEffect& found : out.accepted) {
+    const auto twin = std::ranges::find(beside_identified.accepted, found.id, &TracedEffect::id);
+    if (twin == beside_identified.accepted.end()) continue;
+    found.interval.low = std::min(found.interval.low, twin->interval.low);
+    found.interval.high = std::max(found.interval.high, twin->interval.high);
+  }
+  if (out.verdict == TraceVerdict::kEffects) {
+    out.verdict = TraceVerdict::kAmbiguous;
+    out.reason = trace::cannot_tell_words(doubt);
+  }
+  out.ambiguities.push_back(std::move(doubt));
+}
+
+bool explains_all(const Trace& trace) {
+  return trace.verdict == TraceVerdict::kEffects || trace.verdict == TraceVerdict::kClean ||
+         trace.verdict == TraceVerdict::kAmbiguous;
 }
 
 /// Student's t of the squares of held-out errors, whitened, over the stretches of the instants that
@@ -349,13 +391,24 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
   // Masses that bend to what they are not ask for further effects.
-  if (advantage < effects::kClearlyBetter ||
-      rival.trace.accepted.size() > out.trace.accepted.size())
-    return out;
+  if (rival.trace.accepted.size() > out.trace.accepted.size()) return out;
+  if (advantage >= effects::kClearlyBetter) {
+    rival.base.reason = fmt::format(
+        "with the effects that were found, identified masses predict unseen stretches better than "
+        "declared ones do with theirs (Student's t {:.1f})",
+        advantage);
+    return rival;
+  }
+  if (advantage <= -effects::kClearlyBetter || !explains_all(rival.trace)) return out;
+  const std::vector<TracedEffect> superfluous = in_place_of_masses(out.trace, rival.trace);
+  if (superfluous.size() == 1) doubt_masses(superfluous.front(), rival.trace, out.trace);
+  if (superfluous.size() < 2) return out;
+  // Wrong masses are one cause, and plainer than several.
+  std::string names;
+  for (const TracedEffect& effect : superfluous)
+    names += (names.empty() ? "" : ", ") + trace::name_of(effect.id);
   rival.base.reason = fmt::format(
-      "with the effects that were found, identified masses predict unseen stretches better than "
-      "declared ones do with theirs (Student's t {:.1f})",
-      advantage);
+      "identified masses predict unseen stretches as well as declared ones do with {}", names);
   return rival;
 }
 

@@ -8,7 +8,13 @@
 namespace kinescope {
 namespace {
 
-// Of the joint that carries all; -1: there is none.
+// A channel that leaves more of the motion than it explains drives something else, if anything.
+bool is_driven(const StructureJoint& joint) {
+  constexpr double kHalf = 0.5;
+  return joint.channel && joint.unexplained < kHalf;
+}
+
+// Of the joint that carries all, and that nothing drives; -1: there is none.
 int joint_below_all(const Structure& structure) {
   if (structure.links.empty() || !structure.links.front().markers.empty()) return -1;
   int out = -1;
@@ -17,18 +23,17 @@ int joint_below_all(const Structure& structure) {
     if (out >= 0) return -1;
     out = static_cast<int>(j);
   }
-  if (out < 0 || structure.joints[static_cast<std::size_t>(out)].channel) return -1;
-  return std::ranges::any_of(structure.joints,
-                             [](const StructureJoint& joint) { return joint.channel.has_value(); })
-             ? out
-             : -1;
+  if (out < 0 || is_driven(structure.joints[static_cast<std::size_t>(out)])) return -1;
+  return std::ranges::any_of(structure.joints, is_driven) ? out : -1;
 }
 
 }  // namespace
 
 std::optional<Structure> with_base_at_rest(const Structure& structure, const JointLog& log) {
   const int below = joint_below_all(structure);
-  if (below < 0 || structure.joint_values.cols() <= below) return std::nullopt;
+  if (below < 0) return std::nullopt;
+  const bool is_of_channel = structure.joints[static_cast<std::size_t>(below)].channel.has_value();
+  if (!is_of_channel && structure.joint_values.cols() <= below) return std::nullopt;
   return with_joint_at_rest(structure, static_cast<std::size_t>(below), log);
 }
 

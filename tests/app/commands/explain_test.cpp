@@ -172,6 +172,15 @@ TEST(Explain, AForgottenSizeIsShownByWhatMovesAboutTheSamePoint) {
   EXPECT_NEAR(answered.trace["accepted"][0]["size"].get<double>(), truth.size, 2e-3);
 }
 
+// One of no library beside a model that it bends: a wobble of another joint took a seventh of it.
+TEST(Explain, WhatIsATenthOfItselfBesideTheRestIsNotNamed) {
+  const Answered answered = run_case(13839);
+  EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;
+  EXPECT_EQ(answered.difference, "");
+  EXPECT_EQ(answered.trace["verdict"], "unknown");
+  EXPECT_TRUE(effects(answered).empty()) << answered.trace["accepted"].dump();
+}
+
 TEST(Explain, AReadingThatTheFitLeftOutIsNamed) {
   const Answered answered = run_case(13, Damage::kCorruptedRow);
   EXPECT_EQ(answered.outcome.code, 0) << answered.outcome.err;

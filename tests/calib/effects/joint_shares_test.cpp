@@ -272,5 +272,47 @@ TEST(JointEffects, WavesAreLookedForWithoutGaps) {
   }
 }
 
+// Gravity nearly along the hinge: a turn of it by half of what pulls halves the sag that the same
+// parameters stand for.
+TEST(JointEffects, ASagIsAsLargeAsGravityIsFoundToPull) {
+  constexpr double kPull = 0.04;  // of gravity across the axis
+  EffectWorld world = hinge(0.4);
+  Marker marker;
+  marker.link = LinkId{1};
+  marker.T_link_marker.translation = {0.4, 0.0, 0.0};
+  world.tree.markers = {marker};
+  world.gravity_base = Eigen::Vector3d(kPull, 0.0, -1.0).normalized();
+  const auto sag_in = [](const EffectWorld& of) {
+    for (CameraEffect& known : joint_effects(of))
+      if (known.candidate.id.effect == "compliance") return known;
+    throw std::logic_error("no compliance");
+  };
+  const Eigen::VectorXd theta = values({0.01, -0.004});
+  const CameraEffect alone = sag_in(world);
+  EXPECT_FALSE(alone.size_beside);
+  Eigen::VectorXd sags = theta;
+  const std::vector<Correction> corrections = alone.corrections(0.0);
+  for (Eigen::Index k = 0; k < sags.size(); ++k)
+    sags[k] /= corrections[static_cast<std::size_t>(k)].reference;
+  world.sags[0] = sags;
+  const CameraEffect sag = sag_in(world);
+  ASSERT_TRUE(sag.size_beside);
+  const double as_declared = sag.candidate.size(theta);
+  EXPECT_NEAR(sag.size_beside(Eigen::Vector2d::Zero())(theta), as_declared, kExact);
+  for (const Eigen::Vector2d& turns :
+       {Eigen::Vector2d(0.02, 0.0), Eigen::Vector2d(0.0, -0.02), Eigen::Vector2d(-0.01, 0.015)}) {
+    EffectWorld turned = world;
+    turned.gravity_base = sag.gravity_base(turns);
+    Eigen::VectorXd there = sags;
+    const std::vector<Correction> loads = sag_in(turned).corrections(0.0);
+    for (Eigen::Index k = 0; k < there.size(); ++k)
+      there[k] *= loads[static_cast<std::size_t>(k)].reference;
+    const double truth = sag_in(turned).candidate.size(there);
+    EXPECT_GT(std::abs(truth - as_declared), 0.05 * as_declared) << turns.transpose();
+    // A turn is a straight line, and lengthens what it turns.
+    EXPECT_NEAR(sag.size_beside(turns)(theta), truth, 1e-3 * truth) << turns.transpose();
+  }
+}
+
 }  // namespace
 }  // namespace kinescope::effects

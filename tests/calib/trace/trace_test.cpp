@@ -310,6 +310,21 @@ TEST(TraceTest, AStartEffectStaysOnlyIfItEarnsItsPlace) {
   EXPECT_GT(real.held_out_before.value, 1.1 * real.held_out_after.value);
 }
 
+// As where sightings that were put aside come back: what such a time leaves looks like another
+// step.
+TEST(TraceTest, AStartEffectsTimeIsLookedForAgain) {
+  LinearWorldOptions options;
+  options.seed = 4;
+  constexpr double kTruth = 8.0;  // s
+  TraceOptions known;
+  known.start = {{{"step", "joint1"}, kTruth + 1.0}};
+  const Trace trace = trace_effects(LinearWorld(options, {{0, "step", 4.0, kTruth}}), known);
+  EXPECT_TRUE(only(trace, {"step", "joint1"})) << trace.reason;
+  ASSERT_EQ(trace.added.size(), 1U);
+  EXPECT_NEAR(trace.added.front().scan, kTruth, 0.1);
+  EXPECT_EQ(trace.steps.size(), 2U);  // nothing was added or taken out
+}
+
 // Beside the others its columns are what the model can do itself; fitted, it predicts clearly
 // better.
 // How far it goes and how fast cannot be told apart before its time constant is over.

@@ -173,6 +173,25 @@ TEST(DamagedLog, Spikes) {
   expect_line(looked.of(LogFault::kSpike)[1], kFirstLine + 700);
 }
 
+// A blow of two rows, which several joints feel; one reading that fails, or a packet of zeros.
+TEST(DamagedLog, ABlowIsNoSpike) {
+  const auto with_jump = [](double tau1, double tau2, double q1) {
+    LogWorld world = make_log_world(usual_noise());
+    for (const Eigen::Index row : {700, 701}) {
+      world.rows(row, world.column("tau1")) += tau1;
+      world.rows(row, world.column("tau2")) += tau2;
+    }
+    world.rows(700, world.column("q1")) += q1;
+    return world;
+  };
+  EXPECT_EQ(look(with_jump(80.0, -50.0, 0.0)).loud(), "");
+  EXPECT_EQ(look(with_jump(80.0, 0.0, 0.0)).loud(), "spike ");
+  EXPECT_EQ(look(with_jump(80.0, -50.0, 3.0)).of(LogFault::kSpike).front().channel, "q1");
+  LogWorld dropped = make_log_world(usual_noise());
+  for (const char* column : {"tau1", "tau2"}) dropped.rows(700, dropped.column(column)) = -200.0;
+  EXPECT_EQ(look(dropped).loud(), "spike spike ");
+}
+
 /// Every row with a probability of 5 % any value of the channel's range; how many are.
 Eigen::Index make_wild(LogWorld& world, const char* channel) {
   constexpr double kShare = 0.05;

@@ -610,6 +610,39 @@ TEST(TorqueEffects, AWrongMassIsNoGain) {
   }
 }
 
+// Of one joint, a gain and all masses scaled alike are the same torque; friction is known as well
+// as which of them it is.
+TEST(TorqueEffects, AGainThatMayBeTheMassesIsOneOfTwo) {
+  EffectWorldOptions options = quiet_world();
+  options.joints = 1;
+  const auto traced = [&](double declared) {
+    Rng rng = Rng::from_name("effects", 22);
+    EffectWorld world =
+        effect_world({{"coulomb", 0, 0, 0.2}, {"viscous", 0, 0, 0.2}}, options, rng);
+    for (InertialParameters& link : world.model.links)
+      link = InertialParameters::from_vector(declared * link.vector());
+    TorqueTraceOptions trace;
+    trace.contacts = false;
+    trace.model.filter = declared_options().filter;
+    return trace_torque(world.model, exact_samples(world), trace).trace;
+  };
+  const Trace right = traced(1.0);
+  EXPECT_EQ(right.verdict, TraceVerdict::kEffects) << right.reason;
+  const Trace wrong = traced(0.8);
+  EXPECT_EQ(wrong.verdict, TraceVerdict::kAmbiguous) << wrong.reason;
+  ASSERT_EQ(wrong.ambiguities.size(), 1U);
+  const std::vector<EffectId>& either = wrong.ambiguities.front().effects;
+  EXPECT_EQ(either.front().effect, "torque_gain");
+  EXPECT_EQ(either.back(), (EffectId{"masses", "links"}));
+  for (const TracedEffect& truth : right.accepted) {
+    const auto found = std::ranges::find(wrong.accepted, truth.id, &TracedEffect::id);
+    ASSERT_NE(found, wrong.accepted.end()) << truth.id.effect;
+    EXPECT_LE(found->interval.low, truth.size) << truth.id.effect;
+    EXPECT_GE(found->interval.high, truth.size) << truth.id.effect;
+    EXPECT_GT(found->interval.high, 1.15 * found->interval.low) << truth.id.effect;
+  }
+}
+
 TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorld world = effect_world({}, quiet_world(), rng);

@@ -62,6 +62,19 @@ TEST(RestingBase, TheRobotStaysWhereItMostlyStood) {
   EXPECT_LT(log_pose(before.inverse() * after).norm(), kExactProduct);
 }
 
+// A camera that drifts looks like a joint of whatever channel rises with time.
+TEST(RestingBase, AChannelThatExplainsLessThanHalfDrivesNothing) {
+  Structure driven = moving_base();
+  driven.joints.front().channel = ChannelTerm{0, 1.0, 0.0};
+  driven.joints.front().unexplained = 0.6;
+  const auto resting = with_base_at_rest(driven, log_of_one());
+  ASSERT_TRUE(resting);
+  ASSERT_EQ(resting->joints.size(), 1U);
+  EXPECT_TRUE(resting->joints.front().channel);
+  driven.joints.front().unexplained = 0.4;
+  EXPECT_FALSE(with_base_at_rest(driven, log_of_one()));
+}
+
 TEST(RestingBase, OtherStructuresStayAsTheyAre) {
   Structure driven = moving_base();
   driven.joints.front().channel = ChannelTerm{0, 1.0, 0.0};
