@@ -308,6 +308,91 @@ Eigen::MatrixXd rates_between_neighbours(const Eigen::VectorXd& t_s,
   return out;
 }
 
+/// Of presliding as it is usual: beyond that a joint is elastic, and does not stick.
+constexpr double kLongestPresliding = 32.0;
+/// Turns from which on most of them say how far a joint moves until it slides.
+constexpr std::size_t kFewestTurns = 4;
+
+/// One joint in all motions.
+struct JointRecord {
+  const RigidModel& model;
+  const std::vector<TorqueSamples>& motions;
+  const std::vector<Eigen::MatrixXd>& residuals;
+  const std::vector<Eigen::MatrixXd>& ways;
+  Eigen::Index joint = 0;
+
+  /// Beyond the noise of the positions.
+  [[nodiscard]] double way(std::size_t motion, double presliding) const {
+    SlidingOptions options;
+    options.presliding = Eigen::VectorXd::Constant(model.size(), presliding);
+    return sliding_way(model, joint, motions[motion].q, options);
+  }
+
+  [[nodiscard]] Slid slid(double presliding) const {
+    std::vector<std::array<double, 3>> rows;
+    Slid out;
+    for (std::size_t m = 0; m < motions.size(); ++m) {
+      const double far = way(m, presliding);
+      for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
+        const double gone = ways[m](t, joint);
+        if (std::abs(gone) < far) continue;
+        rows.push_back({motions[m].dq(t, joint), gone > 0.0 ? 1.0 : -1.0, residuals[m](t, joint)});
+        out.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
+      }
+    }
+    const auto all = static_cast<Eigen::Index>(rows.size());
+    const Eigen::Index step = all / kMostRows + 1;
+    const Eigen::Index kept = (all + step - 1) / step;
+    out.dq.resize(kept);
+    out.direction.resize(kept);
+    out.residual.resize(kept);
+    for (Eigen::Index k = 0; k < kept; ++k) {
+      const auto& row = rows[static_cast<std::size_t>(k * step)];
+      out.dq[k] = row[0];
+      out.direction[k] = row[1];
+      out.residual[k] = row[2];
+    }
+    return out;
+  }
+
+  /// Just beyond the way after which it is taken to slide, most of its turns lack or have more
+  /// torque than it slides with, and by more than the scatter of sliding.
+  [[nodiscard]] bool slides_later(const SlidingFriction& friction, double presliding) const {
+    std::vector<double> means;  // of every turn, along the motion
+    for (std::size_t m = 0; m < motions.size(); ++m) {
+      const double from = way(m, presliding);
+      const double to = way(m, 2.0 * presliding);
+      double sum = 0.0;
+      double count = 0.0;
+      for (Eigen::Index t = 0; t < motions[m].size(); ++t) {
+        const double gone = ways[m](t, joint);
+        const int direction = gone > 0.0 ? 1 : -1;
+        const bool inside =
+            std::abs(gone) >= from && std::abs(gone) < to && friction.known(direction);
+        if (inside) {
+          sum += direction *
+                 (residuals[m](t, joint) - friction.sliding(motions[m].dq(t, joint), direction));
+          count += 1.0;
+        } else if (count > 0.0) {
+          means.push_back(sum / count);
+          sum = count = 0.0;
+        }
+      }
+      if (count > 0.0) means.push_back(sum / count);
+    }
+    if (means.size() < kFewestTurns) return false;
+    return std::abs(median_of(std::move(means))) > friction.sigma;
+  }
+};
+
+SlidingOptions options_of(const std::vector<SlidingFriction>& friction) {
+  SlidingOptions out;
+  out.presliding.resize(std::ssize(friction));
+  for (Eigen::Index j = 0; j < out.presliding.size(); ++j)
+    out.presliding[j] = friction[static_cast<std::size_t>(j)].presliding;
+  return out;
+}
+
 /// Sliding friction of a joint at a sample, in a direction.
 using SlidingTorque = std::function<double(Eigen::Index, Eigen::Index, int)>;
 
@@ -318,7 +403,7 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
                                       bool knows_inertia) {
   const Eigen::Index n = model.size();
   const bool masses = !terms.mass.empty();
-  const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q);
+  const Eigen::MatrixXi states = sliding_states(model, motion.t_s, motion.q, options_of(friction));
   const Eigen::MatrixXd speeds = windowed_rates(motion.t_s, motion.q);
   const Eigen::MatrixXd accelerations = windowed_rates(motion.t_s, speeds);
   // A joint that breaks away gains its momentum at once: over a window it would seem pushed before.
@@ -473,35 +558,24 @@ std::vector<SlidingFriction> sliding_friction(const RigidModel& model,
                                               const std::vector<TorqueSamples>& motions,
                                               const std::vector<Eigen::MatrixXd>& residuals) {
   KINESCOPE_CHECK(residuals.size() == motions.size(), "one residual a motion");
-  std::vector<Eigen::MatrixXi> states;
-  for (const TorqueSamples& motion : motions) {
-    states.push_back(sliding_states(model, motion.t_s, motion.q));
-  }
+  std::vector<Eigen::MatrixXd> ways;
+  for (const TorqueSamples& motion : motions)
+    ways.push_back(ways_since_turns(model, motion.t_s, motion.q));
   std::vector<SlidingFriction> out;
   for (Eigen::Index j = 0; j < model.size(); ++j) {
-    std::vector<std::array<double, 3>> rows;
-    Slid slid;
-    for (std::size_t m = 0; m < motions.size(); ++m) {
-      for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
-        if (states[m](t, j) == 0) continue;
-        rows.push_back({motions[m].dq(t, j), 1.0 * states[m](t, j), residuals[m](t, j)});
-        slid.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
-      }
+    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
+    const SlidingOptions usual;
+    double presliding = turns ? usual.presliding_rad : usual.presliding_m;
+    const double longest = kLongestPresliding * presliding;
+    const JointRecord record{model, motions, residuals, ways, j};
+    SlidingFriction friction = friction_from(record.slid(presliding), turns);
+    while (friction.known() && 2.0 * presliding <= longest &&
+           record.slides_later(friction, presliding)) {
+      presliding *= 2.0;
+      friction = friction_from(record.slid(presliding), turns);
     }
-    const auto all = static_cast<Eigen::Index>(rows.size());
-    const Eigen::Index step = all / kMostRows + 1;
-    const Eigen::Index kept = (all + step - 1) / step;
-    slid.dq.resize(kept);
-    slid.direction.resize(kept);
-    slid.residual.resize(kept);
-    for (Eigen::Index k = 0; k < kept; ++k) {
-      const auto& row = rows[static_cast<std::size_t>(k * step)];
-      slid.dq[k] = row[0];
-      slid.direction[k] = row[1];
-      slid.residual[k] = row[2];
-    }
-    const JointType type = model.bodies[static_cast<std::size_t>(j)].type;
-    out.push_back(friction_from(slid, type != JointType::kPrismatic));
+    friction.presliding = presliding;
+    out.push_back(friction);
   }
   return out;
 }

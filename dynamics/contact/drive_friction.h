@@ -28,6 +28,7 @@ struct SlidingFriction {
   double fastest_known = 0.0;   ///< faster, viscous friction may be none or twice as much
   double sigma = 0.0;           ///< robust spread of what sliding leaves unexplained
   double slid_s = 0.0;          ///< time that the joint slid
+  double presliding = 0.0;      ///< rad or m from a rest or turn until it slides; 0: usual
   bool slides_forward = false;  ///< the log showed it; else it is an interval there too
   bool slides_backward = false;
 
@@ -47,7 +48,8 @@ struct SlidingFriction {
 [[nodiscard]] Eigen::MatrixXd drive_residual(const RigidModel& model, const TorqueSamples& motion);
 
 /// Friction of each joint by a robust fit (Huber) to the samples in which it slides. A joint that
-/// hardly slides is not known(): its torque says nothing of contacts.
+/// hardly slides is not known(): its torque says nothing of contacts. How far a joint has to move
+/// until it slides is what most of its turns show, SlidingOptions' ways at the least.
 [[nodiscard]] std::vector<SlidingFriction> sliding_friction(
     const RigidModel& model, const std::vector<TorqueSamples>& motions);
 

@@ -63,26 +63,52 @@ int direction_at(const Eigen::VectorXd& t_s, const Eigen::VectorXd& q, const Nei
   return out;
 }
 
+double beyond_noise(const Eigen::VectorXd& q) {
+  return kNoiseSigmas * std::sqrt(2.0) * position_noise(q);
+}
+
+bool turns(const RigidModel& model, Eigen::Index joint) {
+  return model.bodies[static_cast<std::size_t>(joint)].type != JointType::kPrismatic;
+}
+
 }  // namespace
 
-Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t_s,
-                               const Eigen::MatrixXd& q, const SlidingOptions& options) {
-  Eigen::MatrixXi out = Eigen::MatrixXi::Zero(q.rows(), q.cols());
+Eigen::MatrixXd ways_since_turns(const RigidModel& model, const Eigen::VectorXd& t_s,
+                                 const Eigen::MatrixXd& q, const SlidingOptions& options) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(q.rows(), q.cols());
   const Neighbours near = neighbours(t_s, options.window_s);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
-    const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
     const Eigen::VectorXd own = q.col(j);
-    const double noise = kNoiseSigmas * std::sqrt(2.0) * position_noise(own);
-    const double rest = turns ? options.rest_speed_rad_s : options.rest_speed_m_s;
-    const double far = (turns ? options.presliding_rad : options.presliding_m) + noise;
+    const double noise = beyond_noise(own);
+    const double rest = turns(model, j) ? options.rest_speed_rad_s : options.rest_speed_m_s;
     int direction = 0;
     double from = 0.0;
     for (Eigen::Index k = 0; k < q.rows(); ++k) {
       const int now = direction_at(t_s, own, near, k, rest, noise);
       if (now != direction) from = own[k];
       direction = now;
-      if (now != 0 && (own[k] - from) * now >= far) out(k, j) = now;
+      if (now != 0) out(k, j) = now * std::max(0.0, (own[k] - from) * now);
     }
+  }
+  return out;
+}
+
+double sliding_way(const RigidModel& model, Eigen::Index joint, const Eigen::MatrixXd& q,
+                   const SlidingOptions& options) {
+  const double usual = turns(model, joint) ? options.presliding_rad : options.presliding_m;
+  const double own = options.presliding.size() > 0 ? options.presliding[joint] : 0.0;
+  const double way = own > 0.0 ? own : usual;
+  return way + beyond_noise(q.col(joint));
+}
+
+Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t_s,
+                               const Eigen::MatrixXd& q, const SlidingOptions& options) {
+  const Eigen::MatrixXd ways = ways_since_turns(model, t_s, q, options);
+  Eigen::MatrixXi out = Eigen::MatrixXi::Zero(q.rows(), q.cols());
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    const double far = sliding_way(model, j, q, options);
+    for (Eigen::Index k = 0; k < q.rows(); ++k)
+      if (std::abs(ways(k, j)) >= far) out(k, j) = ways(k, j) > 0.0 ? 1 : -1;
   }
   return out;
 }

@@ -102,6 +102,32 @@ TEST(Sliding, SpeedOfSlowFrictionIsFoundBetweenTheFirstGuesses) {
   EXPECT_NEAR(own.coulomb, 1.0, 0.01);
 }
 
+// A gear that winds up: friction comes over ten times the usual way, and what it lacks there is no
+// push.
+TEST(Sliding, HowFarAJointMovesUntilItSlidesIsWhatItsTurnsShow) {
+  const SlidingOptions usual;
+  const Drives stiff({.duration_s = 60.0});
+  for (const SlidingFriction& own : stiff.friction) EXPECT_EQ(own.presliding, usual.presliding_rad);
+  constexpr double kWindsUp = 5e-3;  // rad
+  const Drives soft({.duration_s = 60.0, .presliding_rad = kWindsUp});
+  for (const SlidingFriction& own : soft.friction) {
+    EXPECT_GE(own.presliding, 2.0 * kWindsUp);
+    EXPECT_LE(own.presliding, 8.0 * kWindsUp);
+  }
+  const auto most = [](const Drives& drives) {
+    double out = 0.0;
+    for (const BalanceSample& sample :
+         sliding_balance(drives.rigid, drives.friction, drives.world.samples)) {
+      for (Eigen::Index j = 0; j < sample.drive.size(); ++j) {
+        const double sigma = drives.friction[static_cast<std::size_t>(j)].sigma;
+        if (!sample.may_stick(j)) out = std::max(out, std::abs(sample.drive[j]) / sigma);
+      }
+    }
+    return out;
+  };
+  EXPECT_LT(most(soft), 1.5 * most(stiff));
+}
+
 TEST(Sliding, StickingIsNoEvidenceWithinItsInterval) {
   const Drives drives({.duration_s = 30.0, .speed_rad_s = 0.5});
   TorqueSamples held = drives.world.samples;
