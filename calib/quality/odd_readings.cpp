@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -178,6 +179,38 @@ std::vector<OddReading> odd_readings(const Calibration& calibration, const PoseT
       break;
     }
   }
+  return out;
+}
+
+std::vector<OddStretch> odd_stretches(const Calibration& calibration,
+                                      const std::vector<OddReading>& readings) {
+  // Where the joint comes by what it reads, a frame between two others is none of them.
+  constexpr double kMostApart = 4.0;  // usual steps
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < calibration.times_s.size(); ++i)
+    steps.push_back(calibration.times_s[i] - calibration.times_s[i - 1]);
+  const double apart_s = kMostApart * median_of(std::move(steps));
+  std::map<std::string, std::vector<OddStretch>> by_channel;
+  for (const OddReading& odd : readings) {
+    std::vector<OddStretch>& own = by_channel[odd.channel];
+    const double at_s = odd.time_s + calibration.time_offset_s;
+    const auto off = [](const OddReading& one) { return std::abs(one.expected - one.read); };
+    if (own.empty() || at_s - own.back().to_s > apart_s) {
+      own.push_back({odd.channel, at_s, at_s, 1, odd, true});
+      continue;
+    }
+    OddStretch& last = own.back();
+    last.stands_still = last.stands_still && odd.read == last.most.read;
+    last.to_s = at_s;
+    ++last.frames;
+    if (off(odd) > off(last.most)) last.most = odd;
+  }
+  std::vector<OddStretch> out;
+  for (auto& [channel, own] : by_channel) {
+    std::ranges::copy_if(own, std::back_inserter(out),
+                         [](const OddStretch& stretch) { return stretch.frames > 1; });
+  }
+  std::ranges::stable_sort(out, {}, &OddStretch::from_s);
   return out;
 }
 

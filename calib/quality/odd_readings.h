@@ -34,4 +34,18 @@ struct OddReading {
 [[nodiscard]] std::vector<OddReading> odd_readings(const Calibration& calibration,
                                                    const PoseTracks& tracks, const JointLog& log);
 
+/// Odd readings of one channel in successive frames: a reading that froze, or fell to zero.
+struct OddStretch {
+  std::string channel;
+  double from_s = 0.0;  ///< of the first frame, on the log's clock
+  double to_s = 0.0;    ///< of the last one
+  int frames = 0;
+  OddReading most;            ///< where reading and markers differ most
+  bool stands_still = false;  ///< it reads one value in all of them
+};
+
+/// Of at least two frames of a film, in the order of time.
+[[nodiscard]] std::vector<OddStretch> odd_stretches(const Calibration& calibration,
+                                                    const std::vector<OddReading>& readings);
+
 }  // namespace kinescope

@@ -200,6 +200,17 @@ std::vector<LyingInput> lying_logs() {
        kRun,
        0,
        {"joints.csv: repeats one row from t = ", "the log was frozen"}},
+      {"LogColumnFrozen",
+       poses,
+       [](Files& files) {
+         const std::vector<Row> rows = rows_of(files["joints.csv"]);
+         each_row("joints.csv", [&](Row& row, int i) {
+           if (i >= 300 && i < 340) row[1] = rows[301][1];
+         })(files);
+       },
+       kRun,
+       0,
+       {"stands still at", "but the markers it moves say up to", "a reading that froze"}},
       // joints.csv, written by other programs: read as it is meant
       {"LogOfSemicolonsAndCommas",
        poses,
