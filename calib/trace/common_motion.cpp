@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace kinescope::trace {
 namespace {
@@ -20,6 +21,9 @@ void take_out(const Eigen::VectorXd& direction, Eigen::Ref<Eigen::VectorXd> of) 
   const double squares = direction.squaredNorm();
   if (squares > 0.0) of -= direction * (direction.dot(of) / squares);
 }
+
+// Of the largest share.
+constexpr double kNearly = 0.5;
 
 // Sums over instants in which a place moves two bodies or more.
 struct Products {
@@ -78,16 +82,24 @@ std::optional<CommonMotion> find_common_motion(const NormalSystem& system,
   const Linearisation& linear = system.linear();
   if (linear.body.empty()) return std::nullopt;
   const Eigen::VectorXd time = dense(linear, clock);
-  std::optional<CommonMotion> best;
-  double most = 0.0;
+  std::vector<std::pair<double, CommonMotion>> found;  // with what it explains
+  double largest_share = 0.0;
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Products sums = products_of(linear, dense(linear, places[k].carrier), time);
     if (!(sums.expected > 0.0)) continue;
     const double variance = std::max(0.0, sums.between / sums.expected);
     const double explained = variance * sums.weight;
-    if (best && explained <= most) continue;
+    const double share = explained / std::max(sums.squares, 1e-300);
+    largest_share = std::max(largest_share, share);
+    found.push_back({explained, {k, std::sqrt(variance), share}});
+  }
+  std::optional<CommonMotion> best;
+  double most = 0.0;
+  for (const auto& [explained, motion] : found) {
+    if (motion.share < kNearly * largest_share || (best && explained <= most)) continue;
     most = explained;
-    best = {k, std::sqrt(variance), explained / std::max(sums.squares, 1e-300)};
+    best = motion;
+    best->largest_share = largest_share;
   }
   return best;
 }

@@ -102,7 +102,7 @@ std::string unknown_words(const Stage& now, bool slight, const std::optional<Com
 
 std::optional<CommonMotion> common_motion(const Stage& stage) {
   const auto found = find_common_motion(stage.system, stage.fit.rest_places, stage.fit.clock);
-  return found && found->share > kMostOfIt ? found : std::nullopt;
+  return found && found->largest_share > kMostOfIt ? found : std::nullopt;
 }
 
 bool is_of_readings(const Stage& stage, const CommonMotion& motion) {

@@ -75,6 +75,35 @@ TEST(CommonMotion, NoiseOfEachRowOrOfEachBodyIsNone) {
   EXPECT_LT(found_in({.of_body = 3.0}).share, 0.2);
 }
 
+// Of a joint that moves a marker more, further out, the same shake makes more of what is left
+// there.
+TEST(CommonMotion, TheJointBeforeIsNamedWhereBodiesFurtherOutShowItToo) {
+  Linearisation linear = world({.shake = 0.8});
+  // A third carrier moves the last body alone, and one behind it that sees as much.
+  std::vector<Eigen::Triplet<double>> carriers;
+  for (int c = 0; c < linear.carriers.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(linear.carriers, c); entry; ++entry) {
+      carriers.emplace_back(entry.row(), c, entry.value());
+      const auto row = static_cast<std::size_t>(entry.row());
+      if (c == 0 && linear.body[row] == kBodies - 1) {
+        if (entry.row() % 2 == 0) linear.body[row] = kBodies;
+        carriers.emplace_back(entry.row(), 2, entry.value());
+      }
+    }
+  }
+  linear.carriers.resize(linear.residual.size(), 3);
+  linear.carriers.setFromTriplets(carriers.begin(), carriers.end());
+  // What the second body shows of it is half noise of its own.
+  Rng rng(8);
+  for (Eigen::Index row = 0; row < linear.residual.size(); ++row)
+    if (linear.body[static_cast<std::size_t>(row)] == 1) linear.residual[row] += rng.normal(1.5);
+  const NormalSystem system(linear, make_partition(linear));
+  const auto found = find_common_motion(system, {{"outer", "rad", 2}, {"joint", "rad", 0}}, 1);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->place, 1U);
+  EXPECT_GT(found->largest_share, found->share);
+}
+
 TEST(CommonMotion, StampsThatScatterAreNone) { EXPECT_LT(found_in({.of_time = 3.0}).share, 0.05); }
 
 TEST(CommonMotion, OneBodyAloneDoesNotTell) {
