@@ -17,6 +17,8 @@ struct TorqueScale {
   double correlation = 0.0;  ///< -1 to 1, without friction or offset
   double lag_s = 0.0;        ///< measured comes that much later; 0 where it cannot be told
   double size_ratio = 0.0;   ///< rms of measured over rms of predicted
+  /// Friction is so much more than what the model says that errors of its laws pass for the model.
+  bool of_friction = false;
 };
 
 struct TorqueScales {

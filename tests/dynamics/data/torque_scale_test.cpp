@@ -99,6 +99,21 @@ TEST(TorqueScale, WhereFrictionIsFarMoreTheScaleIsNotJudged) {
   EXPECT_TRUE(refuses(compare_torque_scale(scene.samples, scene.predicted, drive_scale)));
 }
 
+// A light wrist: what a wrong law of friction leaves may go against the little that it lifts.
+TEST(TorqueScale, WhereFrictionIsFarMoreOfOneJointItsSignIsNotJudged) {
+  Scene scene = make_scene();
+  scene.predicted.col(1) *= -0.01;
+  const TorqueScales scales = compare_torque_scale(scene.samples, scene.predicted);
+  EXPECT_TRUE(scales.joints[1].of_friction);
+  EXPECT_FALSE(scales.joints[0].of_friction);
+  EXPECT_FALSE(refuses(scales)) << to_line(scales.findings.front());
+  ASSERT_EQ(scales.findings.size(), 1U);
+  EXPECT_EQ(scales.findings[0].weight, FaultWeight::kNote);
+  // As much of all joints is another unit.
+  scene.predicted *= 1e-3;
+  EXPECT_TRUE(refuses(compare_torque_scale(scene.samples, scene.predicted)));
+}
+
 TEST(TorqueScale, FindsATorqueThatComesLate) {
   constexpr double kLag = 0.03;
   const Scene scene = make_scene(kLag);
