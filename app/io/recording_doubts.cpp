@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -26,21 +28,46 @@ double doubled_area(const std::vector<Eigen::Vector2d>& corners_px) {
 void turn_clockwise_corners(TagObservations& corners, const MarkerSet& markers,
                             const std::filesystem::path& file, std::vector<std::string>& warnings) {
   constexpr double kNearlyAll = 0.95;  // a detector errs in fewer
-  std::vector<TagObservation*> clockwise;
-  int squares = 0;
+  struct Sightings {
+    std::vector<TagObservation*> clockwise;
+    int all = 0;
+    [[nodiscard]] bool nearly_all() const {
+      return !clockwise.empty() && static_cast<double>(clockwise.size()) >= kNearlyAll * all;
+    }
+  };
+  std::map<TagId, Sightings> by_tag;
+  Sightings together;
   for (TagObservation& tag : corners.observations) {
     if (markers.boards.contains(tag.id)) continue;
-    ++squares;
-    if (doubled_area(tag.corners_px) > 0.0) clockwise.push_back(&tag);
+    Sightings& own = by_tag[tag.id];
+    for (Sightings* of : {&own, &together}) {
+      ++of->all;
+      if (doubled_area(tag.corners_px) > 0.0) of->clockwise.push_back(&tag);
+    }
   }
-  const auto count = static_cast<int>(clockwise.size());
-  if (count == 0 || count < kNearlyAll * squares) return;
-  for (TagObservation* tag : clockwise) std::ranges::reverse(tag->corners_px);
-  warnings.push_back(fmt::format(
-      "{}: the corners 0, 1, 2, 3 of {} of {} sightings go round clockwise: taken for OpenCV's "
-      "order, from the upper left. Does v count upward instead, the robot comes out mirrored: take "
-      "v from the images' height",
-      file.string(), count, squares));
+  const auto turn = [](const Sightings& of) {
+    for (TagObservation* tag : of.clockwise) std::ranges::reverse(tag->corners_px);
+  };
+  if (together.nearly_all()) {
+    turn(together);
+    warnings.push_back(fmt::format(
+        "{}: the corners 0, 1, 2, 3 of {} of {} sightings go round clockwise: taken for OpenCV's "
+        "order, from the upper left. Does v count upward instead, the robot comes out mirrored: "
+        "take v from the images' height",
+        file.string(), together.clockwise.size(), together.all));
+    return;
+  }
+  std::string names;
+  for (const auto& [id, own] : by_tag) {
+    if (!own.nearly_all()) continue;
+    turn(own);
+    names += fmt::format("{}tag_{}", names.empty() ? "" : ", ", id.value);
+  }
+  if (names.empty()) return;
+  warnings.push_back(
+      fmt::format("{}: the corners 0, 1, 2, 3 of {} go round clockwise, those of other markers "
+                  "do not: taken for OpenCV's order, from the upper left; give all in one order",
+                  file.string(), names));
 }
 
 void warn_of_principal_point(const CameraModel& camera, const std::filesystem::path& file,

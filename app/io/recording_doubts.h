@@ -16,7 +16,8 @@ namespace kinescope {
 
 /// Where nearly all square markers are seen from behind, through the paper, their corners are
 /// turned to AprilTag's order, and a warning says so: OpenCV's order is told from v counted upward,
-/// which mirrors the robot, by no table alone.
+/// which mirrors the robot, by no table alone. So are those of single markers that go round another
+/// way than the others.
 void turn_clockwise_corners(TagObservations& corners, const MarkerSet& markers,
                             const std::filesystem::path& file, std::vector<std::string>& warnings);
 

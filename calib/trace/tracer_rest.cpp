@@ -228,8 +228,8 @@ bool Tracer::drop_what_rests_explain() {
     if (is_usual(effect.id) && predicts_beside(others, system)) continue;
     const Score score = jackknife_test(system, candidate->columns(effect.scan));
     const double tests = tests_of(stage->fit.candidates, *candidate);
-    // What a tenth of it is left of is no cause, however certain that tenth is: a curve beside a
-    // model that has bent itself leaves some (`undeclared`, 13839).
+    // What shrinks to less than a tenth beside the rest is no cause, however certain that is: a
+    // curve in a model that has bent itself leaves some (`undeclared`, 13839).
     const double alone = details_[i].effect.explained * base_->system.total().rr;
     if (!score.hidden() && score.p_value * tests < level_ && score.gain >= kDoubtfulShare * alone)
       continue;

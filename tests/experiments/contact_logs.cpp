@@ -484,21 +484,20 @@ void contact_logs_simulated() {
   std::printf("simulated, %s\n", "a minute each");
   constexpr int kMinutes = 20;
   for (const bool masses : {true, false}) {
-    for (const char* kind : {"sines", "stop and go", "slow, stop and go"}) {
+    for (const std::string kind : {"sines", "stop and go", "slow, stop and go", "winds up"}) {
       const Folder work;
       DynamicModel model = contact_arm(3);
       Count count;
       for (int w = 0; w < kMinutes / 2; ++w) {
         Rng rng = Rng::from_name(kind, static_cast<std::uint64_t>(w));
         TorqueSamples samples;
-        if (std::string(kind) == "sines") {
+        if (kind == "sines") {
           samples = contact_world(model, {.duration_s = 60.0, .rate_hz = 250.0}, rng).samples;
         } else {
-          samples = drive_world(model,
-                                {.duration_s = 60.0,
-                                 .speed_rad_s = std::string(kind) == "stop and go" ? 0.8 : 0.08},
-                                rng)
-                        .samples;
+          DriveWorldOptions drives{.duration_s = 60.0,
+                                   .speed_rad_s = kind == "slow, stop and go" ? 0.08 : 0.8};
+          if (kind == "winds up") drives.presliding_rad = 5e-3;
+          samples = drive_world(model, drives, rng).samples;
         }
         TorqueLog log;
         log.t_s = samples.t_s;
@@ -510,7 +509,7 @@ void contact_logs_simulated() {
         count.add(look(work, write_log(work, "log.csv", log), {}, work / "robot.urdf",
                        model.gravity_m_s2));
       }
-      print_count(kind, masses ? "masses known" : "identified", count);
+      print_count(kind.c_str(), masses ? "masses known" : "identified", count);
     }
   }
   for (const double obstacle_nm : {0.5, 1.0, 3.0}) sweeps_into_obstacles(obstacle_nm);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <string>
 
 #include <Eigen/Geometry>
 
@@ -122,6 +123,15 @@ std::vector<LyingInput> lying_sightings() {
        kInspect,
        0,
        {"go round clockwise: taken for OpenCV's order, from the upper left"}},
+      {"CornersOfOneMarkerNumberedTheOtherWay",
+       corners,
+       each_row("corners.csv",
+                [](Row& row, int) {
+                  if (row[1] == "7") row[2] = std::to_string(3 - std::stoi(row[2]));
+                }),
+       kInspect,
+       0,
+       {"of tag_7 go round clockwise, those of other markers do not"}},
       {"CornersOfAMarkerWithoutSize",
        corners,
        is("tags.yaml", "family: tag36h11\nsizes: {3: 0.05}\n"),
