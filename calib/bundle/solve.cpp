@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <numbers>
+#include <optional>
 
 #include <ceres/ordered_groups.h>
 #include <ceres/solver.h>
@@ -282,10 +283,11 @@ SolveSummary solve(const Spec& spec, State& state, const std::vector<int>& sight
   // It becomes a part of longer sentences.
   if (summary.message.ends_with('.')) summary.message.pop_back();
   const bool converged = summary.termination_type == ceres::CONVERGENCE;
-  double last_taken = summary.initial_cost;
+  std::optional<double> last_taken;
   for (const ceres::IterationSummary& iteration : summary.iterations)
     if (iteration.iteration > 0 && iteration.step_is_successful) last_taken = iteration.cost_change;
-  const bool settled = last_taken < kSettledTolerance * summary.final_cost;
+  const bool settled = summary.termination_type == ceres::NO_CONVERGENCE && last_taken &&
+                       *last_taken < kSettledTolerance * summary.final_cost;
   return {converged,
           converged || settled,
           summary.message,
