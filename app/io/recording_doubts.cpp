@@ -39,10 +39,10 @@ void turn_clockwise_corners(TagObservations& corners, const MarkerSet& markers,
   Sightings together;
   for (TagObservation& tag : corners.observations) {
     if (markers.boards.contains(tag.id)) continue;
-    Sightings& own = by_tag[tag.id];
-    for (Sightings* of : {&own, &together}) {
+    const bool is_clockwise = doubled_area(tag.corners_px) > 0.0;
+    for (Sightings* of : {&by_tag[tag.id], &together}) {
       ++of->all;
-      if (doubled_area(tag.corners_px) > 0.0) of->clockwise.push_back(&tag);
+      if (is_clockwise) of->clockwise.push_back(&tag);
     }
   }
   const auto turn = [](const Sightings& of) {

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "kinematics/core/mean_step.h"
 #include "kinematics/core/median.h"
 
 namespace kinescope {
@@ -185,11 +186,8 @@ std::vector<OddReading> odd_readings(const Calibration& calibration, const PoseT
 std::vector<OddStretch> odd_stretches(const Calibration& calibration,
                                       const std::vector<OddReading>& readings) {
   // Where the joint comes by what it reads, a frame between two others is none of them.
-  constexpr double kMostApart = 4.0;  // usual steps
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < calibration.times_s.size(); ++i)
-    steps.push_back(calibration.times_s[i] - calibration.times_s[i - 1]);
-  const double apart_s = kMostApart * median_of(std::move(steps));
+  constexpr double kMostApart = 4.0;  // usual steps; chosen
+  const double apart_s = kMostApart * median_step_s(calibration.times_s);
   std::map<std::string, std::vector<OddStretch>> by_channel;
   for (const OddReading& odd : readings) {
     std::vector<OddStretch>& own = by_channel[odd.channel];

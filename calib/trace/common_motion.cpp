@@ -22,7 +22,7 @@ void take_out(const Eigen::VectorXd& direction, Eigen::Ref<Eigen::VectorXd> of) 
   if (squares > 0.0) of -= direction * (direction.dot(of) / squares);
 }
 
-// Of the largest share.
+// Of the largest share; chosen (0.48 and 0.59 of two joints where the first has a wave, and 0.32).
 constexpr double kNearly = 0.5;
 
 // Sums over instants in which a place moves two bodies or more.

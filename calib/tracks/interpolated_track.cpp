@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "kinematics/core/median.h"
-
 namespace kinescope::tracks {
 namespace {
 
@@ -47,12 +45,6 @@ std::optional<PoseSample> InterpolatedTrack::at(double time_s) const {
   out.alternative_cost =
       (1.0 - share) * before.alternative_cost + share * samples_[k]->alternative_cost;
   return out;
-}
-
-double median_step(const std::vector<double>& times_s) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < times_s.size(); ++i) steps.push_back(times_s[i] - times_s[i - 1]);
-  return median_of(std::move(steps));
 }
 
 bool are_simultaneous(const std::vector<double>& times_s, const std::vector<double>& others_s) {

@@ -30,9 +30,6 @@ class InterpolatedTrack {
 /// the marker. Chosen, not measured.
 inline constexpr double kBridgedSteps = 3.5;
 
-/// Median step between times, s; 0 of fewer than two.
-[[nodiscard]] double median_step(const std::vector<double>& times_s);
-
 /// Most of the times are times of the others, too: postures, or cameras on one trigger. Nothing is
 /// to be interpolated.
 [[nodiscard]] bool are_simultaneous(const std::vector<double>& times_s,

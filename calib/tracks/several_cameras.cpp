@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calib/tracks/interpolated_track.h"
+#include "kinematics/core/mean_step.h"
 #include "kinematics/core/median.h"
 #include "kinematics/core/nearest_rotation.h"
 
@@ -58,7 +59,7 @@ InterpolatedTrack interpolated(const PoseTracks& all, const PoseTrack& track, bo
     samples.push_back(&sample);
   }
   return {std::move(times_s), std::move(samples),
-          bridge ? tracks::kBridgedSteps * tracks::median_step(all.times_s) : 0.0};
+          bridge ? tracks::kBridgedSteps * median_step_s(all.times_s) : 0.0};
 }
 
 // Weighted least squares of |reference - T own|.
@@ -228,8 +229,7 @@ std::optional<CameraPlace> placed_by(const PoseTracks& placed, const PoseTracks&
   CameraPlace out;
   out.ahead_s = about_s;
   if (options.scan_clocks) {
-    const double step_s =
-        0.5 * std::max(tracks::median_step(own.times_s), tracks::median_step(placed.times_s));
+    const double step_s = 0.5 * std::max(median_step_s(own.times_s), median_step_s(placed.times_s));
     if (const auto ahead_s = clock_by_motion(common, step_s, about_s, options)) {
       out.ahead_s = *ahead_s;
       out.clock_known = true;
@@ -383,7 +383,7 @@ std::map<int, double> bridges(const std::vector<double>& times_s,
   std::map<int, double> out;
   for (const auto& [camera, times] : own) {
     const bool exact = camera == 0 || tracks::are_simultaneous(times, own[0]);
-    out[camera] = exact ? 0.0 : tracks::kBridgedSteps * tracks::median_step(times);
+    out[camera] = exact ? 0.0 : tracks::kBridgedSteps * median_step_s(times);
   }
   return out;
 }

@@ -308,34 +308,25 @@ Eigen::MatrixXd rates_between_neighbours(const Eigen::VectorXd& t_s,
   return out;
 }
 
-/// Of presliding as it is usual: beyond that a joint is elastic, and does not stick.
+/// Of presliding as it is usual, chosen: beyond 5 degrees a joint is elastic, and does not stick.
 constexpr double kLongestPresliding = 32.0;
-/// Turns from which on most of them say how far a joint moves until it slides.
+/// Turns from which on most of them say how far a joint moves until it slides; chosen.
 constexpr std::size_t kFewestTurns = 4;
 
 /// One joint in all motions.
 struct JointRecord {
-  const RigidModel& model;
   const std::vector<TorqueSamples>& motions;
   const std::vector<Eigen::MatrixXd>& residuals;
   const std::vector<Eigen::MatrixXd>& ways;
   Eigen::Index joint = 0;
 
-  /// Beyond the noise of the positions.
-  [[nodiscard]] double way(std::size_t motion, double presliding) const {
-    SlidingOptions options;
-    options.presliding = Eigen::VectorXd::Constant(model.size(), presliding);
-    return sliding_way(model, joint, motions[motion].q, options);
-  }
-
   [[nodiscard]] Slid slid(double presliding) const {
     std::vector<std::array<double, 3>> rows;
     Slid out;
     for (std::size_t m = 0; m < motions.size(); ++m) {
-      const double far = way(m, presliding);
       for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
         const double gone = ways[m](t, joint);
-        if (std::abs(gone) < far) continue;
+        if (std::abs(gone) < presliding) continue;
         rows.push_back({motions[m].dq(t, joint), gone > 0.0 ? 1.0 : -1.0, residuals[m](t, joint)});
         out.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
       }
@@ -360,15 +351,13 @@ struct JointRecord {
   [[nodiscard]] bool slides_later(const SlidingFriction& friction, double presliding) const {
     std::vector<double> means;  // of every turn, along the motion
     for (std::size_t m = 0; m < motions.size(); ++m) {
-      const double from = way(m, presliding);
-      const double to = way(m, 2.0 * presliding);
       double sum = 0.0;
       double count = 0.0;
       for (Eigen::Index t = 0; t < motions[m].size(); ++t) {
         const double gone = ways[m](t, joint);
         const int direction = gone > 0.0 ? 1 : -1;
-        const bool inside =
-            std::abs(gone) >= from && std::abs(gone) < to && friction.known(direction);
+        const bool inside = std::abs(gone) >= presliding && std::abs(gone) < 2.0 * presliding &&
+                            friction.known(direction);
         if (inside) {
           sum += direction *
                  (residuals[m](t, joint) - friction.sliding(motions[m].dq(t, joint), direction));
@@ -564,10 +553,9 @@ std::vector<SlidingFriction> sliding_friction(const RigidModel& model,
   std::vector<SlidingFriction> out;
   for (Eigen::Index j = 0; j < model.size(); ++j) {
     const bool turns = model.bodies[static_cast<std::size_t>(j)].type != JointType::kPrismatic;
-    const SlidingOptions usual;
-    double presliding = turns ? usual.presliding_rad : usual.presliding_m;
+    double presliding = presliding_of(model, j);
     const double longest = kLongestPresliding * presliding;
-    const JointRecord record{model, motions, residuals, ways, j};
+    const JointRecord record{motions, residuals, ways, j};
     SlidingFriction friction = friction_from(record.slid(presliding), turns);
     while (friction.known() && 2.0 * presliding <= longest &&
            record.slides_later(friction, presliding)) {

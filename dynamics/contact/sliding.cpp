@@ -63,10 +63,6 @@ int direction_at(const Eigen::VectorXd& t_s, const Eigen::VectorXd& q, const Nei
   return out;
 }
 
-double beyond_noise(const Eigen::VectorXd& q) {
-  return kNoiseSigmas * std::sqrt(2.0) * position_noise(q);
-}
-
 bool turns(const RigidModel& model, Eigen::Index joint) {
   return model.bodies[static_cast<std::size_t>(joint)].type != JointType::kPrismatic;
 }
@@ -79,7 +75,7 @@ Eigen::MatrixXd ways_since_turns(const RigidModel& model, const Eigen::VectorXd&
   const Neighbours near = neighbours(t_s, options.window_s);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
     const Eigen::VectorXd own = q.col(j);
-    const double noise = beyond_noise(own);
+    const double noise = kNoiseSigmas * std::sqrt(2.0) * position_noise(own);
     const double rest = turns(model, j) ? options.rest_speed_rad_s : options.rest_speed_m_s;
     int direction = 0;
     double from = 0.0;
@@ -87,18 +83,16 @@ Eigen::MatrixXd ways_since_turns(const RigidModel& model, const Eigen::VectorXd&
       const int now = direction_at(t_s, own, near, k, rest, noise);
       if (now != direction) from = own[k];
       direction = now;
-      if (now != 0) out(k, j) = now * std::max(0.0, (own[k] - from) * now);
+      if (now != 0) out(k, j) = now * std::max(0.0, (own[k] - from) * now - noise);
     }
   }
   return out;
 }
 
-double sliding_way(const RigidModel& model, Eigen::Index joint, const Eigen::MatrixXd& q,
-                   const SlidingOptions& options) {
-  const double usual = turns(model, joint) ? options.presliding_rad : options.presliding_m;
+double presliding_of(const RigidModel& model, Eigen::Index joint, const SlidingOptions& options) {
   const double own = options.presliding.size() > 0 ? options.presliding[joint] : 0.0;
-  const double way = own > 0.0 ? own : usual;
-  return way + beyond_noise(q.col(joint));
+  if (own > 0.0) return own;
+  return turns(model, joint) ? options.presliding_rad : options.presliding_m;
 }
 
 Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t_s,
@@ -106,7 +100,7 @@ Eigen::MatrixXi sliding_states(const RigidModel& model, const Eigen::VectorXd& t
   const Eigen::MatrixXd ways = ways_since_turns(model, t_s, q, options);
   Eigen::MatrixXi out = Eigen::MatrixXi::Zero(q.rows(), q.cols());
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
-    const double far = sliding_way(model, j, q, options);
+    const double far = presliding_of(model, j, options);
     for (Eigen::Index k = 0; k < q.rows(); ++k)
       if (std::abs(ways(k, j)) >= far) out(k, j) = ways(k, j) > 0.0 ? 1 : -1;
   }

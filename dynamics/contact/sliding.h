@@ -25,16 +25,16 @@ struct SlidingOptions {
   Eigen::VectorXd presliding = {};  ///< of each joint, rad or m; empty or 0: those
 };
 
-/// Way of each joint since it rested or turned round, below zero where it moves backward; zero
-/// where it rests or turns. Positions alone are looked at. Samples x joints of one uninterrupted
-/// motion, rad or m.
+/// Way of each joint since it rested or turned round, beyond what noise of its positions could be,
+/// below zero where it moves backward; zero where it rests or turns. Positions alone are looked at.
+/// Samples x joints of one uninterrupted motion, rad or m.
 [[nodiscard]] Eigen::MatrixXd ways_since_turns(const RigidModel& model, const Eigen::VectorXd& t_s,
                                                const Eigen::MatrixXd& q,
                                                const SlidingOptions& options = {});
 
-/// The way after which a joint slides, beyond what noise of its positions could be.
-[[nodiscard]] double sliding_way(const RigidModel& model, Eigen::Index joint,
-                                 const Eigen::MatrixXd& q, const SlidingOptions& options = {});
+/// The way after which a joint slides, rad or m.
+[[nodiscard]] double presliding_of(const RigidModel& model, Eigen::Index joint,
+                                   const SlidingOptions& options = {});
 
 /// One entry a sample and joint of one uninterrupted motion, the values of Slide; positions alone
 /// are looked at. Samples x joints.

@@ -404,11 +404,8 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   if (superfluous.size() == 1) doubt_masses(superfluous.front(), rival.trace, out.trace);
   if (superfluous.size() < 2) return out;
   // Wrong masses are one cause, and plainer than several.
-  std::string names;
-  for (const TracedEffect& effect : superfluous)
-    names += (names.empty() ? "" : ", ") + trace::name_of(effect.id);
-  rival.base.reason = fmt::format(
-      "identified masses predict unseen stretches as well as declared ones do with {}", names);
+  rival.base.reason = trace::found_words(
+      "identified masses predict unseen stretches as well as declared ones do with", superfluous);
   return rival;
 }
 
