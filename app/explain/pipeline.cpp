@@ -296,7 +296,7 @@ std::string model_remedy(RecordingEntry entry, bool camera_declared) {
   return std::string(camera_declared ? "check that camera.yaml is this camera's, "
                                      : "calibrate the camera (kinescope camera); check ") +
          "that tags.yaml has every marker's size, that no marker has slipped and that the camera "
-         "stood still";
+         "stood still, its focus and zoom fixed";
 }
 
 Structure find_robot(const Recording& recording, const PoseTracks& tracks,

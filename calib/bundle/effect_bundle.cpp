@@ -10,10 +10,12 @@
 #include <set>
 
 #include "calib/bundle/choose_sightings.h"
+#include "calib/bundle/corrected.h"
 #include "calib/bundle/folds.h"
 #include "calib/bundle/linearise.h"
 #include "calib/bundle/make_spec.h"
 #include "calib/bundle/solve.h"
+#include "kinematics/core/chi_square.h"
 #include "kinematics/core/error.h"
 
 namespace kinescope {
@@ -188,7 +190,9 @@ struct EffectBundle::Impl {
   Spec spec;  // plain, noise known
   State start;
   double offset_start_s = 0.0;
+  std::vector<int> usable;
   std::vector<int> used;
+  double reject_sigma = 0.0;
   std::vector<int> fold;
   std::vector<DesignCoupling> couplings;
   double bias_px = 0.0;
@@ -215,7 +219,9 @@ EffectBundle::EffectBundle(const Measurements& measurements, const MarkerSet& ma
   // The best plain model shows which sightings stand out; the clock is free for that only.
   State state = bundle::initial_state(spec, start);
   bundle::guess_targets(spec, bundle::usable_sightings(spec, state), state);
-  const std::vector<int> usable = thin_frames(spec, bundle::usable_sightings(spec, state));
+  impl_->reject_sigma = options.reject_sigma;
+  impl_->usable = thin_frames(spec, bundle::usable_sightings(spec, state));
+  const std::vector<int>& usable = impl_->usable;
   Spec robust = spec;
   if (spec.postures) {
     const bundle::RobustSolution solution =
@@ -494,6 +500,39 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   }
   out.correlation_time_s = spec.postures ? 0.0 : bundle::correlation_time(spec, state, impl_->used);
   return out;
+}
+
+double EffectBundle::most_of_a_sighting() const {
+  int rows = 1;
+  for (const int index : impl_->usable)
+    rows = std::max(rows, impl_->spec.sightings[static_cast<std::size_t>(index)].dimension());
+  return chi_square_quantile(rows, impl_->reject_sigma);
+}
+
+Eigen::VectorXd EffectBundle::gain_of_frames(const BundleChange& change,
+                                             const BundleSolution& solved,
+                                             const std::vector<std::size_t>& which) const {
+  const State& state = solved.end->state;
+  const auto frames = static_cast<Eigen::Index>(impl_->spec.times_s.size());
+  // By frame, with that share of these corrections everywhere.
+  const auto squares_at = [&](double share) {
+    Spec with;
+    State unused;
+    impl_->change_model(change, with, unused);
+    for (const std::size_t k : which)
+      with.corrections[k].share = Eigen::VectorXd::Constant(frames, share);
+    const Readings readings(with, state);
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(frames);
+    for (const int index : impl_->usable) {
+      const Sighting& sighting = with.sightings[static_cast<std::size_t>(index)];
+      const auto at = bundle::corrected_error_of(with, state, readings, sighting);
+      const double most = chi_square_quantile(sighting.dimension(), impl_->reject_sigma);
+      const double squares = at ? at->error.residual.squaredNorm() : most;
+      out[sighting.frame] += squares < most ? squares : most;
+    }
+    return out;
+  };
+  return squares_at(0.0) - squares_at(1.0);
 }
 
 JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s,

@@ -107,8 +107,8 @@ struct CameraEffect {
 [[nodiscard]] std::vector<CameraEffect> camera_effects(const EffectWorld& world);
 
 /// Of this recording alone, from a time on or growing with it: tag_slip, camera_bump, camera_drift,
-/// thermal_growth, clock_jump, zero_jump, zero_drift. Not of a camera that is carried: camera_bump,
-/// camera_drift; nor with one on the robot: thermal_growth.
+/// focal_jump, focal_drift, thermal_growth, clock_jump, zero_jump, zero_drift. Not of a camera that
+/// is carried: camera_bump, camera_drift; nor with one on the robot: thermal_growth.
 [[nodiscard]] std::vector<CameraEffect> time_effects(const EffectWorld& world);
 
 /// Of several recordings, what is another one in one of them: recording_zero, recording_mount,

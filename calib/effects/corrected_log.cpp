@@ -81,10 +81,10 @@ bool moves_load_of(const KinematicTree& tree, JointId joint, const Joint& other)
 
 // Throws for an effect at a joint that is not there.
 void check_place(const FittedEffect& effect, const KinematicTree& tree, const JointLog& log) {
-  constexpr std::array<std::string_view, 13> kElsewhere{
-      "rolling_shutter", "lens_distortion", "intrinsics",      "blooming",     "tag_size",
-      "bent_tag",        "tag_slip",        "camera_bump",     "camera_drift", "thermal_growth",
-      "clock_jump",      "recording_mount", "recording_growth"};
+  constexpr std::array<std::string_view, 15> kElsewhere{
+      "rolling_shutter", "lens_distortion", "intrinsics",       "blooming",     "tag_size",
+      "bent_tag",        "tag_slip",        "camera_bump",      "camera_drift", "thermal_growth",
+      "clock_jump",      "recording_mount", "recording_growth", "focal_jump",   "focal_drift"};
   if (std::ranges::find(kElsewhere, effect.id.effect) != kElsewhere.end()) return;
   const auto joint = tree.joint(effect.id.place);
   if (!joint) throw refused(log, effect, "the robot has no such joint");

@@ -127,14 +127,17 @@ Eigen::VectorXd creeping_time(const EffectWorld& world) {
 
 // A time constant, as the value of the scan: from what is over early to a straight line.
 void creeps(const EffectWorld& world, Candidate& c) {
-  constexpr std::array kConstants{0.1, 0.2, 0.4, 0.8, 1.6, 3.2};  // of the recording
+  // Of the recording; the last is a straight line, but for a thousandth of it.
+  constexpr std::array kConstants{0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 100.0};
+  constexpr double kHardlyBent = 3.2;
   const Eigen::VectorXd time = creeping_time(world);
   const double length = time[time.size() - 1] - time[0];
   for (const double constant : kConstants) c.scan.push_back(constant * length);
   c.scan_name = "time constant";
   c.scan_unit = world.postures ? "postures" : "s";
+  c.is_single = true;
   // What is far from its end by then goes along a straight line.
-  c.scan_words = [most = c.scan.back(), unit = c.scan_unit](double constant) {
+  c.scan_words = [most = kHardlyBent * length, unit = c.scan_unit](double constant) {
     return constant > most ? fmt::format("more than {:.3g} {}", most, unit)
                            : fmt::format("{:.3g} {}", constant, unit);
   };
@@ -202,6 +205,69 @@ CameraEffect camera_drift(const EffectWorld& world) {
   out.corrections = [like = out, time = creeping_time(world)](double constant) {
     return twists(like, CorrectedPart::kCamera, 0, creep(time, constant));
   };
+  return out;
+}
+
+// The focal length over the one at first: a lens that moves to focus (or zooms) takes the image's
+// centre along a little.
+std::function<std::vector<Correction>(double)> another_focus(
+    const CameraEffect& like, std::function<Eigen::VectorXd(double)> share) {
+  return [like, share = std::move(share)](double scan) {
+    Correction focal = correct(CorrectedPart::kFocalLength, like, 0);
+    focal.share = share(scan);
+    return std::vector{focal};
+  };
+}
+
+std::function<std::vector<Correction>(double)> centre_with_focus(
+    const CameraEffect& like, std::function<Eigen::VectorXd(double)> share) {
+  constexpr double kMostShift = 1.0;  // px, chosen
+  constexpr int kFirstOfCentre = 2;   // cx, cy among the intrinsic parameters
+  return [like, share = std::move(share)](double scan) {
+    std::vector<Correction> out;
+    for (int axis = 0; axis < 2; ++axis) {
+      Correction shift = correct(CorrectedPart::kIntrinsic, like, 0, kFirstOfCentre + axis);
+      shift.name =
+          fmt::format("{} centre beside the focal length {}", like.candidate.id.place, "xy"[axis]);
+      shift.unit = "px";
+      shift.share = share(scan);
+      shift.is_nuisance = true;
+      shift.prior_sigma = kMostShift;
+      out.push_back(std::move(shift));
+    }
+    return out;
+  };
+}
+
+constexpr std::string_view kFocusCheck =
+    "autofocus and zoom of the camera: switch both off; a lens that warms up or comes loose";
+
+CameraEffect focal_jump(const EffectWorld& world) {
+  CameraEffect out =
+      effect("focal_jump", "camera", "the focal length jumped (the camera focused anew, or zoomed)",
+             {{"relative change", ""}}, "");
+  out.candidate.check = kFocusCheck;
+  out.candidate.record = "fix the focus; bring the markers nearer to the camera and farther away";
+  happens_once(world, periods_of(world), out.candidate);
+  told_in_one_posture(world, world.moving, out.candidate);
+  out.corrections = another_focus(out, since(world));
+  out.nuisances = centre_with_focus(out, since(world));
+  return out;
+}
+
+CameraEffect focal_drift(const EffectWorld& world) {
+  CameraEffect out =
+      effect("focal_drift", "camera",
+             "the focal length changes slowly (focus that creeps, a lens that warms up)",
+             {{"relative change", ""}}, "");
+  out.candidate.check = kFocusCheck;
+  out.candidate.record = "fix the focus, and let the camera warm up";
+  creeps(world, out.candidate);
+  const auto share = [time = creeping_time(world)](double constant) {
+    return creep(time, constant);
+  };
+  out.corrections = another_focus(out, share);
+  out.nuisances = centre_with_focus(out, share);
   return out;
 }
 
@@ -311,6 +377,12 @@ std::vector<CameraEffect> time_effects(const EffectWorld& world) {
       out.push_back(moved);
       for (std::size_t c = 0; world.cameras.size() > 1 && c < world.cameras.size(); ++c)
         out.push_back(at_camera(world, c, without_base(moved)));
+    }
+  }
+  if (!world.of_recordings && world.kind == MeasurementKind::kCorners) {
+    for (std::size_t c = 0; c < world.cameras.size(); ++c) {
+      for (const CameraEffect& focal : {focal_jump(world), focal_drift(world)})
+        out.push_back(at_camera(world, c, focal));
     }
   }
   if (!world.of_recordings && world.camera_link.value == 0) out.push_back(thermal_growth(world));

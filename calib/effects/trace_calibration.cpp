@@ -233,6 +233,24 @@ void size_again(const EffectBundle& chosen, const CalibrationTraceOptions& optio
   take_corrections(model, options, out);
 }
 
+// True where some instant is another one than the sightings that were used say.
+bool move_to_likeliest_instants(const EffectBundle& bundle, const CalibrationTraceOptions& options,
+                                CalibrationTrace& out) {
+  const effects::TracedBundle model(bundle, options);
+  if (model.possible(out.trace.added) != out.trace.added) return false;
+  const std::vector<AddedEffect> moved = model.at_likeliest_instants(out.trace.added);
+  if (moved == out.trace.added) return false;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const AddedEffect& before = out.trace.added[i];
+    for (TracedEffect& accepted : out.trace.accepted) {
+      if (accepted.id == before.id && accepted.scan == before.scan) accepted.scan = moved[i].scan;
+    }
+  }
+  out.trace.added = moved;
+  take_corrections(model, options, out);
+  return true;
+}
+
 }  // namespace
 
 CalibrationTrace trace_calibration(const Measurements& measurements, const MarkerSet& markers,
@@ -242,13 +260,14 @@ CalibrationTrace trace_calibration(const Measurements& measurements, const Marke
   const EffectBundle bundle(measurements, markers, log, start, options.calibrate);
   CalibrationTrace out = traced_with_gravity(bundle, options, progress);
   if (out.corrections.empty()) return out;
+  CalibrationTraceOptions begun = options;
+  begun.gravity_base = out.gravity_base;
+  const bool moved = move_to_likeliest_instants(bundle, begun, out);
   CalibrationStart known = start;
   known.corrections = without_readings(out);
   const EffectBundle chosen(measurements, markers, log, known, options.calibrate);
-  CalibrationTraceOptions begun = options;
-  begun.gravity_base = out.gravity_base;
   if (!judges_better(chosen, bundle)) {
-    if (!chosen.chose_as(bundle)) size_again(chosen, begun, out);
+    if (moved || !chosen.chose_as(bundle)) size_again(chosen, begun, out);
     return out;
   }
   begun.trace.start = out.trace.added;

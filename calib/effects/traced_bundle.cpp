@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -224,6 +226,11 @@ std::vector<RestPlace> rest_places_of(const EffectWorld& world, Carriers& carrie
     turn.direction = Vector6d::Unit(axis);
     out.push_back({fmt::format("camera-to-base pose about {}", "xyz"[axis]), "rad",
                    carriers.add(turn), 0.0, 0.0});
+  }
+  if (alone && world.kind == MeasurementKind::kCorners) {
+    Correction focal;  // autofocus that hunts
+    focal.part = CorrectedPart::kFocalLength;
+    out.push_back({"camera focal length", "", carriers.add(focal), 0.0, 0.0});
   }
   for (const int marker : world.seen) {
     const Marker& m = world.tree.markers[static_cast<std::size_t>(marker)];
@@ -529,6 +536,40 @@ std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects
       return effect.candidate.id == added.id && !effect.candidate.is_curve();
     });
   });
+  return effects;
+}
+
+std::vector<AddedEffect> TracedBundle::at_likeliest_instants(
+    std::vector<AddedEffect> effects) const {
+  if (bundle_->of_recordings()) return effects;
+  const auto [world, library, change, solved] = ready_for(effects);
+  if (!solved->converged) return effects;
+  const std::vector<double>& times_s = world.frames.times_s;
+  std::size_t next = 0;
+  for (AddedEffect& added : effects) {
+    const CameraEffect& effect = effect_of(library, added.id);
+    if (effect.is_time_offset) continue;
+    std::vector<std::size_t> which(effect.corrections(added.scan).size());
+    std::iota(which.begin(), which.end(), next);
+    next += which.size();
+    if (effect.candidate.scan_step == 0.0) continue;  // nothing that happens once
+    const Eigen::VectorXd gain = bundle_->gain_of_frames(change, *solved, which);
+    // From the last frame on: what it gains if it happened there.
+    double best_s = added.scan;
+    double since = 0.0;
+    double most = -std::numeric_limits<double>::infinity();
+    double now = 0.0;
+    for (std::size_t f = times_s.size(); f-- > 0;) {
+      since += gain[static_cast<Eigen::Index>(f)];
+      if (times_s[f] >= added.scan) now = since;
+      const bool searched =
+          times_s[f] >= effect.candidate.scan.front() && times_s[f] <= effect.candidate.scan.back();
+      if (!searched || since <= most) continue;
+      most = since;
+      best_s = times_s[f];
+    }
+    if (most > now + bundle_->most_of_a_sighting()) added.scan = best_s;
+  }
   return effects;
 }
 

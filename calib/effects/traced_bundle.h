@@ -31,6 +31,12 @@ class TracedBundle final : public TracedModel {
   /// Without curves, which hold what is left beside the others.
   [[nodiscard]] std::vector<AddedEffect> possible(std::vector<AddedEffect> effects) const;
 
+  /// What happens once, at the instant that most sightings bear out, those among them that are left
+  /// out: near another one they stand out, and those that are used do not tell it from the right
+  /// one. The same where that is borne out as well, and of several recordings.
+  [[nodiscard]] std::vector<AddedEffect> at_likeliest_instants(
+      std::vector<AddedEffect> effects) const;
+
   /// The robot and its motion as the fit with these effects has them: the log read that much later,
   /// loads where the effects leave the joints.
   [[nodiscard]] EffectWorld world_of(const std::vector<AddedEffect>& effects) const;

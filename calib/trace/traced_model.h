@@ -92,6 +92,9 @@ struct Candidate {
   /// All that is of this kind has some of it (friction): what is left at its place and is less than
   /// it explains is beside it, and puts no doubt on its name.
   bool is_usual = false;
+  /// There is no second one at its place: what one more would explain is the first at another value
+  /// of the scan (something creeps once, with one time constant).
+  bool is_single = false;
   std::vector<EffectParameter> parameters;
   /// The size that is reported is the parameter itself where there is one, else
   /// sqrt(sum of weight x parameter^2), in `size_unit`.

@@ -151,6 +151,7 @@ void Tracer::forward() {
       known_searched_ = true;
       if (search_again(std::nullopt)) continue;
     }
+    if (!next && search_again_for_a_second(family)) continue;
     if (next) next = or_what_is_below_floors(std::move(next), family);
     // What hides behind others is looked for where all of these are beyond doubt: the backward
     // check takes out the others first.
@@ -426,7 +427,18 @@ bool Tracer::is_large(const Candidate& candidate, double scan, const Score& scor
 bool Tracer::may_be_added(const Candidate& candidate, double scan, const Score& score) const {
   return !score.hidden() && is_large(candidate, scan, score) && !removed_.contains(candidate.id) &&
          is_possible(candidate, score.theta) &&
-         std::ranges::count(now_->added, candidate.id, &AddedEffect::id) < kMostAlike;
+         std::ranges::count(now_->added, candidate.id, &AddedEffect::id) <
+             (candidate.is_single ? 1 : kMostAlike);
+}
+
+bool Tracer::search_again_for_a_second(const std::vector<TestedMember>& family) {
+  for (const TestedMember& member : family) {
+    const Candidate& candidate = now_->fit.candidates[member.index];
+    if (candidate.is_single && is_added(candidate.id) && member.p_value <= level_ &&
+        search_again(candidate.id.place))
+      return true;
+  }
+  return false;
 }
 
 std::vector<Tracer::Contender> Tracer::contenders(const NormalSystem& system,

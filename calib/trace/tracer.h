@@ -105,6 +105,8 @@ class Tracer {
   [[nodiscard]] bool is_needed(const Stage& stage, std::size_t index);
   /// True where a value was found that predicts better.
   [[nodiscard]] bool search_again(const std::optional<std::string>& place);
+  /// The same at the place of an effect that there can be only one of, where one more would show.
+  [[nodiscard]] bool search_again_for_a_second(const std::vector<TestedMember>& family);
   void sharpen(std::size_t index);
   /// Where the size of an effect is the value of its scan, and predicts as well there.
   [[nodiscard]] StagePtr with_sizes_for_scans(StagePtr stage);

@@ -34,9 +34,11 @@ struct Drawn {
   std::size_t library = 0;
   std::size_t own = 0;
 };
-constexpr std::array kDrawn{Drawn{1000, 16, 3}, Drawn{3000, 20, 9}, Drawn{10000, 23, 9}};
+constexpr std::array kDrawn{Drawn{1000, 16, 3}, Drawn{3000, 20, 9}, Drawn{10000, 23, 9},
+                            Drawn{14000, 25, 8}};
 // For those below a growth of the robot was in no library.
 constexpr int kGrowthWasOwn = 10000;
+constexpr std::ptrdiff_t kGrowthWasAt = 8;
 
 // Effects that a robot at rest before a tracker can have.
 bool shows_at_postures(const std::string& effect) {
@@ -66,7 +68,8 @@ bool clashes(const InjectedEffect& effect, const std::vector<InjectedEffect>& ot
 void draw_effects(std::size_t count, UndeclaredCase& of, Rng& rng) {
   const bool own = of.kind == UndeclaredKind::kOwn;
   std::vector<std::string> known = own ? truth::own_effects() : truth::library_effects();
-  if (own && of.number < kGrowthWasOwn) known.emplace_back("thermal_growth");
+  if (own && of.number < kGrowthWasOwn)
+    known.insert(known.begin() + kGrowthWasAt, "thermal_growth");
   std::span<const std::string> names = known;
   const auto drawn =
       std::ranges::find_if(kDrawn, [&](const Drawn& d) { return of.number < d.below; });

@@ -67,6 +67,21 @@ struct Drift {
   }
 };
 
+// The focal length over the declared one.
+struct Focus {
+  double jump = 0.0;
+  double jumps_at_s = 0.0;
+  double drift = 0.0;  ///< at the last frame
+  double time_constant_s = 1.0;
+  double last_s = 1.0;  // of the frames
+  double swing = 0.0;
+  double omega = 1.0;  ///< rad/s
+  [[nodiscard]] double factor(double t_s) const {
+    return 1.0 + (t_s >= jumps_at_s ? jump : 0.0) + drift * creep(t_s, time_constant_s, last_s) +
+           swing * std::sin(omega * t_s);
+  }
+};
+
 struct Growth {
   double relative = 0.0;  ///< at the last frame
   double time_constant_s = 1.0;
@@ -104,6 +119,7 @@ struct Chequer {
 struct Undeclared {
   Clock clock;
   CameraModel camera;
+  Focus focus;
   double line_s = 0.0;  ///< a row
   double reference_row = 0.0;
   std::optional<Bump> bump;
@@ -221,6 +237,16 @@ void add(const InjectedEffect& effect, const FilmedRobot& robot, Undeclared& out
     out.drift = drift_of(effect, time_s, robot.last_frame_s, rng);
   } else if (effect.effect == "own_sway") {
     out.sway = sway_of(effect, rng);
+  } else if (effect.effect == "focal_jump") {
+    out.focus.jump = effect.size;
+    out.focus.jumps_at_s = time_s;
+  } else if (effect.effect == "focal_drift") {
+    out.focus.drift = effect.size;
+    out.focus.time_constant_s = time_s;
+    out.focus.last_s = robot.last_frame_s;
+  } else if (effect.effect == "own_hunting") {
+    out.focus.swing = effect.size;
+    out.focus.omega = kTwoPi * effect.detail;
   } else if (effect.effect == "thermal_growth") {
     out.growth = {effect.size, time_s, robot.last_frame_s};
   } else if (effect.effect == "own_chequer") {
@@ -303,11 +329,14 @@ class Eye {
   [[nodiscard]] std::optional<Eigen::Vector2d> expose(const Marker& marker,
                                                       const Eigen::Vector3d& corner, double stamp_s,
                                                       const Pose& T_stamp) const {
-    auto pixel = project(un_.camera, T_stamp * corner);
+    CameraModel camera = un_.camera;
+    camera.fx *= un_.focus.factor(stamp_s);
+    camera.fy *= un_.focus.factor(stamp_s);
+    auto pixel = project(camera, T_stamp * corner);
     if (un_.line_s == 0.0) return pixel;
     for (int i = 0; pixel && i < 4; ++i) {
       const double t = stamp_s + un_.line_s * (pixel->y() - un_.reference_row);
-      pixel = project(un_.camera, camera_from_tag(marker, t) * corner);
+      pixel = project(camera, camera_from_tag(marker, t) * corner);
     }
     return pixel;
   }

@@ -23,7 +23,7 @@ struct Strength {
   Unit kind = Unit::kPlain;
 };
 
-constexpr std::array<Strength, 33> kWeakest{{
+constexpr std::array<Strength, 36> kWeakest{{
     {"time_offset", 0.5e-3},
     {"clock_drift", 5e-5},  // 0.5 ms rms over 33 s
     {"encoder_scale", 500e-6},
@@ -57,6 +57,9 @@ constexpr std::array<Strength, 33> kWeakest{{
     {"own_creep", 0.03 * kRadPerDegree, Unit::kAngle},
     {"blooming", 0.03},
     {"thermal_growth", 0.15e-3},
+    {"focal_jump", 0.5e-3},
+    {"focal_drift", 1e-3},
+    {"own_hunting", 0.5e-3},
 }};
 
 constexpr std::array<std::string_view, 19> kOnJoints{
@@ -64,8 +67,10 @@ constexpr std::array<std::string_view, 19> kOnJoints{
     "coupling",      "helical",      "axis_wobble",  "curved_slider", "zero_jump",
     "zero_drift",    "own_tanh",     "own_speed",    "own_product",   "own_acceleration",
     "own_vibration", "own_creep",    "quantisation", "own_cubic"};
-constexpr std::array<std::string_view, 4> kAtATime{"tag_slip", "camera_bump", "zero_jump",
-                                                   "clock_jump"};
+constexpr std::array<std::string_view, 5> kAtATime{"tag_slip", "camera_bump", "zero_jump",
+                                                   "clock_jump", "focal_jump"};
+constexpr std::array<std::string_view, 4> kCreeping{"camera_drift", "zero_drift", "thermal_growth",
+                                                    "focal_drift"};
 constexpr std::array<std::string_view, 6> kByAnother{
     "coupling", "own_tanh", "own_speed", "own_product", "own_acceleration", "own_creep"};
 constexpr std::array<std::string_view, 3> kOnRevolute{"eccentricity", "helical", "axis_wobble"};
@@ -88,11 +93,11 @@ double detail_of(std::string_view effect, const Joint* joint, Rng& rng) {
   if (effect == "eccentricity") return 1.0 + rng.index(2);
   if (effect == "axis_wobble") return -1.0;
   if (among(kAtATime, effect)) return rng.uniform(0.25, 0.75);
-  if (effect == "camera_drift" || effect == "zero_drift" || effect == "thermal_growth")
-    return rng.uniform(0.2, 2.0);
+  if (among(kCreeping, effect)) return rng.uniform(0.2, 2.0);
   if (effect == "own_chequer" || effect == "own_ripple") return rng.uniform(60.0, 120.0);
   if (effect == "bent_tag") return rng.uniform(0.2, 1.4);
   if (effect == "own_vibration") return rng.uniform(2.0, 6.0);
+  if (effect == "own_hunting") return rng.uniform(0.1, 0.4);
   if (effect != "gear_error") return 0.0;
   return joint->type == JointType::kPrismatic ? rng.uniform(15.0, 60.0) : rng.uniform(6.0, 40.0);
 }
@@ -134,14 +139,15 @@ const std::vector<std::string>& library_effects() {
       "backlash",      "compliance",      "coupling",        "helical",        "axis_wobble",
       "curved_slider", "lens_distortion", "rolling_shutter", "tag_size",       "tag_slip",
       "camera_bump",   "camera_drift",    "zero_jump",       "zero_drift",     "clock_jump",
-      "intrinsics",    "bent_tag",        "quantisation",    "thermal_growth", "blooming"};
+      "intrinsics",    "bent_tag",        "quantisation",    "thermal_growth", "blooming",
+      "focal_jump",    "focal_drift"};
   return names;
 }
 
 const std::vector<std::string>& own_effects() {
   static const std::vector<std::string> names{"own_tanh",      "own_speed",   "own_chequer",
                                               "own_ripple",    "own_product", "own_acceleration",
-                                              "own_vibration", "own_creep"};
+                                              "own_vibration", "own_creep",   "own_hunting"};
   return names;
 }
 

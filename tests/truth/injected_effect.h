@@ -43,6 +43,9 @@ namespace kinescope::truth {
 ///   camera_bump      rad, about a point 0.3 m away; detail: when, share of the time
 ///   camera_drift     rad from the first frame to the last, about a point 0.3 m away; detail: time
 ///                    constant of its approach to rest, share of the time
+///   focal_jump       1, change of the focal length from then on; detail: when, share of the time
+///   focal_drift      1, change of the focal length from the first frame to the last; detail as of
+///                    camera_drift
 ///   thermal_growth   1, growth of all the robot's lengths from the first frame to the last; detail
 ///                    as of camera_drift
 ///   zero_jump        rad (m), the joint's zero from then on; detail: when, share of the time
@@ -62,6 +65,7 @@ namespace kinescope::truth {
 ///   own_acceleration true value of `place` += size x acceleration of `with` / its largest
 ///   own_vibration    rad (m) amplitude; detail: Hz
 ///   own_sway         rad, amplitude of the camera's turn; detail: Hz; not drawn at random
+///   own_hunting      1, amplitude of the focal length's swing; detail: Hz
 ///   own_creep        true value of `place` += size x (value of `with`, as it was about 1.5 s ago
 ///                    and before, fading - its value) / reach
 struct InjectedEffect {

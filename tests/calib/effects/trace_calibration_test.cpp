@@ -60,6 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{"tag_slip", "tag_12"}, std::pair{"camera_bump", "camera"},
                       std::pair{"clock_drift", "clock"}, std::pair{"time_offset", "q2"},
                       std::pair{"camera_drift", "camera"}, std::pair{"clock_jump", "clock"},
+                      std::pair{"focal_jump", "camera"}, std::pair{"focal_drift", "camera"},
                       std::pair{"thermal_growth", "robot"}, std::pair{"blooming", "camera"},
                       std::pair{"zero_jump", "q2"}, std::pair{"zero_drift", "q3"},
                       std::pair{"intrinsics", "camera focal length"},
@@ -208,7 +209,7 @@ TEST_P(Unnamed, HasNoNameOfTheLibrary) {
 INSTANTIATE_TEST_SUITE_P(TraceCalibration, Unnamed,
                          ::testing::Values("own_tanh", "own_speed", "own_chequer", "own_ripple",
                                            "own_product", "own_acceleration", "own_creep",
-                                           "own_vibration"),
+                                           "own_vibration", "own_hunting"),
                          [](const auto& tested) { return tested.param; });
 
 // Of 0.7 deg: the time constant that is best beside a model that has bent itself is not the right
@@ -226,6 +227,21 @@ TEST(TraceCalibration, ATimeConstantIsFoundWithTheEffectInTheModel) {
   EXPECT_NEAR(found.size, drift.size, 0.02 * drift.size);
   const double length_s = world.measurements.times_s.back() - world.measurements.times_s.front();
   EXPECT_NEAR(found.scan, drift.detail * length_s, 0.1 * drift.detail * length_s);
+}
+
+// A straight line is no sum of two that bend, which would be known by their difference only.
+TEST(TraceCalibration, ADriftAlongAStraightLineIsOne) {
+  InjectedEffect drift = strong("camera_drift", "camera");
+  drift.size = 0.012;
+  drift.detail = 300.0;
+  const Trace trace = trace_of(make_effect_world(filmed({drift}))).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& found = trace.accepted.front();
+  EXPECT_EQ(found.id, (EffectId{"camera_drift", "camera"})) << answer(trace);
+  EXPECT_LE(found.interval.low, drift.size);
+  EXPECT_GE(found.interval.high, drift.size);
+  EXPECT_NEAR(found.size, drift.size, 0.02 * drift.size);
+  EXPECT_LT(found.interval.high, 1.1 * drift.size);
 }
 
 // The log without the effects says where the joint is, but for what a zero is.

@@ -89,6 +89,20 @@ TEST(TraceCalibration, ACameraThatSwaysIsNoJoint) {
   }
 }
 
+// Autofocus: no joint, and no camera that moves.
+TEST(TraceCalibration, AFocusThatHuntsIsNoJoint) {
+  constexpr double kSize = 5e-3;
+  constexpr double kTurns = 6.0;  // in the recording
+  EffectWorldOptions options = filmed({}, 400);
+  const double length_s = options.frames / options.frame_rate_hz;
+  options.effects = {{"own_hunting", "camera", kSize, kTurns / length_s}};
+  const Trace trace = trace_of(make_effect_world(options)).trace;
+  EXPECT_EQ(trace.verdict, TraceVerdict::kUnknown) << answer(trace);
+  EXPECT_TRUE(trace.accepted.empty()) << answer(trace);
+  ASSERT_FALSE(trace.rest.empty());
+  EXPECT_EQ(trace.rest.front().place, "camera focal length");
+}
+
 TEST(TraceCalibration, GravityIsToldBesideACurve) {
   const World world = make_effect_world(filmed({strong("compliance", "q2")}));
   CalibrationTraceOptions options;
