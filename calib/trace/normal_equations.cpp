@@ -45,7 +45,10 @@ Eigen::VectorXd solve_without(const NormalEquations& total, const NormalEquation
   Eigen::MatrixXd H = scale.asDiagonal() * (total.H - part.H) * scale.asDiagonal();
   H.diagonal().array() += kRidge;
   const Eigen::VectorXd g = scale.asDiagonal() * (total.g - part.g);
-  return scale.asDiagonal() * solve_symmetric(H, g);
+  // The ridge makes it positive definite, but for rounding where parts show nothing.
+  const CholeskyFactor factor(H);
+  return scale.asDiagonal() *
+         (factor.positive_definite() ? factor.solve(g) : solve_symmetric(H, g));
 }
 
 }  // namespace kinescope::trace

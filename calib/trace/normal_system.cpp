@@ -23,26 +23,47 @@ GroupSums sums_of(const RowMatrix& J, const Eigen::VectorXd& r) {
   return out;
 }
 
-// Of the rows of each group of instants.
-std::vector<GroupSums> grouped(const Linearisation& linear, const std::vector<int>& group,
-                               int groups) {
-  std::vector<GroupSums> out;
-  for (int k = 0; k < groups; ++k) {
-    Eigen::Index rows = 0;
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      if (group[i] == k) rows += linear.first_row[i + 1] - linear.first_row[i];
-    }
-    RowMatrix J(rows, linear.jacobian.cols());
-    Eigen::VectorXd r(rows);
-    Eigen::Index at = 0;
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      if (group[i] != k) continue;
-      const Eigen::Index count = linear.first_row[i + 1] - linear.first_row[i];
-      J.middleRows(at, count) = linear.jacobian.middleRows(linear.first_row[i], count);
-      r.segment(at, count) = linear.residual.segment(linear.first_row[i], count);
-      at += count;
-    }
-    out.push_back(sums_of(J, r));
+GroupSums& operator+=(GroupSums& sum, const GroupSums& other) {
+  sum.H += other.H;
+  sum.g += other.g;
+  sum.rr += other.rr;
+  return sum;
+}
+
+// Of the rows of these instants.
+GroupSums sums_over(const Linearisation& linear, const std::vector<std::size_t>& instants) {
+  Eigen::Index rows = 0;
+  for (const std::size_t i : instants) rows += linear.first_row[i + 1] - linear.first_row[i];
+  RowMatrix J(rows, linear.jacobian.cols());
+  Eigen::VectorXd r(rows);
+  Eigen::Index at = 0;
+  for (const std::size_t i : instants) {
+    const Eigen::Index count = linear.first_row[i + 1] - linear.first_row[i];
+    J.middleRows(at, count) = linear.jacobian.middleRows(linear.first_row[i], count);
+    r.segment(at, count) = linear.residual.segment(linear.first_row[i], count);
+    at += count;
+  }
+  return sums_of(J, r);
+}
+
+struct SumsOfGroups {
+  std::vector<GroupSums> stretches;
+  std::vector<GroupSums> folds;
+};
+
+// Every row once: a fold is made of its parts of the stretches.
+SumsOfGroups grouped(const Linearisation& linear, const Partition& partition) {
+  std::map<std::pair<int, int>, std::vector<std::size_t>> parts;
+  for (std::size_t i = 0; i < partition.stretch.size(); ++i)
+    parts[{partition.stretch[i], partition.fold[i]}].push_back(i);
+  const Eigen::Index n = linear.jacobian.cols();
+  const GroupSums none{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), 0.0};
+  SumsOfGroups out{std::vector<GroupSums>(static_cast<std::size_t>(partition.stretches), none),
+                   std::vector<GroupSums>(static_cast<std::size_t>(partition.folds), none)};
+  for (const auto& [groups, instants] : parts) {
+    const GroupSums part = sums_over(linear, instants);
+    out.stretches[static_cast<std::size_t>(groups.first)] += part;
+    out.folds[static_cast<std::size_t>(groups.second)] += part;
   }
   return out;
 }
@@ -71,15 +92,12 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
     const Eigen::Index first = linear.first_row[i];
     std::fill_n(instant_.begin() + first, linear.first_row[i + 1] - first, static_cast<int>(i));
   }
-  stretches_ = grouped(linear, partition_.stretch, partition_.stretches);
-  folds_ = grouped(linear, partition_.fold, partition_.folds);
+  auto [stretches, folds] = grouped(linear, partition_);
+  stretches_ = std::move(stretches);
+  folds_ = std::move(folds);
   const Eigen::Index parameters = linear.jacobian.cols();
   total_ = {Eigen::MatrixXd::Zero(parameters, parameters), Eigen::VectorXd::Zero(parameters), 0.0};
-  for (const GroupSums& stretch : stretches_) {
-    total_.H += stretch.H;
-    total_.g += stretch.g;
-    total_.rr += stretch.rr;
-  }
+  for (const GroupSums& stretch : stretches_) total_ += stretch;
   if (linear.prior_gradient.size() > 0) total_.g -= linear.prior_gradient;
   inverse_ = scaled_pseudo_inverse(
       linear.prior.size() == 0 ? total_.H : Eigen::MatrixXd(total_.H + linear.prior), kUnseen);
