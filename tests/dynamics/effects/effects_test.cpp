@@ -658,6 +658,41 @@ TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   EXPECT_EQ(model.base().kind, TorqueBaseKind::kIdentified) << model.base().reason;
 }
 
+// The load that rubs is that of the masses that are found, whatever was declared.
+TEST(TorqueEffects, LoadFrictionIsAShareOfTheLoadThatIsFound) {
+  constexpr double kTruth = 0.1;
+  constexpr double kSigmas = 4.0;  // of two shares in eight logs: p = 0.001
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  for (const double declared : {0.0, 0.7, 1.0, 1.4}) {
+    for (const std::uint64_t seed : {41U, 42U}) {
+      SCOPED_TRACE(testing::Message() << declared << " of the masses, log " << seed);
+      Rng rng = Rng::from_name("load", seed);
+      EffectWorld world = effect_world(
+          {{"load_friction", 1, 0, kTruth}, {"load_friction", 2, 0, kTruth}}, options, rng);
+      for (InertialParameters& link : world.model.links)
+        link = InertialParameters::from_vector(declared * link.vector());
+      TracedTorqueOptions traced = declared_options();
+      traced.base = TorqueBaseKind::kIdentified;
+      const TorqueTracedModel model(world.model, exact_samples(world), traced);
+      std::vector<AddedEffect> added;
+      for (const char* joint : {"joint1", "joint2", "joint3"})
+        for (const char* effect : {"coulomb", "viscous"}) added.push_back({{effect, joint}, 0.0});
+      for (const char* joint : {"joint2", "joint3"})
+        added.push_back({{"load_friction", joint}, 0.0});
+      const TracedFit fit = model.fit(added);
+      ASSERT_TRUE(fit.converged) << fit.reason;
+      const Eigen::MatrixXd H =
+          fit.linear.jacobian.transpose() * fit.linear.jacobian + fit.linear.prior;
+      const Eigen::VectorXd variance = H.inverse().diagonal().tail(2);
+      for (Eigen::Index k = 0; k < 2; ++k) {
+        const double share = fit.values[fit.values.size() - 2 + static_cast<std::size_t>(k)][0];
+        EXPECT_NEAR(share, kTruth, kSigmas * std::sqrt(variance[k]));
+      }
+    }
+  }
+}
+
 // A drive whose gain is wrong says another mass than the others do: how well all of them are known
 // together is then no matter of noise.
 TEST(TorqueEffects, JointsThatDisagreeAboutAPayloadWidenItsInterval) {
