@@ -326,7 +326,7 @@ struct JointRecord {
     for (std::size_t m = 0; m < motions.size(); ++m) {
       for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
         const double gone = ways[m](t, joint);
-        if (std::abs(gone) < presliding) continue;
+        if (std::abs(gone) < presliding || motions[m].is_missing(t, joint)) continue;
         rows.push_back({motions[m].dq(t, joint), gone > 0.0 ? 1.0 : -1.0, residuals[m](t, joint)});
         out.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
       }
@@ -357,7 +357,7 @@ struct JointRecord {
         const double gone = ways[m](t, joint);
         const int direction = gone > 0.0 ? 1 : -1;
         const bool inside = std::abs(gone) >= presliding && std::abs(gone) < 2.0 * presliding &&
-                            friction.known(direction);
+                            friction.known(direction) && !motions[m].is_missing(t, joint);
         if (inside) {
           sum += direction *
                  (residuals[m](t, joint) - friction.sliding(motions[m].dq(t, joint), direction));
@@ -442,7 +442,7 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
                              accelerations(t, j) * (wanted - taken.lowest) > 0.0;
       // Without inertia, what the log begins with may be the end of a motion.
       const bool begins = !past.has_slid && std::isfinite(clear[j]);
-      const bool anything = speeds_up || !own.known() || begins;
+      const bool anything = speeds_up || !own.known() || begins || motion.is_missing(t, j);
       if (taken.lowest == taken.highest && !anything) {
         sample.drive[j] -= taken.lowest;
         sample.sigma[j] =

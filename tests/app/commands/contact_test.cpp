@@ -2,6 +2,8 @@
 //
 // `kinescope contact` as a user meets it: contacts found in a log, by the momentum balance or by a
 // torque model, products, refusals.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -85,6 +87,37 @@ TEST_F(ContactCommand, ADeadTorqueChannelIsLeftOutAndNamed) {
     const nlohmann::json found = contacts();
     EXPECT_EQ(found.at("unfit"), nlohmann::json::array({"joint2"}));
     EXPECT_LE(found.at("contacts").size(), touched_.labels.size());
+    std::filesystem::remove_all(folder_.path() / "out");
+  }
+}
+
+/// The first second and a half of the samples outside the labels, in which the joint turns fast.
+Eigen::Index calm_row(const ContactWorld& world, Eigen::Index joint, double span_s) {
+  constexpr double kApart_s = 0.5;
+  for (Eigen::Index row = 0; row < world.samples.size(); ++row) {
+    const double t = world.samples.t_s[row];
+    const bool calm = std::ranges::none_of(world.labels, [&](const auto& label) {
+      return label.begin_s < t + span_s + kApart_s && label.end_s > t - kApart_s;
+    });
+    if (calm && t > 1.0 && std::abs(world.samples.dq(row, joint)) > 0.3) return row;
+  }
+  return 0;
+}
+
+TEST_F(ContactCommand, ATorqueThatFreezesIsNamedAndNoContact) {
+  constexpr double kSpan_s = 0.5;
+  TorqueSamples samples = touched_.samples;
+  const Eigen::Index row = calm_row(touched_, 1, kSpan_s);
+  ASSERT_GT(row, 0);
+  const auto rows = static_cast<Eigen::Index>(kSpan_s / (samples.t_s[1] - samples.t_s[0]));
+  samples.torque.col(1).segment(row, rows).setConstant(samples.torque(row, 1));
+  folder_.write("log.csv", torque_log_csv(samples));
+  for (const std::vector<std::string>& model :
+       {std::vector<std::string>{"--learn", path("free.csv")}, {"--model", "parametric"}}) {
+    const Outcome outcome = run(words(model));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("column 'tau2' keeps the value"), std::string::npos) << outcome.err;
+    expect_labelled(contacts().at("contacts"));
     std::filesystem::remove_all(folder_.path() / "out");
   }
 }

@@ -776,6 +776,24 @@ TEST(TorqueEffects, IdentifiedMassesPredictWhatWasFitted) {
   EXPECT_LT((predicted - fitted).norm(), kShare * fitted.norm());
 }
 
+TEST(TorqueEffects, TorquesThatWereNotMeasuredDoNotCount) {
+  Rng rng = Rng::from_name("effects", 15);
+  const EffectWorld world = effect_world({{"coulomb", 1, 0, 0.2}}, quiet_world(), rng);
+  const TorqueSamples sound = exact_samples(world);
+  TorqueSamples broken = sound;
+  const Eigen::Index from = sound.size() / 3;
+  const Eigen::Index rows = sound.size() / 5;
+  broken.torque.col(1).segment(from, rows).setConstant(100.0 * sound.torque.cwiseAbs().maxCoeff());
+  broken.torque_missing = MissingTorque::Constant(sound.size(), sound.joints(), false);
+  broken.torque_missing.col(1).segment(from, rows).setConstant(true);
+  const auto coulomb = [&](const TorqueSamples& samples) {
+    const TorqueTracedModel model(world.model, samples, declared_options());
+    for (const Eigen::Index row : model.motion().kept()) EXPECT_TRUE(samples.is_measured(row));
+    return model.fit({{{"coulomb", "joint2"}, 0.0}}).values.front()[0];
+  };
+  EXPECT_NEAR(coulomb(broken), coulomb(sound), 0.01 * coulomb(sound));
+}
+
 TEST(TorqueEffects, RepeatsOfAPathAreHeldOutTogether) {
   Rng rng = Rng::from_name("effects", 11);
   EffectWorldOptions options = quiet_world();
