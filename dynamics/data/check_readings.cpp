@@ -201,11 +201,15 @@ std::optional<Eigen::Index> usual_length(const std::vector<ValueRun>& runs) {
   return std::nullopt;
 }
 
-/// The joint's speed changes in it.
+/// The joint moves in most of it, and its speed changes.
 bool is_in_motion(const Reading& reading, const ValueRun& run) {
   std::vector<double> speeds;
-  for (Eigen::Index row = run.begin; row < run.end; ++row) speeds.push_back(reading.speed(row));
-  return reading.varies(std::move(speeds));
+  Eigen::Index moving = 0;
+  for (Eigen::Index row = run.begin; row < run.end; ++row) {
+    speeds.push_back(reading.speed(row));
+    if (reading.moves(row)) ++moving;
+  }
+  return 2 * moving >= run.rows() && reading.varies(std::move(speeds));
 }
 
 bool catches_up(const Reading& reading, const ValueRun& run) {

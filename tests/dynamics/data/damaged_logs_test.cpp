@@ -471,6 +471,15 @@ TEST(DamagedLog, SoundTorquesThatRepeatStay) {
   }
   rests.rows.col(rests.column("dq2")).segment(600, 600).setZero();
   expect_all_kept(rests, "a joint at rest");
+  // Switched off while it comes to rest, as at the end of a program.
+  LogWorld stops = make_log_world(usual_noise());
+  for (const char* column : {"q2", "tau2"}) {
+    const Eigen::Index c = stops.column(column);
+    stops.rows.col(c).tail(600).setConstant(column[0] == 'q' ? stops.rows(1400, c) : 0.0);
+  }
+  stops.rows.col(stops.column("tau2")).segment(1380, 21).setZero();
+  stops.rows.col(stops.column("dq2")).tail(600).setZero();
+  expect_all_kept(stops, "a joint that comes to rest");
   // Torques in steps, as some drives are commanded, between others that change.
   expect_all_kept(changed("tau1",
                           [](const Rows& rows, Eigen::Index r, Eigen::Index c) {
