@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -21,7 +22,7 @@ constexpr double kOnGrid = 0.98;         // of the values
 constexpr std::size_t kFewValues = 8;    // a grid needs that many levels to be one
 constexpr double kHeldShare = 0.35;      // of the rows without change
 constexpr double kManyLevels = 0.5;      // of the changes: values that hardly ever come back
-constexpr double kRestS = 0.25;          // chosen: longer than positions are held
+constexpr double kReachS = 0.1;          // chosen: either way, longer than positions are held
 constexpr double kLagReachS = 0.3;
 constexpr double kCommandLagGain = 0.8;
 
@@ -54,24 +55,28 @@ void name_grid(const TorqueLog& log, const Channel& channel, std::vector<LogFind
               "counts as noise of a third of a step"));
 }
 
-/// Of each row whether its joint moves by then or soon: positions that are renewed slowly stand
-/// still for a while, too.
+/// Of each row whether its joint moves so fast that every row has a new position: what repeats
+/// while it rests, or creeps from step to step of its encoder, is no news.
 std::vector<char> rows_in_motion(const TorqueLog& log, Eigen::Index joint) {
   const double step_s = median_of(steps_of(log.t_s, log.trajectory));
-  const auto reach =
-      step_s > 0.0 ? static_cast<Eigen::Index>(std::ceil(kRestS / step_s)) : Eigen::Index{1};
-  const auto moves = [&](Eigen::Index row) {
-    return log.trajectory(row) == log.trajectory(row - 1) &&
-           log.q(row, joint) != log.q(row - 1, joint);
-  };
-  std::vector<char> out(static_cast<std::size_t>(log.rows()), 0);
-  Eigen::Index known = 0;  // rows before are decided
+  const Eigen::Index reach =
+      step_s > 0.0 ? std::max<Eigen::Index>(1, std::lround(kReachS / step_s)) : 1;
+  double quantum = std::numeric_limits<double>::infinity();
   for (Eigen::Index row = 1; row < log.rows(); ++row) {
-    if (!moves(row)) continue;
-    const Eigen::Index end = std::min(log.rows(), row + reach + 1);
-    for (Eigen::Index k = std::max(known, row - reach); k < end; ++k)
-      out[static_cast<std::size_t>(k)] = 1;
-    known = end;
+    const double change = std::abs(log.q(row, joint) - log.q(row - 1, joint));
+    if (change > 0.0) quantum = std::min(quantum, change);
+  }
+  std::vector<char> out(static_cast<std::size_t>(log.rows()), 0);
+  const std::vector<Eigen::Index> bounds = log.bounds();
+  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
+    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
+      const Eigen::Index from = std::max(bounds[b], row - reach);
+      const Eigen::Index to = std::min(bounds[b + 1] - 1, row + reach);
+      out[static_cast<std::size_t>(row)] = std::abs(log.q(to, joint) - log.q(from, joint)) >=
+                                                   static_cast<double>(to - from) * quantum
+                                               ? 1
+                                               : 0;
+    }
   }
   return out;
 }
