@@ -163,11 +163,13 @@ TEST(TorqueEffects, ColumnsAreTheDerivativesOfTheFitsPrediction) {
   }
 }
 
-TorqueTrace trace_of_lag(double constant_s, double noise, double cutoff_hz) {
+TorqueTrace trace_of_lag(double constant_s, double noise, double cutoff_hz,
+                         std::vector<TrueEffect> effects = {}) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorldOptions options = quiet_world();
   options.noise = noise;
-  const EffectWorld world = effect_world({{"torque_lag", 1, 2, constant_s}}, options, rng);
+  effects.push_back({"torque_lag", 1, 2, constant_s});
+  const EffectWorld world = effect_world(effects, options, rng);
   TorqueTraceOptions trace;
   trace.model = declared_options(cutoff_hz);
   return trace_torque(world.model, exact_samples(world, cutoff_hz), trace);
@@ -190,6 +192,11 @@ TEST(TorqueEffects, ALowPassFarAboveTheMotionMayBeADelay) {
   std::vector<EffectId> named = out.trace.ambiguities.front().effects;
   std::ranges::sort(named);
   EXPECT_EQ(named, (std::vector<EffectId>{{"torque_delay", "joint2"}, {"torque_lag", "joint2"}}));
+  // What is known stands before what is not.
+  const Trace beside = trace_of_lag(0.01, 0.02, 6.0, {{"coulomb", 0, 0, 0.3}}).trace;
+  ASSERT_EQ(beside.verdict, TraceVerdict::kAmbiguous) << beside.reason;
+  EXPECT_LT(beside.reason.find("coulomb at joint1"), beside.reason.find("cannot tell"))
+      << beside.reason;
 }
 
 TEST(TorqueEffects, ADriveHasNoLowPassSlowerThanItsMotion) {
@@ -212,6 +219,17 @@ TEST(TorqueEffects, ALowPassAndADelayStandInOneAnothersPlaceOnly) {
       EXPECT_EQ(std::ranges::count(fit.candidates, EffectId{other, "joint1"}, &Candidate::id), 1);
     }
   }
+}
+
+TEST(TorqueEffects, ADriftThatGoesOnIsLongerThanTheLog) {
+  Rng rng = Rng::from_name("effects", 3);
+  const EffectWorld world = effect_world({}, quiet_world(), rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const TracedFit fit = model.fit({});
+  const Candidate& drift = candidate(fit, {"drift", "joint2"});
+  ASSERT_TRUE(drift.scan_words);
+  EXPECT_EQ(drift.scan_words(drift.scan.back()), "longer than the log");
+  EXPECT_EQ(drift.scan_words(1.5), "1.5 s");
 }
 
 TEST(TorqueEffects, ALowPassIsPredictedAndTakenOutAgain) {
@@ -634,6 +652,9 @@ TEST(TorqueEffects, AGainThatMayBeTheMassesIsOneOfTwo) {
   const std::vector<EffectId>& either = wrong.ambiguities.front().effects;
   EXPECT_EQ(either.front().effect, "torque_gain");
   EXPECT_EQ(either.back(), (EffectId{"masses", "links"}));
+  // What is known stands before what is not.
+  EXPECT_LT(wrong.reason.find("coulomb at joint1"), wrong.reason.find("cannot tell"))
+      << wrong.reason;
   for (const TracedEffect& truth : right.accepted) {
     const auto found = std::ranges::find(wrong.accepted, truth.id, &TracedEffect::id);
     ASSERT_NE(found, wrong.accepted.end()) << truth.id.effect;
