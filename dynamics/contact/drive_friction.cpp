@@ -280,6 +280,19 @@ FrictionInterval with_doubt_of_speed(FrictionInterval taken, const SlidingFricti
   return {taken.lowest - below, taken.highest + above};
 }
 
+/// Where the torque was not measured friction may be anything; what was cut off at a limit may have
+/// been larger, and no less.
+FrictionInterval with_missing(FrictionInterval taken, const TorqueSamples& motion, Eigen::Index t,
+                              Eigen::Index joint) {
+  constexpr double kAnything = std::numeric_limits<double>::infinity();
+  const double torque = motion.torque(t, joint);
+  const bool upper = torque == motion.torque.col(joint).maxCoeff();
+  const bool lower = torque == motion.torque.col(joint).minCoeff();
+  if (!lower) taken.lowest = -kAnything;
+  if (!upper) taken.highest = kAnything;
+  return taken;
+}
+
 struct JointPast {
   bool has_slid = false;
   double stuck_until_s = 0.0;
@@ -428,13 +441,14 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
       const int direction = own.known(states(t, j)) ? states(t, j) : 0;
       past.has_slid = past.has_slid || direction != 0;
       const double rate = terms.rate(t, j);
-      const FrictionInterval taken = with_doubt_of_speed(
+      FrictionInterval taken = with_doubt_of_speed(
           interval_of(own, sliding(t, j, direction), motion.dq(t, j), speeds(t, j), direction), own,
           speeds(t, j),
           std::abs(motion.dq(t, j) - speeds(t, j)) +
               kHalf * kRateWindow_s * std::abs(accelerations(t, j)),
           direction);
       const double wanted = sample.drive[j] - rate;
+      if (motion.is_missing(t, j)) taken = with_missing(taken, motion, t, j);
       // Seen to one side only, an acceleration at the end is noise.
       const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
                              std::abs(accelerations(t, j)) > clear[j] &&
@@ -442,7 +456,7 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
                              accelerations(t, j) * (wanted - taken.lowest) > 0.0;
       // Without inertia, what the log begins with may be the end of a motion.
       const bool begins = !past.has_slid && std::isfinite(clear[j]);
-      const bool anything = speeds_up || !own.known() || begins || motion.is_missing(t, j);
+      const bool anything = speeds_up || !own.known() || begins;
       if (taken.lowest == taken.highest && !anything) {
         sample.drive[j] -= taken.lowest;
         sample.sigma[j] =

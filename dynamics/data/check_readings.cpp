@@ -33,6 +33,9 @@ constexpr double kLeastZeros = 0.25;  // chosen: of the values in one band width
 /// that of the band.
 constexpr double kMostZeros = 0.5;
 
+/// Of a row: `kLost` says nothing, `kLimit` that the torque is at least so large.
+enum Mark : char { kSound, kLost, kLimit };
+
 /// Rows [begin, end) of one trajectory.
 struct ValueRun {
   Eigen::Index begin = 0, end = 0;
@@ -116,7 +119,7 @@ void leave_out_limits(const Reading& reading, std::vector<char>& marked,
     }
     const bool certain = reading.varies(std::move(speeds));
     if (certain) {
-      for (const Eigen::Index row : rows) marked[static_cast<std::size_t>(row)] = 1;
+      for (const Eigen::Index row : rows) marked[static_cast<std::size_t>(row)] = kLimit;
     }
     findings.push_back(reading.finding(
         LogFault::kClipped, clipping.rows, clipping.first, limit,
@@ -174,7 +177,7 @@ void leave_out_dead_zone(const Reading& reading, std::vector<char>& marked,
   const double share = share_of(std::ssize(rows), log.rows());
   const bool few = share <= kMostZeros;
   if (few) {
-    for (const Eigen::Index row : rows) marked[static_cast<std::size_t>(row)] = 1;
+    for (const Eigen::Index row : rows) marked[static_cast<std::size_t>(row)] = kLost;
   }
   findings.push_back(reading.finding(
       LogFault::kDeadZone, std::ssize(rows), rows.front(), *band,
@@ -239,7 +242,7 @@ void leave_out_frozen(const Reading& reading, std::vector<char>& marked,
   if (frozen.empty() || 2 * frozen.size() < kept_values) return;
   Eigen::Index rows = 0;
   for (const ValueRun& run : frozen) {
-    std::fill(marked.begin() + run.begin, marked.begin() + run.end, char{1});
+    std::fill(marked.begin() + run.begin, marked.begin() + run.end, static_cast<char>(kLost));
     rows += run.rows();
   }
   const ValueRun& longest = *std::ranges::max_element(frozen, {}, &ValueRun::rows);
@@ -253,11 +256,11 @@ void leave_out_frozen(const Reading& reading, std::vector<char>& marked,
       "these readings are left out; look after the sensor and what reads it"));
 }
 
-/// A straight line over what is marked; the nearest reading at a trajectory's ends.
+/// A straight line over what is lost; the nearest reading at a trajectory's ends.
 void bridge(const std::vector<char>& marked, Eigen::Index joint, TorqueLog& log) {
   const std::vector<Eigen::Index> bounds = log.bounds();
   const auto is_marked = [&](Eigen::Index row) {
-    return marked[static_cast<std::size_t>(row)] != 0;
+    return marked[static_cast<std::size_t>(row)] == kLost;
   };
   for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
     for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
@@ -301,7 +304,7 @@ CheckedLog check_readings(TorqueLog log) {
   }
   for (std::size_t j = 0; j < marked.size(); ++j) {
     const auto column = static_cast<Eigen::Index>(j);
-    if (std::ranges::find(marked[j], char{1}) == marked[j].end()) continue;
+    if (std::ranges::count(marked[j], char{kSound}) == log.rows()) continue;
     if (log.torque_missing.size() == 0)
       log.torque_missing = MissingTorque::Constant(log.rows(), log.torque.cols(), false);
     for (Eigen::Index row = 0; row < log.rows(); ++row)

@@ -122,6 +122,27 @@ TEST_F(ContactCommand, ATorqueThatFreezesIsNamedAndNoContact) {
   }
 }
 
+// A blow that takes a torque to its limit says that it is at least so large.
+TEST_F(ContactCommand, ContactsThatReachALimitAreFound) {
+  constexpr double kApart_s = 0.5;
+  TorqueSamples samples = touched_.samples;
+  Eigen::VectorXd limit = Eigen::VectorXd::Zero(samples.joints());
+  for (Eigen::Index row = 0; row < samples.size(); ++row) {
+    const double t = samples.t_s[row];
+    const bool calm = std::ranges::none_of(touched_.labels, [&](const auto& label) {
+      return label.begin_s < t + kApart_s && label.end_s > t - kApart_s;
+    });
+    if (calm) limit = limit.cwiseMax(samples.torque.row(row).transpose().cwiseAbs());
+  }
+  for (Eigen::Index j = 0; j < samples.joints(); ++j)
+    samples.torque.col(j) = samples.torque.col(j).cwiseMax(-limit[j]).cwiseMin(limit[j]);
+  folder_.write("log.csv", torque_log_csv(samples));
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("is cut off at"), std::string::npos) << outcome.err;
+  expect_labelled(contacts().at("contacts"));
+}
+
 TEST_F(ContactCommand, WildReadingsAreNoContacts) {
   TorqueSamples samples = touched_.samples;
   const double largest = 2.0 * samples.torque.col(1).cwiseAbs().maxCoeff();
