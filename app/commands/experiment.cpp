@@ -14,6 +14,7 @@
 #include "app/io/json_text.h"
 #include "app/io/output_folder.h"
 #include "app/torque/torque_inputs.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/gp/process_group.h"
 #include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
@@ -76,7 +77,7 @@ ExperimentLog read_log(const ExperimentOptions& options, const Console& console)
   for (const LogFinding& finding : data.findings) {
     if (finding.weight == FaultWeight::kWarning) console.warn(to_line(finding));
   }
-  return {robot.model, std::move(data.samples), robot.joints};
+  return {robot.model, measured_part(data.samples), robot.joints};
 }
 
 void silence_output() {

@@ -10,6 +10,7 @@
 
 #include "app/commands/inspection.h"
 #include "app/torque/torque_inputs.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/median.h"
 #include "kinematics/log/channel_table.h"
@@ -63,7 +64,7 @@ void look_at_scale(const std::filesystem::path& file, const DynamicModel& model,
                    const TorqueLogReport& report, const TorqueDataOptions& options,
                    std::vector<LogFinding>& findings) {
   if (!has_masses(model) || report.log.torque.cols() == 0 || report.log.torque_unit == "A") return;
-  const TorqueSamples samples = filtered_data(report, options.motion).samples;
+  const TorqueSamples samples = measured_part(filtered_data(report, options.motion).samples);
   const TorqueScales scales = torque_scales(make_rigid_model(model), samples, {file});
   findings.insert(findings.end(), scales.findings.begin(), scales.findings.end());
 }

@@ -14,6 +14,7 @@
 #include "app/report/result_values.h"
 #include "app/torque/saved_model_log.h"
 #include "app/torque/torque_inputs.h"
+#include "dynamics/data/splits.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/file.h"
 
@@ -65,9 +66,10 @@ std::string table(const JudgedPrediction& predicted, const RigidModel& rigid) {
     out += fmt::format("{},{}", samples.t_s[i], samples.trajectory[i]);
     for (Eigen::Index j = 0; j < samples.joints(); ++j) {
       const double mean = predicted.torque.mean(i, j);
-      out += fmt::format(",{:.9g},{:.9g},{:.9g},{:.9g}", samples.torque(i, j), mean,
-                         predicted.bands.width_90(j) * predicted.torque.sigma(i, j),
-                         samples.torque(i, j) - mean);
+      const double measured = samples.is_missing(i, j) ? std::nan("") : samples.torque(i, j);
+      out +=
+          fmt::format(",{:.9g},{:.9g},{:.9g},{:.9g}", measured, mean,
+                      predicted.bands.width_90(j) * predicted.torque.sigma(i, j), measured - mean);
     }
     out += "\n";
   }
@@ -81,15 +83,17 @@ struct JointResult {
 };
 
 std::vector<JointResult> results(const JudgedPrediction& predicted) {
-  const Eigen::MatrixXd error = predicted.samples.torque - predicted.torque.mean;
-  const Eigen::VectorXd nmse =
-      normalised_error_percent(predicted.samples.torque, predicted.torque.mean);
+  const std::vector<Eigen::Index> rows = measured_rows(predicted.samples);
+  const Eigen::MatrixXd measured = predicted.samples.torque(rows, Eigen::all);
+  const Eigen::MatrixXd mean = predicted.torque.mean(rows, Eigen::all);
+  const Eigen::MatrixXd sigma = predicted.torque.sigma(rows, Eigen::all);
+  const Eigen::MatrixXd error = measured - mean;
+  const Eigen::VectorXd nmse = normalised_error_percent(measured, mean);
   const auto count = static_cast<double>(error.rows());
   std::vector<JointResult> out;
   for (Eigen::Index j = 0; j < error.cols(); ++j) {
-    const auto held = (error.col(j).array().abs() <=
-                       predicted.bands.width_90(j) * predicted.torque.sigma.col(j).array())
-                          .count();
+    const auto held =
+        (error.col(j).array().abs() <= predicted.bands.width_90(j) * sigma.col(j).array()).count();
     out.push_back(
         {nmse[j], error.col(j).norm() / std::sqrt(count), static_cast<double>(held) / count});
   }

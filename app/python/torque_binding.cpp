@@ -74,7 +74,10 @@ class SavedModel {
     out["q"] = array_of(samples.q);
     out["qd"] = array_of(samples.dq);
     out["qdd"] = array_of(samples.ddq);
-    out["torque"] = array_of(samples.torque);
+    Eigen::MatrixXd torque = samples.torque;
+    if (samples.torque_missing.size() > 0)
+      torque = samples.torque_missing.select(std::nan(""), torque.array());
+    out["torque"] = array_of(torque);
     return out;
   }
 

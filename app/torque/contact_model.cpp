@@ -11,6 +11,7 @@
 
 #include "app/torque/torque_inputs.h"
 #include "dynamics/contact/sliding.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/data/torque_scale.h"
 #include "dynamics/identify/prediction.h"
 #include "dynamics/rigid/inverse_dynamics.h"
@@ -51,7 +52,7 @@ std::optional<RigidPrediction> predicted_by(const RigidModel& rigid, const Torqu
                                             const TorqueDataOptions& options) {
   RigidPrediction out;
   try {
-    out.samples = filtered_data(log, options.motion).samples;
+    out.samples = measured_part(filtered_data(log, options.motion).samples);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kUndetermined) throw;
     return std::nullopt;
@@ -100,6 +101,7 @@ Eigen::MatrixXd weights_of(const RigidModel& rigid, const TorqueSamples& samples
       (sliding_states(rigid, samples).array() == 0)
           .select(kSticking, Eigen::MatrixXd::Ones(samples.size(), samples.joints()));
   for (const Eigen::Index j : unmeasured) out.col(j).setZero();
+  if (samples.torque_missing.size() > 0) out = samples.torque_missing.select(0.0, out.array());
   return out;
 }
 
@@ -294,6 +296,8 @@ TorqueSamples with_joints(const TorqueSamples& samples, const std::vector<Eigen:
   out.dq = chosen(samples.dq);
   out.ddq = chosen(samples.ddq);
   out.torque = chosen(samples.torque);
+  if (samples.torque_missing.size() > 0)
+    out.torque_missing = samples.torque_missing(Eigen::all, joints);
   out.joint_names.clear();
   return out;
 }
@@ -312,6 +316,8 @@ std::vector<TorqueSamples> unfiltered(const TorqueLog& log, const Eigen::VectorX
     part.dq = dq.middleRows(from, count);
     part.torque = log.torque.middleRows(from, count) * gains.cwiseInverse().asDiagonal();
     part.trajectory = log.trajectory.segment(from, count);
+    if (log.torque_missing.size() > 0)
+      part.torque_missing = log.torque_missing.middleRows(from, count);
     part.torque_unit = log.torque_unit;
     out.push_back(std::move(part));
   }

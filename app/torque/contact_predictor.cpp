@@ -273,11 +273,11 @@ TorqueModelFile learn_contact_model(TorqueModelKind kind, const DynamicModel& ro
       return span.trajectory == data.samples.trajectory_name(data.samples.trajectory[t]) &&
              data.samples.t_s[t] >= span.begin_s && data.samples.t_s[t] <= span.end_s;
     });
-    if (!touched) free.push_back(t);
+    if (!touched && data.samples.is_measured(t)) free.push_back(t);
   }
   TorqueModelOptions models = quick_options();
   models.keep_saved = true;
-  const TorqueSamples samples = select_rows(data.samples, free);
+  const TorqueSamples samples = measured_part(select_rows(data.samples, free));
   check_torque_memory({kind}, samples.size(), samples.joints(), models);
   TorqueModelFile out;
   out.version = program_version();
@@ -302,11 +302,13 @@ PredictedLog predict_log(const TorqueModelFile& file, const TorqueLogReport& log
   PredictedLog out;
   TorqueSamples all;
   Eigen::MatrixXd means;
+  std::vector<Eigen::Index> measured;  // rows of both
   for (TorqueSamples& motion : unfiltered(log.log, Eigen::VectorXd::Ones(log.log.q.cols()))) {
     const std::optional<TorqueSamples> samples =
         filtered_motion(trajectory_of(log.log, motion.trajectory[0]), filter);
     if (!samples) continue;
     const FilteredPrediction filtered = predict_filtered(file, *samples);
+    for (const Eigen::Index row : measured_rows(*samples)) measured.push_back(all.size() + row);
     append(*samples, filtered.mean, all, means);
     all.trajectory.tail(samples->size()).setConstant(motion.trajectory[0]);
     out.torques.push_back(at_samples(filtered, *samples, motion));
@@ -319,7 +321,7 @@ PredictedLog predict_log(const TorqueModelFile& file, const TorqueLogReport& log
                     filter.cutoff_hz),
         "record longer");
   }
-  check_scale(file.model, log.log, files, all, means);
+  check_scale(file.model, log.log, files, select_rows(all, measured), means(measured, Eigen::all));
   out.new_motion = motion_words(file.model.learned, all, file.model.rigid);
   return out;
 }

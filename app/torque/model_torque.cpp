@@ -23,6 +23,7 @@
 #include "app/torque/torque_split.h"
 #include "app/torque/torque_trace_stage.h"
 #include "app/torque/traced_score.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/identify/gravity_from_torques.h"
 #include "dynamics/identify/torque_terms.h"
 #include "kinematics/core/error.h"
@@ -85,10 +86,9 @@ TorqueScales check_scale(const std::vector<fs::path>& logs, const DynamicModel& 
                          const IdentifyOptions& identify, TorqueSummary& summary) {
   if (summary.data.samples.torque_unit == "A") return {};
   TorqueScales scales;
-  if (has_masses(model)) {
-    scales = torque_scales(make_rigid_model(model), summary.data.samples, logs);
-  }
-  check_torque_signs(model, summary.data.samples, identify, logs, scales);
+  const TorqueSamples samples = measured_part(summary.data.samples);
+  if (has_masses(model)) scales = torque_scales(make_rigid_model(model), samples, logs);
+  check_torque_signs(model, samples, identify, logs, scales);
   throw_refusals(scales.findings);
   summary.data.findings.insert(summary.data.findings.end(), scales.findings.begin(),
                                scales.findings.end());
@@ -323,7 +323,7 @@ TorqueSummary model_torque(const DynamicsOptions& options, const Progress& progr
   if (asks_for_payload(options)) require_payload_question(options, model, log.log.torque_unit);
   summary.data = filtered_data(log, options.data.motion);
   if (options.gravity_from_torques && !options.gravity_m_s2) {
-    take_gravity_of(summary.data.samples, model, summary);
+    take_gravity_of(measured_part(summary.data.samples), model, summary);
   }
   // A robot that moves no joint is refused by the fit.
   if (std::ssize(summary.types) == summary.data.samples.joints()) {

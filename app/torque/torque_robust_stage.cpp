@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "app/torque/torque_inputs.h"
+#include "dynamics/data/splits.h"
 #include "kinematics/core/error.h"
 #include "kinematics/recorded/recorded_log.h"
 
@@ -90,15 +91,15 @@ void require_payload_question(const DynamicsOptions& options, const DynamicModel
 std::optional<TorqueSamples> add_payload(const DynamicsOptions& options, const DynamicModel& model,
                                          TorqueSummary& summary) {
   const PayloadOptions payload = payload_options(options);
-  const TorqueSamples& loaded = summary.data.samples;
+  const TorqueSamples loaded = measured_part(summary.data.samples);
   PayloadSummary out;
   std::optional<TorqueSamples> unloaded;
   if (!options.unloaded_logs.empty()) {
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;
-    unloaded = read_torque_data(recorded::read_channel_tables(options.unloaded_logs),
-                                wanted_joints(model.tree), data)
-                   .samples;
+    unloaded = measured_part(read_torque_data(recorded::read_channel_tables(options.unloaded_logs),
+                                              wanted_joints(model.tree), data)
+                                 .samples);
     out.against = "the log without load " + file_list(options.unloaded_logs);
     out.motion = estimate_payload(model, loaded, *unloaded, payload);
   } else {
@@ -114,7 +115,8 @@ void add_payload_at_rest(const DynamicsOptions& options, const DynamicModel& mod
                          const std::optional<TorqueSamples>& unloaded, TorqueSummary& summary) {
   try {
     const RobustTorqueOptions robust = robust_options(options.models_options);
-    const RobustTorque with = learn_robust_torque(model, summary.data.samples, robust);
+    const RobustTorque with =
+        learn_robust_torque(model, measured_part(summary.data.samples), robust);
     std::optional<RobustTorque> without;
     if (unloaded) without = learn_robust_torque(model, *unloaded, robust);
     summary.payload->at_rest =

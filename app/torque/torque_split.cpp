@@ -39,10 +39,11 @@ void split_samples(const DynamicsOptions& options, const DynamicModel& model,
   } else {
     TorqueDataOptions data = options.data;
     data.motion.cutoff_hz = summary.data.cutoff.cutoff_hz;  // alike, or the scores are not
-    summary.train = summary.data.samples;
-    summary.test = read_torque_data(recorded::read_channel_tables(options.test_logs),
-                                    wanted_joints(model.tree), data)
-                       .samples;
+    summary.train = measured_part(summary.data.samples);
+    const TorqueSamples test = read_torque_data(recorded::read_channel_tables(options.test_logs),
+                                                wanted_joints(model.tree), data)
+                                   .samples;
+    summary.test = test.torque_missing.size() > 0 ? split_at_gaps(measured_part(test)) : test;
     summary.split = "the unseen log " + file_list(options.test_logs);
   }
   const RigidModel rigid = make_rigid_model(model);

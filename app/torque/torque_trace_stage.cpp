@@ -12,6 +12,7 @@
 #include "app/io/json_text.h"
 #include "app/report/result_values.h"
 #include "app/report/trace_json.h"
+#include "dynamics/data/splits.h"
 #include "dynamics/data/torque_data.h"
 #include "kinematics/core/error.h"
 #include "kinematics/urdf/dynamic_urdf.h"
@@ -81,7 +82,8 @@ nlohmann::json contacts_json(const std::vector<ContactSpan>& contacts,
 
 SavedTrace saved_trace(const TorqueTrace& trace, const TorqueSamples& samples,
                        const TorqueFilter& filter) {
-  const Eigen::MatrixXd left = samples.torque - predict_torque(trace.corrected, samples, filter);
+  const Eigen::MatrixXd all = samples.torque - predict_torque(trace.corrected, samples, filter);
+  const Eigen::MatrixXd left = all(measured_rows(samples), Eigen::all);
   return {trace.corrected, filter,
           left.colwise().norm().transpose() / std::sqrt(static_cast<double>(left.rows()))};
 }
@@ -194,8 +196,9 @@ TracedLog trace_torque_stage(const DynamicsOptions& options, const DynamicModel&
   std::vector<std::string> joints;
   for (const WantedJoint& joint : wanted_joints(model.tree)) joints.push_back(joint.name);
   folder.write("torque_compensated.csv",
-               compensated_csv(
-                   compensate(out.corrected, traced.samples, trace_options.model.filter), joints));
+               compensated_csv(measured_part(compensate(out.corrected, traced.samples,
+                                                        trace_options.model.filter)),
+                               joints));
   SavedTrace saved = saved_trace(out, traced.samples, trace_options.model.filter);
   return {std::move(out), std::move(saved), traced.samples, trace_options, urdf.has_value()};
 }

@@ -131,7 +131,8 @@ void conclude(const Stage& now, double base_squares, Trace& trace) {
     trace.reason = std::move(unknown);
   } else if (!trace.ambiguities.empty()) {
     trace.verdict = TraceVerdict::kAmbiguous;
-    trace.reason = cannot_tell_words(trace.ambiguities.front());
+    trace.reason = trace.accepted.empty() ? "" : found_words(trace.found, trace.accepted) + "; ";
+    trace.reason += cannot_tell_words(trace.ambiguities.front());
   } else if (!trace.accepted.empty()) {
     trace.verdict = TraceVerdict::kEffects;
     trace.reason = found_words(trace.found, trace.accepted);

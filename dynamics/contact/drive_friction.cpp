@@ -280,6 +280,19 @@ FrictionInterval with_doubt_of_speed(FrictionInterval taken, const SlidingFricti
   return {taken.lowest - below, taken.highest + above};
 }
 
+/// Where the torque was not measured friction may be anything; what was cut off at a limit may have
+/// been larger, and no less.
+FrictionInterval with_missing(FrictionInterval taken, const TorqueSamples& motion, Eigen::Index t,
+                              Eigen::Index joint) {
+  constexpr double kAnything = std::numeric_limits<double>::infinity();
+  const double torque = motion.torque(t, joint);
+  const bool upper = torque == motion.torque.col(joint).maxCoeff();
+  const bool lower = torque == motion.torque.col(joint).minCoeff();
+  if (!lower) taken.lowest = -kAnything;
+  if (!upper) taken.highest = kAnything;
+  return taken;
+}
+
 struct JointPast {
   bool has_slid = false;
   double stuck_until_s = 0.0;
@@ -326,7 +339,7 @@ struct JointRecord {
     for (std::size_t m = 0; m < motions.size(); ++m) {
       for (Eigen::Index t = 1; t < motions[m].size(); ++t) {
         const double gone = ways[m](t, joint);
-        if (std::abs(gone) < presliding) continue;
+        if (std::abs(gone) < presliding || motions[m].is_missing(t, joint)) continue;
         rows.push_back({motions[m].dq(t, joint), gone > 0.0 ? 1.0 : -1.0, residuals[m](t, joint)});
         out.length_s += motions[m].t_s[t] - motions[m].t_s[t - 1];
       }
@@ -357,7 +370,7 @@ struct JointRecord {
         const double gone = ways[m](t, joint);
         const int direction = gone > 0.0 ? 1 : -1;
         const bool inside = std::abs(gone) >= presliding && std::abs(gone) < 2.0 * presliding &&
-                            friction.known(direction);
+                            friction.known(direction) && !motions[m].is_missing(t, joint);
         if (inside) {
           sum += direction *
                  (residuals[m](t, joint) - friction.sliding(motions[m].dq(t, joint), direction));
@@ -428,13 +441,14 @@ std::vector<BalanceSample> balance_of(const RigidModel& model,
       const int direction = own.known(states(t, j)) ? states(t, j) : 0;
       past.has_slid = past.has_slid || direction != 0;
       const double rate = terms.rate(t, j);
-      const FrictionInterval taken = with_doubt_of_speed(
+      FrictionInterval taken = with_doubt_of_speed(
           interval_of(own, sliding(t, j, direction), motion.dq(t, j), speeds(t, j), direction), own,
           speeds(t, j),
           std::abs(motion.dq(t, j) - speeds(t, j)) +
               kHalf * kRateWindow_s * std::abs(accelerations(t, j)),
           direction);
       const double wanted = sample.drive[j] - rate;
+      if (motion.is_missing(t, j)) taken = with_missing(taken, motion, t, j);
       // Seen to one side only, an acceleration at the end is noise.
       const bool speeds_up = end_s - motion.t_s[t] > kRateWindow_s &&
                              std::abs(accelerations(t, j)) > clear[j] &&

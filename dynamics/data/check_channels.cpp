@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "dynamics/data/channel.h"
 #include "dynamics/data/log_checks.h"
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/median.h"
@@ -13,49 +16,15 @@
 namespace kinescope {
 namespace {
 
-constexpr Eigen::Index kClippedRun = 3;  // rows at the limit; a turning point has one or two
-constexpr int kClippedRuns = 2;
-constexpr double kEntryJump = 3.0;  // change on entering the limit, in steps of the channel
-constexpr double kEntryChange =
-    0.25;  // the same, in usual changes: a turning point slows down first
 constexpr double kCoarseStep = 0.02;     // of the standard deviation; finer steps do no harm
 constexpr double kGridTolerance = 0.05;  // of a step
 constexpr double kOnGrid = 0.98;         // of the values
 constexpr std::size_t kFewValues = 8;    // a grid needs that many levels to be one
 constexpr double kHeldShare = 0.35;      // of the rows without change
 constexpr double kManyLevels = 0.5;      // of the changes: values that hardly ever come back
-constexpr std::size_t kFewLevels =
-    20;  // a channel of fewer has its ends often without being cut off
+constexpr double kReachS = 0.1;          // chosen: either way, longer than positions are held
 constexpr double kLagReachS = 0.3;
 constexpr double kCommandLagGain = 0.8;
-
-struct Channel {
-  std::string name;
-  std::vector<double> values;
-  std::vector<double> changes;  ///< absolute, from row to row of one trajectory
-  double sigma = 0.0;
-  std::optional<double> step;
-};
-
-double standard_deviation(const Eigen::VectorXd& x) {
-  return std::sqrt((x.array() - x.mean()).square().mean());
-}
-
-Channel look_at(const TorqueLog& log, const Eigen::VectorXd& x, const std::string& name) {
-  Channel channel;
-  channel.name = name;
-  channel.values = to_vector(x);
-  // The mean of equal numbers need not be exactly theirs.
-  const bool constant = x.size() > 0 && x.maxCoeff() == x.minCoeff();
-  channel.sigma = constant ? 0.0 : standard_deviation(x);
-  for (Eigen::Index row = 1; row < x.size(); ++row) {
-    if (log.trajectory(row) == log.trajectory(row - 1)) {
-      channel.changes.push_back(std::abs(x(row) - x(row - 1)));
-    }
-  }
-  channel.step = grid_step(channel.values);
-  return channel;
-}
 
 LogFinding finding(const TorqueLog& log, LogFault fault, FaultWeight weight, const Channel& channel,
                    double share, double value, std::string what, std::string remedy) {
@@ -63,47 +32,9 @@ LogFinding finding(const TorqueLog& log, LogFault fault, FaultWeight weight, con
           std::move(what), std::move(remedy)};
 }
 
-/// Runs of samples at one extreme that the channel reaches at speed: a turning point slows down
-/// first.
-struct Clipping {
-  int runs = 0;
-  Eigen::Index rows = 0, first = -1;
-};
-
-Clipping clipping_at(const Channel& channel, double limit) {
-  Clipping out;
-  std::vector<double> moving;
-  for (const double change : channel.changes) {
-    if (change > 0.0) moving.push_back(change);
-  }
-  const double usual = std::max(kEntryChange * median_of(std::move(moving)),
-                                kEntryJump * channel.step.value_or(0.0));
-  const auto count = static_cast<Eigen::Index>(channel.values.size());
-  const auto at = [&](Eigen::Index row) { return channel.values[static_cast<std::size_t>(row)]; };
-  for (Eigen::Index row = 1; row < count; ++row) {
-    if (at(row) != limit || at(row - 1) == limit) continue;
-    Eigen::Index end = row;
-    while (end < count && at(end) == limit) ++end;
-    const bool fast = std::abs(at(row) - at(row - 1)) >= usual ||
-                      (end < count && std::abs(at(end) - limit) >= usual);
-    if (end - row < kClippedRun || !fast) continue;
-    if (out.runs++ == 0) out.first = row;
-    out.rows += end - row;
-  }
-  return out;
-}
-
-std::size_t distinct_values(const Channel& channel) {
-  return std::set<double>(channel.values.begin(), channel.values.end()).size();
-}
-
 void name_clipping(const TorqueLog& log, const Channel& channel,
                    std::vector<LogFinding>& findings) {
-  if (distinct_values(channel) < kFewLevels) return;
-  const auto [low, high] = std::ranges::minmax(channel.values);
-  for (const double limit : {low, high}) {
-    const Clipping clipping = clipping_at(channel, limit);
-    if (clipping.runs < kClippedRuns) continue;
+  for (const auto& [limit, clipping] : clipped_ends(channel)) {
     LogFinding found =
         finding(log, LogFault::kClipped, FaultWeight::kWarning, channel,
                 static_cast<double>(clipping.rows) / static_cast<double>(log.rows()), limit,
@@ -124,23 +55,60 @@ void name_grid(const TorqueLog& log, const Channel& channel, std::vector<LogFind
               "counts as noise of a third of a step"));
 }
 
-void name_held(const TorqueLog& log, const Channel& channel, std::vector<LogFinding>& findings) {
-  std::vector<double> moving;
-  for (const double change : channel.changes) {
-    if (change > 0.0) moving.push_back(change);
+/// Of each row whether its joint moves so fast that every row has a new position: what repeats
+/// while it rests, or creeps from step to step of its encoder, is no news.
+std::vector<char> rows_in_motion(const TorqueLog& log, Eigen::Index joint) {
+  const double step_s = median_of(steps_of(log.t_s, log.trajectory));
+  const Eigen::Index reach =
+      step_s > 0.0 ? std::max<Eigen::Index>(1, std::lround(kReachS / step_s)) : 1;
+  double quantum = std::numeric_limits<double>::infinity();
+  for (Eigen::Index row = 1; row < log.rows(); ++row) {
+    const double change = std::abs(log.q(row, joint) - log.q(row - 1, joint));
+    if (change > 0.0) quantum = std::min(quantum, change);
   }
-  if (moving.empty()) return;
-  const double still =
-      1.0 - static_cast<double>(moving.size()) / static_cast<double>(channel.changes.size());
+  std::vector<char> out(static_cast<std::size_t>(log.rows()), 0);
+  const std::vector<Eigen::Index> bounds = log.bounds();
+  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
+    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
+      const Eigen::Index from = std::max(bounds[b], row - reach);
+      const Eigen::Index to = std::min(bounds[b + 1] - 1, row + reach);
+      out[static_cast<std::size_t>(row)] = std::abs(log.q(to, joint) - log.q(from, joint)) >=
+                                                   static_cast<double>(to - from) * quantum
+                                               ? 1
+                                               : 0;
+    }
+  }
+  return out;
+}
+
+/// `joint`: the channel's; at rest nothing is renewed.
+void name_held(const TorqueLog& log, const Channel& channel, Eigen::Index joint, bool torque,
+               std::vector<LogFinding>& findings) {
+  const std::vector<char> moves = rows_in_motion(log, joint);
+  std::size_t all = 0;
+  std::size_t renewed = 0;
+  std::set<double> values;
+  for (Eigen::Index row = 1; row < log.rows(); ++row) {
+    const auto at = static_cast<std::size_t>(row);
+    const bool counts = moves[at] != 0 && log.trajectory(row) == log.trajectory(row - 1) &&
+                        !(torque && (log.is_missing(row, joint) || log.is_missing(row - 1, joint)));
+    if (!counts) continue;
+    ++all;
+    if (channel.values[at] == channel.values[at - 1]) continue;
+    ++renewed;
+    values.insert(channel.values[at]);
+  }
+  if (renewed == 0) return;
+  const double still = 1.0 - static_cast<double>(renewed) / static_cast<double>(all);
   // A held signal takes a new value at nearly every change; one of few levels is quantised.
-  const bool continuous = static_cast<double>(distinct_values(channel)) >
-                          kManyLevels * static_cast<double>(moving.size());
+  const bool continuous =
+      static_cast<double>(values.size()) > kManyLevels * static_cast<double>(renewed);
   if (still < kHeldShare || !continuous) return;
   const double step_s = median_of(steps_of(log.t_s, log.trajectory));
   findings.push_back(
       finding(log, LogFault::kHeld, FaultWeight::kNote, channel, still, step_s / (1.0 - still),
-              fmt::format("column '{}' keeps its value in {:.0f} % of the rows", channel.name,
-                          100.0 * still),
+              fmt::format("column '{}' keeps its value in {:.0f} % of the rows in motion",
+                          channel.name, 100.0 * still),
               fmt::format("it is renewed every {:.3g} ms on average: on average half of that late",
                           1e3 * step_s / (1.0 - still))));
 }
@@ -167,8 +135,8 @@ bool look_at_signal(const TorqueLog& log, const Eigen::MatrixXd& signal,
     }
     if (!joint_moves && &signal != &log.torque) continue;
     name_grid(log, channel, findings);
-    if (&signal == &log.torque || &signal == &log.dq) name_clipping(log, channel, findings);
-    name_held(log, channel, findings);
+    if (&signal == &log.dq) name_clipping(log, channel, findings);  // torques: check_readings
+    name_held(log, channel, c, &signal == &log.torque, findings);
   }
   return constant_while_moving;
 }
@@ -279,6 +247,7 @@ CheckedLog check_log(TorqueLog log, const LogCheckOptions& options) {
   then(check_spikes(std::move(out.log)));
   then(check_motion(std::move(out.log)));
   then(check_steps(std::move(out.log), options));
+  then(check_readings(std::move(out.log)));
   then(check_channels(std::move(out.log)));
   return out;
 }

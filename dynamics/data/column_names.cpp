@@ -136,6 +136,18 @@ bool unit_may_stand(const std::vector<std::string>& words, std::size_t at) {
   return words[at].size() > 1 && at + 2 == words.size() && glyph(words[at + 1][0]) == Glyph::kDigit;
 }
 
+/// "deg_s", "rad_s_2", "mm_per_s": a rate's unit is all that is left of the name.
+bool is_rate_unit(const std::vector<std::string>& words, std::size_t at, LoggedQuantity quantity) {
+  static const Words kPerSecond = {"s", "sec", "per s", "per sec"};
+  static const Words kPerSquare = {"s 2", "s s", "sec 2", "per s 2"};
+  if (at == 0 || !is_unit_word(words[at])) return false;
+  std::string behind;
+  for (std::size_t w = at + 1; w < words.size(); ++w)
+    behind += (behind.empty() ? "" : " ") + words[w];
+  return (quantity == LoggedQuantity::kVelocity && kPerSecond.contains(behind)) ||
+         (quantity == LoggedQuantity::kAcceleration && kPerSquare.contains(behind));
+}
+
 /// "q_dot_1" and "q_ddot_1" are derivatives.
 LoggedQuantity differentiated(LoggedQuantity quantity, std::string_view word) {
   if (quantity != LoggedQuantity::kPosition) return quantity;
@@ -213,6 +225,9 @@ std::optional<ColumnMeaning> read_column_name(std::string_view name) {
       meaning.origin = LoggedOrigin::kComputed;
     } else if (is_command_word(word)) {
       if (meaning.origin != LoggedOrigin::kComputed) meaning.origin = LoggedOrigin::kCommanded;
+    } else if (known && is_rate_unit(words, w, meaning.quantity)) {
+      meaning.unit = unit_name(word);
+      break;
     } else if (is_unit_word(word) && unit_may_stand(words, w)) {
       meaning.unit = unit_name(word);
     } else if (known && is_percent(word, meaning.quantity)) {

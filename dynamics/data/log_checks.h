@@ -51,6 +51,10 @@ struct CheckedLog {
 /// What does not fit is removed from the log, to be derived. A log without a clock gets its rate
 /// from here.
 [[nodiscard]] CheckedLog check_motion(TorqueLog log);
+/// Torque readings behind which no measurement stands: at a limit that is reached again and again,
+/// frozen while the joint moves, exactly zero in a dead zone. They are marked
+/// (TorqueLog::torque_missing) and bridged.
+[[nodiscard]] CheckedLog check_readings(TorqueLog log);
 /// Channels that are constant, clipped, quantised, renewed too slowly; the lag behind the command.
 /// Signals that are constant while the joint moves are removed from the log.
 [[nodiscard]] CheckedLog check_channels(TorqueLog log);

@@ -37,6 +37,10 @@ std::string_view to_string(LogFault fault) {
       return "constant";
     case kClipped:
       return "clipped";
+    case kFrozen:
+      return "frozen";
+    case kDeadZone:
+      return "dead_zone";
     case kQuantised:
       return "quantised";
     case kHeld:

@@ -23,6 +23,8 @@ enum class LogFault {
   kSpike,             ///< single samples far from their neighbours
   kConstant,          ///< a channel that never changes
   kClipped,           ///< a channel cut off at a limit
+  kFrozen,            ///< a torque that keeps one value while its joint moves on
+  kDeadZone,          ///< a torque that reads exactly 0 within a band
   kQuantised,         ///< a channel of few, equally spaced values
   kHeld,              ///< a channel that is renewed more slowly than the rows
   kWrapped,           ///< jumps by a whole turn

@@ -51,6 +51,7 @@ Eigen::MatrixXd on_even_grid(const TorqueLog& log, const Eigen::MatrixXd& x, Eig
 struct Filtered {
   Eigen::VectorXd t_s;
   Eigen::MatrixXd q, dq, ddq, torque;
+  MissingTorque missing;
 };
 
 class MotionDeriver {
@@ -115,6 +116,7 @@ class MotionDeriver {
     TorqueSamples& samples = out_.samples;
     samples = {log_.t_s, log_.q, log_.dq, log_.ddq, log_.torque, log_.trajectory, {}, {}, {}};
     samples.trajectory_names = log_.trajectory_names;
+    samples.torque_missing = log_.torque_missing;
     name_samples();
     out_.source = MotionSource::kLogged;
     out_.rate_hz = step_s_ > 0.0 ? 1.0 / step_s_ : 0.0;
@@ -252,8 +254,26 @@ class MotionDeriver {
     else
       filter_spline(begin, end, part);
     hold_still(begin, end, part);
+    mark_missing(begin, end, edge_s, part);
     out_.samples.trajectory_names.push_back(name);
     parts.push_back(std::move(part));
+  }
+
+  /// Beside what was not measured the low-pass knows as little as beyond the ends.
+  void mark_missing(Eigen::Index begin, Eigen::Index end, double edge_s, Filtered& part) const {
+    if (log_.torque_missing.size() == 0) return;
+    const double reach_s = std::max(edge_s, step_s_) * (1.0 - 1e-9);
+    part.missing = MissingTorque::Constant(part.t_s.size(), log_.torque.cols(), false);
+    for (Eigen::Index j = 0; j < log_.torque.cols(); ++j) {
+      Eigen::Index next = 0;
+      for (Eigen::Index row = begin; row < end; ++row) {
+        if (!log_.torque_missing(row, j)) continue;
+        while (next < part.t_s.size() && part.t_s(next) < log_.t_s(row) - reach_s) ++next;
+        for (Eigen::Index k = next; k < part.t_s.size() && part.t_s(k) <= log_.t_s(row) + reach_s;
+             ++k)
+          part.missing(k, j) = true;
+      }
+    }
   }
 
   /// A joint that holds its position is at rest exactly: rounding is no motion.
@@ -330,6 +350,7 @@ class MotionDeriver {
     samples.ddq.resize(count, log_.q.cols());
     samples.torque.resize(count, log_.torque.cols());
     samples.trajectory.resize(count);
+    if (log_.torque_missing.size() > 0) samples.torque_missing.resize(count, log_.torque.cols());
     Eigen::Index at = 0;
     for (std::size_t p = 0; p < parts.size(); ++p) {
       const Eigen::Index n = parts[p].t_s.size();
@@ -339,6 +360,7 @@ class MotionDeriver {
       samples.ddq.middleRows(at, n) = parts[p].ddq;
       if (log_.torque.cols() > 0) samples.torque.middleRows(at, n) = parts[p].torque;
       samples.trajectory.segment(at, n).setConstant(static_cast<int>(p));
+      if (parts[p].missing.size() > 0) samples.torque_missing.middleRows(at, n) = parts[p].missing;
       at += n;
     }
     name_samples();
@@ -349,7 +371,7 @@ class MotionDeriver {
     out_.samples.torque_unit = log_.torque_unit;
     out_.samples.torque_step.resize(log_.torque.cols());
     for (Eigen::Index j = 0; j < log_.torque.cols(); ++j)
-      out_.samples.torque_step[j] = grid_step(to_vector(log_.torque.col(j))).value_or(0.0);
+      out_.samples.torque_step[j] = grid_step(measured_torques(log_, j)).value_or(0.0);
   }
 
   const TorqueLog& log_;

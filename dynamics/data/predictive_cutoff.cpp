@@ -58,6 +58,7 @@ std::vector<Part> parts_of(const TorqueLog& log, double edge_s) {
     std::vector<double> times;
     for (Eigen::Index row = part.begin; row < part.begin + rows; row += stride) {
       const double t = log.t_s(row);
+      if (log.torque_missing.size() > 0 && log.torque_missing.row(row).any()) continue;
       if (t >= begin_s + edge && t <= end_s - edge) times.push_back(t);
     }
     part.target_t_s = Eigen::Map<const Eigen::VectorXd>(times.data(), std::ssize(times));

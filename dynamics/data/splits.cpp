@@ -8,7 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "dynamics/data/statistics.h"
 #include "kinematics/core/error.h"
+#include "kinematics/core/median.h"
 #include "kinematics/core/rng.h"
 
 namespace kinescope {
@@ -134,6 +136,7 @@ Fold fold_of(const TorqueSamples& samples, const std::vector<char>& test, double
   }
   for (Eigen::Index row = 0; row < n; ++row) {
     const auto at = static_cast<std::size_t>(row);
+    if (!samples.is_measured(row)) continue;
     if (test[at] != 0)
       fold.test.push_back(row);
     else if (near[at] == 0)
@@ -254,8 +257,7 @@ Folds split_folds(const TorqueSamples& samples, const SplitOptions& options) {
 Fold split_at_random(const TorqueSamples& samples, double share, std::uint64_t seed) {
   const bool sound = share > 0.0 && share < 1.0;
   if (!sound) throw bad_request("dynamics.test_share", fmt::format("{}", share), "between 0 and 1");
-  std::vector<Eigen::Index> rows(static_cast<std::size_t>(samples.size()));
-  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  std::vector<Eigen::Index> rows = measured_rows(samples);
   Rng rng = Rng::from_name("split_at_random", seed);
   for (std::size_t k = rows.size(); k > 1; --k) {
     std::swap(rows[k - 1], rows[static_cast<std::size_t>(rng.index(static_cast<int>(k)))]);
@@ -314,6 +316,38 @@ TorqueSamples select_rows(const TorqueSamples& samples, const std::vector<Eigen:
   out.ddq = samples.ddq(rows, Eigen::all);
   out.torque = samples.torque(rows, Eigen::all);
   out.trajectory = samples.trajectory(rows);
+  if (samples.torque_missing.size() > 0)
+    out.torque_missing = samples.torque_missing(rows, Eigen::all);
+  return out;
+}
+
+std::vector<Eigen::Index> measured_rows(const TorqueSamples& samples) {
+  std::vector<Eigen::Index> out;
+  for (Eigen::Index row = 0; row < samples.size(); ++row)
+    if (samples.is_measured(row)) out.push_back(row);
+  return out;
+}
+
+TorqueSamples split_at_gaps(TorqueSamples samples) {
+  constexpr double kGap = 1.5;  // median steps; filtered samples are even
+  const double most_s = kGap * median_of(steps_of(samples.t_s, samples.trajectory));
+  Eigen::VectorXi trajectory = samples.trajectory;
+  std::vector<std::string> names;
+  for (Eigen::Index row = 0; row < samples.size(); ++row) {
+    const bool begins = row == 0 || samples.trajectory(row) != samples.trajectory(row - 1) ||
+                        samples.t_s(row) - samples.t_s(row - 1) > most_s;
+    if (begins) names.push_back(samples.trajectory_name(samples.trajectory(row)));
+    trajectory(row) = static_cast<int>(names.size()) - 1;
+  }
+  samples.trajectory = std::move(trajectory);
+  samples.trajectory_names = std::move(names);
+  return samples;
+}
+
+TorqueSamples measured_part(const TorqueSamples& samples) {
+  if (samples.torque_missing.size() == 0) return samples;
+  TorqueSamples out = select_rows(samples, measured_rows(samples));
+  out.torque_missing.resize(0, 0);
   return out;
 }
 

@@ -32,7 +32,8 @@ struct Folds {
   std::vector<LogFinding> findings;  ///< trajectories that repeat a path
 };
 
-/// Every sample is in the test part of exactly one fold. The same for the same samples, whatever
+/// Every sample whose torques were measured is in the test part of exactly one fold, the others in
+/// none. The same for the same samples, whatever
 /// the order of the trajectories. Throws undetermined for less than two folds' worth of samples.
 [[nodiscard]] Folds split_folds(const TorqueSamples& samples, const SplitOptions& options = {});
 
@@ -49,6 +50,13 @@ struct Folds {
 /// does): every posture of the shorter lies within 1 % of the joints' ranges of a posture of the
 /// other, at nine of ten samples.
 [[nodiscard]] std::vector<int> repeated_paths(const TorqueSamples& samples);
+
+/// Rows in which the torques of all joints were measured, and these as samples of their own.
+[[nodiscard]] std::vector<Eigen::Index> measured_rows(const TorqueSamples& samples);
+[[nodiscard]] TorqueSamples measured_part(const TorqueSamples& samples);
+
+/// Samples behind a gap in their trajectory as a trajectory of their own, of the same name.
+[[nodiscard]] TorqueSamples split_at_gaps(TorqueSamples samples);
 
 /// The rows as samples of their own; trajectory numbers are kept.
 [[nodiscard]] TorqueSamples select_rows(const TorqueSamples& samples,

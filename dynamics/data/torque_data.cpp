@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "dynamics/data/column_names.h"
 #include "dynamics/data/log_checks.h"
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/error.h"
@@ -30,7 +32,9 @@ bool is_used(const TorqueLog& log, const std::string& name) {
 std::vector<LogFinding> look_at_rest(const ChannelTable& table, const TorqueLog& log) {
   std::vector<LogFinding> findings;
   for (std::size_t c = 0; c < table.names.size(); ++c) {
-    if (is_used(log, table.names[c])) continue;
+    const std::optional<ColumnMeaning> meaning = read_column_name(table.names[c]);
+    const bool clock = meaning && meaning->quantity == LoggedQuantity::kTime;
+    if (clock || is_used(log, table.names[c])) continue;
     Eigen::Index missing = 0, infinite = 0, first = -1;
     for (Eigen::Index row = 0; row < table.rows(); ++row) {
       const double value = table.values(row, static_cast<Eigen::Index>(c));

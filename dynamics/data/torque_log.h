@@ -15,6 +15,7 @@
 #include <Eigen/Core>
 
 #include "dynamics/data/log_findings.h"
+#include "dynamics/data/torque_samples.h"
 #include "kinematics/log/channel_table.h"
 
 namespace kinescope {
@@ -54,6 +55,7 @@ struct TorqueLog {
   std::vector<WantedJoint> joints;     ///< one a column
   Eigen::VectorXd t_s;                 ///< as stamped, or row / rate
   Eigen::MatrixXd q, dq, ddq, torque;  ///< NaN where the file has no number
+  MissingTorque torque_missing;        ///< rows x joints; empty: none is
   Eigen::VectorXi trajectory;          ///< 0, 1, .. in the file's order
   std::vector<std::string> trajectory_names;
   std::vector<int> source;         ///< of each row, index of sources
@@ -69,6 +71,9 @@ struct TorqueLog {
 
   [[nodiscard]] Eigen::Index rows() const { return t_s.size(); }
   [[nodiscard]] Eigen::Index columns() const { return q.cols(); }
+  [[nodiscard]] bool is_missing(Eigen::Index row, Eigen::Index joint) const {
+    return torque_missing.size() > 0 && torque_missing(row, joint);
+  }
   /// "file:line" of a row.
   [[nodiscard]] std::string place(Eigen::Index row) const;
   /// The first row of every trajectory and the end.
@@ -90,6 +95,9 @@ struct ReadTorqueLog {
 
 /// The rows for which `keep` is not 0; trajectory numbers stay.
 [[nodiscard]] TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep);
+
+/// A joint's torques without those that are missing.
+[[nodiscard]] std::vector<double> measured_torques(const TorqueLog& log, Eigen::Index joint);
 
 /// One log after another; trajectory numbers go on, and names get that of their file. All must have
 /// the same joints and signals.

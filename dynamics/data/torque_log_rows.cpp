@@ -28,6 +28,12 @@ Eigen::MatrixXd stacked(const Eigen::MatrixXd& top, const Eigen::MatrixXd& botto
   return out;
 }
 
+/// Of all rows of a log: false where nothing is missing.
+MissingTorque all_missing(const TorqueLog& log) {
+  if (log.torque_missing.size() > 0) return log.torque_missing;
+  return MissingTorque::Constant(log.rows(), log.torque.cols(), false);
+}
+
 void append(TorqueLog& log, const TorqueLog& next) {
   const bool alike = log.q.cols() == next.q.cols() && log.dq.cols() == next.dq.cols() &&
                      log.ddq.cols() == next.ddq.cols() && log.torque.cols() == next.torque.cols() &&
@@ -48,6 +54,11 @@ void append(TorqueLog& log, const TorqueLog& next) {
   log.q = stacked(log.q, next.q);
   log.dq = log.dq.cols() > 0 ? stacked(log.dq, next.dq) : log.dq;
   log.ddq = log.ddq.cols() > 0 ? stacked(log.ddq, next.ddq) : log.ddq;
+  if (log.torque_missing.size() + next.torque_missing.size() > 0) {
+    MissingTorque missing(t_s.size(), next.torque.cols());
+    missing << all_missing(log), all_missing(next);
+    log.torque_missing = std::move(missing);
+  }
   log.torque = log.torque.cols() > 0 ? stacked(log.torque, next.torque) : log.torque;
   const bool commands = log.q_command.cols() > 0 && next.q_command.cols() == log.q_command.cols();
   log.q_command = commands ? stacked(log.q_command, next.q_command) : Eigen::MatrixXd();
@@ -102,6 +113,7 @@ TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep) {
   out.ddq = rows_of(log.ddq, rows);
   out.torque = rows_of(log.torque, rows);
   out.q_command = rows_of(log.q_command, rows);
+  if (log.torque_missing.size() > 0) out.torque_missing = log.torque_missing(rows, Eigen::all);
   out.trajectory = log.trajectory(rows);
   out.source.clear();
   out.lines.clear();
@@ -109,6 +121,13 @@ TorqueLog keep_rows(const TorqueLog& log, const std::vector<char>& keep) {
     out.source.push_back(log.source[static_cast<std::size_t>(row)]);
     out.lines.push_back(log.lines[static_cast<std::size_t>(row)]);
   }
+  return out;
+}
+
+std::vector<double> measured_torques(const TorqueLog& log, Eigen::Index joint) {
+  std::vector<double> out;
+  for (Eigen::Index row = 0; row < log.rows(); ++row)
+    if (!log.is_missing(row, joint)) out.push_back(log.torque(row, joint));
   return out;
 }
 

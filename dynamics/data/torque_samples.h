@@ -10,6 +10,10 @@
 
 namespace kinescope {
 
+/// Of torques, rows x joints: true where the reading was cut off, frozen or in a dead zone. What
+/// stands there is a straight line between the readings before and behind.
+using MissingTorque = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>;
+
 /// Rows are samples, in time order within a trajectory; columns are joints, in the order of the
 /// tree's movable joints. Revolute joints in rad, prismatic joints in m.
 struct TorqueSamples {
@@ -25,9 +29,18 @@ struct TorqueSamples {
   /// Of each joint: what its logged torque is a multiple of; 0 where it is of none. Empty: not
   /// known.
   Eigen::VectorXd torque_step = {};
+  /// samples x joints: no measurement stands behind this torque (MissingTorque). Empty: behind all.
+  MissingTorque torque_missing = {};
 
   [[nodiscard]] Eigen::Index size() const { return t_s.size(); }
   [[nodiscard]] Eigen::Index joints() const { return q.cols(); }
+  [[nodiscard]] bool is_missing(Eigen::Index row, Eigen::Index joint) const {
+    return torque_missing.size() > 0 && torque_missing(row, joint);
+  }
+  /// All joints' torques were.
+  [[nodiscard]] bool is_measured(Eigen::Index row) const {
+    return torque_missing.size() == 0 || !torque_missing.row(row).any();
+  }
   /// Its name, or its number where it has none.
   [[nodiscard]] std::string trajectory_name(int number) const {
     const auto at = static_cast<std::size_t>(number);

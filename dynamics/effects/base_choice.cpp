@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dynamics/data/statistics.h"
 #include "kinematics/core/dense_algebra.h"
@@ -13,6 +14,8 @@ namespace {
 
 constexpr int kRobustSteps = 8;
 constexpr double kHuber = 1.345;
+constexpr int kLoadSteps = 20;      // chosen; of friction of a tenth of the load, four are enough
+constexpr double kSameLoad = 1e-5;  // chosen: far below what a share of the load is known to
 
 /// Least squares over joints that share columns: H and g sum up.
 struct Normal {
@@ -43,6 +46,33 @@ double robust_sigma(const Eigen::VectorXd& residual, Eigen::Index parameters) {
   return kSigmaOverMedian * median_of(to_vector(residual.cwiseAbs())) * std::sqrt(rows / freedom);
 }
 
+/// A joint's friction in proportion to its load.
+Eigen::VectorXd load_friction(const BaseData& data, const Eigen::MatrixXd& load, Eigen::Index j) {
+  return data.way.col(j).cwiseProduct(load.col(j).cwiseAbs());
+}
+
+/// The drive's columns with friction of its load and a gain.
+Eigen::MatrixXd loaded_drive(const BaseData& data, std::size_t joint) {
+  const auto j = static_cast<Eigen::Index>(joint);
+  const Eigen::MatrixXd& drive = data.drives[joint];
+  Eigen::MatrixXd out(drive.rows(), drive.cols() + 2);
+  out << drive, load_friction(data, data.load, j), data.load.col(j);
+  return out;
+}
+
+std::vector<Eigen::MatrixXd> loaded_drives(const BaseData& data) {
+  std::vector<Eigen::MatrixXd> out;
+  for (std::size_t j = 0; j < data.drives.size(); ++j) out.push_back(loaded_drive(data, j));
+  return out;
+}
+
+Eigen::MatrixXd load_of(const BaseData& data, const Eigen::VectorXd& bodies) {
+  Eigen::MatrixXd out(data.torque.rows(), data.torque.cols());
+  for (std::size_t j = 0; j < data.rigid.size(); ++j)
+    out.col(static_cast<Eigen::Index>(j)) = data.rigid[j] * bodies;
+  return out;
+}
+
 Eigen::MatrixXd columns_that_act(const Eigen::MatrixXd& all) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index c = 0; c < all.cols(); ++c) {
@@ -68,18 +98,18 @@ Eigen::VectorXd robust_residual(const Eigen::MatrixXd& X, const Eigen::VectorXd&
 
 /// Columns of one joint in a system in which the drives of all joints stand side by side after the
 /// shared columns.
-Eigen::MatrixXd system_columns(const BaseData& data, std::size_t joint,
+Eigen::MatrixXd system_columns(const std::vector<Eigen::MatrixXd>& drives, std::size_t joint,
                                const std::vector<Eigen::MatrixXd>& shared) {
-  Eigen::Index drives = 0;
+  Eigen::Index columns = 0;
   Eigen::Index first = 0;
-  for (std::size_t j = 0; j < data.drives.size(); ++j) {
-    if (j == joint) first = drives;
-    drives += data.drives[j].cols();
+  for (std::size_t j = 0; j < drives.size(); ++j) {
+    if (j == joint) first = columns;
+    columns += drives[j].cols();
   }
   const Eigen::MatrixXd& own = shared[joint];
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(data.torque.rows(), own.cols() + drives);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(own.rows(), own.cols() + columns);
   out.leftCols(own.cols()) = own;
-  out.middleCols(own.cols() + first, data.drives[joint].cols()) = data.drives[joint];
+  out.middleCols(own.cols() + first, drives[joint].cols()) = drives[joint];
   return out;
 }
 
@@ -91,9 +121,10 @@ Eigen::VectorXd held_out(const BaseData& data, const Eigen::MatrixXd& target,
   for (std::size_t i = 0; i < data.fold.size(); ++i) {
     rows[static_cast<std::size_t>(data.fold[i])].push_back(static_cast<Eigen::Index>(i));
   }
+  const std::vector<Eigen::MatrixXd> drives = loaded_drives(data);
   std::vector<Eigen::MatrixXd> X;
   for (std::size_t j = 0; j < shared.size(); ++j) {
-    X.push_back(system_columns(data, j, shared) / sigma[static_cast<Eigen::Index>(j)]);
+    X.push_back(system_columns(drives, j, shared) / sigma[static_cast<Eigen::Index>(j)]);
   }
   std::vector<Normal> parts;
   Normal total(X.front().cols());
@@ -138,6 +169,24 @@ Eigen::VectorXd held_out(const BaseData& data, const Eigen::MatrixXd& target,
   return out;
 }
 
+/// The bodies where friction grows with this load.
+Eigen::VectorXd bodies_beside(const BaseData& data, const Eigen::MatrixXd& load,
+                              const Eigen::VectorXd& sigma) {
+  std::vector<Eigen::MatrixXd> drives;
+  for (std::size_t j = 0; j < data.drives.size(); ++j) {
+    const Eigen::MatrixXd& drive = data.drives[j];
+    Eigen::MatrixXd all(drive.rows(), drive.cols() + 1);
+    all << drive, load_friction(data, load, static_cast<Eigen::Index>(j));
+    drives.push_back(std::move(all));
+  }
+  Normal normal(system_columns(drives, 0, data.rigid).cols());
+  for (std::size_t j = 0; j < data.rigid.size(); ++j) {
+    const auto c = static_cast<Eigen::Index>(j);
+    normal.add(system_columns(drives, j, data.rigid) / sigma[c], data.torque.col(c) / sigma[c]);
+  }
+  return normal.solve().head(data.rigid.front().cols());
+}
+
 }  // namespace
 
 double paired_t(const Eigen::VectorXd& worse, const Eigen::VectorXd& better) {
@@ -154,8 +203,9 @@ WidestFit widest_fit(const BaseData& data) {
   for (Eigen::Index j = 0; j < data.torque.cols(); ++j) {
     const auto joint = static_cast<std::size_t>(j);
     const Eigen::MatrixXd rigid = columns_that_act(data.rigid[joint]);
-    Eigen::MatrixXd X(rigid.rows(), rigid.cols() + data.drives[joint].cols());
-    X << rigid, data.drives[joint];
+    const Eigen::MatrixXd drive = loaded_drive(data, joint);
+    Eigen::MatrixXd X(rigid.rows(), rigid.cols() + drive.cols());
+    X << rigid, drive;
     const Eigen::VectorXd residual = robust_residual(X, data.torque.col(j), out.sigma[j]);
     // A torque that is described exactly (no noise at all) still needs a scale.
     const double size = data.torque.col(j).norm() / std::sqrt(static_cast<double>(X.rows()));
@@ -184,6 +234,8 @@ BaseData without_outliers(const BaseData& data, const Eigen::MatrixXd& whitened)
   out.ddq = chosen(data.ddq);
   out.torque = chosen(data.torque);
   out.declared = chosen(data.declared);
+  out.way = chosen(data.way);
+  out.load = chosen(data.load);
   for (std::size_t j = 0; j < data.rigid.size(); ++j) {
     out.rigid.push_back(chosen(data.rigid[j]));
     out.drives.push_back(chosen(data.drives[j]));
@@ -202,12 +254,14 @@ BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma) {
 }
 
 Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma) {
-  Normal normal(system_columns(data, 0, data.rigid).cols());
-  for (std::size_t j = 0; j < data.rigid.size(); ++j) {
-    const auto c = static_cast<Eigen::Index>(j);
-    normal.add(system_columns(data, j, data.rigid) / sigma[c], data.torque.col(c) / sigma[c]);
+  Eigen::MatrixXd load = data.load;
+  Eigen::VectorXd bodies;
+  for (int step = 0; step < kLoadSteps; ++step) {
+    bodies = bodies_beside(data, load, sigma);
+    const Eigen::MatrixXd last = std::exchange(load, load_of(data, bodies));
+    if ((load - last).norm() <= kSameLoad * load.norm()) break;
   }
-  return normal.solve().head(data.rigid.front().cols());
+  return bodies;
 }
 
 }  // namespace kinescope::effects

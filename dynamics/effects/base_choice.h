@@ -22,6 +22,8 @@ struct BaseData {
   Eigen::MatrixXd declared;             ///< torque of the model as declared, friction and all
   std::vector<Eigen::MatrixXd> rigid;   ///< regressor of each joint, instants x 10 bodies
   std::vector<Eigen::MatrixXd> drives;  ///< columns that a joint's drive may add
+  Eigen::MatrixXd way;                  ///< of friction, -1 to 1, instants x joints
+  Eigen::MatrixXd load;                 ///< that bodies put on a joint, instants x joints
   std::vector<Eigen::MatrixXd> common;  ///< of each joint: a payload and gravity, shared parameters
   std::vector<int> fold;
 };
@@ -55,7 +57,9 @@ struct BaseErrors {
 [[nodiscard]] BaseErrors compare_bases(const BaseData& data, const Eigen::VectorXd& sigma);
 
 /// Parameters of the bodies that explain the torque best beside the drives (least squares,
-/// whitened, directions that the log does not show left at zero), 10 bodies.
+/// whitened, directions that the log does not show left at zero), 10 bodies. The load that rubs is
+/// that of these bodies themselves, from data.load on; a load of other bodies as a column of its
+/// own would take a part of theirs.
 [[nodiscard]] Eigen::VectorXd identified_bodies(const BaseData& data, const Eigen::VectorXd& sigma);
 
 }  // namespace kinescope::effects

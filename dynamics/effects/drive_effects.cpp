@@ -112,6 +112,11 @@ Candidate drift(const SharedContext& c, std::size_t j) {
   out.scan = {0.1 * log.duration_s, 0.3 * log.duration_s, log.duration_s, 8.0 * log.duration_s};
   out.scan_name = "time constant";
   out.scan_unit = "s";
+  // What is far from its end by then goes along a straight line.
+  out.scan_words = [duration_s = log.duration_s](double constant_s) {
+    return constant_s > duration_s ? std::string("longer than the log")
+                                   : fmt::format("{:.3g} s", constant_s);
+  };
   out.columns = [c, j](double constant_s) {
     const Settling settling{c->log.begin_s, c->log.duration_s, constant_s};
     return drift_columns(*c, j, settling.at(c->motion->at_instants(c->motion->time_s())),

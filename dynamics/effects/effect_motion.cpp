@@ -92,8 +92,9 @@ void EffectMotion::choose_instants() {
     }
     for (Eigen::Index row = piece.begin + edge; row < piece.begin + piece.rows - edge;
          row += stride) {
-      const bool finite = samples_.torque.row(row).allFinite() && samples_.q.row(row).allFinite() &&
-                          samples_.dq.row(row).allFinite() && samples_.ddq.row(row).allFinite();
+      const bool finite = samples_.is_measured(row) && samples_.torque.row(row).allFinite() &&
+                          samples_.q.row(row).allFinite() && samples_.dq.row(row).allFinite() &&
+                          samples_.ddq.row(row).allFinite();
       if (finite) kept_.push_back(row);
     }
   }

@@ -48,7 +48,7 @@ class EffectMotion {
   EffectMotion(TorqueSamples samples, const EffectMotionOptions& options);
 
   [[nodiscard]] const TorqueSamples& samples() const { return samples_; }
-  /// Rows of samples() that are kept.
+  /// Rows of samples() that are kept: none whose torque is missing, but where every sample is.
   [[nodiscard]] const std::vector<Eigen::Index>& kept() const { return kept_; }
   [[nodiscard]] Eigen::Index instants() const { return static_cast<Eigen::Index>(kept_.size()); }
   [[nodiscard]] Eigen::Index joints() const { return samples_.joints(); }

@@ -224,6 +224,16 @@ void TorqueFitter::move_widths(const Eigen::VectorXd& change) {
   set_widths(widths);
 }
 
+/// Free bodies say themselves what load it is that rubs.
+void TorqueFitter::take_load_of_base() {
+  const bool rubs = std::ranges::any_of(
+      added_, [](const Added& added) { return added.effect.id.effect == "load_friction"; });
+  if (!rubs || base_values_.isZero(0.0)) return;
+  for (Eigen::Index j = 0; j < joints_; ++j)
+    context_.load.col(j) = case_->base[static_cast<std::size_t>(j)] * base_values_;
+  candidates_ = make_candidates(context_);
+}
+
 void TorqueFitter::apply(const Eigen::VectorXd& change) {
   const Eigen::Index p = base_values_.size();
   base_values_ += change.head(p);
@@ -241,6 +251,7 @@ void TorqueFitter::apply(const Eigen::VectorXd& change) {
     if (added.kind == Kind::kLag) added.values = added.values.cwiseMax(0.0).eval();
   }
   if (tilt != case_->tilt_deg) tilt_base(tilt);
+  take_load_of_base();
   if (free_widths() > 0) move_widths(change.segment(p, free_widths()));
 }
 

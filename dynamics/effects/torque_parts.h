@@ -122,6 +122,7 @@ class TorqueFitter {
   void keep_best_widths(const Normal& equations);
   void settle_on_best_widths();
   void apply(const Eigen::VectorXd& change);
+  void take_load_of_base();
   void move_widths(const Eigen::VectorXd& change);
   [[nodiscard]] bool at_a_bound(Eigen::Index turning, double change) const;
   [[nodiscard]] Eigen::MatrixXd observed() const;

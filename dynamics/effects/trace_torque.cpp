@@ -317,7 +317,7 @@ void doubt_masses(const TracedEffect& effect, const Trace& beside_identified, Tr
   }
   if (out.verdict == TraceVerdict::kEffects) {
     out.verdict = TraceVerdict::kAmbiguous;
-    out.reason = trace::cannot_tell_words(doubt);
+    out.reason += "; " + trace::cannot_tell_words(doubt);
   }
   out.ambiguities.push_back(std::move(doubt));
 }

@@ -83,18 +83,16 @@ Eigen::MatrixXd drive_columns(const EffectContext& context, const BaseData& data
   const double high = travel.high_speed;
   const double slow = 0.1 * travel.rms_speed;
   const Eigen::ArrayXd v = data.dq.col(j).array() / high;
-  const Eigen::VectorXd way = effects::direction_column(context, joint);
   const Eigen::VectorXd dip = effects::turning_column(
       context, joint, "base stribeck", [&](const FinePath& p, double width) {
         return (effects::direction(p.dq, width) * effects::stribeck_decay(p.dq, slow)).eval();
       });
   const Eigen::VectorXd time_s = context.motion->at_instants(context.motion->time_s());
   const double duration = std::max(time_s[time_s.size() - 1] - time_s[0], 1e-12);
-  Eigen::MatrixXd out(v.size(), 13);
-  out << Eigen::VectorXd::Ones(v.size()), v.matrix(), way, data.ddq.col(j), data.q.col(j),
-      v.abs().matrix(), (v * v.abs()).matrix(), v.cube().matrix(), dip,
-      (time_s.array() - time_s[0]).matrix() / duration, context.measured_rate.col(j),
-      way.cwiseProduct(context.load.col(j).cwiseAbs()), context.load.col(j);
+  Eigen::MatrixXd out(v.size(), 11);
+  out << Eigen::VectorXd::Ones(v.size()), v.matrix(), data.way.col(j), data.ddq.col(j),
+      data.q.col(j), v.abs().matrix(), (v * v.abs()).matrix(), v.cube().matrix(), dip,
+      (time_s.array() - time_s[0]).matrix() / duration, context.measured_rate.col(j);
   return out;
 }
 
@@ -106,8 +104,11 @@ BaseData base_data(const EffectContext& context, const RigidModel& rigid) {
   data.ddq = context.motion->rows_at_instants(samples.ddq);
   data.torque = context.motion->rows_at_instants(samples.torque);
   data.rigid = regressors_of_samples(rigid, data.q, data.dq, data.ddq);
+  data.load = context.load;
+  data.way.resize(data.q.rows(), data.q.cols());
   const std::vector<int> tips = effects::tips(rigid);
   for (Eigen::Index j = 0; j < data.q.cols(); ++j) {
+    data.way.col(j) = effects::direction_column(context, static_cast<std::size_t>(j));
     data.drives.push_back(drive_columns(context, data, j));
     Eigen::MatrixXd common(data.q.rows(), 3 + 10 * static_cast<Eigen::Index>(tips.size()));
     for (std::size_t t = 0; t < tips.size(); ++t) {

@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "dynamics/data/splits.h"
 #include "dynamics/simulation/simulation.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/median.h"
@@ -166,7 +167,8 @@ CorrectedTorqueModel without_effects(const CorrectedTorqueModel& model) {
 }  // namespace
 
 Rollout roll_out(const CorrectedTorqueModel& model, const KinematicTree& tree,
-                 const TorqueSamples& samples, const RolloutOptions& options) {
+                 const TorqueSamples& log, const RolloutOptions& options) {
+  const TorqueSamples samples = split_at_gaps(log);
   KINESCOPE_CHECK(samples.joints() == model.base.rigid.size(), "samples of this robot");
   Rollout out;
   const std::optional<LinkId> tip = tip_of(tree);

@@ -2,6 +2,8 @@
 //
 // `kinescope contact` as a user meets it: contacts found in a log, by the momentum balance or by a
 // torque model, products, refusals.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -87,6 +89,58 @@ TEST_F(ContactCommand, ADeadTorqueChannelIsLeftOutAndNamed) {
     EXPECT_LE(found.at("contacts").size(), touched_.labels.size());
     std::filesystem::remove_all(folder_.path() / "out");
   }
+}
+
+/// The first second and a half of the samples outside the labels, in which the joint turns fast.
+Eigen::Index calm_row(const ContactWorld& world, Eigen::Index joint, double span_s) {
+  constexpr double kApart_s = 0.5;
+  for (Eigen::Index row = 0; row < world.samples.size(); ++row) {
+    const double t = world.samples.t_s[row];
+    const bool calm = std::ranges::none_of(world.labels, [&](const auto& label) {
+      return label.begin_s < t + span_s + kApart_s && label.end_s > t - kApart_s;
+    });
+    if (calm && t > 1.0 && std::abs(world.samples.dq(row, joint)) > 0.3) return row;
+  }
+  return 0;
+}
+
+TEST_F(ContactCommand, ATorqueThatFreezesIsNamedAndNoContact) {
+  constexpr double kSpan_s = 0.5;
+  TorqueSamples samples = touched_.samples;
+  const Eigen::Index row = calm_row(touched_, 1, kSpan_s);
+  ASSERT_GT(row, 0);
+  const auto rows = static_cast<Eigen::Index>(kSpan_s / (samples.t_s[1] - samples.t_s[0]));
+  samples.torque.col(1).segment(row, rows).setConstant(samples.torque(row, 1));
+  folder_.write("log.csv", torque_log_csv(samples));
+  for (const std::vector<std::string>& model :
+       {std::vector<std::string>{"--learn", path("free.csv")}, {"--model", "parametric"}}) {
+    const Outcome outcome = run(words(model));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("column 'tau2' keeps the value"), std::string::npos) << outcome.err;
+    expect_labelled(contacts().at("contacts"));
+    std::filesystem::remove_all(folder_.path() / "out");
+  }
+}
+
+// A blow that takes a torque to its limit says that it is at least so large.
+TEST_F(ContactCommand, ContactsThatReachALimitAreFound) {
+  constexpr double kApart_s = 0.5;
+  TorqueSamples samples = touched_.samples;
+  Eigen::VectorXd limit = Eigen::VectorXd::Zero(samples.joints());
+  for (Eigen::Index row = 0; row < samples.size(); ++row) {
+    const double t = samples.t_s[row];
+    const bool calm = std::ranges::none_of(touched_.labels, [&](const auto& label) {
+      return label.begin_s < t + kApart_s && label.end_s > t - kApart_s;
+    });
+    if (calm) limit = limit.cwiseMax(samples.torque.row(row).transpose().cwiseAbs());
+  }
+  for (Eigen::Index j = 0; j < samples.joints(); ++j)
+    samples.torque.col(j) = samples.torque.col(j).cwiseMax(-limit[j]).cwiseMin(limit[j]);
+  folder_.write("log.csv", torque_log_csv(samples));
+  const Outcome outcome = run(words({"--learn", path("free.csv")}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("is cut off at"), std::string::npos) << outcome.err;
+  expect_labelled(contacts().at("contacts"));
 }
 
 TEST_F(ContactCommand, WildReadingsAreNoContacts) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `kinescope dynamics` as a user meets it: results, products, refusals.
+#include <algorithm>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -58,6 +59,29 @@ TEST_F(DynamicsCommand, GivesModelUrdfAndReport) {
   const std::string page = read_text_file(folder_.path() / "out/dynamics.html");
   EXPECT_EQ(page.find("nan"), std::string::npos);
   EXPECT_NE(page.find("Models side by side"), std::string::npos);
+}
+
+TEST_F(DynamicsCommand, ReadingsAtALimitAreLeftOutAndSaid) {
+  Eigen::VectorXd torque = samples_.torque.col(0);
+  std::ranges::sort(torque);
+  const double limit = torque[torque.size() * 4 / 5];
+  samples_.torque.col(0) = samples_.torque.col(0).cwiseMin(limit);
+  folder_.write("log.csv", torque_log_csv(samples_));
+  const Outcome outcome = run(words());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::size_t said = outcome.err.find("column 'tau1' is cut off at");
+  ASSERT_NE(said, std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("these readings are left out", said), std::string::npos);
+  EXPECT_EQ(outcome.err.find("tau1", said + 20), std::string::npos) << "said once";
+  const auto document = nlohmann::json::parse(read_text_file(folder_.path() / "out/dynamics.json"));
+  for (const auto& model : document.at("models")) {
+    for (const auto& nmse : model.at("nmse_percent"))
+      EXPECT_LT(nmse.get<double>(), 1.0) << model.at("model");
+  }
+  for (const auto& effect : document.at("trace").at("accepted"))
+    EXPECT_NE(effect.at("effect"), "contact") << effect;
+  EXPECT_FALSE(document.at("trace").at("verdict") == "unknown")
+      << document.at("trace").at("reason");
 }
 
 // Friction that the URDF does not declare is sized once: by tracing, where it is traced.

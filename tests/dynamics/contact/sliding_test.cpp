@@ -150,6 +150,48 @@ TEST(Sliding, StickingIsNoEvidenceWithinItsInterval) {
   EXPECT_LT(balance(-6.0)[rest].drive[0], -3.0);
 }
 
+// Cut off at a limit it is at least so large: less than expected says nothing, more does.
+TEST(Sliding, ATorqueAtItsLimitIsAtLeastSoLarge) {
+  const Drives drives({.duration_s = 30.0, .speed_rad_s = 0.5});
+  const TorqueSamples& free = drives.world.samples;
+  const Eigen::VectorXd torque = free.torque.col(0);
+  const auto balance = [&](double limit, const Eigen::VectorXd& truth, bool at_limit) {
+    TorqueSamples cut = free;
+    cut.torque_missing = MissingTorque::Constant(free.size(), free.joints(), false);
+    for (Eigen::Index k = 0; k < free.size(); ++k) {
+      cut.torque(k, 0) = std::min(limit, truth(k));
+      cut.torque_missing(k, 0) = truth(k) >= limit;
+      if (!at_limit && cut.torque_missing(k, 0)) cut.torque(k, 0) = 0.0;
+    }
+    return sliding_balance(drives.rigid, drives.friction, cut);
+  };
+  const auto sliding = sliding_states(drives.rigid, free);
+  // Less than the drive gives.
+  const double limit = 0.5;  // N m; friction takes 1
+  const std::vector<BalanceSample> cut = balance(limit, torque, true);
+  const std::vector<BalanceSample> lost = balance(limit, torque, false);
+  constexpr double kClear = 0.3;  // N m, of the noise
+  int looked_at = 0;
+  for (Eigen::Index k = 0; k < free.size(); ++k) {
+    if (torque(k) < limit + kClear || sliding(k, 0) == 0) continue;
+    ++looked_at;
+    const auto at = static_cast<std::size_t>(k);
+    EXPECT_TRUE(cut[at].may_stick(0));
+    EXPECT_EQ(cut[at].drive[0], lost[at].drive[0]) << k;
+  }
+  EXPECT_GT(looked_at, 100);
+  // A push as far as the limit.
+  constexpr double kPush = 6.0;  // N m
+  Eigen::VectorXd pushed = torque;
+  Eigen::Index row = free.size() / 2;
+  while (sliding(row, 0) == 0) ++row;
+  pushed(row) = torque.maxCoeff() + 2.0 * kPush;
+  const double far = torque.maxCoeff() + kPush;
+  const auto at = static_cast<std::size_t>(row);
+  EXPECT_GT(balance(far, pushed, true)[at].drive[0] - balance(far, pushed, false)[at].drive[0],
+            0.9 * kPush);
+}
+
 // All within the friction's interval: the momentum that it breaks away with comes at once.
 TEST(Sliding, NothingPushesBeforeABreakaway) {
   const RigidModel model = make_rigid_model(contact_arm(1));

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "dynamics/data/splits.h"
 #include "dynamics/data/torque_data.h"
 #include "kinematics/core/error.h"
 #include "kinematics/core/gzip.h"
@@ -80,6 +81,15 @@ TEST(DamagedLog, EmptyAndInfiniteCells) {
   expect_line(looked.first(LogFault::kInfinite), kFirstLine + 101);
   EXPECT_EQ(looked.first(LogFault::kInfinite).value, 2.0);
   EXPECT_EQ(looked.report.log.rows(), world.rows.rows() - 3);
+}
+
+TEST(DamagedLog, LargeNumbersInOtherColumnsAreNumbers) {
+  LogWorld world = make_log_world(usual_noise());
+  world.rows.col(0) = 1.7e15 + 1e6 * world.rows.col(0).array();
+  world.header[0] = "stamp_us";
+  std::string text = world.csv();
+  const Looked looked = {look_at_torque_log({write_log("damaged.csv", text)}, world.joints, {})};
+  EXPECT_TRUE(looked.of(LogFault::kInfinite).empty());
 }
 
 TEST(DamagedLog, MostlyEmptyIsRefused) {
@@ -349,6 +359,135 @@ TEST(DamagedLog, ClippedTorque) {
   EXPECT_NEAR(looked.first(LogFault::kClipped).value, limit, 1e-6);
 }
 
+/// Rows of a joint's torque that are marked as missing.
+Eigen::Index missing(const Looked& looked, Eigen::Index joint) {
+  const MissingTorque& marks = looked.report.log.torque_missing;
+  return marks.size() == 0 ? 0 : marks.col(joint).count();
+}
+
+TEST(DamagedLog, ReadingsAtALimitAreLeftOut) {
+  LogWorld world = make_log_world(usual_noise());
+  const Eigen::Index tau = world.column("tau1");
+  const Eigen::VectorXd truth = world.rows.col(tau);
+  const double limit = 0.6 * truth.maxCoeff();
+  world.rows.col(tau) = truth.cwiseMin(limit);
+  const Looked looked = look(world);
+  const LogFinding found = looked.first(LogFault::kClipped);
+  EXPECT_NE(found.remedy.find("left out"), std::string::npos) << found.remedy;
+  const TorqueLog& log = looked.report.log;
+  for (Eigen::Index row = 0; row < log.rows(); ++row)
+    ASSERT_EQ(log.is_missing(row, 0), truth(row) >= limit) << row;
+  EXPECT_EQ(missing(looked, 1) + missing(looked, 2), 0);
+  // So are the samples beside them, whose low-pass reaches there.
+  const TorqueSamples samples =
+      filtered_data(looked.report, {.cutoff_hz = 10.0, .rate_hz = 100.0}).samples;
+  ASSERT_EQ(samples.torque_missing.rows(), samples.size());
+  for (Eigen::Index k = 0; k < samples.size(); ++k) {
+    bool near = false;
+    for (Eigen::Index row = 0; row < log.rows(); ++row)
+      near = near || (log.is_missing(row, 0) && std::abs(log.t_s(row) - samples.t_s(k)) < 0.09);
+    EXPECT_TRUE(!near || samples.is_missing(k, 0)) << samples.t_s(k);
+    EXPECT_FALSE(samples.is_missing(k, 1));
+  }
+  const std::vector<Eigen::Index> kept = measured_rows(samples);
+  EXPECT_GT(std::ssize(kept), samples.size() / 3);
+  EXPECT_LT(samples.torque.col(0)(kept).maxCoeff(), limit);
+}
+
+TEST(DamagedLog, ATorqueThatFreezesIsLeftOut) {
+  LogWorld world = make_log_world(usual_noise());
+  const Eigen::Index tau = world.column("tau2");
+  world.rows.col(tau).segment(800, 300).setConstant(world.rows(800, tau));
+  world.rows.col(tau).segment(1500, 60).setConstant(world.rows(1500, tau));
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "frozen ");
+  const LogFinding found = looked.first(LogFault::kFrozen);
+  EXPECT_EQ(found.channel, "tau2");
+  EXPECT_NEAR(found.value, 1.495, 1e-9);
+  EXPECT_NE(found.what.find("from 4.00 to 5.50 s while"), std::string::npos) << found.what;
+  EXPECT_NE(found.what.find("1 times more"), std::string::npos) << found.what;
+  expect_line(found, kFirstLine + 800);
+  EXPECT_EQ(missing(looked, 1), 360);
+  EXPECT_EQ(missing(looked, 0) + missing(looked, 2), 0);
+  const TorqueLog& log = looked.report.log;
+  EXPECT_NEAR(log.torque(950, 1), 0.5 * (log.torque(799, 1) + log.torque(1100, 1)), 0.05);
+}
+
+TEST(DamagedLog, ReadingsInADeadZoneAreLeftOut) {
+  LogWorld world = make_log_world(usual_noise());
+  const Eigen::Index tau = world.column("tau2");
+  const Eigen::VectorXd truth = world.rows.col(tau);
+  const double band = 0.15 * truth.cwiseAbs().maxCoeff();
+  world.rows.col(tau) = (truth.array().abs() < band).select(0.0, truth);
+  const Looked looked = look(world);
+  EXPECT_EQ(looked.loud(), "dead_zone ");
+  const LogFinding found = looked.first(LogFault::kDeadZone);
+  EXPECT_EQ(found.channel, "tau2");
+  EXPECT_NEAR(found.value, band, 0.05 * band);
+  EXPECT_EQ(missing(looked, 1), (truth.array().abs() < band).count());
+}
+
+// What repeats values by its nature.
+TEST(DamagedLog, SoundTorquesThatRepeatStay) {
+  const auto changed = [](const char* column, const auto& change) {
+    LogWorld world = make_log_world(usual_noise());
+    const Eigen::Index c = world.column(column);
+    for (Eigen::Index r = 0; r < world.rows.rows(); ++r)
+      world.rows(r, c) = change(world.rows, r, c);
+    return world;
+  };
+  const auto expect_all_kept = [](const LogWorld& world, const char* what) {
+    const Looked looked = look(world);
+    EXPECT_EQ(looked.report.log.torque_missing.size(), 0) << what << ": " << looked.loud();
+    for (const LogFault fault : {LogFault::kFrozen, LogFault::kDeadZone, LogFault::kClipped})
+      EXPECT_TRUE(looked.of(fault).empty()) << what;
+  };
+  using Rows = Eigen::MatrixXd;
+  for (const double step : {0.02, 0.1, 0.5, 2.0}) {
+    const auto rounded = [step](const Rows& rows, Eigen::Index r, Eigen::Index c) {
+      return step * std::round(rows(r, c) / step);
+    };
+    for (const char* column : {"tau1", "tau2", "tau3"})
+      expect_all_kept(changed(column, rounded), "a quantised torque");
+  }
+  for (const Eigen::Index rows_held : {2, 4, 20, 40}) {
+    const auto held = [rows_held](const Rows& rows, Eigen::Index r, Eigen::Index c) {
+      return rows(r - r % rows_held, c);
+    };
+    expect_all_kept(changed("tau1", held), "a torque that is held from sample to sample");
+    expect_all_kept(changed("tau2", held), "a torque that is held from sample to sample");
+  }
+  expect_all_kept(changed("tau1", [](const Rows&, Eigen::Index, Eigen::Index) { return 0.0; }),
+                  "a column of zeros");
+  // Zero now and then, as drivers publish that have missed a reading.
+  expect_all_kept(changed("tau1", [](const Rows& rows, Eigen::Index r,
+                                     Eigen::Index c) { return r % 41 < 5 ? 0.0 : rows(r, c); }),
+                  "readings that were missed");
+  // Rests for a while, exactly; then a torque that is exactly the same is no news.
+  LogWorld rests = make_log_world(usual_noise());
+  for (const char* column : {"q2", "tau2"}) {
+    const Eigen::Index c = rests.column(column);
+    rests.rows.col(c).segment(600, 600).setConstant(rests.rows(600, c));
+  }
+  rests.rows.col(rests.column("dq2")).segment(600, 600).setZero();
+  expect_all_kept(rests, "a joint at rest");
+  // Switched off while it comes to rest, as at the end of a program.
+  LogWorld stops = make_log_world(usual_noise());
+  for (const char* column : {"q2", "tau2"}) {
+    const Eigen::Index c = stops.column(column);
+    stops.rows.col(c).tail(600).setConstant(column[0] == 'q' ? stops.rows(1400, c) : 0.0);
+  }
+  stops.rows.col(stops.column("tau2")).segment(1380, 21).setZero();
+  stops.rows.col(stops.column("dq2")).tail(600).setZero();
+  expect_all_kept(stops, "a joint that comes to rest");
+  // Torques in steps, as some drives are commanded, between others that change.
+  expect_all_kept(changed("tau1",
+                          [](const Rows& rows, Eigen::Index r, Eigen::Index c) {
+                            return r % 400 < 200 ? 3.0 + static_cast<double>(r / 400) : rows(r, c);
+                          }),
+                  "torques in steps");
+}
+
 TEST(DamagedLog, QuantisedAndHeldTorque) {
   LogWorld world = make_log_world(usual_noise());
   const Eigen::Index tau = world.column("tau1");
@@ -363,6 +502,14 @@ TEST(DamagedLog, QuantisedAndHeldTorque) {
   EXPECT_EQ(slow.loud(), "");
   ASSERT_EQ(slow.of(LogFault::kHeld).size(), 1U);
   EXPECT_NEAR(slow.first(LogFault::kHeld).value, 0.02, 1e-4) << "renewed every 20 ms";
+  // A joint that rests most of the time, its position and torque as they were.
+  LogWorld rests = make_log_world(usual_noise());
+  for (const char* column : {"q1", "tau1"}) {
+    const Eigen::Index c = rests.column(column);
+    rests.rows.col(c).tail(1500).setConstant(rests.rows(501, c));
+  }
+  rests.rows.col(rests.column("dq1")).tail(1500).setZero();
+  EXPECT_TRUE(look(rests).of(LogFault::kHeld).empty());
 }
 
 TEST(DamagedLog, CommandsThatTheRobotFollowsLate) {

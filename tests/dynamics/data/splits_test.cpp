@@ -122,6 +122,33 @@ TEST(Splits, LastPartIsHeldOut) {
   EXPECT_EQ(select_rows(one, by_block.test).size(), 30);
 }
 
+TEST(Splits, WhatWasNotMeasuredIsInNoPart) {
+  TorqueSamples samples = make_samples({100}, {1});
+  samples.torque_missing = MissingTorque::Constant(100, samples.torque.cols(), false);
+  samples.torque_missing(3, 0) = samples.torque_missing(80, samples.torque.cols() - 1) = true;
+  const auto expect_without = [](const Fold& fold) {
+    for (const Eigen::Index row : {3, 80}) {
+      EXPECT_EQ(std::ranges::count(fold.train, row), 0) << row;
+      EXPECT_EQ(std::ranges::count(fold.test, row), 0) << row;
+    }
+  };
+  std::size_t tested = 0;
+  for (const Fold& fold : split_folds(samples, {.folds = 4}).folds) {
+    expect_without(fold);
+    tested += fold.test.size();
+  }
+  EXPECT_EQ(tested, 98U);
+  expect_without(split_last(samples, 0.3));
+  expect_without(split_at_random(samples, 0.3, 1));
+  const TorqueSamples measured = measured_part(samples);
+  EXPECT_EQ(measured.size(), 98);
+  EXPECT_EQ(measured.torque_missing.size(), 0);
+  const TorqueSamples split = split_at_gaps(measured);
+  EXPECT_EQ(split.trajectory(2), 0);
+  EXPECT_EQ(split.trajectory(3), 1);
+  EXPECT_EQ(split.trajectory(97), 2);
+}
+
 TEST(Splits, RefuseWhatLeavesNothing) {
   const TorqueSamples few = make_samples({6}, {1});
   EXPECT_NE(refusal_of([&] { static_cast<void>(split_folds(few)); }).find("6 samples are too few"),

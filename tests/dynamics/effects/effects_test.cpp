@@ -163,11 +163,13 @@ TEST(TorqueEffects, ColumnsAreTheDerivativesOfTheFitsPrediction) {
   }
 }
 
-TorqueTrace trace_of_lag(double constant_s, double noise, double cutoff_hz) {
+TorqueTrace trace_of_lag(double constant_s, double noise, double cutoff_hz,
+                         std::vector<TrueEffect> effects = {}) {
   Rng rng = Rng::from_name("effects", 4);
   EffectWorldOptions options = quiet_world();
   options.noise = noise;
-  const EffectWorld world = effect_world({{"torque_lag", 1, 2, constant_s}}, options, rng);
+  effects.push_back({"torque_lag", 1, 2, constant_s});
+  const EffectWorld world = effect_world(effects, options, rng);
   TorqueTraceOptions trace;
   trace.model = declared_options(cutoff_hz);
   return trace_torque(world.model, exact_samples(world, cutoff_hz), trace);
@@ -190,6 +192,11 @@ TEST(TorqueEffects, ALowPassFarAboveTheMotionMayBeADelay) {
   std::vector<EffectId> named = out.trace.ambiguities.front().effects;
   std::ranges::sort(named);
   EXPECT_EQ(named, (std::vector<EffectId>{{"torque_delay", "joint2"}, {"torque_lag", "joint2"}}));
+  // What is known stands before what is not.
+  const Trace beside = trace_of_lag(0.01, 0.02, 6.0, {{"coulomb", 0, 0, 0.3}}).trace;
+  ASSERT_EQ(beside.verdict, TraceVerdict::kAmbiguous) << beside.reason;
+  EXPECT_LT(beside.reason.find("coulomb at joint1"), beside.reason.find("cannot tell"))
+      << beside.reason;
 }
 
 TEST(TorqueEffects, ADriveHasNoLowPassSlowerThanItsMotion) {
@@ -212,6 +219,17 @@ TEST(TorqueEffects, ALowPassAndADelayStandInOneAnothersPlaceOnly) {
       EXPECT_EQ(std::ranges::count(fit.candidates, EffectId{other, "joint1"}, &Candidate::id), 1);
     }
   }
+}
+
+TEST(TorqueEffects, ADriftThatGoesOnIsLongerThanTheLog) {
+  Rng rng = Rng::from_name("effects", 3);
+  const EffectWorld world = effect_world({}, quiet_world(), rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const TracedFit fit = model.fit({});
+  const Candidate& drift = candidate(fit, {"drift", "joint2"});
+  ASSERT_TRUE(drift.scan_words);
+  EXPECT_EQ(drift.scan_words(drift.scan.back()), "longer than the log");
+  EXPECT_EQ(drift.scan_words(1.5), "1.5 s");
 }
 
 TEST(TorqueEffects, ALowPassIsPredictedAndTakenOutAgain) {
@@ -634,6 +652,9 @@ TEST(TorqueEffects, AGainThatMayBeTheMassesIsOneOfTwo) {
   const std::vector<EffectId>& either = wrong.ambiguities.front().effects;
   EXPECT_EQ(either.front().effect, "torque_gain");
   EXPECT_EQ(either.back(), (EffectId{"masses", "links"}));
+  // What is known stands before what is not.
+  EXPECT_LT(wrong.reason.find("coulomb at joint1"), wrong.reason.find("cannot tell"))
+      << wrong.reason;
   for (const TracedEffect& truth : right.accepted) {
     const auto found = std::ranges::find(wrong.accepted, truth.id, &TracedEffect::id);
     ASSERT_NE(found, wrong.accepted.end()) << truth.id.effect;
@@ -656,6 +677,41 @@ TEST(TorqueEffects, MassesThatAreWrongAreNotTrusted) {
   options.base = TorqueBaseKind::kAuto;
   const TorqueTracedModel model(world.model, exact_samples(world), options);
   EXPECT_EQ(model.base().kind, TorqueBaseKind::kIdentified) << model.base().reason;
+}
+
+// The load that rubs is that of the masses that are found, whatever was declared.
+TEST(TorqueEffects, LoadFrictionIsAShareOfTheLoadThatIsFound) {
+  constexpr double kTruth = 0.1;
+  constexpr double kSigmas = 4.0;  // of two shares in eight logs: p = 0.001
+  EffectWorldOptions options = quiet_world();
+  options.noise = 0.01;
+  for (const double declared : {0.0, 0.7, 1.0, 1.4}) {
+    for (const std::uint64_t seed : {41U, 42U}) {
+      SCOPED_TRACE(testing::Message() << declared << " of the masses, log " << seed);
+      Rng rng = Rng::from_name("load", seed);
+      EffectWorld world = effect_world(
+          {{"load_friction", 1, 0, kTruth}, {"load_friction", 2, 0, kTruth}}, options, rng);
+      for (InertialParameters& link : world.model.links)
+        link = InertialParameters::from_vector(declared * link.vector());
+      TracedTorqueOptions traced = declared_options();
+      traced.base = TorqueBaseKind::kIdentified;
+      const TorqueTracedModel model(world.model, exact_samples(world), traced);
+      std::vector<AddedEffect> added;
+      for (const char* joint : {"joint1", "joint2", "joint3"})
+        for (const char* effect : {"coulomb", "viscous"}) added.push_back({{effect, joint}, 0.0});
+      for (const char* joint : {"joint2", "joint3"})
+        added.push_back({{"load_friction", joint}, 0.0});
+      const TracedFit fit = model.fit(added);
+      ASSERT_TRUE(fit.converged) << fit.reason;
+      const Eigen::MatrixXd H =
+          fit.linear.jacobian.transpose() * fit.linear.jacobian + fit.linear.prior;
+      const Eigen::VectorXd variance = H.inverse().diagonal().tail(2);
+      for (Eigen::Index k = 0; k < 2; ++k) {
+        const double share = fit.values[fit.values.size() - 2 + static_cast<std::size_t>(k)][0];
+        EXPECT_NEAR(share, kTruth, kSigmas * std::sqrt(variance[k]));
+      }
+    }
+  }
 }
 
 // A drive whose gain is wrong says another mass than the others do: how well all of them are known
@@ -739,6 +795,24 @@ TEST(TorqueEffects, IdentifiedMassesPredictWhatWasFitted) {
   const Eigen::MatrixXd fitted = model.motion().rows_at_instants(samples.torque) - left;
   constexpr double kShare = 1e-6;  // of the torque: normal equations
   EXPECT_LT((predicted - fitted).norm(), kShare * fitted.norm());
+}
+
+TEST(TorqueEffects, TorquesThatWereNotMeasuredDoNotCount) {
+  Rng rng = Rng::from_name("effects", 15);
+  const EffectWorld world = effect_world({{"coulomb", 1, 0, 0.2}}, quiet_world(), rng);
+  const TorqueSamples sound = exact_samples(world);
+  TorqueSamples broken = sound;
+  const Eigen::Index from = sound.size() / 3;
+  const Eigen::Index rows = sound.size() / 5;
+  broken.torque.col(1).segment(from, rows).setConstant(100.0 * sound.torque.cwiseAbs().maxCoeff());
+  broken.torque_missing = MissingTorque::Constant(sound.size(), sound.joints(), false);
+  broken.torque_missing.col(1).segment(from, rows).setConstant(true);
+  const auto coulomb = [&](const TorqueSamples& samples) {
+    const TorqueTracedModel model(world.model, samples, declared_options());
+    for (const Eigen::Index row : model.motion().kept()) EXPECT_TRUE(samples.is_measured(row));
+    return model.fit({{{"coulomb", "joint2"}, 0.0}}).values.front()[0];
+  };
+  EXPECT_NEAR(coulomb(broken), coulomb(sound), 0.01 * coulomb(sound));
 }
 
 TEST(TorqueEffects, RepeatsOfAPathAreHeldOutTogether) {
