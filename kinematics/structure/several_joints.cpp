@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/parallel_for.h"
 #include "kinematics/structure/attachment_cost.h"
 #include "kinematics/structure/screening.h"
 #include "kinematics/structure/tangent.h"
@@ -196,10 +197,14 @@ Ordered best_order(const Problem& p) {
   const bool exhaustive = best.order.size() <= kExhaustive;
   for (int round = 0; round < (exhaustive ? 1 : 8); ++round) {
     Ordered next = best;
-    for (auto& order : exhaustive ? all_orders(best.order) : insertions(best.order)) {
-      ChainFit fit = fit_outwards(p, start_model(p, order), kMostFitted);
-      if (fit.cost < next.fit.cost - kClearlyLikelierOrder)
-        next = {std::move(order), std::move(fit)};
+    auto orders = exhaustive ? all_orders(best.order) : insertions(best.order);
+    std::vector<ChainFit> fits(orders.size());
+    parallel_for(orders.size(), [&](std::size_t i) {
+      fits[i] = fit_outwards(p, start_model(p, orders[i]), kMostFitted);
+    });
+    for (std::size_t i = 0; i < orders.size(); ++i) {
+      if (fits[i].cost < next.fit.cost - kClearlyLikelierOrder)
+        next = {std::move(orders[i]), std::move(fits[i])};
     }
     if (next.order == best.order) break;
     best = std::move(next);
@@ -210,7 +215,7 @@ Ordered best_order(const Problem& p) {
 // All couplings (joint a also moved by the channel of joint b), each tried at a ratio of -1, 0
 // and 1.
 ChainFit best_coupling(const Problem& p, const Ordered& now) {
-  ChainFit best = now.fit;
+  std::vector<ChainModel> models;
   for (std::size_t a = 0; a < now.order.size(); ++a) {
     for (std::size_t b = 0; b < now.order.size(); ++b) {
       if (a == b) continue;
@@ -234,11 +239,17 @@ ChainFit best_coupling(const Problem& p, const Ordered& now) {
         } else {
           joint.terms.push_back({p.channels[kb], 0.0});
         }
-        ChainFit fit = fit_outwards(p, std::move(model), kMostFitted);
-        if (fit.cost < best.cost) best = std::move(fit);
+        models.push_back(std::move(model));
       }
     }
   }
+  std::vector<ChainFit> fits(models.size());
+  parallel_for(models.size(), [&](std::size_t i) {
+    fits[i] = fit_outwards(p, std::move(models[i]), kMostFitted);
+  });
+  ChainFit best = now.fit;
+  for (ChainFit& fit : fits)
+    if (fit.cost < best.cost) best = std::move(fit);
   return best;
 }
 
