@@ -509,30 +509,22 @@ double EffectBundle::most_of_a_sighting() const {
   return chi_square_quantile(rows, impl_->reject_sigma);
 }
 
-Eigen::VectorXd EffectBundle::gain_of_frames(const BundleChange& change,
-                                             const BundleSolution& solved,
-                                             const std::vector<std::size_t>& which) const {
+Eigen::VectorXd EffectBundle::squares_of_frames(const BundleChange& change,
+                                                const BundleSolution& solved) const {
+  Spec with;
+  State unused;
+  impl_->change_model(change, with, unused);
   const State& state = solved.end->state;
-  const auto frames = static_cast<Eigen::Index>(impl_->spec.times_s.size());
-  // By frame, with that share of these corrections everywhere.
-  const auto squares_at = [&](double share) {
-    Spec with;
-    State unused;
-    impl_->change_model(change, with, unused);
-    for (const std::size_t k : which)
-      with.corrections[k].share = Eigen::VectorXd::Constant(frames, share);
-    const Readings readings(with, state);
-    Eigen::VectorXd out = Eigen::VectorXd::Zero(frames);
-    for (const int index : impl_->usable) {
-      const Sighting& sighting = with.sightings[static_cast<std::size_t>(index)];
-      const auto at = bundle::corrected_error_of(with, state, readings, sighting);
-      const double most = chi_square_quantile(sighting.dimension(), impl_->reject_sigma);
-      const double squares = at ? at->error.residual.squaredNorm() : most;
-      out[sighting.frame] += squares < most ? squares : most;
-    }
-    return out;
-  };
-  return squares_at(0.0) - squares_at(1.0);
+  const Readings readings(with, state);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(with.times_s.size()));
+  for (const int index : impl_->usable) {
+    const Sighting& sighting = with.sightings[static_cast<std::size_t>(index)];
+    const auto at = bundle::corrected_error_of(with, state, readings, sighting);
+    const double most = chi_square_quantile(sighting.dimension(), impl_->reject_sigma);
+    const double squares = at ? at->error.residual.squaredNorm() : most;
+    out[sighting.frame] += squares < most ? squares : most;
+  }
+  return out;
 }
 
 JointMotion EffectBundle::Impl::motion(const std::vector<double>& times_s,

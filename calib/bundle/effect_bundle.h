@@ -100,12 +100,11 @@ class EffectBundle {
   /// change, where it is known.
   [[nodiscard]] BundleFit fit(const BundleChange& change, const std::vector<Correction>& probes,
                               const BundleSolution* solved = nullptr) const;
-  /// Of every frame, the squares (in noises) by which its sightings are nearer to where they are
-  /// expected with these corrections of the change, their share being 1, than without them. Those
-  /// that are left out count as well; each of either kind misses by no more than one just kept.
-  [[nodiscard]] Eigen::VectorXd gain_of_frames(const BundleChange& change,
-                                               const BundleSolution& solved,
-                                               const std::vector<std::size_t>& which) const;
+  /// Of every frame, squares (in noises) of how far its sightings are from where they are expected
+  /// with the values of a solution. Those that are left out count as well; each of either kind
+  /// misses by no more than one just kept. `change`: as solved, but for shares.
+  [[nodiscard]] Eigen::VectorXd squares_of_frames(const BundleChange& change,
+                                                  const BundleSolution& solved) const;
   /// What a sighting costs at the most there.
   [[nodiscard]] double most_of_a_sighting() const;
 

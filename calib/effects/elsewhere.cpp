@@ -47,16 +47,21 @@ CameraEffect at_camera(const EffectWorld& world, std::size_t camera, CameraEffec
   Eigen::VectorXd own(static_cast<Eigen::Index>(world.camera_of_frame.size()));
   for (Eigen::Index f = 0; f < own.size(); ++f)
     own[f] = world.camera_of_frame[static_cast<std::size_t>(f)] == static_cast<int>(camera);
-  of.corrections = [all = of.corrections, own, before, place](double scan) {
-    std::vector<Correction> out = all(scan);
-    for (Correction& correction : out) {
-      correction.block = place;
-      correction.name.replace(0, before.size(), place);
-      correction.share =
-          correction.share.size() == 0 ? own : Eigen::VectorXd(correction.share.cwiseProduct(own));
-    }
-    return out;
+  const auto in_own = [&](std::function<std::vector<Correction>(double)> everywhere) {
+    return [all = std::move(everywhere), own, before, place](double scan) {
+      std::vector<Correction> out = all(scan);
+      for (Correction& correction : out) {
+        correction.block = place;
+        correction.name.replace(0, before.size(), place);
+        correction.share = correction.share.size() == 0
+                               ? own
+                               : Eigen::VectorXd(correction.share.cwiseProduct(own));
+      }
+      return out;
+    };
   };
+  of.corrections = in_own(std::move(of.corrections));
+  if (of.nuisances) of.nuisances = in_own(std::move(of.nuisances));
   return of;
 }
 

@@ -227,8 +227,8 @@ std::function<std::vector<Correction>(double)> centre_with_focus(
     std::vector<Correction> out;
     for (int axis = 0; axis < 2; ++axis) {
       Correction shift = correct(CorrectedPart::kIntrinsic, like, 0, kFirstOfCentre + axis);
-      shift.name =
-          fmt::format("{} centre beside the focal length {}", like.candidate.id.place, "xy"[axis]);
+      shift.name = fmt::format("{} centre beside {} {}", like.candidate.id.place,
+                               like.candidate.id.effect, "xy"[axis]);
       shift.unit = "px";
       shift.share = share(scan);
       shift.is_nuisance = true;

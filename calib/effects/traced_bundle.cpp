@@ -541,25 +541,37 @@ std::vector<AddedEffect> TracedBundle::possible(std::vector<AddedEffect> effects
 
 std::vector<AddedEffect> TracedBundle::at_likeliest_instants(
     std::vector<AddedEffect> effects) const {
-  if (bundle_->of_recordings()) return effects;
+  const auto once = [](const CameraEffect& effect) { return effect.candidate.scan_step > 0.0; };
+  const std::vector<CameraEffect> all = all_effects(world_at(clock_ahead(0.0)));
+  const bool any = std::ranges::any_of(
+      effects, [&](const AddedEffect& added) { return once(effect_of(all, added.id)); });
+  if (!any || bundle_->of_recordings()) return effects;
   const auto [world, library, change, solved] = ready_for(effects);
   if (!solved->converged) return effects;
   const std::vector<double>& times_s = world.frames.times_s;
-  std::size_t next = 0;
-  for (AddedEffect& added : effects) {
+  // Cameras follow one another.
+  std::vector<std::size_t> from_last(times_s.size());
+  std::iota(from_last.begin(), from_last.end(), std::size_t{0});
+  std::ranges::stable_sort(from_last, std::greater{}, [&](std::size_t f) { return times_s[f]; });
+  const std::vector<AddedEffect> found = effects;
+  // Of every frame, with the effect having happened by an instant.
+  const auto squares_since = [&, &library = library, &solved = solved](std::size_t i, double at_s) {
+    std::vector<AddedEffect> varied = found;
+    varied[i].scan = at_s;
+    return bundle_->squares_of_frames(change_of(library, varied), *solved);
+  };
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    AddedEffect& added = effects[i];
     const CameraEffect& effect = effect_of(library, added.id);
-    if (effect.is_time_offset) continue;
-    std::vector<std::size_t> which(effect.corrections(added.scan).size());
-    std::iota(which.begin(), which.end(), next);
-    next += which.size();
-    if (effect.candidate.scan_step == 0.0) continue;  // nothing that happens once
-    const Eigen::VectorXd gain = bundle_->gain_of_frames(change, *solved, which);
-    // From the last frame on: what it gains if it happened there.
+    if (!once(effect)) continue;
+    const Eigen::VectorXd gain = squares_since(i, kNever) - squares_since(i, -kNever);
+    // What it gains if it happened at each.
     double best_s = added.scan;
     double since = 0.0;
     double most = -std::numeric_limits<double>::infinity();
     double now = 0.0;
-    for (std::size_t f = times_s.size(); f-- > 0;) {
+    for (const std::size_t f : from_last) {
       since += gain[static_cast<Eigen::Index>(f)];
       if (times_s[f] >= added.scan) now = since;
       const bool searched =

@@ -64,6 +64,9 @@ World rig_view(const FilmedRobot& robot, const JointLog& log, const RigCamera& c
   Rng rng = Rng::from_name("rig " + camera.name, robot.seed);
   Pose T_bumped;
   T_bumped.rotation = exp_rotation({camera.bump_rad, 0.0, 0.0});
+  World refocused = world;
+  refocused.camera.fx *= 1.0 + camera.refocus;
+  refocused.camera.fy *= 1.0 + camera.refocus;
   const auto frames = static_cast<int>(robot.duration_s * camera.rate_hz);
   world.joint_values.resize(frames, static_cast<Eigen::Index>(robot.tree.joints.size()));
   for (int f = 0; f < frames; ++f) {
@@ -75,10 +78,11 @@ World rig_view(const FilmedRobot& robot, const JointLog& log, const RigCamera& c
     const Pose T_camera_base = world.measurements.times_s.back() < camera.bumped_s
                                    ? world.T_camera_base
                                    : T_bumped * world.T_camera_base;
+    const bool is_refocused = world.measurements.times_s.back() >= camera.refocused_s;
     for (const Marker& marker : robot.tree.markers) {
-      auto tag =
-          seen_tag(world, marker, T_camera_base * links[marker.link.index()] * marker.T_link_marker,
-                   camera.sigma_px, rng);
+      auto tag = seen_tag(is_refocused ? refocused : world, marker,
+                          T_camera_base * links[marker.link.index()] * marker.T_link_marker,
+                          camera.sigma_px, rng);
       if (!tag) continue;
       tag->frame = f;
       world.measurements.corners.push_back(std::move(*tag));

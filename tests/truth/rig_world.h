@@ -26,6 +26,9 @@ struct RigCamera {
   /// From this time on (own clock) it stands turned by as much about its own x.
   double bumped_s = 1e9;
   double bump_rad = 0.0;
+  /// From when on its focal length is another one, by its own clock, and by what share.
+  double refocused_s = 1e9;
+  double refocus = 0.0;
 };
 
 struct RigOptions {

@@ -123,6 +123,21 @@ TEST(RunSeveralCameras, ABumpIsOfTheCameraThatWasBumped) {
             (std::vector<std::string>{"time_offset at clock", "camera_bump at camera left"}));
 }
 
+TEST(RunSeveralCameras, AnotherFocusIsOfTheCameraThatHasIt) {
+  std::vector<RigCamera> cameras = front_and_left();
+  cameras[1].refocused_s = 6.0;
+  cameras[1].refocus = 0.004;
+  const Ran run = run_on(written("rig_focus", scara_before(cameras)));
+  ASSERT_EQ(run.code, 0) << run.error;
+  EXPECT_EQ(effects_of(run.read("trace.json")),
+            (std::vector<std::string>{"time_offset at clock", "focal_jump at camera left"}));
+  const json jump = run.read("trace.json").at("accepted").back();
+  EXPECT_NEAR(jump.at("size").get<double>(), cameras[1].refocus, 0.02 * cameras[1].refocus);
+  // By the clock of the first camera.
+  const double jumped_s = cameras[1].refocused_s + cameras[1].clock_s - cameras[0].clock_s;
+  EXPECT_NEAR(jump.at("at").at("value").get<double>(), jumped_s, 1.5 / cameras[1].rate_hz);
+}
+
 TEST(RunSeveralCameras, ACameraThatSharesNothingIsNamedAndLeftOut) {
   const fs::path folder = written("rig_strange", scara_before(front_and_left()));
   std::string text = read_text_file(folder / "corners_left.csv");

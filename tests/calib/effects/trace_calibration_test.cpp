@@ -229,6 +229,20 @@ TEST(TraceCalibration, ATimeConstantIsFoundWithTheEffectInTheModel) {
   EXPECT_NEAR(found.scan, drift.detail * length_s, 0.1 * drift.detail * length_s);
 }
 
+// Where the robot is fast, sightings between a wrong instant and the right one stand out and are
+// left out: those that are used do not tell one from the other.
+TEST(TraceCalibration, AJumpIsWhenTheSightingsSayThatAreLeftOut) {
+  const InjectedEffect jump{"clock_jump", "clock", 0.08, 0.45};
+  const World world = make_effect_world(filmed({jump}, 400));
+  const Trace trace = trace_of(world).trace;
+  ASSERT_EQ(trace.accepted.size(), 1U) << answer(trace);
+  const TracedEffect& found = trace.accepted.front();
+  EXPECT_EQ(found.id, (EffectId{"clock_jump", "clock"})) << answer(trace);
+  const std::vector<double>& times_s = world.measurements.times_s;
+  const double jumped_s = jump.detail * (times_s.back() + times_s[1]);
+  EXPECT_NEAR(found.scan, jumped_s, 1.5 * times_s[1]);
+}
+
 // A straight line is no sum of two that bend, which would be known by their difference only.
 TEST(TraceCalibration, ADriftAlongAStraightLineIsOne) {
   InjectedEffect drift = strong("camera_drift", "camera");
