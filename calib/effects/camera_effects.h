@@ -54,6 +54,9 @@ inline constexpr double kUsualShift = 0.02;
 /// Behind a joint's name, the nuisance that stands beside its play.
 inline constexpr std::string_view kPlayStart = "place in its gap at the start";
 
+/// Of the image's centre: cx, cy among the intrinsic parameters.
+inline constexpr int kFirstOfCentre = 2;
+
 /// Periods a turn of an eccentricity that is a bent coupling.
 inline constexpr double kBendPeriods = 2.0;
 

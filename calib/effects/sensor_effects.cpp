@@ -107,9 +107,9 @@ std::vector<CameraEffect> of_camera(const CameraModel& camera) {
                        {{"p1", ""}, {"p2", ""}}, {6, 7}));
   }
   out.push_back(focal_length());
-  out.push_back(of_intrinsics("intrinsics", kCentre,
-                              "the image's centre is not the declared one (a cropped image)",
-                              {{"cx", "px"}, {"cy", "px"}}, "px", {2, 3}));
+  out.push_back(of_intrinsics(
+      "intrinsics", kCentre, "the image's centre is not the declared one (a cropped image)",
+      {{"cx", "px"}, {"cy", "px"}}, "px", {kFirstOfCentre, kFirstOfCentre + 1}));
   CameraEffect aspect = of_intrinsics("intrinsics", "camera aspect",
                                       "the image is stretched one way", {{"fy", "px"}}, "px", {1});
   aspect.candidate.check = "how the video was scaled: pixels that are not square";

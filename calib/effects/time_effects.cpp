@@ -221,8 +221,7 @@ std::function<std::vector<Correction>(double)> another_focus(
 
 std::function<std::vector<Correction>(double)> centre_with_focus(
     const CameraEffect& like, std::function<Eigen::VectorXd(double)> share) {
-  constexpr double kMostShift = 1.0;  // px, chosen
-  constexpr int kFirstOfCentre = 2;   // cx, cy among the intrinsic parameters
+  constexpr double kMostShift = 1.0;  // px; chosen
   return [like, share = std::move(share)](double scan) {
     std::vector<Correction> out;
     for (int axis = 0; axis < 2; ++axis) {

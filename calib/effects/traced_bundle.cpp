@@ -259,9 +259,7 @@ std::vector<RestField> rest_fields_of(const EffectWorld& world, double floor, Ca
   if (world.kind != MeasurementKind::kCorners) return {};
   RestField image{"camera", "px", "place in the image", "px", {}, {}, std::max(floor, kUsualShift)};
   for (int axis = 0; axis < 2; ++axis) {
-    constexpr int kFirstOfCentre =
-        2;  // cx, cy among the intrinsic parameters: all corners shift alike
-    Correction shift;
+    Correction shift;  // all corners alike
     shift.part = CorrectedPart::kIntrinsic;
     shift.index = kFirstOfCentre + axis;
     image.carriers[static_cast<std::size_t>(axis)] = carriers.add(shift);

@@ -55,7 +55,7 @@ struct Reading {
     return std::abs(speed(row)) >= kMoves * rms_speed;
   }
   /// The speed is not the same all the while.
-  [[nodiscard]] bool varies(std::vector<double> speeds) const {
+  [[nodiscard]] bool varies(const std::vector<double>& speeds) const {
     return quantile(speeds, 0.95) - quantile(speeds, 0.05) >= kVaries * rms_speed;
   }
   [[nodiscard]] std::string column() const { return fmt::format("column '{}'", channel.name); }
@@ -117,7 +117,7 @@ void leave_out_limits(const Reading& reading, std::vector<char>& marked,
       rows.push_back(row);
       speeds.push_back(reading.speed(row));
     }
-    const bool certain = reading.varies(std::move(speeds));
+    const bool certain = reading.varies(speeds);
     if (certain) {
       for (const Eigen::Index row : rows) marked[static_cast<std::size_t>(row)] = kLimit;
     }
@@ -212,7 +212,7 @@ bool is_in_motion(const Reading& reading, const ValueRun& run) {
     speeds.push_back(reading.speed(row));
     if (reading.moves(row)) ++moving;
   }
-  return 2 * moving >= run.rows() && reading.varies(std::move(speeds));
+  return 2 * moving >= run.rows() && reading.varies(speeds);
 }
 
 bool catches_up(const Reading& reading, const ValueRun& run) {

@@ -113,29 +113,42 @@ TEST(RunSeveralCameras, AClockThatIsSecondsOffIsNamedAndTaken) {
   }
 }
 
+// Beside the clocks' offset an effect of the second camera, which is given back.
+json effect_of_left(const std::string& name, const std::vector<RigCamera>& cameras,
+                    const std::string& effect) {
+  const Ran run = run_on(written(name, scara_before(cameras)));
+  EXPECT_EQ(run.code, 0) << run.error;
+  if (run.code != 0) return {};
+  const json trace = run.read("trace.json");
+  EXPECT_EQ(effects_of(trace),
+            (std::vector<std::string>{"time_offset at clock", effect + " at camera left"}));
+  return trace.at("accepted").back();
+}
+
+// Seconds of the first camera's clock at one of the second's.
+double by_first_clock(const std::vector<RigCamera>& cameras, double left_s) {
+  return left_s + cameras[1].clock_s - cameras[0].clock_s;
+}
+
 TEST(RunSeveralCameras, ABumpIsOfTheCameraThatWasBumped) {
   std::vector<RigCamera> cameras = front_and_left();
   cameras[1].bumped_s = 6.0;
   cameras[1].bump_rad = 0.003;
-  const Ran run = run_on(written("rig_bump", scara_before(cameras)));
-  ASSERT_EQ(run.code, 0) << run.error;
-  EXPECT_EQ(effects_of(run.read("trace.json")),
-            (std::vector<std::string>{"time_offset at clock", "camera_bump at camera left"}));
+  const json bump = effect_of_left("rig_bump", cameras, "camera_bump");
+  ASSERT_FALSE(bump.is_null());
+  EXPECT_NEAR(bump.at("at").at("value").get<double>(), by_first_clock(cameras, 6.0),
+              1.5 / cameras[1].rate_hz);
 }
 
 TEST(RunSeveralCameras, AnotherFocusIsOfTheCameraThatHasIt) {
   std::vector<RigCamera> cameras = front_and_left();
   cameras[1].refocused_s = 6.0;
   cameras[1].refocus = 0.004;
-  const Ran run = run_on(written("rig_focus", scara_before(cameras)));
-  ASSERT_EQ(run.code, 0) << run.error;
-  EXPECT_EQ(effects_of(run.read("trace.json")),
-            (std::vector<std::string>{"time_offset at clock", "focal_jump at camera left"}));
-  const json jump = run.read("trace.json").at("accepted").back();
+  const json jump = effect_of_left("rig_focus", cameras, "focal_jump");
+  ASSERT_FALSE(jump.is_null());
   EXPECT_NEAR(jump.at("size").get<double>(), cameras[1].refocus, 0.02 * cameras[1].refocus);
-  // By the clock of the first camera.
-  const double jumped_s = cameras[1].refocused_s + cameras[1].clock_s - cameras[0].clock_s;
-  EXPECT_NEAR(jump.at("at").at("value").get<double>(), jumped_s, 1.5 / cameras[1].rate_hz);
+  EXPECT_NEAR(jump.at("at").at("value").get<double>(), by_first_clock(cameras, 6.0),
+              1.5 / cameras[1].rate_hz);
 }
 
 TEST(RunSeveralCameras, ACameraThatSharesNothingIsNamedAndLeftOut) {
