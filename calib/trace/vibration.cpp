@@ -21,6 +21,8 @@ namespace {
 // Turns in the recording: fewer are a curve over time, whose test has eight knots. Autofocus that
 // hunts swings a few times (`undeclared`, 14239: 5.3 turns in 18 s).
 constexpr double kLeastTurns = 3.0;
+// Up to here joints move as slowly in a recording: what they do swings, too (chosen).
+constexpr double kTurnsOfMotion = 12.0;
 // Frequencies tried, in steps of one turn in the recording.
 constexpr int kOversampling = 4;
 constexpr int kFrequencySteps = 40;  // of the golden section: to 1e-8 of the bracket
@@ -197,7 +199,9 @@ std::optional<Vibration> find_vibration(const NormalSystem& system,
   if (out.score.hidden() || !is_large(out.score, options)) return std::nullopt;
   out.p_value = tests * std::max(out.score.p_value, jackknife_test(system, columns).p_value);
   if (out.p_value > level) return std::nullopt;
-  if (linear.body.empty() && is_of_the_motion(system, covariates, frequency_hz, level))
+  const bool as_slow_as_motion = frequency_hz * duration < kTurnsOfMotion;
+  if ((linear.body.empty() || as_slow_as_motion) &&
+      is_of_the_motion(system, covariates, frequency_hz, level))
     return std::nullopt;
   return out;
 }

@@ -22,8 +22,9 @@ struct Vibration {
 /// and moves the prediction by the floors of `options`. Frequencies are those above what a curve
 /// over time resolves and below half the rate of instants: a faster one shows at its alias. Nothing
 /// for postures, and for rows of no body whose noise is not known apart. Noise of any colour is
-/// none: each stretch of time has its own phase of it. Nor, for rows of no body, what one of the
-/// covariates swings with: that is of the motion. Fisher 1929; Scargle 1982.
+/// none: each stretch of time has its own phase of it. Nor, for rows of no body and where it is as
+/// slow as joints move, what one of the covariates swings with: that is of the motion. Fisher 1929;
+/// Scargle 1982.
 [[nodiscard]] std::optional<Vibration> find_vibration(const NormalSystem& system,
                                                       const std::vector<RestPlace>& places,
                                                       const std::vector<Covariate>& covariates,
