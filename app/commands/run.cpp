@@ -98,9 +98,8 @@ void describe_recording(const Recording& recording, const Observed& observed,
 // Motion between the readings of a slow log is interpolated: all that moves is then off by a time,
 // too.
 std::string jitter_words(double jitter_s, const JointLog& log, const Observed& observed) {
-  constexpr double kSlow = 2.0;  // frames
   const double log_step = log.size() > 1 ? mean_step_s(log.times_s) : 0.0;
-  if (log_step > kSlow * mean_step_s(frame_times(observed))) {
+  if (log_step > mean_step_s(frame_times(observed))) {
     return fmt::format(
         "the frames and the joint log scatter by {:.2g} ms (standard deviation) about each other: "
         "{} has {:.2g} readings a second, and the motion between them is interpolated: log faster",
@@ -240,26 +239,6 @@ std::string odd_words(const OddReading& odd, const Recording& recording) {
       odd.expected);
 }
 
-// Of one channel.
-std::string odd_words(const std::vector<OddStretch>& stretches, const Recording& recording) {
-  const OddStretch& worst = *std::ranges::max_element(stretches, {}, [](const OddStretch& one) {
-    return std::abs(one.most.expected - one.most.read);
-  });
-  int frames = 0;
-  for (const OddStretch& one : stretches) frames += one.frames;
-  std::string out = fmt::format(
-      "{}: from {} = {:.6g} to {:.6g} '{}' {} {:.6g}, but the markers it moves say up to {:.6g}",
-      recording.log.source, recording.log.time_column, worst.from_s, worst.to_s, worst.channel,
-      worst.stands_still ? "stands still at" : "reads about", worst.most.read, worst.most.expected);
-  if (stretches.size() > 1) {
-    out += fmt::format("; it is as wrong in {} more stretch{}", stretches.size() - 1,
-                       stretches.size() == 2 ? "" : "es");
-  }
-  return fmt::format(
-      "{}: {} frames left out{}", out, frames,
-      worst.stands_still ? " (a reading that froze, or a row that was repeated)" : "");
-}
-
 ExplainOptions explain_options(const RunOptions& options, RunSummary& run, Stopwatch& clock,
                                const Progress& progress) {
   ExplainOptions out;
@@ -297,17 +276,9 @@ void take(TracedCalibration fitted, const Recording& recording, const Observed& 
   }
   if (fitted.stamp_jitter_s > 0.0)
     run.warnings.push_back(jitter_words(fitted.stamp_jitter_s, run.log, observed));
-  const std::vector<OddReading> odd = odd_readings(run.calibration, run.tracks, run.log);
-  if (of_postures) {
-    for (const OddReading& one : odd) run.warnings.push_back(odd_words(one, recording));
-    return;
-  }
-  // Between the readings of a motion a single wrong one is a spike, and stands apart already.
-  std::map<std::string, std::vector<OddStretch>> by_channel;
-  for (OddStretch& stretch : odd_stretches(run.calibration, odd))
-    by_channel[stretch.channel].push_back(std::move(stretch));
-  for (const auto& [channel, stretches] : by_channel)
-    run.warnings.push_back(odd_words(stretches, recording));
+  if (!of_postures) return;
+  for (const OddReading& odd : odd_readings(run.calibration, run.tracks, run.log))
+    run.warnings.push_back(odd_words(odd, recording));
 }
 
 // Frames of the (reference) camera for the report, spread evenly over those of which the

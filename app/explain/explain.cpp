@@ -11,9 +11,11 @@
 #include "app/explain/explainer.h"
 #include "app/explain/hypothesis_fit.h"
 #include "app/explain/recording_pieces.h"
+#include "calib/bundle/postures.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/partly_followed.h"
 #include "calib/tracks/even_stamps.h"
+#include "kinematics/core/mean_step.h"
 #include "kinematics/log/exchanged_readings.h"
 #include "kinematics/log/readings_apart.h"
 
@@ -27,6 +29,14 @@ struct ChangedEvidence {
   PoseTracks tracks;
 };
 
+void erase_sightings(ChangedEvidence& of, const auto& is_aside) {
+  Measurements& measured = of.observed.measurements;
+  std::erase_if(measured.corners, is_aside);
+  std::erase_if(measured.points.observations, is_aside);
+  for (PoseTrack& track : measured.poses.tracks) std::erase_if(track.samples, is_aside);
+  for (PoseTrack& track : of.tracks.tracks) std::erase_if(track.samples, is_aside);
+}
+
 // Without these readings. What was measured at the very instant of one has no reading then.
 ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart>& apart) {
   ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
@@ -35,14 +45,9 @@ ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   std::set<double> stamps;
   for (const ReadingApart& reading : apart) stamps.insert(log.times_s[reading.row]);
-  const auto is_aside = [&](const auto& seen) {
+  erase_sightings(out, [&](const auto& seen) {
     return stamps.contains(times_s[static_cast<std::size_t>(seen.frame)]);
-  };
-  Measurements& measured = out.observed.measurements;
-  std::erase_if(measured.corners, is_aside);
-  std::erase_if(measured.points.observations, is_aside);
-  for (PoseTrack& track : measured.poses.tracks) std::erase_if(track.samples, is_aside);
-  for (PoseTrack& track : out.tracks.tracks) std::erase_if(track.samples, is_aside);
+  });
   return out;
 }
 
@@ -161,6 +166,48 @@ Explanation with_parts_followed(Explanation now, const Evidence& evidence,
   return now;
 }
 
+// Without what was seen while the log was wrong. It may have begun, and ended, within a frame's
+// step.
+ChangedEvidence without(const Evidence& evidence, const JointLog& log, double time_offset_s,
+                        const std::vector<OddStretch>& stretches) {
+  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
+  out.recording.log = log;
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  constexpr double kReach = 1.5;  // steps: one frame more
+  const double step_s = median_step_s(times_s);
+  erase_sightings(out, [&](const auto& seen) {
+    const double at_s = times_s[static_cast<std::size_t>(seen.frame)] + time_offset_s;
+    return std::ranges::any_of(stretches, [&](const OddStretch& stretch) {
+      return at_s > stretch.from_s - kReach * step_s && at_s < stretch.to_s + kReach * step_s;
+    });
+  });
+  return out;
+}
+
+// Readings that froze, came late or twice are no error of the robot.
+Explanation with_stretches_apart(Explanation now, const Evidence& evidence,
+                                 const ExplainOptions& options,
+                                 std::vector<std::string>& warnings) {
+  if (!now.fitted || now.log.empty()) return now;
+  const Calibration& calibration = now.fitted->calibration;
+  if (shows_postures(calibration.tree, now.log, calibration.times_s)) return now;
+  const std::vector<OddStretch> stretches =
+      odd_stretches(calibration, now.log, odd_readings(calibration, evidence.tracks, now.log));
+  for (std::string& line : lines_of(stretches, now.log)) warnings.push_back(std::move(line));
+  if (stretches.empty()) return now;
+  const ChangedEvidence changed = without(evidence, now.log, calibration.time_offset_s, stretches);
+  ExplainOptions alike = options;
+  alike.calibrate.fold_of_frame = folds_of(calibration);
+  std::vector<std::string> said;
+  Explanation other = explained(
+      {changed.recording, changed.observed, changed.tracks, evidence.camera}, alike, said);
+  if (!is_settled(other) && !is_better(other, now, evidence.observed.measurements)) return now;
+  for (std::string& line : said) {
+    if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
+  }
+  return other;
+}
+
 ChangedEvidence stamped_evenly(const Evidence& evidence, const std::vector<double>& times_s) {
   ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
   Measurements& measured = out.observed.measurements;
@@ -201,8 +248,9 @@ std::optional<ChangedEvidence> with_even_stamps(const Evidence& evidence,
 
 Explanation explained_as_stamped(const Evidence& evidence, const ExplainOptions& options,
                                  std::vector<std::string>& warnings) {
-  return with_parts_followed(with_exchanged_back(evidence, options, warnings), evidence, options,
-                             warnings);
+  return with_stretches_apart(with_parts_followed(with_exchanged_back(evidence, options, warnings),
+                                                  evidence, options, warnings),
+                              evidence, options, warnings);
 }
 
 }  // namespace

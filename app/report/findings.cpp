@@ -164,7 +164,7 @@ void add_noise(const RunSummary& run, const Analysis& analysis, std::vector<Find
   if (calibration.sigma_scale > kNoiseLimit) {
     findings.push_back(
         {kModelError * 0.3 + std::min(calibration.sigma_scale, 10.0),
-         fmt::format("The residuals are {:.1f} times the declared noise of the measurement; the "
+         fmt::format("The residuals are {:.1f} times the expected noise of the measurement; the "
                      "uncertainties are widened accordingly.",
                      calibration.sigma_scale),
          ""});

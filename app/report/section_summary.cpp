@@ -99,7 +99,7 @@ std::string residual_light(const Trace& trace, double sigma_scale) {
   if (sigma_scale > kNoiseLimit) {
     return light(
         "Residual", "fair",
-        fmt::format("nothing known is left, but {:.1f} times the declared noise", sigma_scale),
+        fmt::format("nothing known is left, but {:.1f} times the expected noise", sigma_scale),
         rule);
   }
   return light("Residual", "good", trace_word(trace), rule);
@@ -220,7 +220,7 @@ std::string method_section(const Facts& facts) {
   row("Iterations", "/calibration/iterations", Quantity::kCount);
   row("Cost before", "/calibration/initial_cost", Quantity::kPlain);
   row("Cost after", "/calibration/final_cost", Quantity::kPlain);
-  row("Noise found / noise declared", "/calibration/sigma_scale", Quantity::kPlain);
+  row("Noise found / noise expected", "/calibration/sigma_scale", Quantity::kPlain);
   row("Sightings used", "/calibration/sightings_used", Quantity::kCount);
   row("Sightings left out", "/calibration/sightings_rejected", Quantity::kCount);
   row("Correlation time of the residuals, s", "/calibration/correlation_time_s", Quantity::kTime);

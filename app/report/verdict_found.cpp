@@ -90,14 +90,21 @@ std::string driving_words(const RunSummary& run) {
 }
 
 /// " Temp and 7 other channels that move drive nothing.": of channels that stand still nothing is
-/// expected.
+/// expected, and what is in doubt is said with the limits.
 std::string idle_words(const RunSummary& run) {
   constexpr std::size_t kMostNames = 4;
+  const Structure structure = value_of(run.structure);
+  const auto is_in_doubt = [&](const std::string& name) {
+    return std::ranges::any_of(structure.doubts, [&](const StructureDoubt& doubt) {
+      return std::ranges::find(doubt.names, name) != doubt.names.end();
+    });
+  };
   std::vector<std::string> names;
-  for (const int channel : value_of(run.structure).idle_channels) {
+  for (const int channel : structure.idle_channels) {
     const auto column = run.log.values.col(channel);
-    if (column.size() > 0 && column.maxCoeff() > column.minCoeff())
-      names.push_back(run.log.channels.at(static_cast<std::size_t>(channel)));
+    const std::string& name = run.log.channels.at(static_cast<std::size_t>(channel));
+    if (column.size() > 0 && column.maxCoeff() > column.minCoeff() && !is_in_doubt(name))
+      names.push_back(name);
   }
   if (names.empty()) return "";
   if (names.size() == 1) return fmt::format(" The channel {} moves and drives nothing.", names[0]);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes   a calibrated robot, the marker poses and the log it was calibrated from.
-// Gives   single readings that contradict all the markers they move, with what those say instead.
-// Method  in a frame that lost every marker behind a joint as an outlier, and none before it, the
-//         joint's value from each marker's pose alone: one of them that brings the markers back is
-//         the reading that was wrong.
+// Gives   readings that contradict the markers they move, with what those say instead.
+// Method  in a frame that lost markers as outliers, the values of all joints from the markers'
+// poses
+//         alone (least squares); the fewest of them that bring the markers back, no more than there
+//         are markers lost, are the readings that were wrong.
 #pragma once
 
 #include <optional>
@@ -34,18 +35,27 @@ struct OddReading {
 [[nodiscard]] std::vector<OddReading> odd_readings(const Calibration& calibration,
                                                    const PoseTracks& tracks, const JointLog& log);
 
-/// Odd readings of one channel in successive frames: a reading that froze, or fell to zero.
+/// Odd readings in successive frames: some that froze, fell to zero, came late or twice.
 struct OddStretch {
-  std::string channel;
-  double from_s = 0.0;  ///< of the first frame, on the log's clock
-  double to_s = 0.0;    ///< of the last one
+  std::vector<std::string> channels;  ///< that were wrong together
+  double from_s = 0.0;                ///< of the first frame, on the log's clock
+  double to_s = 0.0;                  ///< of the last one
   int frames = 0;
-  OddReading most;            ///< where reading and markers differ most
-  bool stands_still = false;  ///< it reads one value in all of them
+  OddReading most;            ///< of the first channel, where reading and markers differ most
+  bool stands_still = false;  ///< one value of each, or one row, in all of them
+  /// The log has the same rows so long before, s.
+  std::optional<double> repeats_s = {};
+  /// The log has what the markers show, but so much later (earlier where negative), s.
+  std::optional<double> late_s = {};
 };
 
-/// Of at least two frames of a film, in the order of time.
+/// Of at least two frames of a film, in the order of time. O(rows^2) at worst, where rows repeat.
 [[nodiscard]] std::vector<OddStretch> odd_stretches(const Calibration& calibration,
+                                                    const JointLog& log,
                                                     const std::vector<OddReading>& readings);
+
+/// For a user, a line for those of the same channels.
+[[nodiscard]] std::vector<std::string> lines_of(const std::vector<OddStretch>& stretches,
+                                                const JointLog& log);
 
 }  // namespace kinescope

@@ -302,14 +302,9 @@ void add_constant_doubt(const GrownTree& tree, const Readings& readings, const J
        std::move(names)});
 }
 
-// Channels that hardly move, while there are markers between which their joint could hide.
+// What moves less than the best marker would show is as good as at rest.
 void add_still_doubts(const GrownTree& tree, const Series& series, const Readings& readings,
                       const JointLog& log, Verdict& verdict) {
-  std::vector<int> markers(tree.links.size(), 0);
-  for (const GrownBody& b : tree.bodies) {
-    if (b.link >= 0) ++markers[static_cast<std::size_t>(b.link)];
-  }
-  const bool hides = markers[0] >= 1 || std::ranges::any_of(markers, [](int m) { return m >= 2; });
   const double scale = usual_scale(tree, readings);
   for (int c = 0; c < readings.channels(); ++c) {
     if (!readings.moves(c) || drives_something(tree, c)) continue;
@@ -317,12 +312,12 @@ void add_still_doubts(const GrownTree& tree, const Series& series, const Reading
     if (motion > visible_motion(series)) continue;
     const std::string name = channel_words(log, readings, c);
     verdict.doubts.push_back(
-        {fmt::format("channel {} hardly moves: whether it drives a joint cannot be told", name),
-         fmt::format("record again with {} moving over more of its range, or take the column out "
-                     "of the log if it drives no joint",
+        {fmt::format("channel {} hardly moves: a joint that it drives would not be seen, and "
+                     "markers on both sides of it count as one link",
+                     name),
+         fmt::format("if {} drives a joint, record again with it moving over more of its range",
                      name),
          {name.substr(1, name.size() - 2)}});
-    if (hides) verdict.status = StructureStatus::kUndetermined;
   }
 }
 

@@ -274,7 +274,7 @@ TEST(Report, NoiseBeyondTheDeclaredOneIsNoGreenLight) {
   run.calibration.sigma_scale = 2.2;
   const std::string html = report_html(run, "");
   EXPECT_EQ(html.find("noise, nothing else"), std::string::npos);
-  EXPECT_NE(html.find("nothing known is left, but 2.2 times the declared noise"),
+  EXPECT_NE(html.find("nothing known is left, but 2.2 times the expected noise"),
             std::string::npos);
 }
 

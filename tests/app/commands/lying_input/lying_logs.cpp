@@ -210,7 +210,21 @@ std::vector<LyingInput> lying_logs() {
        },
        kRun,
        0,
-       {"stands still at", "but the markers it moves say up to", "a reading that froze"}},
+       {"'ch0' is wrong (readings that froze, or a row that was repeated)",
+        "but the markers it moves say"}},
+      {"LogLateForAWhile",
+       poses,
+       [](Files& files) {
+         const std::vector<Row> rows = rows_of(files["joints.csv"]);
+         each_row("joints.csv", [&](Row& row, int i) {
+           if (i >= 300 && i < 400)
+             std::copy(rows[static_cast<std::size_t>(i - 24)].begin() + 1,
+                       rows[static_cast<std::size_t>(i - 24)].end(), row.begin() + 1);
+         })(files);
+       },
+       kRun,
+       0,
+       {"'ch0', 'ch1', 'ch2' are wrong (0.25 s late)"}},
       // joints.csv, written by other programs: read as it is meant
       {"LogOfSemicolonsAndCommas",
        poses,
