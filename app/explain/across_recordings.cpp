@@ -80,11 +80,18 @@ CalibrationStart near_end(const Explanation& of) {
 
 // The effects as a fit had them.
 void take_effects(const Calibration& fitted, std::vector<Correction>& corrections) {
-  std::size_t next = 0;
-  for (const Parameter& parameter : fitted.parameters)
-    if (parameter.block == "effects" && next < corrections.size())
-      corrections[next++].value = parameter.value;
-  KINESCOPE_CHECK(next == corrections.size(), "a value for each correction");
+  auto next = corrections.begin();
+  const auto skip_local = [&] {
+    next = std::find_if(next, corrections.end(),
+                        [](const Correction& correction) { return !correction.is_local; });
+  };
+  skip_local();
+  for (const Parameter& parameter : fitted.parameters) {
+    if (parameter.block != "effects" || next == corrections.end()) continue;
+    next++->value = parameter.value;
+    skip_local();
+  }
+  KINESCOPE_CHECK(next == corrections.end(), "a value for each correction");
 }
 
 // Of the reference recording's offset, and what a further one's clock lags it.

@@ -47,7 +47,10 @@ void take_values(const Calibration& calibration, const std::vector<Correction>& 
   for (const Parameter& parameter : calibration.parameters) {
     if (parameter.block == "effects") values.push_back(parameter.value);
   }
-  KINESCOPE_CHECK(values.size() == corrections.size(), "a value for each correction");
+  // Those of a few frames each are not among a calibration's parameters.
+  KINESCOPE_CHECK(
+      std::ssize(values) == std::ranges::count(corrections, false, &Correction::is_local),
+      "a value for each correction");
   values.resize(
       static_cast<std::size_t>(std::ranges::count(corrections, false, &Correction::is_nuisance)));
   std::size_t next = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace kinescope::bundle {
 namespace {
@@ -157,6 +158,8 @@ std::vector<int> corrections_of(const Spec& spec, const Sighting& sighting) {
   std::vector<int> out;
   for (std::size_t c = 0; c < spec.corrections.size(); ++c) {
     const Correction& correction = spec.corrections[c];
+    // There may be thousands that bear on a few frames each.
+    if (correction.is_local && !acts_in(correction, sighting.frame)) continue;
     bool bears = true;
     switch (correction.part) {
       case CorrectedPart::kJoint:
@@ -208,13 +211,15 @@ std::vector<CorrectionBlock> correction_blocks(const Spec& spec) {
   return out;
 }
 
-std::vector<CorrectionBlock> correction_blocks_of(const Spec& spec, const Sighting& sighting) {
-  const std::vector<int> bearing = corrections_of(spec, sighting);
-  std::vector<CorrectionBlock> out = correction_blocks(spec);
-  std::erase_if(out, [&](const CorrectionBlock& block) {
-    const auto first = std::ranges::lower_bound(bearing, block.first);
-    return first == bearing.end() || *first >= block.first + block.count;
-  });
+std::vector<CorrectionBlock> correction_blocks_of(const Spec& spec,
+                                                  const std::vector<CorrectionBlock>& blocks,
+                                                  const Sighting& sighting) {
+  std::vector<CorrectionBlock> out;
+  for (const int bearing : corrections_of(spec, sighting)) {
+    const auto next = std::ranges::upper_bound(blocks, bearing, {}, &CorrectionBlock::first);
+    const CorrectionBlock& block = *std::prev(next);
+    if (out.empty() || out.back().first != block.first) out.push_back(block);
+  }
   return out;
 }
 

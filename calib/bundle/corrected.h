@@ -19,9 +19,9 @@ struct CorrectionBlock {
   int count = 0;
 };
 [[nodiscard]] std::vector<CorrectionBlock> correction_blocks(const Spec& spec);
-/// Those with a correction that bears on the sighting.
-[[nodiscard]] std::vector<CorrectionBlock> correction_blocks_of(const Spec& spec,
-                                                                const Sighting& sighting);
+/// Of `blocks`, all of the spec's, those with a correction that bears on the sighting.
+[[nodiscard]] std::vector<CorrectionBlock> correction_blocks_of(
+    const Spec& spec, const std::vector<CorrectionBlock>& blocks, const Sighting& sighting);
 
 /// Rotation, then translation, of a correction whose value is 1, in a frame.
 [[nodiscard]] Vector6d twist_at(const Correction& correction, int frame);

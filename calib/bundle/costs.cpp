@@ -24,8 +24,12 @@ CameraModel camera_from(const CameraModel& base, const double* intrinsics) {
 // value in this frame), the mount, the time offset, the intrinsics, the target.
 class SightingCost final : public ceres::CostFunction {
  public:
-  SightingCost(const Spec& spec, const Sighting& sighting, const Readings& readings)
-      : spec_(&spec), sighting_(&sighting), readings_(&readings) {
+  SightingCost(const Spec& spec, const Sighting& sighting, const Readings& readings,
+               std::vector<CorrectionBlock> corrections)
+      : spec_(&spec),
+        sighting_(&sighting),
+        readings_(&readings),
+        correction_blocks_(std::move(corrections)) {
     const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
     path_ = &spec.path[marker.link.index()];
     set_num_residuals(sighting.dimension());
@@ -42,7 +46,6 @@ class SightingCost final : public ceres::CostFunction {
     if (sighting.kind == MeasurementKind::kCorners) sizes.push_back(kMaxIntrinsics);
     if (sighting.target >= 0) sizes.push_back(3);
     first_correction_ = sizes.size();
-    correction_blocks_ = correction_blocks_of(spec, sighting);
     for (const CorrectionBlock& block : correction_blocks_) {
       sizes.push_back(block.count);
       for (int k = 0; k < block.count; ++k) corrections_.push_back(block.first + k);
@@ -269,8 +272,9 @@ class DistanceCost final : public ceres::SizedCostFunction<1, 3, 3> {
 }  // namespace
 
 ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
-                                        const Readings& readings) {
-  return new SightingCost(spec, sighting, readings);
+                                        const Readings& readings,
+                                        std::vector<CorrectionBlock> corrections) {
+  return new SightingCost(spec, sighting, readings, std::move(corrections));
 }
 
 ceres::CostFunction* make_frame_prior(const NominalSigmas& sigmas, const Joint& nominal) {

@@ -5,6 +5,7 @@
 
 #include <ceres/cost_function.h>
 
+#include "calib/bundle/corrected.h"
 #include "calib/bundle/problem.h"
 
 namespace kinescope::bundle {
@@ -13,9 +14,10 @@ namespace kinescope::bundle {
 /// joint on the way its frame (7) and its map (scale, offset) or its value in this frame (1), the
 /// mount (7), the time offset (1), for a further camera its lag (1), for corners the intrinsics
 /// (12), for points in a target its place (3), each block of corrections that bears on the
-/// sighting (corrected.h). `readings` must follow the time offset.
+/// sighting: `corrections`. `readings` must follow the time offset.
 [[nodiscard]] ceres::CostFunction* make_sighting_cost(const Spec& spec, const Sighting& sighting,
-                                                      const Readings& readings);
+                                                      const Readings& readings,
+                                                      std::vector<CorrectionBlock> corrections);
 /// The frame of a joint that should stay near the nominal one, but for its zero. Block: the frame
 /// (7).
 [[nodiscard]] ceres::CostFunction* make_frame_prior(const NominalSigmas& sigmas,

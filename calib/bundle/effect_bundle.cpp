@@ -440,7 +440,13 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   const LinearBundle linear = bundle::linearise(spec, state, impl_->used);
   const Columns columns = sort_columns(linear, change.corrections.size(), change.time_offset);
   std::vector<Eigen::Index> model = columns.own;
-  model.insert(model.end(), columns.change.begin(), columns.change.end());
+  std::vector<Eigen::Index> local;
+  std::vector<Eigen::Index> local_corrections;
+  for (std::size_t c = 0; c < columns.change.size(); ++c) {
+    const bool is_local = c < change.corrections.size() && change.corrections[c].is_local;
+    (is_local ? local : model).push_back(columns.change[c]);
+    if (is_local) local_corrections.push_back(static_cast<Eigen::Index>(c));
+  }
 
   std::map<int, std::vector<int>> sightings;
   for (const int index : impl_->used) {
@@ -454,6 +460,17 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   if (with_places) out.place_px.resize(rows, 2);
   out.jacobian.resize(rows, static_cast<Eigen::Index>(model.size()));
   std::vector<Eigen::Triplet<double>> entries;
+  std::vector<Eigen::Triplet<double>> local_entries;
+  const auto add_columns = [](const Eigen::MatrixXd& J, Eigen::Index first,
+                              const std::vector<Eigen::Index>& which,
+                              std::vector<Eigen::Triplet<double>>& to) {
+    for (std::size_t p = 0; p < which.size(); ++p) {
+      for (Eigen::Index i = 0; i < J.rows(); ++i) {
+        if (const double value = -J(i, which[p]); value != 0.0)
+          to.emplace_back(first + i, static_cast<Eigen::Index>(p), value);
+      }
+    }
+  };
   Eigen::Index row = 0;
   for (const auto& [frame, block] : linear.frames) {
     if (frame < 0) continue;  // measured distances are part of the model's prior knowledge
@@ -462,12 +479,8 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
     const Eigen::Index count = block.r.size();
     out.residual.segment(row, count) = block.r;
     out.jacobian.middleRows(row, count) = -block.J(Eigen::all, model);
-    for (std::size_t p = 0; p < columns.probes.size(); ++p) {
-      for (Eigen::Index i = 0; i < count; ++i) {
-        const double value = -block.J(i, columns.probes[p]);
-        if (value != 0.0) entries.emplace_back(row + i, static_cast<Eigen::Index>(p), value);
-      }
-    }
+    add_columns(block.J, row, columns.probes, entries);
+    add_columns(block.J, row, local, local_entries);
     Eigen::Index at = row;
     for (const int index : sightings.at(frame)) {
       const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
@@ -485,6 +498,10 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   out.first_row.push_back(row);
   out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
   out.probes.setFromTriplets(entries.begin(), entries.end());
+  out.local.resize(rows, std::ssize(local));
+  out.local.setFromTriplets(local_entries.begin(), local_entries.end());
+  out.local_values = out.values(local_corrections);
+  out.local_information = linear.prior_information.diagonal()(local);
   if (!linear.prior_information.isZero(0.0)) {
     out.prior_information = linear.prior_information(model, model);
     out.prior_gradient = linear.prior_gradient(model);

@@ -60,9 +60,13 @@ struct BundleSolution {
 struct BundleFit : BundleSolution {
   Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
-      jacobian;                       ///< rows x parameters, d predicted; the change's columns last
-  Eigen::MatrixXd prior_information;  ///< of the parameters; empty without priors
-  Eigen::VectorXd prior_gradient;     ///< of half the priors' squares; empty likewise
+      jacobian;  ///< rows x parameters, d predicted; the change's columns last
+  /// The same of the change's local corrections, which are not among those; in their order.
+  Eigen::SparseMatrix<double, Eigen::RowMajor> local;
+  Eigen::VectorXd local_values;
+  Eigen::VectorXd local_information;    ///< of their priors
+  Eigen::MatrixXd prior_information;    ///< of the parameters; empty without priors
+  Eigen::VectorXd prior_gradient;       ///< of half the priors' squares; empty likewise
   Eigen::SparseMatrix<double> probes;   ///< rows x probes, d predicted
   std::vector<Eigen::Index> first_row;  ///< of every instant, one past the last
   std::vector<int> frames;              ///< of every instant

@@ -47,10 +47,19 @@ void add_priors(BuiltProblem& built, const std::vector<double*>& parameters, int
   ceres::CRSMatrix jacobian;
   KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
                   "priors can be evaluated");
-  const Eigen::MatrixXd J = dense_rows(jacobian, 0, jacobian.num_rows, 0, width);
-  out.prior_information = J.transpose() * J;
-  out.prior_gradient =
-      J.transpose() * Eigen::Map<const Eigen::VectorXd>(residuals.data(), jacobian.num_rows);
+  // A prior bears on one block: thousands of them are no dense product.
+  for (int row = 0; row < jacobian.num_rows; ++row) {
+    const auto at = static_cast<std::size_t>(row);
+    for (int a = jacobian.rows[at]; a < jacobian.rows[at + 1]; ++a) {
+      const int column = jacobian.cols[static_cast<std::size_t>(a)];
+      const double value = jacobian.values[static_cast<std::size_t>(a)];
+      out.prior_gradient[column] += value * residuals[at];
+      for (int b = jacobian.rows[at]; b < jacobian.rows[at + 1]; ++b) {
+        out.prior_information(column, jacobian.cols[static_cast<std::size_t>(b)]) +=
+            value * jacobian.values[static_cast<std::size_t>(b)];
+      }
+    }
+  }
 }
 
 // Takes the frame's own unknowns out: J <- J - L (L'L)^-1 L' J.

@@ -212,14 +212,16 @@ BuiltProblem::BuiltProblem(const Spec& spec, State& state, const std::vector<int
   problem_options.enable_fast_removal = false;
   problem_ = std::make_unique<ceres::Problem>(problem_options);
   // Those that nothing shows are unknowns, too.
-  for (const CorrectionBlock& block : correction_blocks(spec))
+  const std::vector<CorrectionBlock> corrections = correction_blocks(spec);
+  for (const CorrectionBlock& block : corrections)
     problem_->AddParameterBlock(corrections_at(state, block), block.count);
-  for (const int index : sightings) add_sighting(spec, state, index, options);
+  for (const int index : sightings) add_sighting(spec, state, index, corrections, options);
   add_priors(spec, state);
   set_manifolds(spec, state, options);
 }
 
 void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
+                                const std::vector<CorrectionBlock>& corrections,
                                 const BuildOptions& options) {
   const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
   const Marker& marker = spec.tree.markers[static_cast<std::size_t>(sighting.marker)];
@@ -240,12 +242,12 @@ void BuiltProblem::add_sighting(const Spec& spec, State& state, int index,
   if (sighting.target >= 0) {
     blocks.push_back(state.targets[static_cast<std::size_t>(sighting.target)].data());
   }
-  for (const CorrectionBlock& block : correction_blocks_of(spec, sighting))
-    blocks.push_back(corrections_at(state, block));
+  std::vector<CorrectionBlock> bearing = correction_blocks_of(spec, corrections, sighting);
+  for (const CorrectionBlock& block : bearing) blocks.push_back(corrections_at(state, block));
   ceres::LossFunction* loss =
       options.robust_width ? new ceres::CauchyLoss(*options.robust_width) : nullptr;
-  ids_.push_back(
-      problem_->AddResidualBlock(make_sighting_cost(spec, sighting, *readings_), loss, blocks));
+  ids_.push_back(problem_->AddResidualBlock(
+      make_sighting_cost(spec, sighting, *readings_, std::move(bearing)), loss, blocks));
 }
 
 void BuiltProblem::add_priors(const Spec& spec, State& state) {

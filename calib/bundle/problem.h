@@ -195,6 +195,8 @@ struct BuildOptions {
   bool freeze_globals = false;  ///< only joint values, and poses of the camera, per frame move
 };
 
+struct CorrectionBlock;
+
 /// A Ceres problem over some of the sightings.
 class BuiltProblem {
  public:
@@ -208,7 +210,8 @@ class BuiltProblem {
   [[nodiscard]] const std::vector<double*>& camera_poses() const { return camera_poses_; }
 
  private:
-  void add_sighting(const Spec& spec, State& state, int index, const BuildOptions& options);
+  void add_sighting(const Spec& spec, State& state, int index,
+                    const std::vector<CorrectionBlock>& corrections, const BuildOptions& options);
   void add_priors(const Spec& spec, State& state);
   void set_manifolds(const Spec& spec, State& state, const BuildOptions& options);
   void free_camera_poses(State& state);

@@ -11,6 +11,7 @@
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/linearise.h"
 #include "kinematics/core/dense_algebra.h"
+#include "kinematics/core/error.h"
 #include "kinematics/core/stretch_widening.h"
 
 namespace kinescope::bundle {
@@ -55,29 +56,31 @@ Stretches stretches(const Spec& spec, const LinearBundle& linear, double correla
   return out;
 }
 
-// Factors by which the variances grow because the residuals are not independent.
+// Factors by which the variances of some parameters grow because the residuals are not independent.
 struct Inflation {
   Eigen::VectorXd of_parameter;
   double pooled = 1.0;
 };
 
 Inflation inflation(const LinearBundle& linear, const Stretches& stretch,
-                    const Eigen::MatrixXd& covariance) {
+                    const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& of) {
   std::map<int, Eigen::VectorXd> scores;
   const Eigen::Index n = covariance.rows();
   for (const auto& [frame, rows] : linear.frames) {
     auto [entry, fresh] = scores.try_emplace(stretch.of_frame.at(frame), Eigen::VectorXd::Zero(n));
     entry->second += rows.J.transpose() * rows.r;
   }
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
-  for (const auto& [key, g] : scores) meat += g * g.transpose();
   const auto count = static_cast<double>(scores.size());
-  if (count < 3.0) return {Eigen::VectorXd::Ones(n)};
-  const Eigen::MatrixXd sandwich =
-      covariance * meat * covariance * (stretch.widening * count / (count - 1.0));
-  Eigen::VectorXd ratio(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    ratio[i] = covariance(i, i) > 0.0 ? sandwich(i, i) / covariance(i, i) : 1.0;
+  if (count < 3.0) return {Eigen::VectorXd::Ones(std::ssize(of))};
+  Eigen::MatrixXd by_stretch(n, std::ssize(scores));
+  Eigen::Index next = 0;
+  for (const auto& [key, g] : scores) by_stretch.col(next++) = g;
+  const Eigen::VectorXd sandwich = (covariance * by_stretch).rowwise().squaredNorm() *
+                                   (stretch.widening * count / (count - 1.0));
+  Eigen::VectorXd ratio(std::ssize(of));
+  for (Eigen::Index i = 0; i < ratio.size(); ++i) {
+    const Eigen::Index own = of[static_cast<std::size_t>(i)];
+    ratio[i] = covariance(own, own) > 0.0 ? sandwich[own] / covariance(own, own) : 1.0;
   }
   // The ratio of one parameter scatters by sqrt(2 / stretches); half of it is taken from the pool.
   const double pooled = ratio.mean();
@@ -165,14 +168,22 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
 // compressed video repeats the pixels of what does not move, and any camera samples it in one
 // place. Its residuals cannot show that, as the marker's pose takes it up; their scatter does,
 // where it is less than the noise.
+// Parameters x any: the scatter is what this makes with its transpose.
 Eigen::MatrixXd scatter_of_rests(const Rests& all, Eigen::Index parameters) {
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(parameters, parameters);
+  std::vector<Eigen::MatrixXd> pulls;
+  Eigen::Index columns = 0;
   for (const Rest& rest : all.rests) {
     const double noise = all.noise_ratio[static_cast<std::size_t>(rest.first->camera)] *
                          rest.declared_square / static_cast<double>(rest.residuals_px.size());
     const double scatter = rest.scatter();
-    if (scatter < kMostScatter * noise)
-      out += (noise - scatter) * rest.pull.transpose() * rest.pull;
+    if (!(scatter < kMostScatter * noise)) continue;
+    pulls.emplace_back(std::sqrt(noise - scatter) * rest.pull.transpose());
+    columns += pulls.back().cols();
+  }
+  Eigen::MatrixXd out(parameters, columns);
+  for (Eigen::Index next = 0; const Eigen::MatrixXd& pull : pulls) {
+    out.middleCols(next, pull.cols()) = pull;
+    next += pull.cols();
   }
   return out;
 }
@@ -240,6 +251,62 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information, std::vector<bool>
          scale.asDiagonal();
 }
 
+// Columns of corrections that bear on a few frames each, of which there may be thousands, and the
+// others.
+struct Columns {
+  std::vector<Eigen::Index> local;
+  std::vector<Eigen::Index> other;
+};
+
+bool is_local(const Spec& spec, const State& state, const FreeBlock& block) {
+  if (block.block != "effects") return false;
+  return spec.corrections[static_cast<std::size_t>(block.data - state.corrections.data())].is_local;
+}
+
+Columns columns_of(const Spec& spec, const State& state, const std::vector<FreeBlock>& blocks) {
+  Columns out;
+  Eigen::Index next = 0;
+  for (const FreeBlock& block : blocks) {
+    std::vector<Eigen::Index>& to = is_local(spec, state, block) ? out.local : out.other;
+    for (std::size_t i = 0; i < block.names.size(); ++i) to.push_back(next++);
+  }
+  return out;
+}
+
+// Of an information matrix, the local ones eliminated (Schur complement).
+struct Reduced {
+  Eigen::MatrixXd information;
+  CholeskyFactor local;
+  Eigen::MatrixXd answer;  // local x other: how they follow the others
+
+  Reduced(const Eigen::MatrixXd& whole, const Columns& columns)
+      : information(whole(columns.other, columns.other)) {
+    if (columns.local.empty()) return;
+    local = CholeskyFactor(whole(columns.local, columns.local));
+    KINESCOPE_CHECK(local.positive_definite(), "local corrections have priors");
+    const Eigen::MatrixXd beside = whole(columns.local, columns.other);
+    answer = local.solve(beside);
+    information -= beside.transpose() * answer;
+  }
+};
+
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information, const Columns& columns,
+                           std::vector<bool>& unseen) {
+  if (columns.local.empty()) return inverse_of(information, unseen);
+  const Reduced reduced(information, columns);
+  std::vector<bool> unseen_others(columns.other.size(), false);
+  const Eigen::MatrixXd others = inverse_of(reduced.information, unseen_others);
+  for (std::size_t i = 0; i < columns.other.size(); ++i)
+    unseen[static_cast<std::size_t>(columns.other[i])] = unseen_others[i];
+  Eigen::MatrixXd out(information.rows(), information.cols());
+  const Eigen::MatrixXd beside = -reduced.answer * others;
+  out(columns.other, columns.other) = others;
+  out(columns.local, columns.other) = beside;
+  out(columns.other, columns.local) = beside.transpose();
+  out(columns.local, columns.local) = reduced.local.inverse() - beside * reduced.answer.transpose();
+  return out;
+}
+
 // A correction with a prior is one that the data need not show.
 Eigen::MatrixXd with_known_corrections(Eigen::MatrixXd data, const LinearBundle& linear) {
   Eigen::Index at = 0;
@@ -253,49 +320,68 @@ Eigen::MatrixXd with_known_corrections(Eigen::MatrixXd data, const LinearBundle&
   return data;
 }
 
+// J'J, its lower half. Of thousands of parameters a frame shows some.
+void add_products(const Eigen::MatrixXd& J, Eigen::MatrixXd& sum) {
+  std::vector<Eigen::Index> shown;
+  for (Eigen::Index c = 0; c < J.cols(); ++c)
+    if (!J.col(c).isZero(0.0)) shown.push_back(c);
+  const Eigen::MatrixXd own = J(Eigen::all, shown);
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(own.cols(), own.cols());
+  products.selfadjointView<Eigen::Lower>().rankUpdate(own.transpose());
+  for (Eigen::Index b = 0; b < products.cols(); ++b)
+    for (Eigen::Index a = b; a < products.rows(); ++a)
+      sum(shown[static_cast<std::size_t>(a)], shown[static_cast<std::size_t>(b)]) += products(a, b);
+}
+
 }  // namespace
 
 Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vector<int>& used) {
   LinearBundle linear = linearise(spec, state, used);
   if (spec.prior) linear = with_frames_held(spec, state, std::move(linear));
   Uncertainty out;
-  out.blocks = linear.blocks;
-  const int n = width_of(out.blocks);
-  for (const FreeBlock& block : out.blocks) {
-    for (std::size_t i = 0; i < block.names.size(); ++i) {
+  const int n = width_of(linear.blocks);
+  const Columns columns = columns_of(spec, state, linear.blocks);
+  for (const FreeBlock& block : linear.blocks) {
+    if (is_local(spec, state, block)) continue;
+    out.blocks.push_back(block);
+    for (std::size_t i = 0; i < block.names.size(); ++i)
       out.parameters.push_back({block.names[i], block.block, block.units[i], 0.0, {}, {}});
-    }
   }
   if (n == 0) return out;
   Eigen::MatrixXd data = Eigen::MatrixXd::Zero(n, n);
   for (const auto& [frame, rows] : linear.frames) {
-    data.selfadjointView<Eigen::Lower>().rankUpdate(rows.J.transpose());
+    add_products(rows.J, data);
     out.chi_square += rows.r.squaredNorm();
     out.rows += static_cast<int>(rows.r.size());
   }
   data = Eigen::MatrixXd(data.selfadjointView<Eigen::Lower>());
 
   std::vector<bool> unseen(static_cast<std::size_t>(n), false);
-  observe(with_known_corrections(data, linear), out.parameters, out.observability);
-  const Eigen::MatrixXd white = inverse_of(data + linear.prior_information, unseen);
+  observe(Reduced(with_known_corrections(data, linear), columns).information, out.parameters,
+          out.observability);
+  const Eigen::MatrixXd white = inverse_of(data + linear.prior_information, columns, unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
   const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
-  const Inflation inflated = inflation(linear, stretch, white);
+  const Inflation inflated = inflation(linear, stretch, white, columns.other);
   out.noise_widening = inflated.pooled;
   const Eigen::VectorXd factor = inflated.of_parameter.cwiseSqrt();
-  out.covariance = factor.asDiagonal() * white * factor.asDiagonal();
+  out.covariance = factor.asDiagonal() * white(columns.other, columns.other) * factor.asDiagonal();
   if (spec.kind == MeasurementKind::kCorners) {
-    out.covariance +=
-        white * scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n) * white;
+    const Eigen::MatrixXd shift =
+        white(columns.other, Eigen::all) *
+        scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n);
+    if (shift.cols() > 0) out.covariance += shift * shift.transpose();
   }
-  for (int i = 0; i < n; ++i) {
-    Parameter& parameter = out.parameters[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < out.parameters.size(); ++i) {
+    Parameter& parameter = out.parameters[i];
+    const Eigen::Index column = columns.other[i];
     // Where a nominal robot stands as a whole may be nobody's to know; its axes are known beside
     // one another.
     const bool is_of_robot = spec.prior && parameter.block != "effects";
-    if (unseen[static_cast<std::size_t>(i)] && !is_of_robot) continue;
-    parameter.sigma_white = std::sqrt(white(i, i));
-    parameter.sigma = std::sqrt(out.covariance(i, i));
+    if (unseen[static_cast<std::size_t>(column)] && !is_of_robot) continue;
+    parameter.sigma_white = std::sqrt(white(column, column));
+    parameter.sigma =
+        std::sqrt(out.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)));
   }
   return out;
 }

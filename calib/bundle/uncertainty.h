@@ -11,7 +11,9 @@
 namespace kinescope::bundle {
 
 struct Uncertainty {
-  std::vector<FreeBlock> blocks;      ///< the global ones, in the order of the rows below
+  /// The global ones but for corrections that bear on a few frames each, in the order of the rows
+  /// below.
+  std::vector<FreeBlock> blocks;
   std::vector<Parameter> parameters;  ///< names, units, sigmas; values are left to the caller
   Eigen::MatrixXd covariance;         ///< widened for noise that is correlated in time
   Observability observability;

@@ -614,16 +614,23 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   const auto places =
       parameter_places(library, effects, static_cast<Eigen::Index>(change.corrections.size()));
   // The change's columns stand in the bundle's order: put them into that of the effects.
-  const Eigen::Index own = fit.jacobian.cols() - fit.values.size();
+  const Eigen::Index own = fit.jacobian.cols() - fit.values.size() + fit.local_values.size();
+  std::vector<Eigen::Index> column_of;  // of every value of the change
   std::vector<Eigen::Index> order;
   for (Eigen::Index c = 0; c < own; ++c) order.push_back(c);
-  for (std::size_t c = 0; c < change.corrections.size(); ++c) {
-    if (change.corrections[c].is_nuisance) order.push_back(own + static_cast<Eigen::Index>(c));
+  Eigen::Index column = own;
+  for (Eigen::Index c = 0; c < fit.values.size(); ++c) {
+    const auto at = static_cast<std::size_t>(c);
+    const bool is_correction = at < change.corrections.size();
+    const bool is_local = is_correction && change.corrections[at].is_local;
+    column_of.push_back(is_local ? -1 : column++);
+    if (is_correction && !is_local && change.corrections[at].is_nuisance)
+      order.push_back(column_of.back());
   }
   for (const std::vector<Eigen::Index>& effect : places) {
     Eigen::VectorXd& values = out.values.emplace_back(static_cast<Eigen::Index>(effect.size()));
     for (std::size_t k = 0; k < effect.size(); ++k) {
-      order.push_back(own + effect[k]);
+      order.push_back(column_of[static_cast<std::size_t>(effect[k])]);
       values[static_cast<Eigen::Index>(k)] = fit.values[effect[k]];
     }
   }
@@ -632,6 +639,12 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   if (fit.prior_information.size() > 0) {
     linear.prior = fit.prior_information(order, order);
     linear.prior_gradient = fit.prior_gradient(order);
+  }
+  if (fit.local.cols() > 0) {
+    linear.local_prediction = fit.local * fit.local_values;
+    linear.local_residual = fit.residual;
+    linear.local = std::move(fit.local);
+    linear.local_information = std::move(fit.local_information);
   }
   linear.residual = std::move(fit.residual);
   linear.carriers.swap(fit.probes);

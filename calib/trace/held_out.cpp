@@ -11,7 +11,8 @@
 namespace kinescope::trace {
 namespace {
 
-// Every row's error where it is predicted without its own fold.
+// Every row's error where it is predicted without its own fold; of local parameters nothing is
+// known there.
 Eigen::VectorXd held_out_rows(const NormalSystem& system,
                               const std::vector<EffectColumn>& columns) {
   const std::vector<NormalEquations> folds = augmented(
@@ -21,6 +22,7 @@ Eigen::VectorXd held_out_rows(const NormalSystem& system,
   const std::vector<int>& fold_of = system.partition().fold;
   const auto k = static_cast<Eigen::Index>(columns.size());
   Eigen::VectorXd out = linear.residual;
+  if (linear.local_prediction.size() > 0) out += linear.local_prediction;
   for (std::size_t fold = 0; fold < folds.size(); ++fold) {
     const Eigen::VectorXd step = solve_without(total, folds[fold]);
     const auto own = step.head(system.parameters());

@@ -51,19 +51,29 @@ struct SumsOfGroups {
   std::vector<GroupSums> folds;
 };
 
-// Every row once: a fold is made of its parts of the stretches.
-SumsOfGroups grouped(const Linearisation& linear, const Partition& partition) {
+std::vector<LocalElimination::Part> parts_of(const Partition& partition) {
   std::map<std::pair<int, int>, std::vector<std::size_t>> parts;
   for (std::size_t i = 0; i < partition.stretch.size(); ++i)
     parts[{partition.stretch[i], partition.fold[i]}].push_back(i);
+  std::vector<LocalElimination::Part> out;
+  for (auto& [groups, instants] : parts)
+    out.push_back({groups.first, groups.second, std::move(instants)});
+  return out;
+}
+
+// Every row once: a fold is made of its parts of the stretches.
+SumsOfGroups grouped(const Linearisation& linear, const Partition& partition,
+                     const std::vector<LocalElimination::Part>& parts,
+                     const LocalElimination& local) {
   const Eigen::Index n = linear.jacobian.cols();
   const GroupSums none{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), 0.0};
   SumsOfGroups out{std::vector<GroupSums>(static_cast<std::size_t>(partition.stretches), none),
                    std::vector<GroupSums>(static_cast<std::size_t>(partition.folds), none)};
-  for (const auto& [groups, instants] : parts) {
-    const GroupSums part = sums_over(linear, instants);
-    out.stretches[static_cast<std::size_t>(groups.first)] += part;
-    out.folds[static_cast<std::size_t>(groups.second)] += part;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    GroupSums sums = sums_over(linear, parts[p].instants);
+    if (!local.empty()) local.eliminate(p, sums);
+    out.stretches[static_cast<std::size_t>(parts[p].stretch)] += sums;
+    out.folds[static_cast<std::size_t>(parts[p].fold)] += sums;
   }
   return out;
 }
@@ -92,7 +102,9 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
     const Eigen::Index first = linear.first_row[i];
     std::fill_n(instant_.begin() + first, linear.first_row[i + 1] - first, static_cast<int>(i));
   }
-  auto [stretches, folds] = grouped(linear, partition_);
+  const std::vector<LocalElimination::Part> parts = parts_of(partition_);
+  local_ = LocalElimination(linear, parts);
+  auto [stretches, folds] = grouped(linear, partition_, parts, local_);
   stretches_ = std::move(stretches);
   folds_ = std::move(folds);
   const Eigen::Index parameters = linear.jacobian.cols();
@@ -104,8 +116,12 @@ NormalSystem::NormalSystem(const Linearisation& linear, Partition partition)
   step_ = inverse_ * total_.g;
 }
 
+double NormalSystem::spent() const {
+  return static_cast<double>(parameters()) + local_.determined();
+}
+
 double NormalSystem::freedom() const {
-  return std::max(1.0, static_cast<double>(linear_->residual.size() - parameters()));
+  return std::max(1.0, static_cast<double>(linear_->residual.size()) - spent());
 }
 
 double NormalSystem::memory() const {
@@ -122,14 +138,22 @@ const NormalSystem::CarrierSums& NormalSystem::carrier(int index) const {
 NormalSystem::CarrierSums NormalSystem::carrier_sums(int index) const {
   CarrierSums sums{Eigen::VectorXd::Zero(linear_->instants()),
                    RowMatrix::Zero(linear_->instants(), parameters()),
+                   LocalProducts(linear_->instants(), linear_->local.cols()),
                    Eigen::VectorXd::Zero(linear_->instants())};
+  std::vector<Eigen::Triplet<double>> with_local;
   for (Eigen::SparseMatrix<double>::InnerIterator entry(linear_->carriers, index); entry; ++entry) {
     const auto i = static_cast<Eigen::Index>(instant_[static_cast<std::size_t>(entry.row())]);
     sums.with_residual[i] += entry.value() * linear_->residual[entry.row()];
     sums.with_jacobian.row(i) += entry.value() * linear_->jacobian.row(entry.row());
     const double unit = linear_->unit[entry.row()];
     if (unit > 0.0) sums.weight[i] += 1.0 / (unit * unit);
+    if (local_.empty()) continue;
+    using RowEntries = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
+    for (RowEntries own(linear_->local, entry.row()); own; ++own)
+      with_local.emplace_back(static_cast<int>(i), static_cast<int>(own.col()),
+                              entry.value() * own.value());
   }
+  sums.with_local.setFromTriplets(with_local.begin(), with_local.end());
   return sums;
 }
 
@@ -214,6 +238,8 @@ std::vector<EffectSums> NormalSystem::sums(
         out[e].EE(b, a) = sum;
       }
     }
+    for (std::size_t p = 0; p < local_.parts(); ++p)
+      local_.take(p, local_.taken(p, local_products(effects[e]), shares[e]), out[e]);
   }
   return out;
 }
@@ -256,6 +282,21 @@ std::vector<EffectSums> NormalSystem::grouped_sums(const std::vector<EffectColum
     }
   }
   for (EffectSums& own : out) own.EE = Eigen::MatrixXd(own.EE.selfadjointView<Eigen::Lower>());
+  if (local_.empty()) return out;
+  const std::vector<const LocalProducts*> products = local_products(columns);
+  Eigen::MatrixXd all(linear_->instants(), k);
+  for (Eigen::Index a = 0; a < k; ++a) all.col(a) = shares[static_cast<std::size_t>(a)];
+  for (std::size_t p = 0; p < local_.parts(); ++p) {
+    const std::size_t instant = local_.part(p).instants.front();
+    local_.take(p, local_.taken(p, products, all), out[static_cast<std::size_t>(group[instant])]);
+  }
+  return out;
+}
+
+std::vector<const LocalProducts*> NormalSystem::local_products(
+    const std::vector<EffectColumn>& columns) const {
+  std::vector<const LocalProducts*> out;
+  for (const EffectColumn& column : columns) out.push_back(&carrier(column.carrier).with_local);
   return out;
 }
 
@@ -310,13 +351,13 @@ NormalSystem::Touched NormalSystem::touched_after(const Eigen::VectorXd& delta,
                                                   const std::vector<EffectColumn>& columns,
                                                   const Eigen::VectorXd& theta) const {
   const std::vector<bool> counts = touches(columns);
-  const Eigen::VectorXd moved = moved_by(columns, theta);
+  const Eigen::VectorXd left =
+      local_.residual() - freed(moved_by(columns, theta) + linear_->jacobian * delta);
   Touched out;
-  for (Eigen::Index row = 0; row < moved.size(); ++row) {
+  for (Eigen::Index row = 0; row < left.size(); ++row) {
     if (!counts[static_cast<std::size_t>(row)]) continue;
-    const double left = linear_->residual[row] - moved[row] - linear_->jacobian.row(row).dot(delta);
     out.rows += 1.0;
-    out.squares += left * left;
+    out.squares += left[row] * left[row];
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "calib/trace/local_elimination.h"
 #include "calib/trace/partition.h"
 #include "calib/trace/traced_model.h"
 #include "kinematics/core/memo.h"
@@ -15,20 +16,6 @@ namespace kinescope::trace {
 
 /// Directions of the model's own parameters below this (scaled) are not seen by the data.
 inline constexpr double kUnseen = 1e-13;
-
-/// J'J, J'r and r'r over the rows of a group; over all of them J'r less what priors pull.
-struct GroupSums {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd g;
-  double rr = 0.0;
-};
-
-/// The same of an effect's columns E beside the model's own J: J'E, E'E, E'r.
-struct EffectSums {
-  Eigen::MatrixXd JE;
-  Eigen::MatrixXd EE;
-  Eigen::VectorXd Er;
-};
 
 /// Inverse of a symmetric positive semidefinite matrix whose directions below `floor` of the
 /// largest (diagonal scaled to 1) are left out.
@@ -51,7 +38,9 @@ class NormalSystem {
   /// Of the model's own parameters to where the sum of squares is least.
   [[nodiscard]] const Eigen::VectorXd& step() const { return step_; }
   [[nodiscard]] Eigen::Index parameters() const { return total_.g.size(); }
-  /// Rows beyond the model's own parameters; 1 at the least.
+  /// How many parameters the data determine, the local ones among them.
+  [[nodiscard]] double spent() const;
+  /// Rows beyond those; 1 at the least.
   [[nodiscard]] double freedom() const;
   /// Instants that say the same, in the mean, because noise lasts; 1 where it does not.
   [[nodiscard]] double memory() const;
@@ -86,6 +75,10 @@ class NormalSystem {
   /// What columns of the size `theta` do to every row.
   [[nodiscard]] Eigen::VectorXd moved_by(const std::vector<EffectColumn>& columns,
                                          const Eigen::VectorXd& theta) const;
+  /// Rows' values less what the local parameters make of them.
+  [[nodiscard]] Eigen::VectorXd freed(Eigen::VectorXd rows) const {
+    return local_.freed(std::move(rows));
+  }
 
  private:
   // Of one carrier at each instant: carrier'residual, carrier'J, and of the rows it touches the
@@ -93,6 +86,7 @@ class NormalSystem {
   struct CarrierSums {
     Eigen::VectorXd with_residual;
     RowMatrix with_jacobian;  // instants x parameters
+    LocalProducts with_local;
     Eigen::VectorXd weight;
   };
   [[nodiscard]] const CarrierSums& carrier(int index) const;
@@ -102,12 +96,15 @@ class NormalSystem {
   [[nodiscard]] std::vector<EffectSums> grouped_sums(const std::vector<EffectColumn>& columns,
                                                      const std::vector<int>& group,
                                                      int groups) const;
+  [[nodiscard]] std::vector<const LocalProducts*> local_products(
+      const std::vector<EffectColumn>& columns) const;
   [[nodiscard]] Eigen::VectorXd share_of(const EffectColumn& column) const;
   [[nodiscard]] std::vector<bool> touches(const std::vector<EffectColumn>& columns) const;
 
   const Linearisation* linear_;
   Partition partition_;
   std::vector<int> instant_;  // of every row
+  LocalElimination local_;
   std::vector<GroupSums> stretches_;
   std::vector<GroupSums> folds_;
   GroupSums total_;

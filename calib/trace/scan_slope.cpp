@@ -34,9 +34,10 @@ std::optional<Eigen::VectorXd> scan_slope(const Stage& stage, std::size_t index)
 
 std::optional<ScanStep> scan_step(const NormalSystem& system, const Eigen::VectorXd& slope) {
   const Linearisation& linear = system.linear();
-  const Eigen::VectorXd beside = linear.jacobian.transpose() * slope;
+  const Eigen::VectorXd freed = system.freed(slope);
+  const Eigen::VectorXd beside = linear.jacobian.transpose() * freed;
   const Eigen::VectorXd taken_up = system.inverse() * beside;
-  const double information = slope.squaredNorm() - beside.dot(taken_up);
+  const double information = slope.dot(freed) - beside.dot(taken_up);
   if (!(information > kUnseenShare * slope.squaredNorm())) return {};
   const double score = slope.dot(linear.residual) - taken_up.dot(system.total().g);
   return ScanStep{score / information,

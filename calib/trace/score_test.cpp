@@ -126,8 +126,7 @@ PooledNoise pooled_noise(const NormalSystem& system, const Projected& p,
   const auto k = static_cast<double>(p.theta.size());
   const NormalSystem::Touched touched = system.touched_after(p.delta, columns, p.T * p.theta);
   // Of the model's own parameters, these rows pay their part.
-  const double own = static_cast<double>(system.parameters()) * touched.rows /
-                     static_cast<double>(linear.residual.size());
+  const double own = system.spent() * touched.rows / static_cast<double>(linear.residual.size());
   const double freedom = touched.rows - own - k;
   if (freedom < 1.0) return {};
   const double memory = system.memory();

@@ -26,6 +26,12 @@ struct Linearisation {
   Eigen::MatrixXd prior;           ///< parameters x parameters: information of priors; empty: none
   Eigen::VectorXd prior_gradient;  ///< what the priors pull at the solution, as the residual does
                                    ///< by J'r; empty: nothing
+  /// Rows x local parameters, in the same way: parameters that bear on a few neighbouring instants
+  /// only, of which there may be many (where in its step an encoder stands). Empty: none.
+  Eigen::SparseMatrix<double, Eigen::RowMajor> local;
+  Eigen::VectorXd local_information;     ///< of each: of its prior about zero, whitened
+  Eigen::VectorXd local_prediction;      ///< rows: what they make of them at the solution
+  Eigen::VectorXd local_residual;        ///< rows: the residual at which they are at their best
   Eigen::SparseMatrix<double> carriers;  ///< rows x carriers: what effects act through, as
                                          ///< d predicted / d (a joint's value, a marker's shift ..)
   std::vector<Eigen::Index> first_row;   ///< of every instant, and one past the last
