@@ -280,8 +280,9 @@ bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan
 
 /// Masses that are declared wrongly would look like it.
 bool is_like_masses(const TracedEffect& effect) {
-  constexpr std::array<std::string_view, 6> kLikeMasses{
-      "payload", "torque_gain", "motor_inertia", "spring", "cross_talk", "gravity_direction"};
+  constexpr std::array<std::string_view, 7> kLikeMasses{
+      "payload", "payload_change", "torque_gain",      "motor_inertia",
+      "spring",  "cross_talk",     "gravity_direction"};
   return std::ranges::find(kLikeMasses, effect.id.effect) != kLikeMasses.end();
 }
 
@@ -320,6 +321,18 @@ void doubt_masses(const TracedEffect& effect, const Trace& beside_identified, Tr
     out.reason += "; " + trace::cannot_tell_words(doubt);
   }
   out.ambiguities.push_back(std::move(doubt));
+}
+
+/// But for the friction that the model declares, which is an effect beside identified masses.
+std::ptrdiff_t effects_beyond(const DynamicModel& model, const Trace& trace) {
+  return std::ranges::count_if(trace.accepted, [&](const TracedEffect& effect) {
+    for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
+      if (model.tree.joints[j].name != effect.id.place) continue;
+      return !(effect.id.effect == "coulomb" && model.joints[j].coulomb > 0.0) &&
+             !(effect.id.effect == "viscous" && model.joints[j].viscous > 0.0);
+    }
+    return true;
+  });
 }
 
 bool explains_all(const Trace& trace) {
@@ -391,7 +404,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
   // Masses that bend to what they are not ask for further effects.
-  if (rival.trace.accepted.size() > out.trace.accepted.size()) return out;
+  if (effects_beyond(model, rival.trace) > std::ssize(out.trace.accepted)) return out;
   if (advantage >= effects::kClearlyBetter) {
     rival.base.reason = fmt::format(
         "with the effects that were found, identified masses predict unseen stretches better than "
