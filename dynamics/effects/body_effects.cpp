@@ -7,10 +7,25 @@
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
+#include "dynamics/rigid/regressor.h"
 #include "kinematics/model/inertial_parameters.h"
 
 namespace kinescope::effects {
 namespace {
+
+/// A body whose origin no joint moves says nothing of its mass, but of its first moment.
+bool shows_mass(const EffectContext& context, int body) {
+  constexpr Eigen::Index kPlaces = 3;
+  const TorqueSamples& samples = context.motion->samples();
+  for (Eigen::Index k = 1; k <= kPlaces; ++k) {
+    const Eigen::Index row = k * (samples.size() - 1) / (kPlaces + 1);
+    // A unit each: the sample's own may be none.
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(samples.joints());
+    const Eigen::MatrixXd Y = regressor(context.rigid, samples.q.row(row).transpose(), ones, ones);
+    if (!Y.col(Eigen::Index{10} * body).isZero(1e-9)) return true;
+  }
+  return false;
+}
 
 /// All ten parameters: its mass and centre are what is asked for, its inertia must not be in the
 /// way.
@@ -31,6 +46,16 @@ Candidate payload(const SharedContext& c, int tip, int body) {
   }
   out.size_weights = Eigen::VectorXd::Unit(10, 0);
   out.size = [](const Eigen::VectorXd& theta) { return theta[0]; };
+  if (!shows_mass(*c, body)) {
+    out.words = fmt::format(
+        "{} carries another mass, or elsewhere, than the model says: its first "
+        "moment is off",
+        link);
+    out.size_unit = kilograms ? "kg m" : "A per N m x kg m";
+    out.size_weights = Eigen::VectorXd::Zero(10);
+    out.size_weights.segment<3>(1).setOnes();
+    out.size = {};
+  }
   out.columns = [c, carriers, tip](double) {
     std::vector<EffectColumn> columns;
     for (int k = 0; k < 10; ++k) columns.push_back({carriers.body(tip, k), {}});
@@ -66,7 +91,10 @@ Candidate payload_change(const SharedContext& c, int tip, int body) {
   constexpr int kTimes = 40;  // chosen: two of them are never further apart than a motion is long
   Candidate out = payload(c, tip, body);
   out.id.effect = "payload_change";
-  out.words = fmt::format("{} carries more mass from an instant on (less: negative)", out.id.place);
+  out.words =
+      out.size
+          ? fmt::format("{} carries more mass from an instant on (less: negative)", out.id.place)
+          : fmt::format("the first moment of {} is another from an instant on", out.id.place);
   out.check = "what the robot picked up or put down; a tool that came loose";
   out.record = "the same motion with the load and without it";
   // A load of the whole log, or wrong masses, are none that came.

@@ -742,6 +742,24 @@ TEST(TorqueEffects, JointsThatDisagreeAboutAPayloadWidenItsInterval) {
   EXPECT_GT(width(beside), 3.0 * width(alone));
 }
 
+// A hinge says nothing of a mass on its axis: 0 kg would be no size.
+TEST(TorqueEffects, APayloadOfAHingeIsItsFirstMoment) {
+  Rng rng = Rng::from_name("effects", 7);
+  EffectWorldOptions options = quiet_world();
+  options.joints = 1;
+  const EffectWorld world = effect_world({{"payload", 0, 0, 0.3}}, options, rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const EffectId id{"payload", world.effects.front().place};
+  const Candidate known = candidate(model.fit({}), id);
+  EXPECT_EQ(known.size_unit, "kg m");
+  const TracedFit with = model.fit({{id, 0.0}});
+  const Eigen::Vector3d axis = make_rigid_model(world.model).bodies.front().axis;
+  const Eigen::Vector3d centre(0.03, -0.02, 0.06);
+  const double truth = world.effects.front().size * (centre - axis * axis.dot(centre)).norm();
+  const Eigen::VectorXd& values = with.values.front();
+  EXPECT_NEAR(std::sqrt(known.size_weights.dot(values.cwiseAbs2())), truth, 0.02 * truth);
+}
+
 // Neither is it a payload of the whole log, nor masses, nor a contact that is left out.
 TEST(TorqueEffects, ALoadThatIsPickedUpIsKnownWithItsInstant) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
