@@ -227,6 +227,12 @@ CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel&
   return out;
 }
 
+/// The low-pass smears a contact over its own memory.
+double contact_margin_s(const TorqueTraceOptions& options) {
+  const double cutoff_hz = options.model.filter.cutoff_hz;
+  return options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
+}
+
 /// What the corrected model leaves at every instant of the whole log, spans and all.
 std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
                                     const TorqueTracedModel& whole, const Eigen::VectorXd& sigma,
@@ -248,14 +254,16 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
       whitened.col(j).array() *= 1.0 - near;
     }
   }
+  // Nor about the instant at which a load comes, which is known to a step of the samples.
+  const Eigen::ArrayXd time_s = whole.motion().at_instants(whole.motion().time_s()).array();
+  for (const TorqueEffect& effect : corrected.effects) {
+    if (effect.id.effect != "payload_change") continue;
+    const Eigen::ArrayXd near =
+        ((time_s - effect.scan).abs() < contact_margin_s(options)).cast<double>();
+    whitened.array().colwise() *= 1.0 - near;
+  }
   return merged(find_contact_spans(whole.motion(), whitened, sigma, options.contact_spans),
                 2.0 * options.contact_spans.window_s);
-}
-
-/// The low-pass smears a contact over its own memory.
-double contact_margin_s(const TorqueTraceOptions& options) {
-  const double cutoff_hz = options.model.filter.cutoff_hz;
-  return options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
 }
 
 /// The effects that were found with the values of another fit.
