@@ -10,6 +10,7 @@
 
 #include "app/io/json_text.h"
 #include "app/io/output_folder.h"
+#include "app/torque/contact_loads.h"
 #include "app/torque/contact_model.h"
 #include "app/torque/contact_predictor.h"
 #include "app/torque/torque_inputs.h"
@@ -41,6 +42,19 @@ struct LogBalance {
   std::vector<BalanceSample> samples;
   LogClock clock;
   Eigen::VectorXd torque_variance;  // about each joint's mean, as measured
+  std::vector<TimeSpan> loaded;     // spans in which a load lasts
+
+  // What is learned from.
+  [[nodiscard]] std::vector<BalanceSample> unloaded(double guard_s) const {
+    std::vector<BalanceSample> out;
+    for (const BalanceSample& sample : samples) {
+      const bool is_loaded = std::ranges::any_of(loaded, [&](const TimeSpan& span) {
+        return sample.stamp_s >= span.begin_s - guard_s && sample.stamp_s <= span.end_s + guard_s;
+      });
+      if (!is_loaded) out.push_back(sample);
+    }
+    return out;
+  }
 };
 
 // Far enough apart that detection begins anew in each, and what is left out around a contact stays
@@ -80,9 +94,22 @@ Eigen::VectorXd variance_of_torque(const std::vector<TorqueSamples>& parts) {
   return squares / static_cast<double>(rows);
 }
 
+// Of consecutive samples, those that are loaded.
+std::vector<TimeSpan> spans_of(const std::vector<char>& loaded, const Eigen::VectorXd& time_s) {
+  std::vector<TimeSpan> out;
+  for (std::size_t i = 0; i < loaded.size(); ++i) {
+    if (loaded[i] == 0) continue;
+    const double stamp_s = time_s[static_cast<Eigen::Index>(i)];
+    if (i == 0 || loaded[i - 1] == 0) out.push_back({.begin_s = stamp_s});
+    out.back().end_s = stamp_s;
+  }
+  return out;
+}
+
 LogBalance on_one_clock(const std::vector<TorqueSamples>& parts,
                         const std::vector<std::vector<BalanceSample>>& samples,
-                        const TorqueLog& log, double guard_s) {
+                        const TorqueLog& log, const std::vector<TrajectorySpan>& loads,
+                        double guard_s) {
   LogBalance out;
   out.clock = {apart(parts, guard_s), log.trajectory_names};
   out.torque_variance = variance_of_torque(parts);
@@ -92,11 +119,19 @@ LogBalance on_one_clock(const std::vector<TorqueSamples>& parts,
   for (std::size_t i = 0; i < out.samples.size(); ++i) {
     out.samples[i].stamp_s = out.clock.clock.time_s()[static_cast<Eigen::Index>(i)];
   }
+  std::vector<char> loaded;
+  for (const TorqueSamples& part : parts) {
+    const std::vector<char> own =
+        loaded_rows(part.t_s, part.trajectory, log.trajectory_names, loads);
+    loaded.insert(loaded.end(), own.begin(), own.end());
+  }
+  out.loaded = spans_of(loaded, out.clock.clock.time_s());
   return out;
 }
 
 LogBalance balance_of(const ContactModel& model, const TorqueLogReport& report,
-                      const TorqueDataOptions& options, double guard_s) {
+                      const std::vector<TrajectorySpan>& loads, const TorqueDataOptions& options,
+                      double guard_s) {
   const TorqueLog& log = report.log;
   const ModelDoubt doubt = model_doubt(model, report, options);
   const std::vector<TorqueSamples> parts = unfiltered(log, model.gains);
@@ -104,17 +139,18 @@ LogBalance balance_of(const ContactModel& model, const TorqueLogReport& report,
   for (const TorqueSamples& part : parts) {
     samples.push_back(balance_samples(model, part, doubt, log.dq.cols() > 0));
   }
-  return on_one_clock(parts, samples, log, guard_s);
+  return on_one_clock(parts, samples, log, loads, guard_s);
 }
 
 LogBalance balance_of(const TorqueModelFile& file, const std::vector<PredictedFriction>& friction,
-                      const PredictedLog& predicted, const TorqueLog& log, double guard_s) {
+                      const PredictedLog& predicted, const TorqueLog& log,
+                      const std::vector<TrajectorySpan>& loads, double guard_s) {
   std::vector<std::vector<BalanceSample>> samples;
   for (std::size_t m = 0; m < predicted.motions.size(); ++m) {
     samples.push_back(
         predicted_balance(file.model.rigid, friction, predicted.motions[m], predicted.torques[m]));
   }
-  return on_one_clock(predicted.motions, samples, log, guard_s);
+  return on_one_clock(predicted.motions, samples, log, loads, guard_s);
 }
 
 struct DetectedContacts {
@@ -124,11 +160,16 @@ struct DetectedContacts {
 
 DetectedContacts detect(const Balances& balances, const ContactOptions& options) {
   DetectedContacts out;
-  const std::vector<BalanceSample>& samples = balances.looked_at.samples;
+  const LogBalance& looked_at = balances.looked_at;
+  const LogBalance& learned = balances.learned ? *balances.learned : looked_at;
+  const std::vector<BalanceSample> samples = looked_at.unloaded(options.guard_s);
   out.calibration = balances.learned
-                        ? calibrate_contacts(balances.learned->samples, samples, options)
+                        ? calibrate_contacts(learned.unloaded(options.guard_s), samples, options)
                         : calibrate_contacts(samples, options);
-  out.events = detect_contacts(out.calibration, samples);
+  std::vector<TimeSpan>& excluded = out.calibration.excluded;
+  excluded.insert(excluded.end(), learned.loaded.begin(), learned.loaded.end());
+  std::ranges::sort(excluded, {}, &TimeSpan::begin_s);
+  out.events = detect_contacts(out.calibration, looked_at.samples, looked_at.loaded);
   return out;
 }
 
@@ -152,12 +193,17 @@ void apply_gains(const Eigen::VectorXd& gains, ContactSummary& summary) {
 struct Logs {
   TorqueLogReport looked_at;
   std::optional<TorqueLogReport> learn;
+  std::vector<TrajectorySpan> loads, learn_loads;  // that last, in each of them
+  std::optional<TorqueLogReport> unloaded;         // the one to learn from, without
 
-  [[nodiscard]] const TorqueLogReport& to_learn_from() const { return learn ? *learn : looked_at; }
+  [[nodiscard]] const TorqueLogReport& to_learn_from() const {
+    return unloaded ? *unloaded : learn ? *learn : looked_at;
+  }
 };
 
 Logs read_logs(const ContactCommandOptions& options, const DynamicModel& model) {
-  Logs out{.looked_at = read_log(options.logs, model, options.data), .learn = {}};
+  Logs out;
+  out.looked_at = read_log(options.logs, model, options.data);
   if (options.learn_logs.empty()) return out;
   out.learn = read_log(options.learn_logs, model, options.data);
   const std::string& unit = out.looked_at.log.torque_unit;
@@ -167,6 +213,23 @@ Logs read_logs(const ContactCommandOptions& options, const DynamicModel& model) 
                     "learn from a log of the same signals");
   }
   return out;
+}
+
+// What lasts is found by how it differs from the rest of its log, and before anything is learned.
+void find_loads(const ContactCommandOptions& options, const DynamicModel& model, Logs& logs) {
+  Eigen::VectorXd gains = Eigen::VectorXd::Ones(logs.looked_at.log.torque.cols());
+  if (logs.looked_at.log.torque_unit == "A") {
+    try {
+      gains = make_contact_model(options, model, logs.looked_at, logs.to_learn_from()).gains;
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kUndetermined) throw;
+      return;
+    }
+  }
+  logs.loads = loads_in(logs.looked_at, model, gains, options);
+  logs.learn_loads = logs.learn ? loads_in(*logs.learn, model, gains, options) : logs.loads;
+  if (!logs.learn_loads.empty())
+    logs.unloaded = without_loads(logs.to_learn_from(), logs.learn_loads);
 }
 
 // Joints of whose torque a constant would leave less, outside the contacts, than the model does.
@@ -218,9 +281,10 @@ void report_detection(const Balances& balances, DetectedContacts found, ContactS
 
 Balances momentum_balances(const ContactModel& expected, const Logs& logs,
                            const ContactCommandOptions& options, double guard_s) {
-  Balances out{.looked_at = balance_of(expected, logs.looked_at, options.data, guard_s),
+  Balances out{.looked_at = balance_of(expected, logs.looked_at, logs.loads, options.data, guard_s),
                .learned = {}};
-  if (logs.learn) out.learned = balance_of(expected, *logs.learn, options.data, guard_s);
+  if (logs.learn)
+    out.learned = balance_of(expected, *logs.learn, logs.learn_loads, options.data, guard_s);
   return out;
 }
 
@@ -295,14 +359,17 @@ void find_by_prediction(const ContactCommandOptions& options, const DynamicModel
   std::optional<PredictedLog> learn;
   if (logs.learn) learn = predict_log(file, *logs.learn, options.learn_logs, options.data);
   keep_usable_inertia(file, looked_at, learn);
-  std::vector<PredictedFriction> friction = friction_beside(file, learn ? *learn : looked_at);
+  std::vector<PredictedFriction> friction = friction_beside(
+      file, without_loads(learn ? *learn : looked_at, logs.to_learn_from().log.trajectory_names,
+                          logs.learn_loads));
   for (const Eigen::Index j : unmeasured_joints(logs.looked_at.log, logs.to_learn_from().log))
     friction[static_cast<std::size_t>(j)] = {};
-  Balances balances{
-      .looked_at = balance_of(file, friction, looked_at, logs.looked_at.log, contact.guard_s),
-      .learned = {}};
+  Balances balances{.looked_at = balance_of(file, friction, looked_at, logs.looked_at.log,
+                                            logs.loads, contact.guard_s),
+                    .learned = {}};
   if (learn)
-    balances.learned = balance_of(file, friction, *learn, logs.learn->log, contact.guard_s);
+    balances.learned =
+        balance_of(file, friction, *learn, logs.learn->log, logs.learn_loads, contact.guard_s);
   summary.new_motion = std::move(looked_at.new_motion);
   report_detection(balances, detect(balances, contact), summary);
 }
@@ -339,7 +406,8 @@ ContactSummary find_contacts(const ContactCommandOptions& options) {
   summary.joints = robot.joints;
   summary.types = robot.types;
   summary.links = robot.links;
-  const Logs logs = read_logs(options, model);
+  Logs logs = read_logs(options, model);
+  find_loads(options, model, logs);
   summary.torque_unit = logs.looked_at.log.torque_unit;
   summary.learned =
       logs.learn ? file_list(options.learn_logs) + " and the log itself" : "the log itself";

@@ -66,8 +66,9 @@ void validate(const ContactOptions& options) {
 }
 
 std::vector<ContactEvent> detect_contacts(const ContactCalibration& calibration,
-                                          const std::vector<BalanceSample>& samples) {
-  return contact::log_statistics(calibration, samples).events;
+                                          const std::vector<BalanceSample>& samples,
+                                          const std::vector<TimeSpan>& loaded) {
+  return contact::log_statistics(calibration, samples, loaded).events;
 }
 
 FalseAlarmCheck check_false_alarms(const ContactCalibration& calibration,

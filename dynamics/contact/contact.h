@@ -96,9 +96,10 @@ struct ContactEvent {
   double statistic = 0.0;             ///< at the alarm, in units of its threshold
 };
 
-/// All contacts of a log: a ContactDetector over its samples.
+/// All contacts of a log: a ContactDetector over its samples, with the spans in which a load lasts.
 [[nodiscard]] std::vector<ContactEvent> detect_contacts(const ContactCalibration& calibration,
-                                                        const std::vector<BalanceSample>& samples);
+                                                        const std::vector<BalanceSample>& samples,
+                                                        const std::vector<TimeSpan>& loaded = {});
 
 /// Observed rate with the 95 % interval of the rate behind so many alarms (Garwood 1936).
 struct AlarmRate {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -17,6 +18,8 @@ namespace {
 
 /// Without external torque, all end windows are below their level at 99.9 % of the samples.
 constexpr double kQuietZ = 3.1;
+/// Sigmas beyond which a joint's torque is part of a contact: the coverage factor of the report.
+constexpr double kBeyondNoise = 2.0;
 
 int in_steps(double span_s, double step_s) {
   return std::max(1, static_cast<int>(std::lround(span_s / step_s)));
@@ -30,8 +33,9 @@ std::size_t record_capacity(const ContactCalibration& c) {
 
 }  // namespace
 
-ContactDetector::ContactDetector(ContactCalibration calibration)
+ContactDetector::ContactDetector(ContactCalibration calibration, std::vector<TimeSpan> loaded)
     : calibration_(std::move(calibration)),
+      loaded_(std::move(loaded)),
       filter_(calibration_.noise),
       bank_(calibration_.joints(),
             in_steps(calibration_.options.longest_window_s, calibration_.step_s)),
@@ -40,6 +44,8 @@ ContactDetector::ContactDetector(ContactCalibration calibration)
   const Eigen::Index n = calibration_.joints();
   mean_ = error_mean_ = error_variance_ = Eigen::VectorXd::Zero(n);
   covariance_ = Eigen::MatrixXd::Zero(n, n);
+  slides_since_s_ = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+  carried_ = Eigen::VectorXi::Zero(n);
   bend_t_.reserve(record_capacity(calibration_));
   bend_y_.reserve(record_capacity(calibration_));
   quiet_level_ = chi_square_quantile(static_cast<double>(n), kQuietZ);
@@ -51,6 +57,7 @@ ContactDecision ContactDetector::update(const BalanceSample& sample) {
                       "calibrate with a log of the same robot");
   }
   ContactDecision decision{.stamp_s = sample.stamp_s};
+  if (is_finite(sample)) watch_sliding(sample);
   if (!is_finite(sample)) {
     decision.fault = SampleFault::kNotFinite;
   } else if (!filter_.started()) {
@@ -90,8 +97,9 @@ void ContactDetector::watch_onset(const BalanceSample& sample, ContactDecision& 
   }
   if (decision.statistic < 1.0) return;
   decision.alarm = in_contact_ = true;
-  const double onset_s = look_for_onset(age);
-  decision.resumed = !event_.open && !event_.cut_off && event_.end_s >= onset_s;
+  double onset_s = look_for_onset(age);
+  if (const TimeSpan* load = load_at(sample.stamp_s)) onset_s = std::min(onset_s, load->begin_s);
+  decision.resumed = goes_on(onset_s);
   shown_s_ = std::max(decision.resumed ? shown_s_ : 0.0, sample.stamp_s - onset_s);
   if (decision.resumed) {
     event_.open = true;
@@ -197,7 +205,7 @@ void ContactDetector::watch_end(const BalanceSample& sample, ContactDecision& de
   record_.append_unfiltered(sample, calibration_.noise);
   event_.end_s = sample.stamp_s;
   look_at_segment();
-  if (!is_quiet()) return;
+  if (load_at(sample.stamp_s) != nullptr || !is_quiet()) return;
   close(end_of_contact());
   decision.ended = true;
   expect_error(record_.back());
@@ -251,11 +259,51 @@ bool ContactDetector::is_quiet() {
   return true;
 }
 
+void ContactDetector::watch_sliding(const BalanceSample& sample) {
+  for (Eigen::Index j = 0; j < slides_since_s_.size(); ++j) {
+    if (sample.may_stick(j)) {
+      slides_since_s_[j] = std::numeric_limits<double>::quiet_NaN();
+    } else if (std::isnan(slides_since_s_[j])) {
+      slides_since_s_[j] = sample.stamp_s;
+    }
+  }
+  if (in_contact_ || std::isfinite(end_seen_s_)) return;
+  const double window_s = static_cast<double>(quiet_window()) * calibration_.step_s;
+  for (Eigen::Index j = 0; j < slides_since_s_.size(); ++j) {
+    const double since_s = std::max(slides_since_s_[j], event_.end_s);
+    if (carried_[j] != 0 && !(sample.stamp_s - since_s >= window_s)) return;
+  }
+  end_seen_s_ = sample.stamp_s;
+}
+
+/// Where the joints that carried it stick, friction may hide a contact. It went on where they find
+/// it again as they slide, in the same direction: mean_ and covariance_ are those of the alarm.
+bool ContactDetector::goes_on(double onset_s) const {
+  if (event_.open || event_.cut_off) return false;
+  if (event_.end_s >= onset_s) return true;
+  if (end_seen_s_ <= onset_s) return false;
+  for (Eigen::Index j = 0; j < carried_.size(); ++j) {
+    if (carried_[j] != 0 && std::isnan(slides_since_s_[j])) return false;
+  }
+  return CholeskyFactor(covariance_).solve(event_.torque).dot(mean_) > 0.0;
+}
+
+const TimeSpan* ContactDetector::load_at(double stamp_s) const {
+  const auto found = std::ranges::find_if(loaded_, [stamp_s](const TimeSpan& span) {
+    return span.begin_s <= stamp_s && stamp_s <= span.end_s;
+  });
+  return found == loaded_.end() ? nullptr : &*found;
+}
+
 void ContactDetector::close(double end_s) {
   const std::size_t end = record_.at_or_before(end_s);
   if (record_[end].stamp_s > onset_.stamp_s) estimate(end);
   event_.open = false;
   in_contact_ = false;
+  end_seen_s_ = std::numeric_limits<double>::infinity();
+  carried_ = (event_.torque.array().abs() >
+              kBeyondNoise * event_.torque_covariance.diagonal().array().sqrt())
+                 .cast<int>();
 }
 
 bool ContactDetector::finish() {

@@ -23,17 +23,20 @@ enum class SampleFault {
 
 struct ContactDecision {
   double stamp_s = 0.0;
-  bool contact = false;    ///< there is contact now
-  bool alarm = false;      ///< it became known with this sample
-  bool ended = false;      ///< event() was completed with this sample
-  bool resumed = false;    ///< the alarm is of the last event(): it began before that one's end
+  bool contact = false;  ///< there is contact now
+  bool alarm = false;    ///< it became known with this sample
+  bool ended = false;    ///< event() was completed with this sample
+  /// The alarm is of the last event(): it began before that one's end, or that end was not seen.
+  bool resumed = false;
   double statistic = 0.0;  ///< in units of its threshold; of a free robot, alarm from 1
   SampleFault fault = SampleFault::kNone;
 };
 
 class ContactDetector {
  public:
-  explicit ContactDetector(ContactCalibration calibration);
+  /// `loaded`: spans in which a load is known to last (lasting_load.h). A contact that is found in
+  /// one began with it at the latest, and is not over before it.
+  explicit ContactDetector(ContactCalibration calibration, std::vector<TimeSpan> loaded = {});
 
   /// Throws bad_request for a sample of another number of joints.
   ContactDecision update(const BalanceSample& sample);
@@ -56,6 +59,9 @@ class ContactDetector {
   void watch_end(const BalanceSample& sample, ContactDecision& decision);
   [[nodiscard]] std::size_t quiet_window() const;
   [[nodiscard]] bool is_quiet();
+  void watch_sliding(const BalanceSample& sample);
+  [[nodiscard]] bool goes_on(double onset_s) const;
+  [[nodiscard]] const TimeSpan* load_at(double stamp_s) const;
   [[nodiscard]] double end_of_contact();
   void close(double end_s);
   void estimate(std::size_t end);
@@ -64,6 +70,7 @@ class ContactDetector {
   void expect_error(const contact::RecordEntry& at);
 
   ContactCalibration calibration_;
+  std::vector<TimeSpan> loaded_;
   contact::BalanceFilter filter_;
   contact::OnsetBank bank_;
   contact::ImbalanceRecord record_;
@@ -76,7 +83,10 @@ class ContactDetector {
   Eigen::MatrixXd covariance_;                   ///< and its covariance
   std::vector<double> bend_t_, bend_y_;
   double quiet_level_ = 0.0;
-  double shown_s_ = 0.0;  ///< the longest that the contact under way took to show
+  double shown_s_ = 0.0;            ///< the longest that the contact under way took to show
+  Eigen::VectorXd slides_since_s_;  ///< of each joint; NaN: it may stick
+  Eigen::VectorXi carried_;         ///< 1: the joint's torque was part of the last contact
+  double end_seen_s_ = 0.0;  ///< the joints that carried the last contact have slid without it
   bool in_contact_ = false;
 };
 

@@ -9,8 +9,9 @@
 namespace kinescope::contact {
 
 StatisticLog log_statistics(const ContactCalibration& calibration,
-                            const std::vector<BalanceSample>& samples) {
-  ContactDetector detector(calibration);
+                            const std::vector<BalanceSample>& samples,
+                            const std::vector<TimeSpan>& loaded) {
+  ContactDetector detector(calibration, loaded);
   StatisticLog out;
   const Eigen::Index octaves = calibration.thresholds.size();
   out.octaves = Eigen::MatrixXd::Constant(octaves, static_cast<Eigen::Index>(samples.size()),

@@ -15,7 +15,8 @@ struct StatisticLog {
 };
 
 [[nodiscard]] StatisticLog log_statistics(const ContactCalibration& calibration,
-                                          const std::vector<BalanceSample>& samples);
+                                          const std::vector<BalanceSample>& samples,
+                                          const std::vector<TimeSpan>& loaded = {});
 
 /// 1 for the samples outside the spans widened by `guard_s`.
 [[nodiscard]] std::vector<char> outside(const std::vector<BalanceSample>& samples,

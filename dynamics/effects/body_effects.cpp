@@ -7,10 +7,25 @@
 #include <fmt/format.h>
 
 #include "dynamics/effects/candidates.h"
+#include "dynamics/rigid/regressor.h"
 #include "kinematics/model/inertial_parameters.h"
 
 namespace kinescope::effects {
 namespace {
+
+/// A body whose origin no joint moves says nothing of its mass, but of its first moment.
+bool shows_mass(const EffectContext& context, int body) {
+  constexpr Eigen::Index kPlaces = 3;
+  const TorqueSamples& samples = context.motion->samples();
+  for (Eigen::Index k = 1; k <= kPlaces; ++k) {
+    const Eigen::Index row = k * (samples.size() - 1) / (kPlaces + 1);
+    // A unit each: the sample's own may be none.
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(samples.joints());
+    const Eigen::MatrixXd Y = regressor(context.rigid, samples.q.row(row).transpose(), ones, ones);
+    if (!Y.col(Eigen::Index{10} * body).isZero(1e-9)) return true;
+  }
+  return false;
+}
 
 /// All ten parameters: its mass and centre are what is asked for, its inertia must not be in the
 /// way.
@@ -31,10 +46,72 @@ Candidate payload(const SharedContext& c, int tip, int body) {
   }
   out.size_weights = Eigen::VectorXd::Unit(10, 0);
   out.size = [](const Eigen::VectorXd& theta) { return theta[0]; };
+  if (!shows_mass(*c, body)) {
+    out.words = fmt::format(
+        "{} carries another mass, or elsewhere, than the model says: its first "
+        "moment is off",
+        link);
+    out.size_unit = kilograms ? "kg m" : "A per N m x kg m";
+    out.size_weights = Eigen::VectorXd::Zero(10);
+    out.size_weights.segment<3>(1).setOnes();
+    out.size = {};
+  }
   out.columns = [c, carriers, tip](double) {
     std::vector<EffectColumn> columns;
     for (int k = 0; k < 10; ++k) columns.push_back({carriers.body(tip, k), {}});
     return columns;
+  };
+  return out;
+}
+
+/// Effects of a whole log that bodies are like. A load from an early instant on is nearly one of
+/// the whole log, and would be a rival of all of them.
+std::vector<EffectId> like_bodies(const EffectContext& context, const std::string& link) {
+  std::vector<EffectId> out{{"payload", link}, {"gravity_direction", "base"}};
+  for (const std::string& joint : context.joints) {
+    for (const char* effect : {"torque_gain", "spring", "motor_inertia", "torque_offset"})
+      out.push_back({effect, joint});
+    for (const std::string& other : context.joints) {
+      if (other != joint) out.push_back({"cross_talk", fmt::format("{} from {}", joint, other)});
+    }
+  }
+  return out;
+}
+
+/// 0 before a time, 1 from then on, through the low-pass of the torque.
+Eigen::VectorXd since(const EffectContext& context, double at_s) {
+  return context.cache->get(fmt::format("since {:.17g}", at_s), [&] {
+    return context.motion->column(
+        0, [at_s](const FinePath& path) { return (path.time_s >= at_s).cast<double>().eval(); });
+  });
+}
+
+/// The same load from an instant of the log on: what was picked up, or (negative) put down.
+Candidate payload_change(const SharedContext& c, int tip, int body) {
+  constexpr int kTimes = 40;  // chosen: two of them are never further apart than a motion is long
+  Candidate out = payload(c, tip, body);
+  out.id.effect = "payload_change";
+  out.words =
+      out.size
+          ? fmt::format("{} carries more mass from an instant on (less: negative)", out.id.place)
+          : fmt::format("the first moment of {} is another from an instant on", out.id.place);
+  out.check = "what the robot picked up or put down; a tool that came loose";
+  out.record = "the same motion with the load and without it";
+  // A load of the whole log, or wrong masses, are none that came.
+  out.refines = {{"payload", out.id.place}};
+  out.contains = like_bodies(*c, out.id.place);
+  const LogSpan& log = c->log;
+  for (int k = 1; k < kTimes; ++k) out.scan.push_back(log.begin_s + log.duration_s * k / kTimes);
+  // A step between two instants: any time between them says the same.
+  out.scan_step =
+      log.duration_s / static_cast<double>(std::max<Eigen::Index>(1, c->instants() - 1));
+  out.scan_name = "at";
+  out.scan_unit = "s";
+  out.columns = [c, columns = out.columns](double at_s) {
+    std::vector<EffectColumn> loaded = columns(0.0);
+    const Eigen::VectorXd share = since(*c, at_s);
+    for (EffectColumn& column : loaded) column.share = share;
+    return loaded;
   };
   return out;
 }
@@ -79,6 +156,7 @@ void add_bodies(const SharedContext& context, std::vector<Candidate>& out) {
   const std::vector<int> bodies = tips(context->rigid);
   for (std::size_t t = 0; t < bodies.size(); ++t) {
     out.push_back(payload(context, static_cast<int>(t), bodies[t]));
+    out.push_back(payload_change(context, static_cast<int>(t), bodies[t]));
   }
   if (context->rigid.gravity_m_s2.norm() > 0.0) out.push_back(gravity_direction(context));
 }

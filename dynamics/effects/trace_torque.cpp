@@ -227,6 +227,12 @@ CorrectedTorqueModel correct(const DynamicModel& model, const TorqueTracedModel&
   return out;
 }
 
+/// The low-pass smears a contact over its own memory.
+double contact_margin_s(const TorqueTraceOptions& options) {
+  const double cutoff_hz = options.model.filter.cutoff_hz;
+  return options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
+}
+
 /// What the corrected model leaves at every instant of the whole log, spans and all.
 std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
                                     const TorqueTracedModel& whole, const Eigen::VectorXd& sigma,
@@ -248,14 +254,16 @@ std::vector<ContactSpan> spans_left(const CorrectedTorqueModel& corrected,
       whitened.col(j).array() *= 1.0 - near;
     }
   }
+  // Nor about the instant at which a load comes, which is known to a step of the samples.
+  const Eigen::ArrayXd time_s = whole.motion().at_instants(whole.motion().time_s()).array();
+  for (const TorqueEffect& effect : corrected.effects) {
+    if (effect.id.effect != "payload_change") continue;
+    const Eigen::ArrayXd near =
+        ((time_s - effect.scan).abs() < contact_margin_s(options)).cast<double>();
+    whitened.array().colwise() *= 1.0 - near;
+  }
   return merged(find_contact_spans(whole.motion(), whitened, sigma, options.contact_spans),
                 2.0 * options.contact_spans.window_s);
-}
-
-/// The low-pass smears a contact over its own memory.
-double contact_margin_s(const TorqueTraceOptions& options) {
-  const double cutoff_hz = options.model.filter.cutoff_hz;
-  return options.contact_spans.window_s + (cutoff_hz > 0.0 ? 0.5 / cutoff_hz : 0.0);
 }
 
 /// The effects that were found with the values of another fit.
@@ -280,8 +288,9 @@ bool same_spans(const std::vector<ContactSpan>& a, const std::vector<ContactSpan
 
 /// Masses that are declared wrongly would look like it.
 bool is_like_masses(const TracedEffect& effect) {
-  constexpr std::array<std::string_view, 6> kLikeMasses{
-      "payload", "torque_gain", "motor_inertia", "spring", "cross_talk", "gravity_direction"};
+  constexpr std::array<std::string_view, 7> kLikeMasses{
+      "payload", "payload_change", "torque_gain",      "motor_inertia",
+      "spring",  "cross_talk",     "gravity_direction"};
   return std::ranges::find(kLikeMasses, effect.id.effect) != kLikeMasses.end();
 }
 
@@ -320,6 +329,18 @@ void doubt_masses(const TracedEffect& effect, const Trace& beside_identified, Tr
     out.reason += "; " + trace::cannot_tell_words(doubt);
   }
   out.ambiguities.push_back(std::move(doubt));
+}
+
+/// But for the friction that the model declares, which is an effect beside identified masses.
+std::ptrdiff_t effects_beyond(const DynamicModel& model, const Trace& trace) {
+  return std::ranges::count_if(trace.accepted, [&](const TracedEffect& effect) {
+    for (std::size_t j = 0; j < model.tree.joints.size(); ++j) {
+      if (model.tree.joints[j].name != effect.id.place) continue;
+      return !(effect.id.effect == "coulomb" && model.joints[j].coulomb > 0.0) &&
+             !(effect.id.effect == "viscous" && model.joints[j].viscous > 0.0);
+    }
+    return true;
+  });
 }
 
 bool explains_all(const Trace& trace) {
@@ -391,7 +412,7 @@ TorqueTrace trace_torque(const DynamicModel& model, const TorqueSamples& samples
   TorqueTrace rival = trace_beside_base(model, samples, beside_identified, progress);
   const double advantage = advantage_of(rival, out);
   // Masses that bend to what they are not ask for further effects.
-  if (rival.trace.accepted.size() > out.trace.accepted.size()) return out;
+  if (effects_beyond(model, rival.trace) > std::ssize(out.trace.accepted)) return out;
   if (advantage >= effects::kClearlyBetter) {
     rival.base.reason = fmt::format(
         "with the effects that were found, identified masses predict unseen stretches better than "

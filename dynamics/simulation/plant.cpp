@@ -50,7 +50,7 @@ class Assembly {
     std::string_view name;
     void (Assembly::*add)(const TorqueEffect&);
   };
-  static const std::array<Law, 19> kLaws;
+  static const std::array<Law, 20> kLaws;
 
   [[nodiscard]] std::size_t joint_named(const TorqueEffect& effect, std::string_view name) const {
     const auto& bodies = plant_.rigid.bodies;
@@ -175,13 +175,17 @@ class Assembly {
     (void)value(e, 0, 10);
     body->inertia += InertialParameters::from_vector(e.values);
   }
+  /// A plant has one set of bodies: those that the log began with.
+  void payload_change(const TorqueEffect& e) {
+    plant_.left_out.push_back(fmt::format("{} at {}", e.id.effect, e.id.place));
+  }
   void gravity_direction(const TorqueEffect&) {}  // with the bodies of the base
 
   const CorrectedTorqueModel& model_;
   Plant plant_;
 };
 
-const std::array<Assembly::Law, 19> Assembly::kLaws = {
+const std::array<Assembly::Law, 20> Assembly::kLaws = {
     {{"viscous", &Assembly::viscous},
      {"coulomb", &Assembly::coulomb},
      {"asymmetric", &Assembly::asymmetric},
@@ -200,6 +204,7 @@ const std::array<Assembly::Law, 19> Assembly::kLaws = {
      {"torque_lag", &Assembly::torque_lag},
      {"cross_talk", &Assembly::cross_talk},
      {"payload", &Assembly::payload},
+     {"payload_change", &Assembly::payload_change},
      {"gravity_direction", &Assembly::gravity_direction}}};
 
 }  // namespace

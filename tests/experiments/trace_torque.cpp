@@ -27,7 +27,7 @@ constexpr double kStrong = 2.0;  // times the strengths below
 double strength_of(const std::string& effect) {
   if (effect == "gravity_direction") return 3.0;  // deg
   if (effect == "torque_delay") return 0.01;      // s
-  if (effect == "payload") return 0.15;
+  if (effect == "payload" || effect == "payload_change") return 0.15;
   if (effect == "contact") return 0.3;
   if (effect == "hysteresis" || effect == "load_friction") return 0.1;
   return 0.05;

@@ -18,6 +18,7 @@ namespace {
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kPrismaticMetrePerRad = 0.2;
 constexpr double kSettling = 0.5;  // time constant of a drift, of the log
+constexpr double kPickedUp = 0.4;  // when a load is picked up, of the log
 
 struct State {
   Eigen::VectorXd q, dq, ddq;
@@ -84,9 +85,10 @@ class World {
     phase_ = rng.uniform(0.0, kTurn);
     measure();
     declare_friction();
-    truth_ = declared_;
+    truth_ = loaded_ = declared_;
     apply_to_model();
     true_rigid_ = make_rigid_model(truth_);
+    loaded_rigid_ = make_rigid_model(loaded_);
     start_states();
   }
 
@@ -159,15 +161,16 @@ class World {
   /// Effects that are another robot, or the same robot standing elsewhere.
   void apply_to_model() {
     for (const TrueEffect& effect : effects_) {
-      if (effect.effect == "payload") {
+      if (effect.effect == "payload" || effect.effect == "payload_change") {
         const LinkId link{static_cast<int>(truth_.links.size()) - 1};
         const double mass = effect.strength * truth_.links[link.index()].mass_kg;
         const Eigen::Vector3d centre(0.03, -0.02, 0.06);
-        truth_.links[link.index()] +=
+        DynamicModel& carrier = effect.effect == "payload" ? truth_ : loaded_;
+        carrier.links[link.index()] +=
             from_central({.mass_kg = mass,
                           .centre_m = centre,
                           .inertia_kgm2 = 4e-4 * mass * Eigen::Matrix3d::Identity()});
-        known_.push_back({"payload", truth_.tree.links[link.index()].name, mass});
+        known_.push_back({effect.effect, truth_.tree.links[link.index()].name, mass});
       }
       if (effect.effect == "gravity_direction") {
         const double angle = effect.strength * std::numbers::pi / 180.0;
@@ -182,7 +185,7 @@ class World {
     dahl_.assign(effects_.size(), 0.0);
     dahl_time_.assign(effects_.size(), 0.0);
     for (const TrueEffect& e : effects_) {
-      if (e.effect == "payload" || e.effect == "gravity_direction") continue;
+      if (e.effect.starts_with("payload") || e.effect == "gravity_direction") continue;
       const double torque = e.strength * scales_.torque[e.joint];
       if (e.effect == "viscous") know(e, torque / scales_.speed[e.joint]);
       if (e.effect == "coulomb" || e.effect == "stribeck" || e.effect == "hysteresis" ||
@@ -238,7 +241,11 @@ class World {
   /// Torque that the drives give at a time.
   [[nodiscard]] Eigen::VectorXd physical(double t_s) {
     const State s = motion_[0].at(t_s);
-    const Eigen::VectorXd rigid = inverse_dynamics(true_rigid_, s.q, s.dq, s.ddq);
+    Eigen::VectorXd rigid = inverse_dynamics(true_rigid_, s.q, s.dq, s.ddq);
+    if (t_s >= kPickedUp * options_.duration_s) {
+      rigid += inverse_dynamics(loaded_rigid_, s.q, s.dq, s.ddq) -
+               inverse_dynamics(rigid_, s.q, s.dq, s.ddq);
+    }
     Eigen::VectorXd out = rigid;
     const std::vector<JointId> joints = moving_joints(truth_.tree);
     for (Eigen::Index j = 0; j < out.size(); ++j) {
@@ -337,7 +344,8 @@ class World {
   std::vector<TrueEffect> effects_;
   EffectWorldOptions options_;
   DynamicModel declared_, truth_;
-  RigidModel rigid_, true_rigid_;
+  DynamicModel loaded_;  ///< as declared, with what is picked up
+  RigidModel rigid_, true_rigid_, loaded_rigid_;
   std::vector<Motion> motion_;
   Scales scales_;
   double phase_ = 0.0;
@@ -354,7 +362,7 @@ std::vector<std::string> known_torque_effects() {
           "payload",           "spring",        "ripple",
           "torque_offset",     "torque_gain",   "cross_talk",
           "torque_delay",      "torque_lag",    "drift",
-          "gravity_direction", "contact"};
+          "gravity_direction", "contact",       "payload_change"};
 }
 
 EffectWorld effect_world(const std::vector<TrueEffect>& effects, const EffectWorldOptions& options,

@@ -14,8 +14,9 @@
 
 namespace kinescope {
 
-/// `strength`: torque of the effect over the joint's rms torque, about; kg for a payload over the
-/// mass of its link; degrees for gravity; seconds for a delay; shares for gain and cross-talk.
+/// `strength`: torque of the effect over the joint's rms torque, about; kg for a payload (or for
+/// one that is picked up in the log) over the mass of its link; degrees for gravity; seconds for a
+/// delay; shares for gain and cross-talk.
 struct TrueEffect {
   std::string effect;
   int joint = 0;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dynamics/experiments/contact_world.h"
+#include "dynamics/rigid/inverse_dynamics.h"
 #include "kinematics/urdf/dynamic_urdf.h"
 #include "tests/app/commands/program.h"
 #include "tests/app/commands/torque_log_text.h"
@@ -63,6 +64,41 @@ class ContactCommand : public testing::Test {
   RecordingFolder folder_;
   ContactWorld free_, touched_;
 };
+
+/// Something of half a kilogram hangs at the last link from an instant on.
+TorqueSamples picked_up(const DynamicModel& model, TorqueSamples samples, double from_s) {
+  DynamicModel loaded = model;
+  loaded.links.back() += from_central(
+      {.mass_kg = 0.5, .centre_m = {0.02, 0.03, 0.1}, .inertia_kgm2 = Eigen::Matrix3d::Zero()});
+  const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(samples.size(), samples.joints());
+  const Eigen::MatrixXd more =
+      inverse_dynamics_of_samples(make_rigid_model(loaded), samples.q, still, still) -
+      inverse_dynamics_of_samples(make_rigid_model(model), samples.q, still, still);
+  for (Eigen::Index k = 0; k < samples.size(); ++k) {
+    if (samples.t_s[k] >= from_s) samples.torque.row(k) += more.row(k);
+  }
+  return samples;
+}
+
+/// It lasts for half of the log, which friction, offsets and noise are learned from: by the masses
+/// of the URDF, identified ones, and a torque model.
+TEST_F(ContactCommand, ALoadThatIsPickedUpIsOneContact) {
+  const DynamicModel model = contact_arm(3);
+  Rng rng = Rng::from_name("contact command load");
+  const ContactWorld world = contact_world(model, {.duration_s = 24.0}, rng);
+  folder_.write("log.csv", torque_log_csv(picked_up(model, world.samples, 13.0)));
+  for (const std::vector<std::string>& how :
+       {std::vector<std::string>{}, {"--identify"}, {"--model", "parametric"}}) {
+    const Outcome outcome = run(words(how));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json found = contacts().at("contacts");
+    ASSERT_EQ(found.size(), 1U) << outcome.out;
+    EXPECT_NEAR(found[0].at("onset_s").get<double>(), 13.0, 0.1);
+    EXPECT_NEAR(found[0].at("end_s").get<double>(), 24.0, 0.1);
+    EXPECT_EQ(found[0].at("link"), "link3");
+    std::filesystem::remove_all(folder_.path() / "out");
+  }
+}
 
 /// The same with motor currents in place of torques.
 std::string currents(TorqueSamples samples) {

@@ -109,8 +109,8 @@ INSTANTIATE_TEST_SUITE_P(library, EveryEffect,
                                          "cubic_viscous", "load_friction", "position_friction",
                                          "hysteresis", "motor_inertia", "payload", "spring",
                                          "ripple", "torque_offset", "torque_gain", "cross_talk",
-                                         "torque_delay", "torque_lag", "drift",
-                                         "gravity_direction"),
+                                         "torque_delay", "torque_lag", "drift", "gravity_direction",
+                                         "payload_change"),
                          [](const auto& tested) { return tested.param; });
 
 // From a floor to a ceiling, where tilts of all directions are the same.
@@ -492,8 +492,9 @@ Trace trace_with(const EffectWorld& world, const Eigen::MatrixXd& more, double c
   return trace_torque(world.model, samples, options).trace;
 }
 
-// No test of the library sees it, and what it leaves was called noise.
-TEST(TorqueEffects, ALoadPickedUpMidwayIsNoNoise) {
+// Loads are looked for at the last links: no test of the library sees one on another, and what it
+// leaves was called noise.
+TEST(TorqueEffects, ALoadPickedUpByAMiddleLinkIsNoNoise) {
   constexpr double kCutoff_hz = 12.0;
   Rng rng = Rng::from_name("noise", 1);
   EffectWorldOptions quiet = quiet_world();
@@ -501,8 +502,8 @@ TEST(TorqueEffects, ALoadPickedUpMidwayIsNoNoise) {
   const EffectWorld world = effect_world({}, quiet, rng);
   const TorqueSamples samples = exact_samples(world, kCutoff_hz);
   DynamicModel loaded = world.model;
-  InertialParameters& last = loaded.links[loaded.tree.joints.back().child.index()];
-  last = InertialParameters::from_vector(1.5 * last.vector());
+  InertialParameters& middle = loaded.links[loaded.tree.joints[1].child.index()];
+  middle = InertialParameters::from_vector(1.5 * middle.vector());
   const auto torque_of = [&](const DynamicModel& model) {
     return inverse_dynamics_of_samples(make_rigid_model(model), samples.q, samples.dq, samples.ddq);
   };
@@ -739,6 +740,50 @@ TEST(TorqueEffects, JointsThatDisagreeAboutAPayloadWidenItsInterval) {
   EXPECT_EQ(alone.picture.unit, "N m");
   EXPECT_GT(rms(alone.picture.before), 10.0 * rms(alone.picture.after));
   EXPECT_GT(width(beside), 3.0 * width(alone));
+}
+
+// A hinge says nothing of a mass on its axis: 0 kg would be no size.
+TEST(TorqueEffects, APayloadOfAHingeIsItsFirstMoment) {
+  Rng rng = Rng::from_name("effects", 7);
+  EffectWorldOptions options = quiet_world();
+  options.joints = 1;
+  const EffectWorld world = effect_world({{"payload", 0, 0, 0.3}}, options, rng);
+  const TorqueTracedModel model(world.model, exact_samples(world), declared_options());
+  const EffectId id{"payload", world.effects.front().place};
+  const Candidate known = candidate(model.fit({}), id);
+  EXPECT_EQ(known.size_unit, "kg m");
+  const TracedFit with = model.fit({{id, 0.0}});
+  const Eigen::Vector3d axis = make_rigid_model(world.model).bodies.front().axis;
+  const Eigen::Vector3d centre(0.03, -0.02, 0.06);
+  const double truth = world.effects.front().size * (centre - axis * axis.dot(centre)).norm();
+  const Eigen::VectorXd& values = with.values.front();
+  EXPECT_NEAR(std::sqrt(known.size_weights.dot(values.cwiseAbs2())), truth, 0.02 * truth);
+}
+
+// Neither is it a payload of the whole log, nor masses, nor a contact that is left out.
+TEST(TorqueEffects, ALoadThatIsPickedUpIsKnownWithItsInstant) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    SCOPED_TRACE(seed);
+    Rng rng = Rng::from_name("picked up", seed);
+    EffectWorldOptions options = quiet_world();
+    options.noise = 0.01;
+    const EffectWorld world = effect_world({{"payload_change", 0, 0, 0.3}}, options, rng);
+    const TorqueSamples samples = exact_samples(world, 12.0);
+    TorqueTraceOptions trace;
+    trace.model.filter = {LowPass::kSmoothingSpline, 12.0};
+    const TorqueTrace out = trace_torque(world.model, samples, trace);
+    ASSERT_EQ(out.trace.accepted.size(), 1U) << out.trace.reason;
+    const TracedEffect& load = out.trace.accepted.front();
+    EXPECT_EQ(load.id, (EffectId{"payload_change", world.effects.front().place}));
+    EXPECT_NEAR(load.scan, 0.4 * options.duration_s, 0.1);
+    EXPECT_LE(load.interval.low, world.effects.front().size);
+    EXPECT_GE(load.interval.high, world.effects.front().size);
+    EXPECT_LT(load.held_out_after.value, 0.3 * load.held_out_before.value);
+    EXPECT_TRUE(out.contacts.empty());
+    // The robot that is written is the one that the log began with.
+    EXPECT_EQ(out.corrected.in_model, std::vector<char>{0});
+    EXPECT_EQ(out.corrected.model.links.back().mass_kg, world.model.links.back().mass_kg);
+  }
 }
 
 TEST(TorqueEffects, FoundFrictionGoesIntoTheModelAndOutOfTheLog) {

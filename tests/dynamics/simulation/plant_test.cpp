@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(EveryEffect, SameLaw, testing::ValuesIn(cases()),
                                   std::to_string(param.index);
                          });
 
-TEST(Plant, EveryEffectOfTheLibraryCanBeSimulated) {
+TEST(Plant, EveryEffectOfTheLibraryIsSimulatedOrNamed) {
   const DynamicModel arm = panda_arm();
   const RobotEffects known = effects_of_robot(arm, panda_motion(arm));
   for (const Candidate& candidate : known.candidates) {
@@ -115,7 +115,10 @@ TEST(Plant, EveryEffectOfTheLibraryCanBeSimulated) {
     effect.scan = candidate.scan.empty() ? 0.0 : candidate.scan.back();
     effect.values = Eigen::VectorXd::Constant(std::ssize(candidate.parameters), 1e-3);
     const Plant plant = make_plant(with_effects(arm, {effect}, known.travels, known.log));
-    EXPECT_TRUE(plant.left_out.empty()) << candidate.id.effect;
+    // A plant has one set of bodies.
+    const bool changes = candidate.id.effect == "payload_change";
+    EXPECT_EQ(plant.left_out, changes ? std::vector<std::string>{"payload_change at link7"}
+                                      : std::vector<std::string>{});
   }
 }
 
