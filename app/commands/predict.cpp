@@ -124,6 +124,12 @@ ExitCode predict_command(const PredictOptions& options, const Console& console) 
   require_new_file(options.output, "--output", inputs, options.force);
   const TorqueModelFile file = read_torque_model(options.model);
   JudgedPrediction predicted = predict(options, file);
+  if (measured_rows(predicted.samples).empty()) {
+    throw bad_input(options.logs.front().string(),
+                    "in no row the torques of all joints were measured (cut off, frozen, or in a "
+                    "dead zone)",
+                    "record within the range of every joint's torque");
+  }
   const RigidModel& rigid = file.model.rigid;
   const std::vector<JointResult> joints = results(predicted);
   if (std::string words = worse_words(joints, rigid); !words.empty()) {

@@ -17,11 +17,12 @@
 namespace kinescope {
 namespace {
 
+// All chosen.
 constexpr Eigen::Index kMostInstants = 3000;
 constexpr Eigen::Index kFewestInstants = 200;
 constexpr Eigen::Index kGrid = 60;  ///< begins and ends that are tried first
-constexpr double kStretch_s =
-    1.0;  ///< that is unseen at once; longer than the errors of a drive last
+/// s that are unseen at once; longer than the errors of a drive last.
+constexpr double kStretch_s = 1.0;
 constexpr Eigen::Index kDriveColumns = 7;
 constexpr Eigen::Index kPayload = 10;
 constexpr Eigen::Index kForce = 12;  ///< a force and its moments about the link, each along 3 axes

@@ -61,6 +61,19 @@ Channel look_at(const TorqueLog& log, const Eigen::VectorXd& x, const std::strin
   return channel;
 }
 
+std::vector<RowWindow> windows_around_rows(const TorqueLog& log, double reach_s) {
+  const double step_s = median_of(steps_of(log.t_s, log.trajectory));
+  const Eigen::Index reach =
+      step_s > 0.0 ? std::max<Eigen::Index>(1, std::lround(reach_s / step_s)) : 1;
+  std::vector<RowWindow> out;
+  const std::vector<Eigen::Index> bounds = log.bounds();
+  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
+    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row)
+      out.push_back({std::max(bounds[b], row - reach), std::min(bounds[b + 1] - 1, row + reach)});
+  }
+  return out;
+}
+
 double usual_change(const Channel& channel) {
   std::vector<double> changes;
   std::ranges::copy_if(channel.changes, std::back_inserter(changes),

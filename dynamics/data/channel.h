@@ -25,6 +25,13 @@ struct Channel {
 [[nodiscard]] Channel look_at(const TorqueLog& log, const Eigen::VectorXd& x,
                               const std::string& name);
 
+/// Rows around each row, up to `reach_s` either way and within its trajectory; one at the least.
+struct RowWindow {
+  Eigen::Index from = 0;
+  Eigen::Index to = 0;  ///< the last one
+};
+[[nodiscard]] std::vector<RowWindow> windows_around_rows(const TorqueLog& log, double reach_s);
+
 /// Median of the changes that are not zero; 0 of a channel that never changes.
 [[nodiscard]] double usual_change(const Channel& channel);
 

@@ -58,25 +58,15 @@ void name_grid(const TorqueLog& log, const Channel& channel, std::vector<LogFind
 /// Of each row whether its joint moves so fast that every row has a new position: what repeats
 /// while it rests, or creeps from step to step of its encoder, is no news.
 std::vector<char> rows_in_motion(const TorqueLog& log, Eigen::Index joint) {
-  const double step_s = median_of(steps_of(log.t_s, log.trajectory));
-  const Eigen::Index reach =
-      step_s > 0.0 ? std::max<Eigen::Index>(1, std::lround(kReachS / step_s)) : 1;
   double quantum = std::numeric_limits<double>::infinity();
   for (Eigen::Index row = 1; row < log.rows(); ++row) {
     const double change = std::abs(log.q(row, joint) - log.q(row - 1, joint));
     if (change > 0.0) quantum = std::min(quantum, change);
   }
-  std::vector<char> out(static_cast<std::size_t>(log.rows()), 0);
-  const std::vector<Eigen::Index> bounds = log.bounds();
-  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
-    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
-      const Eigen::Index from = std::max(bounds[b], row - reach);
-      const Eigen::Index to = std::min(bounds[b + 1] - 1, row + reach);
-      out[static_cast<std::size_t>(row)] = std::abs(log.q(to, joint) - log.q(from, joint)) >=
-                                                   static_cast<double>(to - from) * quantum
-                                               ? 1
-                                               : 0;
-    }
+  std::vector<char> out;
+  for (const RowWindow& window : windows_around_rows(log, kReachS)) {
+    const double moved = std::abs(log.q(window.to, joint) - log.q(window.from, joint));
+    out.push_back(moved >= static_cast<double>(window.to - window.from) * quantum ? 1 : 0);
   }
   return out;
 }

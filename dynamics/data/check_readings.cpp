@@ -75,18 +75,11 @@ struct Reading {
 };
 
 Eigen::VectorXd smoothed_speed(const TorqueLog& log, Eigen::Index joint) {
-  const double step_s = median_of(steps_of(log.t_s, log.trajectory));
-  const Eigen::Index reach =
-      step_s > 0.0 ? std::max<Eigen::Index>(1, std::lround(kSpeedReachS / step_s)) : 1;
   Eigen::VectorXd out = Eigen::VectorXd::Zero(log.rows());
-  const std::vector<Eigen::Index> bounds = log.bounds();
-  for (std::size_t b = 0; b + 1 < bounds.size(); ++b) {
-    for (Eigen::Index row = bounds[b]; row < bounds[b + 1]; ++row) {
-      const Eigen::Index from = std::max(bounds[b], row - reach);
-      const Eigen::Index to = std::min(bounds[b + 1] - 1, row + reach);
-      const double span_s = log.t_s(to) - log.t_s(from);
-      if (span_s > 0.0) out(row) = (log.q(to, joint) - log.q(from, joint)) / span_s;
-    }
+  for (Eigen::Index row = 0; const RowWindow& window : windows_around_rows(log, kSpeedReachS)) {
+    const double span_s = log.t_s(window.to) - log.t_s(window.from);
+    if (span_s > 0.0) out(row) = (log.q(window.to, joint) - log.q(window.from, joint)) / span_s;
+    ++row;
   }
   return out;
 }
