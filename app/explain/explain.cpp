@@ -201,7 +201,10 @@ Explanation with_stretches_apart(Explanation now, const Evidence& evidence,
   std::vector<std::string> said;
   Explanation other = explained(
       {changed.recording, changed.observed, changed.tracks, evidence.camera}, alike, said);
-  if (!is_settled(other) && !is_better(other, now, evidence.observed.measurements)) return now;
+  // What only the markers say may be an error of the robot that no effect explains.
+  const bool is_of_log = std::ranges::all_of(stretches, &OddStretch::is_told_by_log);
+  if (!(is_of_log && is_settled(other)) && !is_better(other, now, evidence.observed.measurements))
+    return now;
   for (std::string& line : said) {
     if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
   }

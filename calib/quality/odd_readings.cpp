@@ -261,7 +261,9 @@ void add_channel(OddStretch of, OddStretch& to) {
   to.stands_still = to.stands_still && of.stands_still;
 }
 
-// Where the same readings stand in the log before, that is how long the stretch is, and what it is.
+// Where the same readings stand in the log before, that is how long the stretch is, and what it is:
+// readings of these channels that stay, or whole rows, at least as many as chance does not make of
+// a log with few digits.
 void look_for_repeated(OddStretch& stretch, const JointLog& log) {
   const auto row_at = [&](double time_s) {
     return std::ranges::lower_bound(log.times_s, time_s) - log.times_s.begin();
@@ -270,16 +272,17 @@ void look_for_repeated(OddStretch& stretch, const JointLog& log) {
   for (const std::string& name : stretch.channels)
     if (const std::optional<int> channel = log.channel(name)) channels.push_back(*channel);
   std::ptrdiff_t first = row_at(stretch.from_s), end = row_at(stretch.to_s);
+  constexpr std::ptrdiff_t kFewestRows = 5;  // chosen
   if (end - first < 2 || channels.empty()) return;
   const auto is_again = [&](std::ptrdiff_t row, std::ptrdiff_t shift) {
-    return row >= shift && row < std::ssize(log.times_s) &&
-           std::ranges::all_of(
-               channels,
-               [&](int channel) {
-                 return log.values(row, channel) == log.values(row - shift, channel);
-               });
+    if (row < shift || row >= std::ssize(log.times_s)) return false;
+    if (shift > 1) return log.values.row(row) == log.values.row(row - shift);
+    return std::ranges::all_of(channels, [&](int channel) {
+      return log.values(row, channel) == log.values(row - 1, channel);
+    });
   };
   for (std::ptrdiff_t shift = 1; shift <= first; ++shift) {
+    if (shift > 1 && end - first < kFewestRows) return;
     std::ptrdiff_t row = first;
     while (row < end && is_again(row, shift)) ++row;
     if (row < end) continue;
@@ -308,7 +311,7 @@ std::optional<double> late_by(const OddStretch& stretch, const Calibration& cali
   for (const OddReading& odd : readings) {
     const double at_s = odd.time_s + calibration.time_offset_s;
     const std::optional<int> channel = log.channel(odd.channel);
-    if (at_s < stretch.from_s || at_s > stretch.to_s || !channel ||
+    if (at_s < stretch.from_s || at_s > stretch.to_s || !channel || !(motion[*channel] > 0.0) ||
         std::ranges::find(stretch.channels, odd.channel) == stretch.channels.end())
       continue;
     all.push_back({*channel, at_s, odd.expected});
@@ -433,13 +436,16 @@ std::vector<OddStretch> odd_stretches(const Calibration& calibration, const Join
     const auto off = [](const OddReading& one) { return std::abs(one.expected - one.read); };
     if (own.empty() || at_s - own.back().to_s > apart_s) {
       own.push_back({{odd.channel}, at_s, at_s, 1, odd, true});
+      own.back().most.time_s = at_s;
       continue;
     }
     OddStretch& last = own.back();
     last.stands_still = last.stands_still && odd.read == last.most.read;
     last.to_s = at_s;
     ++last.frames;
-    if (off(odd) > off(last.most)) last.most = odd;
+    if (off(odd) <= off(last.most)) continue;
+    last.most = odd;
+    last.most.time_s = at_s;
   }
   std::vector<OddStretch> all;
   for (auto& [channel, own] : by_channel) {

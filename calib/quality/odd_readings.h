@@ -41,12 +41,16 @@ struct OddStretch {
   double from_s = 0.0;                ///< of the first frame, on the log's clock
   double to_s = 0.0;                  ///< of the last one
   int frames = 0;
-  OddReading most;            ///< of the first channel, where reading and markers differ most
+  /// Of the first channel, where reading and markers differ most; on the log's clock.
+  OddReading most;
   bool stands_still = false;  ///< one value of each, or one row, in all of them
   /// The log has the same rows so long before, s.
   std::optional<double> repeats_s = {};
   /// The log has what the markers show, but so much later (earlier where negative), s.
   std::optional<double> late_s = {};
+
+  /// The log itself says what is wrong there.
+  [[nodiscard]] bool is_told_by_log() const { return stands_still || repeats_s || late_s; }
 };
 
 /// Of at least two frames of a film, in the order of time. O(rows^2) at worst, where rows repeat.
