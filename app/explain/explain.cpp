@@ -2,6 +2,7 @@
 #include "app/explain/explain.h"
 
 #include <algorithm>
+#include <functional>
 #include <set>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include "app/explain/hypothesis_fit.h"
 #include "app/explain/recording_pieces.h"
 #include "calib/bundle/postures.h"
+#include "calib/quality/lost_markers.h"
 #include "calib/quality/odd_readings.h"
 #include "calib/quality/partly_followed.h"
 #include "calib/tracks/even_stamps.h"
@@ -211,6 +213,81 @@ Explanation with_stretches_apart(Explanation now, const Evidence& evidence,
   return other;
 }
 
+// Without the sightings of which this is true, by marker and instant.
+ChangedEvidence without_sightings(const Evidence& evidence, const JointLog& log,
+                                  const std::function<bool(TagId, double)>& is_aside) {
+  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
+  out.recording.log = log;
+  const auto at_s = [&](int frame) {
+    return evidence.observed.measurements.times_s[static_cast<std::size_t>(frame)];
+  };
+  const auto of_tags = [&](const auto& seen) { return is_aside(seen.id, at_s(seen.frame)); };
+  std::erase_if(out.observed.measurements.corners, of_tags);
+  for (PoseTracks* tracks : {&out.observed.measurements.poses, &out.tracks}) {
+    for (PoseTrack& track : tracks->tracks) {
+      std::erase_if(track.samples, [&](const PoseSample& sample) {
+        return is_aside(track.id, at_s(sample.frame));
+      });
+    }
+  }
+  return out;
+}
+
+// Markers that moved with no joint all the time may have done so for a half of it. Those that came
+// off, by the robot that shows without their other half.
+std::vector<LostMarker> lost_of_free_markers(const Explanation& now, const Evidence& evidence,
+                                             const ExplainOptions& options) {
+  const std::vector<TagId>& free = now.structure->free_markers;
+  if (free.empty() || now.structure->idle_channels.empty()) return {};
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  const double middle_s = 0.5 * (times_s.front() + times_s.back());
+  for (const bool first : {true, false}) {
+    const ChangedEvidence half = without_sightings(evidence, now.log, [&](TagId id, double at_s) {
+      return std::ranges::find(free, id) != free.end() && (at_s < middle_s) != first;
+    });
+    std::vector<std::string> said;
+    const Explanation other =
+        explained({half.recording, half.observed, half.tracks, evidence.camera}, options, said);
+    if (!is_settled(other) || !other.structure ||
+        other.structure->free_markers.size() >= free.size())
+      continue;
+    // The same robot beside all that was seen.
+    const std::optional<Explanation> whole = HypothesisFit(evidence, options).carried_over(other);
+    if (!whole || !whole->fitted) continue;
+    std::vector<LostMarker> lost = lost_markers(whole->fitted->calibration);
+    if (!lost.empty()) return lost;
+  }
+  return {};
+}
+
+// Markers that came off are no error of the robot.
+Explanation with_lost_markers_apart(Explanation now, const Evidence& evidence,
+                                    const ExplainOptions& options,
+                                    std::vector<std::string>& warnings) {
+  if (!now.fitted || !now.structure || evidence.recording.nominal) return now;
+  const Calibration& calibration = now.fitted->calibration;
+  if (now.log.empty() || shows_postures(calibration.tree, now.log, calibration.times_s) ||
+      !evidence.observed.measurements.camera_of_frame.empty())
+    return now;
+  ExplainOptions alike = options;
+  alike.calibrate.fold_of_frame = folds_of(calibration);
+  std::vector<LostMarker> lost = lost_markers(calibration);
+  if (lost.empty()) lost = lost_of_free_markers(now, evidence, alike);
+  if (lost.empty()) return now;
+  const ChangedEvidence changed = without_sightings(evidence, now.log, [&](TagId id, double at_s) {
+    return std::ranges::any_of(
+        lost, [&](const LostMarker& marker) { return marker.id == id && marker.is_lost_at(at_s); });
+  });
+  std::vector<std::string> said;
+  Explanation other = explained(
+      {changed.recording, changed.observed, changed.tracks, evidence.camera}, alike, said);
+  if (!is_settled(other) && !is_better(other, now, evidence.observed.measurements)) return now;
+  for (std::string& line : said)
+    if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
+  for (const LostMarker& marker : lost) warnings.push_back(words_of(marker));
+  return other;
+}
+
 ChangedEvidence stamped_evenly(const Evidence& evidence, const std::vector<double>& times_s) {
   ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
   Measurements& measured = out.observed.measurements;
@@ -251,9 +328,10 @@ std::optional<ChangedEvidence> with_even_stamps(const Evidence& evidence,
 
 Explanation explained_as_stamped(const Evidence& evidence, const ExplainOptions& options,
                                  std::vector<std::string>& warnings) {
-  return with_stretches_apart(with_parts_followed(with_exchanged_back(evidence, options, warnings),
-                                                  evidence, options, warnings),
-                              evidence, options, warnings);
+  Explanation out = with_exchanged_back(evidence, options, warnings);
+  for (const auto& improve : {with_parts_followed, with_stretches_apart, with_lost_markers_apart})
+    out = improve(std::move(out), evidence, options, warnings);
+  return out;
 }
 
 }  // namespace

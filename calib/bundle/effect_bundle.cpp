@@ -294,6 +294,23 @@ Columns sort_columns(const LinearBundle& linear, std::size_t corrections, bool t
   return out;
 }
 
+// What a joint that rests for long is off by is known from one fold for another.
+bool is_of_one_fold(const Correction& correction, const std::vector<int>& fold_of_frame) {
+  constexpr int kFew = 5;  // frames of other folds that tell little; chosen
+  if (!correction.is_local || correction.share.size() == 0) return false;
+  std::map<int, int> frames;
+  for (Eigen::Index f = 0; f < correction.share.size(); ++f) {
+    const int fold = fold_of_frame[static_cast<std::size_t>(f)];
+    if (correction.share[f] != 0.0 && fold >= 0) ++frames[fold];
+  }
+  int all = 0, most = 0;
+  for (const auto& [fold, count] : frames) {
+    all += count;
+    most = std::max(most, count);
+  }
+  return all - most <= kFew;
+}
+
 // What one whitened unit of each row of a sighting is.
 Eigen::VectorXd units_of(const Sighting& sighting) {
   switch (sighting.kind) {
@@ -441,11 +458,11 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   const Columns columns = sort_columns(linear, change.corrections.size(), change.time_offset);
   std::vector<Eigen::Index> model = columns.own;
   std::vector<Eigen::Index> local;
-  std::vector<Eigen::Index> local_corrections;
   for (std::size_t c = 0; c < columns.change.size(); ++c) {
-    const bool is_local = c < change.corrections.size() && change.corrections[c].is_local;
+    const bool is_local =
+        c < change.corrections.size() && is_of_one_fold(change.corrections[c], impl_->fold);
     (is_local ? local : model).push_back(columns.change[c]);
-    if (is_local) local_corrections.push_back(static_cast<Eigen::Index>(c));
+    if (is_local) out.local_corrections.push_back(static_cast<Eigen::Index>(c));
   }
 
   std::map<int, std::vector<int>> sightings;
@@ -500,7 +517,7 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   out.probes.setFromTriplets(entries.begin(), entries.end());
   out.local.resize(rows, std::ssize(local));
   out.local.setFromTriplets(local_entries.begin(), local_entries.end());
-  out.local_values = out.values(local_corrections);
+  out.local_values = out.values(out.local_corrections);
   out.local_information = linear.prior_information.diagonal()(local);
   if (!linear.prior_information.isZero(0.0)) {
     out.prior_information = linear.prior_information(model, model);

@@ -61,7 +61,9 @@ struct BundleFit : BundleSolution {
   Eigen::VectorXd residual;  ///< rows, whitened: observed minus predicted
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
       jacobian;  ///< rows x parameters, d predicted; the change's columns last
-  /// The same of the change's local corrections, which are not among those; in their order.
+  /// The change's corrections that bear on a few frames of one fold each, which are not among
+  /// those, and the same of them.
+  std::vector<Eigen::Index> local_corrections;
   Eigen::SparseMatrix<double, Eigen::RowMajor> local;
   Eigen::VectorXd local_values;
   Eigen::VectorXd local_information;    ///< of their priors

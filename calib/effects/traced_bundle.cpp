@@ -622,7 +622,7 @@ TracedFit TracedBundle::fit(const std::vector<AddedEffect>& effects) const {
   for (Eigen::Index c = 0; c < fit.values.size(); ++c) {
     const auto at = static_cast<std::size_t>(c);
     const bool is_correction = at < change.corrections.size();
-    const bool is_local = is_correction && change.corrections[at].is_local;
+    const bool is_local = std::ranges::binary_search(fit.local_corrections, c);
     column_of.push_back(is_local ? -1 : column++);
     if (is_correction && !is_local && change.corrections[at].is_nuisance)
       order.push_back(column_of.back());

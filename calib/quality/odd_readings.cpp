@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/mean_step.h"
 #include "kinematics/core/median.h"
 
@@ -92,7 +93,7 @@ class Reader {
       return std::ranges::none_of(frame,
                                   [&](const Seen& seen) { return is_behind(*seen.marker, joint); });
     });
-    if (!values_seen(candidates, q, frame)) return {};
+    if (candidates.empty() || !values_seen(candidates, q, frame)) return {};
     while (candidates.size() > 1) {
       std::size_t least = 0;
       double least_missed = std::numeric_limits<double>::infinity();
@@ -145,7 +146,7 @@ class Reader {
         H += J.transpose() * J;
         g += J.transpose() * r;
       }
-      const Eigen::VectorXd d = H.completeOrthogonalDecomposition().solve(g);
+      const Eigen::VectorXd d = shortest_least_squares(H, g);
       for (Eigen::Index k = 0; k < columns; ++k) q[free[static_cast<std::size_t>(k)].value] += d[k];
       if (d.norm() < kSettled) break;
     }

@@ -173,6 +173,19 @@ TEST(OddStretches, ReadingsThatCameLateAreOneHoweverSlowTheJointsAreBetween) {
   EXPECT_NEAR(found[0].to_s, 6.0, 0.3);
 }
 
+// A frame in which only the base's marker is seen, and is an outlier, says nothing of any reading.
+TEST(OddStretches, NoneWhereNoMarkerIsBehindAJoint) {
+  Filmed film = filmed();
+  for (const std::size_t id : {std::size_t{1}, std::size_t{2}})
+    film.tracks.tracks[id].samples.clear();
+  film.calibration.joint_values = resample(film.log, film.calibration.times_s);
+  SightingResidual& residual = film.calibration.residuals.emplace_back();
+  residual.frame = 7;
+  residual.id = TagId{0};
+  residual.used = false;
+  EXPECT_TRUE(odd_readings(film.calibration, film.tracks, film.log).empty());
+}
+
 // One marker that slipped is no reading: none of the joints brings it back.
 TEST(OddStretches, AMarkerThatIsElsewhereIsNone) {
   Filmed film = filmed();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -71,6 +72,20 @@ std::vector<LyingInput> lying_sightings() {
        4,
        {"poses.csv: the bodies do not move as a robot's links do", "with the poses inverted"},
        {"axis of"}},
+      {"PosesOfAMarkerThatFell",
+       poses,
+       [](Files& files) {
+         Row where;
+         each_row("poses.csv", [&](Row& row, int) {
+           if (row[1] != "3" || std::stod(row[0]) < 4.0) return;
+           if (where.empty()) where = row;
+           std::copy(where.begin() + 2, where.end(), row.begin() + 2);
+         })(files);
+       },
+       kRun,
+       0,
+       {"tag_3 is not where the robot carries it from t = 4", "3 joints"},
+       {"moves, but by no joint"}},
       // corners.csv
       {"CornersExchangedAxes",
        corners,
