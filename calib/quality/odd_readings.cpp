@@ -80,7 +80,7 @@ class Reader {
   [[nodiscard]] std::optional<Eigen::VectorXd> values_seen(const std::vector<JointId>& wrong,
                                                            const Eigen::VectorXd& q,
                                                            const std::vector<Seen>& frame) const {
-    const Eigen::VectorXd moved = fitted(wrong, q, frame);
+    Eigen::VectorXd moved = fitted(wrong, q, frame);
     if (!(missed(moved, frame) < kBroughtBack * missed(q, frame))) return std::nullopt;
     return moved;
   }
