@@ -31,26 +31,33 @@ struct ChangedEvidence {
   PoseTracks tracks;
 };
 
-void erase_sightings(ChangedEvidence& of, const auto& is_aside) {
-  Measurements& measured = of.observed.measurements;
-  std::erase_if(measured.corners, is_aside);
-  std::erase_if(measured.points.observations, is_aside);
-  for (PoseTrack& track : measured.poses.tracks) std::erase_if(track.samples, is_aside);
-  for (PoseTrack& track : of.tracks.tracks) std::erase_if(track.samples, is_aside);
+// Without the sightings of which this is true, by marker and frame.
+ChangedEvidence without_sightings(const Evidence& evidence, JointLog log,
+                                  const std::function<bool(TagId, int)>& is_aside) {
+  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
+  out.recording.log = std::move(log);
+  Measurements& measured = out.observed.measurements;
+  const auto is_seen_aside = [&](const auto& seen) { return is_aside(seen.id, seen.frame); };
+  std::erase_if(measured.corners, is_seen_aside);
+  std::erase_if(measured.points.observations, is_seen_aside);
+  for (PoseTracks* tracks : {&measured.poses, &out.tracks}) {
+    for (PoseTrack& track : tracks->tracks) {
+      std::erase_if(track.samples,
+                    [&](const PoseSample& sample) { return is_aside(track.id, sample.frame); });
+    }
+  }
+  return out;
 }
 
 // Without these readings. What was measured at the very instant of one has no reading then.
 ChangedEvidence without(const Evidence& evidence, const std::vector<ReadingApart>& apart) {
-  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
   const JointLog& log = evidence.recording.log;
-  out.recording.log = without_readings(log, apart);
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   std::set<double> stamps;
   for (const ReadingApart& reading : apart) stamps.insert(log.times_s[reading.row]);
-  erase_sightings(out, [&](const auto& seen) {
-    return stamps.contains(times_s[static_cast<std::size_t>(seen.frame)]);
+  return without_sightings(evidence, without_readings(log, apart), [&](TagId, int frame) {
+    return stamps.contains(times_s[static_cast<std::size_t>(frame)]);
   });
-  return out;
 }
 
 std::string words_of(const std::vector<ReadingApart>& readings, const Explanation& of,
@@ -172,18 +179,20 @@ Explanation with_parts_followed(Explanation now, const Evidence& evidence,
 // step.
 ChangedEvidence without(const Evidence& evidence, const JointLog& log, double time_offset_s,
                         const std::vector<OddStretch>& stretches) {
-  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
-  out.recording.log = log;
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   constexpr double kReach = 1.5;  // steps: one frame more
   const double step_s = median_step_s(times_s);
-  erase_sightings(out, [&](const auto& seen) {
-    const double at_s = times_s[static_cast<std::size_t>(seen.frame)] + time_offset_s;
+  return without_sightings(evidence, log, [&](TagId, int frame) {
+    const double at_s = times_s[static_cast<std::size_t>(frame)] + time_offset_s;
     return std::ranges::any_of(stretches, [&](const OddStretch& stretch) {
       return at_s > stretch.from_s - kReach * step_s && at_s < stretch.to_s + kReach * step_s;
     });
   });
-  return out;
+}
+
+void add_unsaid(std::vector<std::string> said, std::vector<std::string>& warnings) {
+  for (std::string& line : said)
+    if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
 }
 
 // Readings that froze, came late or twice are no error of the robot.
@@ -207,30 +216,8 @@ Explanation with_stretches_apart(Explanation now, const Evidence& evidence,
   const bool is_of_log = std::ranges::all_of(stretches, &OddStretch::is_told_by_log);
   if (!(is_of_log && is_settled(other)) && !is_better(other, now, evidence.observed.measurements))
     return now;
-  for (std::string& line : said) {
-    if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
-  }
+  add_unsaid(std::move(said), warnings);
   return other;
-}
-
-// Without the sightings of which this is true, by marker and instant.
-ChangedEvidence without_sightings(const Evidence& evidence, const JointLog& log,
-                                  const std::function<bool(TagId, double)>& is_aside) {
-  ChangedEvidence out{evidence.recording, evidence.observed, evidence.tracks};
-  out.recording.log = log;
-  const auto at_s = [&](int frame) {
-    return evidence.observed.measurements.times_s[static_cast<std::size_t>(frame)];
-  };
-  const auto of_tags = [&](const auto& seen) { return is_aside(seen.id, at_s(seen.frame)); };
-  std::erase_if(out.observed.measurements.corners, of_tags);
-  for (PoseTracks* tracks : {&out.observed.measurements.poses, &out.tracks}) {
-    for (PoseTrack& track : tracks->tracks) {
-      std::erase_if(track.samples, [&](const PoseSample& sample) {
-        return is_aside(track.id, at_s(sample.frame));
-      });
-    }
-  }
-  return out;
 }
 
 // Markers that moved with no joint all the time may have done so for a half of it. Those that came
@@ -242,7 +229,8 @@ std::vector<LostMarker> lost_of_free_markers(const Explanation& now, const Evide
   const std::vector<double>& times_s = evidence.observed.measurements.times_s;
   const double middle_s = 0.5 * (times_s.front() + times_s.back());
   for (const bool first : {true, false}) {
-    const ChangedEvidence half = without_sightings(evidence, now.log, [&](TagId id, double at_s) {
+    const ChangedEvidence half = without_sightings(evidence, now.log, [&](TagId id, int frame) {
+      const double at_s = times_s[static_cast<std::size_t>(frame)];
       return std::ranges::find(free, id) != free.end() && (at_s < middle_s) != first;
     });
     std::vector<std::string> said;
@@ -274,7 +262,9 @@ Explanation with_lost_markers_apart(Explanation now, const Evidence& evidence,
   std::vector<LostMarker> lost = lost_markers(calibration);
   if (lost.empty()) lost = lost_of_free_markers(now, evidence, alike);
   if (lost.empty()) return now;
-  const ChangedEvidence changed = without_sightings(evidence, now.log, [&](TagId id, double at_s) {
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  const ChangedEvidence changed = without_sightings(evidence, now.log, [&](TagId id, int frame) {
+    const double at_s = times_s[static_cast<std::size_t>(frame)];
     return std::ranges::any_of(
         lost, [&](const LostMarker& marker) { return marker.id == id && marker.is_lost_at(at_s); });
   });
@@ -282,8 +272,7 @@ Explanation with_lost_markers_apart(Explanation now, const Evidence& evidence,
   Explanation other = explained(
       {changed.recording, changed.observed, changed.tracks, evidence.camera}, alike, said);
   if (!is_settled(other) && !is_better(other, now, evidence.observed.measurements)) return now;
-  for (std::string& line : said)
-    if (std::ranges::find(warnings, line) == warnings.end()) warnings.push_back(std::move(line));
+  add_unsaid(std::move(said), warnings);
   for (const LostMarker& marker : lost) warnings.push_back(words_of(marker));
   return other;
 }

@@ -253,9 +253,14 @@ std::vector<OddReading> odd_in_frame(const Calibration& calibration, const Reade
   return out;
 }
 
-void add_channel(OddStretch of, OddStretch& to) {
-  if (std::ranges::find(to.channels, of.channels.front()) == to.channels.end())
-    to.channels.push_back(std::move(of.channels.front()));
+void add_channels(const OddStretch& of, OddStretch& to) {
+  for (const std::string& channel : of.channels)
+    if (std::ranges::find(to.channels, channel) == to.channels.end())
+      to.channels.push_back(channel);
+}
+
+void add_alongside(const OddStretch& of, OddStretch& to) {
+  add_channels(of, to);
   to.from_s = std::min(to.from_s, of.from_s);
   to.to_s = std::max(to.to_s, of.to_s);
   to.frames = std::max(to.frames, of.frames);
@@ -360,9 +365,7 @@ std::vector<OddStretch> with_late_ones_joined(std::vector<OddStretch> stretches)
     OddStretch& last = out.back();
     last.frames += stretch.frames;
     last.to_s = stretch.to_s;
-    for (const std::string& channel : stretch.channels)
-      if (std::ranges::find(last.channels, channel) == last.channels.end())
-        last.channels.push_back(channel);
+    add_channels(stretch, last);
   }
   return out;
 }
@@ -459,7 +462,7 @@ std::vector<OddStretch> odd_stretches(const Calibration& calibration, const Join
     if (out.empty() || stretch.from_s > out.back().to_s)
       out.push_back(std::move(stretch));
     else
-      add_channel(std::move(stretch), out.back());
+      add_alongside(stretch, out.back());
   }
   for (OddStretch& stretch : out) {
     std::ranges::sort(stretch.channels, {},
