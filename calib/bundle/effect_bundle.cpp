@@ -294,6 +294,36 @@ Columns sort_columns(const LinearBundle& linear, std::size_t corrections, bool t
   return out;
 }
 
+// Of every column of a bundle its place among some; -1: not there.
+std::vector<Eigen::Index> places_in(const std::vector<Eigen::Index>& some, int width) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(width), -1);
+  for (std::size_t i = 0; i < some.size(); ++i)
+    out[static_cast<std::size_t>(some[i])] = static_cast<Eigen::Index>(i);
+  return out;
+}
+
+// Of the rows from `first` on.
+void add_entries(const Eigen::VectorXd& values, Eigen::Index first, Eigen::Index column,
+                 std::vector<Eigen::Triplet<double>>& to) {
+  if (column < 0) return;
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    if (values[i] != 0.0) to.emplace_back(first + i, column, values[i]);
+}
+
+// The part of a square matrix that these places tell of.
+Eigen::MatrixXd among(const Eigen::SparseMatrix<double>& whole,
+                      const std::vector<Eigen::Index>& places, Eigen::Index size) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index c = 0; c < whole.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(whole, c); entry; ++entry) {
+      const Eigen::Index a = places[static_cast<std::size_t>(entry.row())];
+      const Eigen::Index b = places[static_cast<std::size_t>(entry.col())];
+      if (a >= 0 && b >= 0) out(a, b) = entry.value();
+    }
+  }
+  return out;
+}
+
 // What a joint that rests for long is off by is known from one fold for another.
 bool is_of_one_fold(const Correction& correction, const std::vector<int>& fold_of_frame) {
   constexpr int kFew = 5;  // frames of other folds that tell little; chosen
@@ -475,19 +505,13 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   out.unit.resize(rows);
   const bool with_places = rows_have_places(spec, impl_->used);
   if (with_places) out.place_px.resize(rows, 2);
-  out.jacobian.resize(rows, static_cast<Eigen::Index>(model.size()));
-  std::vector<Eigen::Triplet<double>> entries;
+  out.jacobian.setZero(rows, static_cast<Eigen::Index>(model.size()));
+  const auto width = bundle::width_of(linear.blocks);
+  const std::vector<Eigen::Index> in_model = places_in(model, width);
+  const std::vector<Eigen::Index> in_probes = places_in(columns.probes, width);
+  const std::vector<Eigen::Index> in_local = places_in(local, width);
+  std::vector<Eigen::Triplet<double>> probe_entries;
   std::vector<Eigen::Triplet<double>> local_entries;
-  const auto add_columns = [](const Eigen::MatrixXd& J, Eigen::Index first,
-                              const std::vector<Eigen::Index>& which,
-                              std::vector<Eigen::Triplet<double>>& to) {
-    for (std::size_t p = 0; p < which.size(); ++p) {
-      for (Eigen::Index i = 0; i < J.rows(); ++i) {
-        if (const double value = -J(i, which[p]); value != 0.0)
-          to.emplace_back(first + i, static_cast<Eigen::Index>(p), value);
-      }
-    }
-  };
   Eigen::Index row = 0;
   for (const auto& [frame, block] : linear.frames) {
     if (frame < 0) continue;  // measured distances are part of the model's prior knowledge
@@ -495,9 +519,14 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
     out.first_row.push_back(row);
     const Eigen::Index count = block.r.size();
     out.residual.segment(row, count) = block.r;
-    out.jacobian.middleRows(row, count) = -block.J(Eigen::all, model);
-    add_columns(block.J, row, columns.probes, entries);
-    add_columns(block.J, row, local, local_entries);
+    for (std::size_t k = 0; k < block.shown.size(); ++k) {
+      const auto column = static_cast<std::size_t>(block.shown[k]);
+      const Eigen::VectorXd derivative = -block.J.col(static_cast<Eigen::Index>(k));
+      if (in_model[column] >= 0)
+        out.jacobian.col(in_model[column]).segment(row, count) = derivative;
+      add_entries(derivative, row, in_probes[column], probe_entries);
+      add_entries(derivative, row, in_local[column], local_entries);
+    }
     Eigen::Index at = row;
     for (const int index : sightings.at(frame)) {
       const Sighting& sighting = spec.sightings[static_cast<std::size_t>(index)];
@@ -514,17 +543,17 @@ BundleFit EffectBundle::fit(const BundleChange& change, const std::vector<Correc
   }
   out.first_row.push_back(row);
   out.probes.resize(rows, static_cast<Eigen::Index>(probes.size()));
-  out.probes.setFromTriplets(entries.begin(), entries.end());
+  out.probes.setFromTriplets(probe_entries.begin(), probe_entries.end());
   out.local.resize(rows, std::ssize(local));
   out.local.setFromTriplets(local_entries.begin(), local_entries.end());
   out.local_values = out.values(out.local_corrections);
-  out.local_information = linear.prior_information.diagonal()(local);
-  if (!linear.prior_information.isZero(0.0)) {
-    out.prior_information = linear.prior_information(model, model);
+  out.local_information = Eigen::VectorXd(linear.prior_information.diagonal())(local);
+  if (linear.prior_information.nonZeros() > 0) {
+    out.prior_information = among(linear.prior_information, in_model, std::ssize(model));
     out.prior_gradient = linear.prior_gradient(model);
   }
   if (const auto distances = linear.frames.find(-1); distances != linear.frames.end()) {
-    const Eigen::MatrixXd J = distances->second.J(Eigen::all, model);
+    const Eigen::MatrixXd J = distances->second.dense(width)(Eigen::all, model);
     if (out.prior_information.size() == 0) {
       out.prior_information = Eigen::MatrixXd::Zero(J.cols(), J.cols());
       out.prior_gradient = Eigen::VectorXd::Zero(J.cols());

@@ -135,11 +135,12 @@ ExpectedRows expected_rows(const Calibration& calibration, const ExpectedRecordi
   const auto width = static_cast<Eigen::Index>(order.size());
   out.J.assign(spec.times_s.size(), Eigen::MatrixXd(0, width));
   for (const auto& [frame, rows] : linear.frames) {
+    const Eigen::MatrixXd own = rows.dense(bundle::width_of(linear.blocks));
     Eigen::MatrixXd& J = out.J[static_cast<std::size_t>(frame)];
     J = Eigen::MatrixXd::Zero(rows.J.rows(), width);
     for (Eigen::Index i = 0; i < width; ++i)
       if (order[static_cast<std::size_t>(i)] >= 0)
-        J.col(i) = rows.J.col(order[static_cast<std::size_t>(i)]);
+        J.col(i) = own.col(order[static_cast<std::size_t>(i)]);
   }
   return out;
 }

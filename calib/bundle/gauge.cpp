@@ -227,19 +227,30 @@ LinearBundle with_frames_held(const Spec& spec, const State& state, LinearBundle
     held[static_cast<std::size_t>(freedom.held)] = true;
   }
   std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> place(static_cast<std::size_t>(n), -1);  // among those that are kept
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (!held[static_cast<std::size_t>(i)]) kept.push_back(i);
+    if (held[static_cast<std::size_t>(i)]) continue;
+    place[static_cast<std::size_t>(i)] = std::ssize(kept);
+    kept.push_back(i);
   }
 
-  const Eigen::MatrixXd& P = linear.prior_information;
+  const Eigen::MatrixXd P = linear.prior_information;
   const Eigen::MatrixXd PG = P * G;
   const LdltFactor factor(Eigen::MatrixXd(G.transpose() * PG));
   const Eigen::MatrixXd marginal = P - PG * factor.solve(Eigen::MatrixXd(PG.transpose()));
   LinearBundle out;
   out.blocks = without(linear.blocks, held);
-  out.prior_information = marginal(kept, kept);
-  for (auto& [frame, rows] : linear.frames) {
-    out.frames.emplace(frame, FrameRows{Eigen::MatrixXd(rows.J(Eigen::all, kept)), rows.r});
+  out.prior_information = Eigen::MatrixXd(marginal(kept, kept)).sparseView();
+  for (const auto& [frame, rows] : linear.frames) {
+    std::vector<Eigen::Index> shown, from;
+    for (std::size_t i = 0; i < rows.shown.size(); ++i) {
+      const Eigen::Index at = place[static_cast<std::size_t>(rows.shown[i])];
+      if (at < 0) continue;
+      shown.push_back(at);
+      from.push_back(static_cast<Eigen::Index>(i));
+    }
+    out.frames.emplace(
+        frame, FrameRows{std::move(shown), Eigen::MatrixXd(rows.J(Eigen::all, from)), rows.r});
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <set>
 
 #include <ceres/cost_function.h>
@@ -22,22 +23,53 @@ std::vector<double*> data_of(const std::vector<FreeBlock>& blocks) {
   return data;
 }
 
-Eigen::MatrixXd dense_rows(const ceres::CRSMatrix& m, int first, int count, int column,
-                           int columns) {
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count, columns);
-  for (int i = 0; i < count; ++i) {
-    const auto row = static_cast<std::size_t>(first + i);
-    for (int k = m.rows[row]; k < m.rows[row + 1]; ++k) {
-      const int c = m.cols[static_cast<std::size_t>(k)] - column;
-      if (c >= 0 && c < columns) out(i, c) = m.values[static_cast<std::size_t>(k)];
-    }
+// Some rows of a matrix.
+class Rows {
+ public:
+  Rows(const ceres::CRSMatrix& matrix, int first, int count)
+      : matrix_(matrix), first_(static_cast<std::size_t>(first)), count_(count) {}
+
+  /// Of their columns before `end` those that they have entries in, ascending.
+  [[nodiscard]] std::vector<Eigen::Index> columns_before(int end) const {
+    std::set<Eigen::Index> out;
+    for (int k = matrix_.rows[first_]; k < matrix_.rows[last()]; ++k)
+      if (column(k) < end) out.insert(column(k));
+    return {out.begin(), out.end()};
   }
+
+  [[nodiscard]] Eigen::MatrixXd dense(const std::vector<Eigen::Index>& columns) const {
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count_, std::ssize(columns));
+    for (int i = 0; i < count_; ++i) {
+      const std::size_t row = first_ + static_cast<std::size_t>(i);
+      for (int k = matrix_.rows[row]; k < matrix_.rows[row + 1]; ++k) {
+        const auto at = std::ranges::lower_bound(columns, column(k));
+        if (at != columns.end() && *at == column(k))
+          out(i, at - columns.begin()) = matrix_.values[static_cast<std::size_t>(k)];
+      }
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] std::size_t last() const { return first_ + static_cast<std::size_t>(count_); }
+  [[nodiscard]] Eigen::Index column(int k) const {
+    return matrix_.cols[static_cast<std::size_t>(k)];
+  }
+
+  const ceres::CRSMatrix& matrix_;
+  std::size_t first_;
+  int count_;
+};
+
+std::vector<Eigen::Index> columns_from(int first, int count) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(count));
+  std::iota(out.begin(), out.end(), Eigen::Index{first});
   return out;
 }
 
 void add_priors(BuiltProblem& built, const std::vector<double*>& parameters, int width,
                 LinearBundle& out) {
-  out.prior_information = Eigen::MatrixXd::Zero(width, width);
+  out.prior_information.resize(width, width);
   out.prior_gradient = Eigen::VectorXd::Zero(width);
   if (built.prior_ids().empty()) return;
   ceres::Problem::EvaluateOptions options;
@@ -47,7 +79,7 @@ void add_priors(BuiltProblem& built, const std::vector<double*>& parameters, int
   ceres::CRSMatrix jacobian;
   KINESCOPE_CHECK(built.problem().Evaluate(options, nullptr, &residuals, nullptr, &jacobian),
                   "priors can be evaluated");
-  // A prior bears on one block: thousands of them are no dense product.
+  std::vector<Eigen::Triplet<double>> entries;
   for (int row = 0; row < jacobian.num_rows; ++row) {
     const auto at = static_cast<std::size_t>(row);
     for (int a = jacobian.rows[at]; a < jacobian.rows[at + 1]; ++a) {
@@ -55,11 +87,12 @@ void add_priors(BuiltProblem& built, const std::vector<double*>& parameters, int
       const double value = jacobian.values[static_cast<std::size_t>(a)];
       out.prior_gradient[column] += value * residuals[at];
       for (int b = jacobian.rows[at]; b < jacobian.rows[at + 1]; ++b) {
-        out.prior_information(column, jacobian.cols[static_cast<std::size_t>(b)]) +=
-            value * jacobian.values[static_cast<std::size_t>(b)];
+        entries.emplace_back(column, jacobian.cols[static_cast<std::size_t>(b)],
+                             value * jacobian.values[static_cast<std::size_t>(b)]);
       }
     }
   }
+  out.prior_information.setFromTriplets(entries.begin(), entries.end());
 }
 
 // Takes the frame's own unknowns out: J <- J - L (L'L)^-1 L' J.
@@ -100,9 +133,11 @@ void evaluate(BuiltProblem& built, BlocksOfFrames::const_iterator first,
     const auto local = locals.find(frame->first);
     const int local_width = local == locals.end() ? 0 : width_of(local->second);
     FrameRows rows;
-    rows.J = dense_rows(jacobian, row, count, 0, width);
+    const Rows own(jacobian, row, count);
+    rows.shown = own.columns_before(width);
+    rows.J = own.dense(rows.shown);
     rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data() + row, count);
-    eliminate(rows, dense_rows(jacobian, row, count, local_column, local_width));
+    eliminate(rows, own.dense(columns_from(local_column, local_width)));
     out.frames.emplace(frame->first, std::move(rows));
     row += count;
     local_column += local_width;
@@ -110,6 +145,12 @@ void evaluate(BuiltProblem& built, BlocksOfFrames::const_iterator first,
 }
 
 }  // namespace
+
+Eigen::MatrixXd FrameRows::dense(int width) const {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(J.rows(), width);
+  out(Eigen::all, shown) = J;
+  return out;
+}
 
 int width_of(const std::vector<FreeBlock>& blocks) {
   int width = 0;

@@ -7,21 +7,27 @@
 #include <map>
 #include <vector>
 
+#include <Eigen/SparseCore>
+
 #include "calib/bundle/problem.h"
 
 namespace kinescope::bundle {
 
 /// The rows of one frame, its sightings in their order; what only this frame knows (joint values
-/// without a channel) is eliminated.
+/// without a channel) is eliminated. Of thousands of parameters a frame shows some.
 struct FrameRows {
-  Eigen::MatrixXd J;  ///< d residual / d parameter
-  Eigen::VectorXd r;  ///< whitened
+  std::vector<Eigen::Index> shown;  ///< parameters, ascending
+  Eigen::MatrixXd J;                ///< rows x shown: d residual / d parameter
+  Eigen::VectorXd r;                ///< whitened
+
+  /// J of all parameters.
+  [[nodiscard]] Eigen::MatrixXd dense(int width) const;
 };
 
 struct LinearBundle {
   std::vector<FreeBlock> blocks;    ///< of the columns
   std::map<int, FrameRows> frames;  ///< by frame; distances between targets under -1
-  Eigen::MatrixXd prior_information;
+  Eigen::SparseMatrix<double> prior_information;
   Eigen::VectorXd prior_gradient;  ///< of half the priors' squares
 };
 

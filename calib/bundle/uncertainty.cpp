@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <functional>
 #include <map>
 
 #include <fmt/format.h>
 
 #include "calib/bundle/gauge.h"
+#include "calib/bundle/information.h"
 #include "calib/bundle/linearise.h"
 #include "kinematics/core/dense_algebra.h"
 #include "kinematics/core/error.h"
@@ -56,19 +57,20 @@ Stretches stretches(const Spec& spec, const LinearBundle& linear, double correla
   return out;
 }
 
-// Factors by which the variances of some parameters grow because the residuals are not independent.
+// Factors by which variances grow because the residuals are not independent.
 struct Inflation {
   Eigen::VectorXd of_parameter;
   double pooled = 1.0;
 };
 
+// Of some parameters, from their rows of the covariance of all.
 Inflation inflation(const LinearBundle& linear, const Stretches& stretch,
                     const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& of) {
   std::map<int, Eigen::VectorXd> scores;
-  const Eigen::Index n = covariance.rows();
+  const Eigen::Index n = covariance.cols();
   for (const auto& [frame, rows] : linear.frames) {
     auto [entry, fresh] = scores.try_emplace(stretch.of_frame.at(frame), Eigen::VectorXd::Zero(n));
-    entry->second += rows.J.transpose() * rows.r;
+    entry->second(rows.shown) += rows.J.transpose() * rows.r;
   }
   const auto count = static_cast<double>(scores.size());
   if (count < 3.0) return {Eigen::VectorXd::Ones(std::ssize(of))};
@@ -79,8 +81,8 @@ Inflation inflation(const LinearBundle& linear, const Stretches& stretch,
                                    (stretch.widening * count / (count - 1.0));
   Eigen::VectorXd ratio(std::ssize(of));
   for (Eigen::Index i = 0; i < ratio.size(); ++i) {
-    const Eigen::Index own = of[static_cast<std::size_t>(i)];
-    ratio[i] = covariance(own, own) > 0.0 ? sandwich[own] / covariance(own, own) : 1.0;
+    const double own = covariance(i, of[static_cast<std::size_t>(i)]);
+    ratio[i] = own > 0.0 ? sandwich[i] / own : 1.0;
   }
   // The ratio of one parameter scatters by sqrt(2 / stretches); half of it is taken from the pool.
   const double pooled = ratio.mean();
@@ -150,12 +152,12 @@ Rests find_rests(const Spec& spec, const LinearBundle& linear, const std::vector
     }
     if (rest.first == nullptr) {
       rest.first = &sighting;
-      rest.pull = Eigen::MatrixXd::Zero(size, rows.J.cols());
+      rest.pull = Eigen::MatrixXd::Zero(size, width_of(linear.blocks));
     }
     rest.last_s = spec.times_s[static_cast<std::size_t>(sighting.frame)];
     rest.declared_square += sighting.declared_sigma * sighting.declared_sigma;
     rest.residuals_px.emplace_back(sighting.sigma * rows.r.segment(begin, size));
-    rest.pull += rows.J.middleRows(begin, size) / sighting.sigma;
+    rest.pull(Eigen::all, rows.shown) += rows.J.middleRows(begin, size) / sighting.sigma;
     begin += size;
   }
   for (auto& [series, rest] : open) close(rest);
@@ -227,110 +229,33 @@ void observe(const Eigen::MatrixXd& data, const std::vector<Parameter>& paramete
   }
 }
 
-// Pseudo-inverse of the information matrix. Directions that are no more than the rounding of its
-// eigenvalues are left out, and the parameters they touch are marked.
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information, std::vector<bool>& unseen) {
-  constexpr double kTouched = 1e-3;  // of a direction of unit length
-  const Eigen::Index n = information.rows();
-  const Eigen::VectorXd scale = unit_scale(information);
-  const SymmetricEigen eigen =
-      symmetric_eigen(scale.asDiagonal() * information * scale.asDiagonal());
-  const double rounding =
-      static_cast<double>(n) * std::numeric_limits<double>::epsilon() * eigen.values[n - 1];
-  Eigen::VectorXd inverse = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    if (eigen.values[k] > rounding) {
-      inverse[k] = 1.0 / eigen.values[k];
-      continue;
-    }
-    for (Eigen::Index i = 0; i < n; ++i) {
-      if (std::abs(eigen.vectors(i, k)) > kTouched) unseen[static_cast<std::size_t>(i)] = true;
-    }
-  }
-  return scale.asDiagonal() * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() *
-         scale.asDiagonal();
-}
-
-// Columns of corrections that bear on a few frames each, of which there may be thousands, and the
-// others.
-struct Columns {
-  std::vector<Eigen::Index> local;
-  std::vector<Eigen::Index> other;
-};
-
 bool is_local(const Spec& spec, const State& state, const FreeBlock& block) {
   if (block.block != "effects") return false;
   return spec.corrections[static_cast<std::size_t>(block.data - state.corrections.data())].is_local;
 }
 
-Columns columns_of(const Spec& spec, const State& state, const std::vector<FreeBlock>& blocks) {
-  Columns out;
+ParameterPlaces places_of(const Spec& spec, const State& state,
+                          const std::vector<FreeBlock>& blocks) {
+  ParameterPlaces out;
   Eigen::Index next = 0;
   for (const FreeBlock& block : blocks) {
-    std::vector<Eigen::Index>& to = is_local(spec, state, block) ? out.local : out.other;
-    for (std::size_t i = 0; i < block.names.size(); ++i) to.push_back(next++);
-  }
-  return out;
-}
-
-// Of an information matrix, the local ones eliminated (Schur complement).
-struct Reduced {
-  Eigen::MatrixXd information;
-  CholeskyFactor local;
-  Eigen::MatrixXd answer;  // local x other: how they follow the others
-
-  Reduced(const Eigen::MatrixXd& whole, const Columns& columns)
-      : information(whole(columns.other, columns.other)) {
-    if (columns.local.empty()) return;
-    local = CholeskyFactor(whole(columns.local, columns.local));
-    KINESCOPE_CHECK(local.positive_definite(), "local corrections have priors");
-    const Eigen::MatrixXd beside = whole(columns.local, columns.other);
-    answer = local.solve(beside);
-    information -= beside.transpose() * answer;
-  }
-};
-
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information, const Columns& columns,
-                           std::vector<bool>& unseen) {
-  if (columns.local.empty()) return inverse_of(information, unseen);
-  const Reduced reduced(information, columns);
-  std::vector<bool> unseen_others(columns.other.size(), false);
-  const Eigen::MatrixXd others = inverse_of(reduced.information, unseen_others);
-  for (std::size_t i = 0; i < columns.other.size(); ++i)
-    unseen[static_cast<std::size_t>(columns.other[i])] = unseen_others[i];
-  Eigen::MatrixXd out(information.rows(), information.cols());
-  const Eigen::MatrixXd beside = -reduced.answer * others;
-  out(columns.other, columns.other) = others;
-  out(columns.local, columns.other) = beside;
-  out(columns.other, columns.local) = beside.transpose();
-  out(columns.local, columns.local) = reduced.local.inverse() - beside * reduced.answer.transpose();
-  return out;
-}
-
-// A correction with a prior is one that the data need not show.
-Eigen::MatrixXd with_known_corrections(Eigen::MatrixXd data, const LinearBundle& linear) {
-  Eigen::Index at = 0;
-  for (const FreeBlock& block : linear.blocks) {
-    const Eigen::Index n = std::ssize(block.names);
-    if (block.block == "effects") {
-      data.block(at, at, n, n) += linear.prior_information.block(at, at, n, n);
+    const bool local = is_local(spec, state, block);
+    std::vector<Eigen::Index>& to = local ? out.local : out.other;
+    for (std::size_t i = 0; i < block.names.size(); ++i) {
+      out.place.push_back(std::ssize(to));
+      out.is_local.push_back(local);
+      to.push_back(next++);
     }
-    at += n;
   }
-  return data;
+  return out;
 }
 
-// J'J, its lower half. Of thousands of parameters a frame shows some.
-void add_products(const Eigen::MatrixXd& J, Eigen::MatrixXd& sum) {
-  std::vector<Eigen::Index> shown;
-  for (Eigen::Index c = 0; c < J.cols(); ++c)
-    if (!J.col(c).isZero(0.0)) shown.push_back(c);
-  const Eigen::MatrixXd own = J(Eigen::all, shown);
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(own.cols(), own.cols());
-  products.selfadjointView<Eigen::Lower>().rankUpdate(own.transpose());
-  for (Eigen::Index b = 0; b < products.cols(); ++b)
-    for (Eigen::Index a = b; a < products.rows(); ++a)
-      sum(shown[static_cast<std::size_t>(a)], shown[static_cast<std::size_t>(b)]) += products(a, b);
+// Of every parameter, whether it is of an effect.
+std::vector<bool> effects_among(const std::vector<FreeBlock>& blocks) {
+  std::vector<bool> out;
+  for (const FreeBlock& block : blocks)
+    out.insert(out.end(), block.names.size(), block.block == "effects");
+  return out;
 }
 
 }  // namespace
@@ -340,7 +265,7 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
   if (spec.prior) linear = with_frames_held(spec, state, std::move(linear));
   Uncertainty out;
   const int n = width_of(linear.blocks);
-  const Columns columns = columns_of(spec, state, linear.blocks);
+  const ParameterPlaces places = places_of(spec, state, linear.blocks);
   for (const FreeBlock& block : linear.blocks) {
     if (is_local(spec, state, block)) continue;
     out.blocks.push_back(block);
@@ -348,40 +273,42 @@ Uncertainty estimate_uncertainty(const Spec& spec, State& state, const std::vect
       out.parameters.push_back({block.names[i], block.block, block.units[i], 0.0, {}, {}});
   }
   if (n == 0) return out;
-  Eigen::MatrixXd data = Eigen::MatrixXd::Zero(n, n);
+  Information information(places);
   for (const auto& [frame, rows] : linear.frames) {
-    add_products(rows.J, data);
+    information.add(rows);
     out.chi_square += rows.r.squaredNorm();
     out.rows += static_cast<int>(rows.r.size());
   }
-  data = Eigen::MatrixXd(data.selfadjointView<Eigen::Lower>());
-
-  std::vector<bool> unseen(static_cast<std::size_t>(n), false);
-  observe(Reduced(with_known_corrections(data, linear), columns).information, out.parameters,
-          out.observability);
-  const Eigen::MatrixXd white = inverse_of(data + linear.prior_information, columns, unseen);
+  // A correction with a prior is one that the data need not show.
+  const std::vector<bool> is_effect = effects_among(linear.blocks);
+  const auto is_of_effects = [&](Eigen::Index i, Eigen::Index j) {
+    return is_effect[static_cast<std::size_t>(i)] && is_effect[static_cast<std::size_t>(j)];
+  };
+  information.add(linear.prior_information, is_of_effects);
+  observe(information.reduced(), out.parameters, out.observability);
+  information.add(linear.prior_information, std::not_fn(is_of_effects));
+  std::vector<bool> unseen(places.other.size(), false);
+  const Eigen::MatrixXd white = information.covariance_rows(unseen);
   out.correlation_time_s = spec.postures ? 0.0 : correlation_time(spec, state, used);
   const Stretches stretch = stretches(spec, linear, out.correlation_time_s);
-  const Inflation inflated = inflation(linear, stretch, white, columns.other);
+  const Inflation inflated = inflation(linear, stretch, white, places.other);
   out.noise_widening = inflated.pooled;
   const Eigen::VectorXd factor = inflated.of_parameter.cwiseSqrt();
-  out.covariance = factor.asDiagonal() * white(columns.other, columns.other) * factor.asDiagonal();
+  out.covariance = factor.asDiagonal() * white(Eigen::all, places.other) * factor.asDiagonal();
   if (spec.kind == MeasurementKind::kCorners) {
     const Eigen::MatrixXd shift =
-        white(columns.other, Eigen::all) *
-        scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n);
+        white * scatter_of_rests(find_rests(spec, linear, used, stretch.length_s), n);
     if (shift.cols() > 0) out.covariance += shift * shift.transpose();
   }
   for (std::size_t i = 0; i < out.parameters.size(); ++i) {
     Parameter& parameter = out.parameters[i];
-    const Eigen::Index column = columns.other[i];
     // Where a nominal robot stands as a whole may be nobody's to know; its axes are known beside
     // one another.
     const bool is_of_robot = spec.prior && parameter.block != "effects";
-    if (unseen[static_cast<std::size_t>(column)] && !is_of_robot) continue;
-    parameter.sigma_white = std::sqrt(white(column, column));
-    parameter.sigma =
-        std::sqrt(out.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)));
+    if (unseen[i] && !is_of_robot) continue;
+    const auto at = static_cast<Eigen::Index>(i);
+    parameter.sigma_white = std::sqrt(white(at, places.other[i]));
+    parameter.sigma = std::sqrt(out.covariance(at, at));
   }
   return out;
 }
