@@ -100,6 +100,7 @@ CameraEffect unsteady(const EffectWorld& world, const Suspect& s, const Unsteady
              fmt::format("{} is read {}", s.name, reading.in_steps ? "in steps" : "with noise"),
              {{parameter, s.unit}}, s.unit);
   out.candidate.possible = as_the_log_shows(reading.size);
+  if (reading.in_steps) out.candidate.expected = Eigen::VectorXd::Constant(1, reading.size);
   // Every encoder has some.
   if (world.kind == MeasurementKind::kCorners) out.candidate.floor = kUsualShift;
   out.candidate.check = reading.in_steps

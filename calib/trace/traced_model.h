@@ -98,6 +98,9 @@ struct Candidate {
   /// All that is of this kind has some of it (friction): what is left at its place and is less than
   /// it explains is beside it, and puts no doubt on its name.
   bool is_usual = false;
+  /// What is known of its parameters from elsewhere (a log shows the steps of its encoder). Where
+  /// that much is large beside the noise, the search begins with it. Empty: nothing.
+  Eigen::VectorXd expected;
   /// There is no second one at its place: what one more would explain is the first at another value
   /// of the scan (something creeps once, with one time constant).
   bool is_single = false;

@@ -56,6 +56,7 @@ std::optional<AddedEffect> Tracer::first() {
 void Tracer::search() {
   add_step(0, std::string(kModelAsItIs), *base_);
   if (now_ != base_) add_step(0, "with the effects that were known", *now_);
+  begin_with_what_is_expected();
   for (bool again = true; again;) {
     forward();
     if (is_ended_) return say_nothing("the search was ended");
@@ -117,6 +118,25 @@ bool Tracer::can_look(const Stage& stage) {
     return false;
   }
   return true;
+}
+
+void Tracer::begin_with_what_is_expected() {
+  constexpr double kLarge = 0.5;  // of the noise of the rows that it touches; chosen
+  std::vector<AddedEffect> effects = now_->added;
+  std::string names;
+  for (const Candidate& candidate : now_->fit.candidates) {
+    if (candidate.expected.size() == 0 || is_added(candidate.id)) continue;
+    const std::vector<EffectColumn> columns = candidate.columns(0.0);
+    const double squares = now_->system.moved_by(columns, candidate.expected).squaredNorm();
+    if (now_->system.noise_share_of(squares, columns) < kLarge) continue;
+    effects.push_back({candidate.id, 0.0});
+    names += (names.empty() ? "" : ", ") + name_of(candidate.id);
+  }
+  if (names.empty()) return;
+  StagePtr begun = stage_of(std::move(effects));
+  if (!begun->fit.converged) return;
+  now_ = std::move(begun);
+  add_step(0, fmt::format("with {}, which the readings show", names), *now_);
 }
 
 bool Tracer::is_added(const EffectId& id) const {

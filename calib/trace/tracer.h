@@ -58,6 +58,8 @@ class Tracer {
   /// The model with these effects; those asked for last are kept.
   [[nodiscard]] StagePtr stage_of(std::vector<AddedEffect> effects);
   [[nodiscard]] bool can_look(const Stage& stage);
+  // Adds them all at once: beside a large one that is missing, others stand in for it.
+  void begin_with_what_is_expected();
   [[nodiscard]] bool is_added(const EffectId& id) const;
   /// Of an effect that was added: as it is offered where it was fitted (what a size is counted in
   /// depends on that fit), or without any.
