@@ -113,6 +113,8 @@ std::optional<Contradiction> stretches_of_a_wrong_log(const Explanation& now,
   out.words_if_taken = out.words_if_kept = lines_of(stretches, now.log);
   out.is_no_error_of_robot = std::ranges::all_of(stretches, &OddStretch::is_told_by_log);
   out.without_it = without_stretches(evidence, now.log, calibration.time_offset_s, stretches);
+  // Where most of the log is wrong, the robot is.
+  if (2 * out.without_it->recording.log.size() < now.log.size()) out.without_it.reset();
   return out;
 }
 

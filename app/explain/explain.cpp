@@ -48,6 +48,18 @@ std::string words_of(const std::vector<ReadingApart>& readings, const Explanatio
   return shown ? fmt::format("{}; the markers say {:.6g}", out, *shown) : out;
 }
 
+// A part of the evidence may lack what was declared: then it is no rival of the whole.
+Explanation explained_part(const ChangedEvidence& part, const ExplainOptions& options,
+                           std::vector<std::string>& said) {
+  try {
+    return explained(part.view(), options, said);
+  } catch (const Error& error) {
+    Explanation out;
+    out.failure = error;
+    return out;
+  }
+}
+
 // Without the readings that nothing leads to, unless the markers speak for them.
 Explanation with_odd_readings_apart(const Evidence& evidence,
                                     const std::vector<ReadingApart>& apart,
@@ -57,12 +69,7 @@ Explanation with_odd_readings_apart(const Evidence& evidence,
   const ChangedEvidence changed = without(evidence, apart);
   std::vector<std::string> said;
   std::vector<std::string> said_with_them;
-  Explanation without_them;
-  try {
-    without_them = explained(changed.view(), options, said);
-  } catch (const Error& error) {
-    without_them.failure = error;
-  }
+  Explanation without_them = explained_part(changed, options, said);
   // What needed no sighting to be given up has nothing against it.
   const bool cost_nothing =
       sightings_in(changed.observed.measurements) == sightings_in(evidence.observed.measurements);
@@ -130,29 +137,30 @@ Explanation with_contradictions_apart(Explanation now, const Evidence& evidence,
   static constexpr std::array kFinders{&joints_followed_in_parts, &stretches_of_a_wrong_log,
                                        &markers_that_came_off};
   std::optional<ChangedEvidence> changed;
+  std::array<std::vector<std::string>, kFinders.size()> kept;  // what each said last
   ExplainOptions alike = options;
   std::size_t asked_since_change = 0;
   for (std::size_t i = 0; asked_since_change < kFinders.size(); i = (i + 1) % kFinders.size()) {
     ++asked_since_change;
+    kept[i].clear();
     if (now.fitted) alike.calibrate.fold_of_frame = folds_of(now.fitted->calibration);
     const Evidence in_force = changed ? changed->view() : evidence;
     std::optional<Contradiction> found = kFinders[i](now, in_force, alike);
     if (!found) continue;
-    if (found->without_it) {
-      std::vector<std::string> said;
-      Explanation other = explained(found->without_it->view(), alike, said);
-      if ((found->is_no_error_of_robot && is_settled(other)) ||
-          is_better(other, now, evidence.observed.measurements)) {
-        now = std::move(other);
-        changed = std::move(found->without_it);
-        add_unsaid(std::move(said), warnings);
-        add_unsaid(std::move(found->words_if_taken), warnings);
-        asked_since_change = 0;
-        continue;
-      }
-    }
-    add_unsaid(std::move(found->words_if_kept), warnings);
+    kept[i] = std::move(found->words_if_kept);
+    if (!found->without_it) continue;
+    std::vector<std::string> said;
+    Explanation other = explained_part(*found->without_it, alike, said);
+    const bool is_enough = found->is_no_error_of_robot && is_settled(other);
+    if (!is_enough && !is_better(other, now, evidence.observed.measurements)) continue;
+    now = std::move(other);
+    changed = std::move(found->without_it);
+    add_unsaid(std::move(said), warnings);
+    add_unsaid(std::move(found->words_if_taken), warnings);
+    kept[i].clear();
+    asked_since_change = 0;
   }
+  for (std::vector<std::string>& words : kept) add_unsaid(std::move(words), warnings);
   return now;
 }
 

@@ -21,21 +21,6 @@ Smoothness diagonalise(const NormalSystem& system, const Candidate& candidate, d
   return {length, eigen.values.cwiseMax(0.0), eigen.vectors.transpose() * score, {}};
 }
 
-// The model without some of its last parameters, at whose values `taken` the residual stands.
-Linearisation without_columns(const Linearisation& linear, Eigen::Index first,
-                              const Eigen::VectorXd& taken) {
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index c = 0; c < linear.jacobian.cols(); ++c) {
-    if (c < first || c >= first + taken.size()) kept.push_back(c);
-  }
-  Linearisation out = linear;
-  out.residual += linear.jacobian.middleCols(first, taken.size()) * taken;
-  out.jacobian = linear.jacobian(Eigen::all, kept);
-  if (linear.prior.size() > 0) out.prior = linear.prior(kept, kept);
-  if (linear.prior_gradient.size() > 0) out.prior_gradient = linear.prior_gradient(kept);
-  return out;
-}
-
 }  // namespace
 
 std::optional<AddedEffect> likeliest_curve(const NormalSystem& system, const Candidate& candidate) {
@@ -58,17 +43,12 @@ std::optional<AddedEffect> likeliest_curve(const NormalSystem& system, const Can
 
 std::vector<AddedEffect> tuned_curves(const Stage& stage) {
   std::vector<AddedEffect> out = stage.added;
-  Eigen::Index first = stage.system.parameters();
-  for (const Eigen::VectorXd& values : stage.fit.values) first -= values.size();
   for (std::size_t i = 0; i < stage.added.size(); ++i) {
-    const Eigen::VectorXd& values = stage.fit.values[i];
     const Candidate* candidate = find_candidate(stage.fit, stage.added[i].id);
-    if (candidate != nullptr && candidate->is_curve()) {
-      const Linearisation without = without_columns(stage.fit.linear, first, values);
-      const NormalSystem system(without, stage.system.partition());
-      if (const auto tuned = likeliest_curve(system, *candidate)) out[i] = *tuned;
-    }
-    first += values.size();
+    if (candidate == nullptr || !candidate->is_curve()) continue;
+    const Linearisation without = without_effect(stage, i);
+    const NormalSystem system(without, stage.system.partition());
+    if (const auto tuned = likeliest_curve(system, *candidate)) out[i] = *tuned;
   }
   return out;
 }

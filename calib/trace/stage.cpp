@@ -23,7 +23,7 @@ double Stage::rms() const {
                    std::max(1.0, linear.points(0, linear.unit.size())));
 }
 
-double held_out_sum_without(const Stage& stage, std::size_t index) {
+Linearisation without_effect(const Stage& stage, std::size_t index) {
   const std::vector<Eigen::VectorXd>& values = stage.fit.values;
   const Linearisation& linear = stage.fit.linear;
   Eigen::Index first = linear.jacobian.cols();
@@ -32,11 +32,16 @@ double held_out_sum_without(const Stage& stage, std::size_t index) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index c = 0; c < linear.jacobian.cols(); ++c)
     if (c < first || c >= first + count) kept.push_back(c);
-  Linearisation less = linear;
-  less.residual += linear.jacobian.middleCols(first, count) * values[index];
-  less.jacobian = linear.jacobian(Eigen::all, kept);
-  if (linear.prior.size() > 0) less.prior = linear.prior(kept, kept);
-  if (linear.prior_gradient.size() > 0) less.prior_gradient = linear.prior_gradient(kept);
+  Linearisation out = linear;
+  out.residual += linear.jacobian.middleCols(first, count) * values[index];
+  out.jacobian = linear.jacobian(Eigen::all, kept);
+  if (linear.prior.size() > 0) out.prior = linear.prior(kept, kept);
+  if (linear.prior_gradient.size() > 0) out.prior_gradient = linear.prior_gradient(kept);
+  return out;
+}
+
+double held_out_sum_without(const Stage& stage, std::size_t index) {
+  const Linearisation less = without_effect(stage, index);
   return held_out_instants(NormalSystem(less, stage.system.partition())).whitened.sum();
 }
 

@@ -31,6 +31,9 @@ struct Stage {
 
 using StagePtr = std::shared_ptr<const Stage>;
 
+/// The same linear model without one of its effects: nothing else has moved.
+[[nodiscard]] Linearisation without_effect(const Stage& stage, std::size_t index);
+
 /// To first order, where one of its effects is not there and all else gives way: no refit.
 [[nodiscard]] double held_out_sum_without(const Stage& stage, std::size_t index);
 

@@ -27,7 +27,7 @@ constexpr Eigen::Index kDriveColumns = 7;
 constexpr Eigen::Index kPayload = 10;
 constexpr Eigen::Index kForce = 12;  ///< a force and its moments about the link, each along 3 axes
 constexpr Eigen::Index kLoad = kPayload + kForce;
-constexpr double kRidge = 1e-7;     ///< of columns of length 1
+constexpr double kRidge = 1e-7;     ///< of columns of length 1; chosen
 constexpr double kFewSigmas = 5.0;  ///< sigmas: a short contact must not choose the span
 constexpr double kUsualSize = 0.6745;
 

@@ -171,9 +171,9 @@ TEST(TraceCalibration, WhichStepAReadingIsInIsToldByTheClockThatIsFound) {
   const Trace trace = trace_of(world).trace;
   EXPECT_EQ(trace.verdict, TraceVerdict::kEffects) << answer(trace);
   ASSERT_EQ(trace.accepted.size(), 2U) << answer(trace);
-  EXPECT_EQ(trace.accepted[0].id, (EffectId{"clock_drift", "clock"}));
-  EXPECT_EQ(trace.accepted[1].id, (EffectId{"quantisation", "q2"}));
-  EXPECT_TRUE(size_is_right(trace.accepted[1], steps.size)) << trace.accepted[1].size;
+  EXPECT_EQ(trace.accepted[0].id, (EffectId{"quantisation", "q2"}));
+  EXPECT_TRUE(size_is_right(trace.accepted[0], steps.size)) << trace.accepted[0].size;
+  EXPECT_EQ(trace.accepted[1].id, (EffectId{"clock_drift", "clock"}));
   EXPECT_LT(trace.held_out_after.value, 1.3 * clean_trace().trace.held_out_after.value);
 }
 

@@ -97,6 +97,28 @@ Change none() {
   return [](Files&) {};
 }
 
+Change log_late(int first, int end, int rows) {
+  return [=](Files& files) {
+    const std::vector<Row> log = rows_of(files.at("joints.csv"));
+    each_row("joints.csv", [&](Row& row, int i) {
+      if (i < first || i >= end) return;
+      const Row& before = log[static_cast<std::size_t>(i - rows)];
+      std::copy(before.begin() + 1, before.end(), row.begin() + 1);
+    })(files);
+  };
+}
+
+Change marker_fallen(const std::string& body, double from_s) {
+  return [=](Files& files) {
+    Row where;
+    each_row("poses.csv", [&](Row& row, int) {
+      if (row[1] != body || std::stod(row[0]) < from_s) return;
+      if (where.empty()) where = row;
+      std::copy(where.begin() + 2, where.end(), row.begin() + 2);
+    })(files);
+  };
+}
+
 Change first_joint(const std::function<void(Joint&)>& edit) {
   return [=](Files& files) {
     const fs::path path = truth::temporary_path("lying_input.urdf");

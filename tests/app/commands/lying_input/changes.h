@@ -33,6 +33,10 @@ using Row = std::vector<std::string>;
                               const std::string& to);
 [[nodiscard]] Change all_of(const std::vector<Change>& changes);
 [[nodiscard]] Change none();
+/// Rows of the log from `first` to before `end` that hold what those so many rows before do.
+[[nodiscard]] Change log_late(int first, int end, int rows);
+/// A marker of poses.csv that lies where it was at that time from then on.
+[[nodiscard]] Change marker_fallen(const std::string& body, double from_s);
 /// What a drawing is with its first joint changed.
 [[nodiscard]] Change first_joint(const std::function<void(Joint&)>& edit);
 [[nodiscard]] Change poses_as(const std::function<Pose(const Pose&)>& other);

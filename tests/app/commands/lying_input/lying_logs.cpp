@@ -214,17 +214,17 @@ std::vector<LyingInput> lying_logs() {
         "but the markers it moves say"}},
       {"LogLateForAWhile",
        poses,
-       [](Files& files) {
-         const std::vector<Row> rows = rows_of(files["joints.csv"]);
-         each_row("joints.csv", [&](Row& row, int i) {
-           if (i >= 300 && i < 400)
-             std::copy(rows[static_cast<std::size_t>(i - 24)].begin() + 1,
-                       rows[static_cast<std::size_t>(i - 24)].end(), row.begin() + 1);
-         })(files);
-       },
+       log_late(300, 400, 24),
        kRun,
        0,
        {"'ch0', 'ch1', 'ch2' are wrong (0.25 s late)"}},
+      {"LogLateForAWhileAndAMarkerThatFell",
+       poses,
+       all_of({log_late(100, 200, 24), marker_fallen("3", 4.0)}),
+       kRun,
+       0,
+       {"'ch0', 'ch1', 'ch2' are wrong (0.25 s late)",
+        "tag_3 is not where the robot carries it from t = 4", "3 joints"}},
       // joints.csv, written by other programs: read as it is meant
       {"LogOfSemicolonsAndCommas",
        poses,

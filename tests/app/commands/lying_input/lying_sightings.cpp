@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -74,14 +73,7 @@ std::vector<LyingInput> lying_sightings() {
        {"axis of"}},
       {"PosesOfAMarkerThatFell",
        poses,
-       [](Files& files) {
-         Row where;
-         each_row("poses.csv", [&](Row& row, int) {
-           if (row[1] != "3" || std::stod(row[0]) < 4.0) return;
-           if (where.empty()) where = row;
-           std::copy(where.begin() + 2, where.end(), row.begin() + 2);
-         })(files);
-       },
+       marker_fallen("3", 4.0),
        kRun,
        0,
        {"tag_3 is not where the robot carries it from t = 4", "3 joints"},
