@@ -81,6 +81,26 @@ std::vector<LostMarker> lost_of_free_markers(const Explanation& now, const Evide
   return {};
 }
 
+bool may_have_lost_markers(const Explanation& now, const Evidence& evidence) {
+  return now.fitted && now.structure && !evidence.recording.nominal && shows_film(now) &&
+         evidence.observed.measurements.camera_of_frame.empty();
+}
+
+std::optional<Contradiction> without_lost(const std::vector<LostMarker>& lost,
+                                          const Explanation& now, const Evidence& evidence) {
+  if (lost.empty()) return {};
+  Contradiction out;
+  out.is_no_error_of_robot = true;
+  for (const LostMarker& marker : lost) out.words_if_taken.push_back(words_of(marker));
+  const std::vector<double>& times_s = evidence.observed.measurements.times_s;
+  out.without_it = without_sightings(evidence, now.log, [&](TagId id, int frame) {
+    const double at_s = times_s[static_cast<std::size_t>(frame)];
+    return std::ranges::any_of(
+        lost, [&](const LostMarker& marker) { return marker.id == id && marker.is_lost_at(at_s); });
+  });
+  return out;
+}
+
 }  // namespace
 
 std::optional<Contradiction> joints_followed_in_parts(const Explanation& now,
@@ -119,23 +139,16 @@ std::optional<Contradiction> stretches_of_a_wrong_log(const Explanation& now,
 }
 
 std::optional<Contradiction> markers_that_came_off(const Explanation& now, const Evidence& evidence,
-                                                   const ExplainOptions& options) {
-  const Measurements& measured = evidence.observed.measurements;
-  if (!now.fitted || !now.structure || evidence.recording.nominal || !shows_film(now) ||
-      !measured.camera_of_frame.empty())
-    return {};
-  std::vector<LostMarker> lost = lost_markers(now.fitted->calibration);
-  if (lost.empty()) lost = lost_of_free_markers(now, evidence, options);
-  if (lost.empty()) return {};
-  Contradiction out;
-  out.is_no_error_of_robot = true;
-  for (const LostMarker& marker : lost) out.words_if_taken.push_back(words_of(marker));
-  out.without_it = without_sightings(evidence, now.log, [&](TagId id, int frame) {
-    const double at_s = measured.times_s[static_cast<std::size_t>(frame)];
-    return std::ranges::any_of(
-        lost, [&](const LostMarker& marker) { return marker.id == id && marker.is_lost_at(at_s); });
-  });
-  return out;
+                                                   const ExplainOptions&) {
+  if (!may_have_lost_markers(now, evidence)) return {};
+  return without_lost(lost_markers(now.fitted->calibration), now, evidence);
+}
+
+std::optional<Contradiction> free_markers_that_came_off(const Explanation& now,
+                                                        const Evidence& evidence,
+                                                        const ExplainOptions& options) {
+  if (!may_have_lost_markers(now, evidence)) return {};
+  return without_lost(lost_of_free_markers(now, evidence, options), now, evidence);
 }
 
 }  // namespace kinescope

@@ -31,5 +31,7 @@ using FindContradiction = std::optional<Contradiction>(const Explanation& now,
 [[nodiscard]] FindContradiction joints_followed_in_parts;
 [[nodiscard]] FindContradiction stretches_of_a_wrong_log;
 [[nodiscard]] FindContradiction markers_that_came_off;
+/// Which therefore seem to move with no joint. Explains halves of the evidence.
+[[nodiscard]] FindContradiction free_markers_that_came_off;
 
 }  // namespace kinescope

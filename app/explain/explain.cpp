@@ -134,8 +134,10 @@ void add_unsaid(std::vector<std::string> said, std::vector<std::string>& warning
 Explanation with_contradictions_apart(Explanation now, const Evidence& evidence,
                                       const ExplainOptions& options,
                                       std::vector<std::string>& warnings) {
-  static constexpr std::array kFinders{&joints_followed_in_parts, &stretches_of_a_wrong_log,
-                                       &markers_that_came_off};
+  // Which readings are wrong, the markers tell: those that came off are asked for before. What
+  // takes long is asked at last.
+  static constexpr std::array kFinders{&joints_followed_in_parts, &markers_that_came_off,
+                                       &stretches_of_a_wrong_log, &free_markers_that_came_off};
   std::optional<ChangedEvidence> changed;
   std::array<std::vector<std::string>, kFinders.size()> kept;  // what each said last
   ExplainOptions alike = options;

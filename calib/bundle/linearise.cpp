@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 #include <set>
 
 #include <ceres/cost_function.h>
@@ -23,47 +22,42 @@ std::vector<double*> data_of(const std::vector<FreeBlock>& blocks) {
   return data;
 }
 
-// Some rows of a matrix.
-class Rows {
- public:
-  Rows(const ceres::CRSMatrix& matrix, int first, int count)
-      : matrix_(matrix), first_(static_cast<std::size_t>(first)), count_(count) {}
-
-  /// Of their columns before `end` those that they have entries in, ascending.
-  [[nodiscard]] std::vector<Eigen::Index> columns_before(int end) const {
-    std::set<Eigen::Index> out;
-    for (int k = matrix_.rows[first_]; k < matrix_.rows[last()]; ++k)
-      if (column(k) < end) out.insert(column(k));
-    return {out.begin(), out.end()};
+// Some rows of a matrix, of its columns from `column` on.
+Eigen::MatrixXd dense_rows(const ceres::CRSMatrix& m, int first, int count, int column,
+                           int columns) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count, columns);
+  for (int i = 0; i < count; ++i) {
+    const auto row = static_cast<std::size_t>(first + i);
+    for (int k = m.rows[row]; k < m.rows[row + 1]; ++k) {
+      const int c = m.cols[static_cast<std::size_t>(k)] - column;
+      if (c >= 0 && c < columns) out(i, c) = m.values[static_cast<std::size_t>(k)];
+    }
   }
+  return out;
+}
 
-  [[nodiscard]] Eigen::MatrixXd dense(const std::vector<Eigen::Index>& columns) const {
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(count_, std::ssize(columns));
-    for (int i = 0; i < count_; ++i) {
-      const std::size_t row = first_ + static_cast<std::size_t>(i);
-      for (int k = matrix_.rows[row]; k < matrix_.rows[row + 1]; ++k) {
-        const auto at = std::ranges::lower_bound(columns, column(k));
-        if (at != columns.end() && *at == column(k))
-          out(i, at - columns.begin()) = matrix_.values[static_cast<std::size_t>(k)];
+// The same of those among the first `width` columns that the rows have entries in.
+FrameRows shown_rows(const ceres::CRSMatrix& m, int first, int count, int width) {
+  std::vector<Eigen::Index> place(static_cast<std::size_t>(width), -1);
+  const auto each_entry = [&](const auto& visit) {
+    for (int i = 0; i < count; ++i) {
+      const auto row = static_cast<std::size_t>(first + i);
+      for (int k = m.rows[row]; k < m.rows[row + 1]; ++k) {
+        const int column = m.cols[static_cast<std::size_t>(k)];
+        if (column < width)
+          visit(i, place[static_cast<std::size_t>(column)], m.values[static_cast<std::size_t>(k)]);
       }
     }
-    return out;
+  };
+  each_entry([](int, Eigen::Index& at, double) { at = 0; });
+  FrameRows out;
+  for (std::size_t c = 0; c < place.size(); ++c) {
+    if (place[c] < 0) continue;
+    place[c] = std::ssize(out.shown);
+    out.shown.push_back(static_cast<Eigen::Index>(c));
   }
-
- private:
-  [[nodiscard]] std::size_t last() const { return first_ + static_cast<std::size_t>(count_); }
-  [[nodiscard]] Eigen::Index column(int k) const {
-    return matrix_.cols[static_cast<std::size_t>(k)];
-  }
-
-  const ceres::CRSMatrix& matrix_;
-  std::size_t first_;
-  int count_;
-};
-
-std::vector<Eigen::Index> columns_from(int first, int count) {
-  std::vector<Eigen::Index> out(static_cast<std::size_t>(count));
-  std::iota(out.begin(), out.end(), Eigen::Index{first});
+  out.J = Eigen::MatrixXd::Zero(count, std::ssize(out.shown));
+  each_entry([&](int row, Eigen::Index at, double value) { out.J(row, at) = value; });
   return out;
 }
 
@@ -132,12 +126,9 @@ void evaluate(BuiltProblem& built, BlocksOfFrames::const_iterator first,
       count += built.problem().GetCostFunctionForResidualBlock(id)->num_residuals();
     const auto local = locals.find(frame->first);
     const int local_width = local == locals.end() ? 0 : width_of(local->second);
-    FrameRows rows;
-    const Rows own(jacobian, row, count);
-    rows.shown = own.columns_before(width);
-    rows.J = own.dense(rows.shown);
+    FrameRows rows = shown_rows(jacobian, row, count, width);
     rows.r = Eigen::Map<Eigen::VectorXd>(residuals.data() + row, count);
-    eliminate(rows, own.dense(columns_from(local_column, local_width)));
+    eliminate(rows, dense_rows(jacobian, row, count, local_column, local_width));
     out.frames.emplace(frame->first, std::move(rows));
     row += count;
     local_column += local_width;
